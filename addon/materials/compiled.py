@@ -1,0 +1,39 @@
+"""What the material compiler hands to the techniques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """A per-corner attribute that a material reads; arrives in the shader as `vec4`."""
+
+    kind: str  # UV, COLOR, TANGENT
+    name: str  # "" = the active one
+
+
+@dataclass(frozen=True)
+class CompiledMaterial:
+    """GLSL for one material topology plus the values of this material.
+
+    `glsl` defines `void evaluate_material(in SurfacePoint point, inout Closures closures)`. It reads
+    `material_values.value[k]` (a uniform block of vec4), samplers `material_image0…`, `point.attributes[k]`.
+    Materials with equal `program_key` share one program; `values` alone differ.
+    """
+
+    name: str
+    program_key: str  # hash of glsl, attribute kinds and image count
+    glsl: str
+    attributes: tuple[Attribute, ...]
+    images: tuple[str, ...]  # Image.key in sampler order
+    values: np.ndarray  # (P, 4) float32, P >= 1
+    transparent: bool  # some ray may pass: the surface is drawn with stochastic transparency
+    emissive: bool
+    emission: tuple[float, float, float]  # mean radiance, for choosing and sampling emissive geometry
+    opacity: float  # mean coverage 0..1, where a shader cannot be run per point
+    diffuse: bool  # has a diffuse closure
+    glossy: bool  # has a glossy closure
+    fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated

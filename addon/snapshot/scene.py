@@ -1,0 +1,196 @@
+"""The Snapshot: everything one frame needs of a Blender scene, as frozen dataclasses and numpy arrays.
+
+No bpy object survives in here, so techniques can be tested on hand-made snapshots and never touch Blender.
+Units are Blender's (metres, watts, radians); matrices are 4x4 float64, column vectors (`world = M @ local`).
+Arrays are C-contiguous and read-only by agreement: whoever wants a change makes a new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..materials.graph import Graph
+
+
+@dataclass(frozen=True)
+class Note:
+    """One sentence for the artist about something that is drawn otherwise than Cycles would draw it."""
+
+    subject: str  # what it is about: "Material 'Glass'", "World", "Camera"
+    text: str  # a full sentence that names the thing and the remedy
+    material: str = ""  # data-block names, so that the interface can select what is meant
+    node: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.subject}: {self.text}"
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Evaluated geometry, shared by all instances that show it.
+
+    Corner arrays run over face corners (loops), so that a vertex may carry several normals and UVs.
+    `slots` counts the material slots that the triangles refer to (at least 1).
+    """
+
+    key: str  # the same as long as this is the same data-block and evaluation kind
+    version: int  # grows each time the content of `key` changes
+    positions: np.ndarray  # (V, 3) float32, local space
+    corner_vertices: np.ndarray  # (C,) int32, vertex of each corner
+    corner_normals: np.ndarray  # (C, 3) float32, unit; smooth, flat or custom as Blender evaluates them
+    triangle_corners: np.ndarray  # (T, 3) int32, corners of each triangle, sorted by material slot
+    triangle_slots: np.ndarray  # (T,) int32, material slot of each triangle, ascending
+    slots: int
+    uv_maps: dict[str, np.ndarray] = field(default_factory=dict)  # name -> (C, 2) float32
+    active_uv: str = ""  # the map that renders when none is named
+    colors: dict[str, np.ndarray] = field(default_factory=dict)  # name -> (C, 4) float32, scene-linear
+    active_color: str = ""
+    tangents: dict[str, np.ndarray] = field(default_factory=dict)  # uv name -> (C, 4) float32, w = bitangent sign
+    bounds_min: np.ndarray = None  # (3,) float64, local space; finite even for an empty mesh (zeros)
+    bounds_max: np.ndarray = None
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.triangle_corners)
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """Ray visibility of an object or light, as in Blender's Object properties."""
+
+    camera: bool = True
+    diffuse: bool = True
+    glossy: bool = True
+    transmission: bool = True
+    volume: bool = True
+    shadow: bool = True
+
+
+@dataclass(frozen=True)
+class Instance:
+    """One placement of a mesh. Instances of the same mesh and materials stand next to each other."""
+
+    object_name: str
+    mesh: str  # Mesh.key
+    matrix: np.ndarray  # (4, 4) float64
+    materials: tuple[int, ...]  # index into Snapshot.materials, one per slot of the mesh
+    visibility: Visibility = Visibility()
+    random: float = 0.0  # 0..1, Blender's per-instance random
+    pass_index: int = 0
+    holdout: bool = False
+    key: str = ""  # stable identity across frames (object and persistent id)
+
+
+@dataclass(frozen=True)
+class Image:
+    """Pixels of an image data-block, bottom row first, exactly as stored: no colour conversion is applied yet.
+
+    `encoding` says what a shader does with a filtered texel: 'LINEAR' nothing, 'SRGB' the sRGB decode.
+    """
+
+    key: str
+    version: int
+    pixels: np.ndarray  # (H, W, 4) float32
+    encoding: str = "LINEAR"
+    alpha_mode: str = "STRAIGHT"  # STRAIGHT, PREMUL, CHANNEL_PACKED, NONE
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material as its node graph; `graph` is flat (groups are dissolved) and holds no bpy object."""
+
+    key: str
+    name: str
+    graph: Graph
+    pass_index: int = 0
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light object. `strength` already holds power x colour x temperature x 2^exposure, normalisation not applied.
+
+    Sun: W/m2; all others: W. `matrix` keeps the object's scale, because the area shapes scale with it.
+    """
+
+    key: str
+    name: str
+    kind: str  # POINT, SPOT, SUN, AREA
+    matrix: np.ndarray  # (4, 4) float64; the light shines along local -Z
+    strength: np.ndarray  # (3,) float64
+    normalize: bool = True  # False: strength does not shrink with the light's area
+    radius: float = 0.0  # POINT, SPOT: metres
+    soft_falloff: bool = True  # POINT, SPOT
+    angle: float = 0.0  # SUN: full angle of the disc, radians
+    shape: str = "RECTANGLE"  # AREA: RECTANGLE or ELLIPSE (square and disk are the special cases)
+    size: tuple[float, float] = (1.0, 1.0)  # AREA: local metres, before the object's scale
+    spread: float = np.pi  # AREA: full angle, radians
+    spot_angle: float = np.pi  # SPOT: full cone angle, radians
+    spot_blend: float = 0.0  # SPOT
+    cast_shadow: bool = True
+    visibility: Visibility = Visibility()
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A view. `kind` PERSPECTIVE or ORTHOGRAPHIC; the frustum is given on the plane one unit before the camera.
+
+    `frame` = (left, right, bottom, top): for PERSPECTIVE tangents of the view angles, for ORTHOGRAPHIC metres;
+    lens shift, sensor fit and pixel aspect are contained. It spans the full picture, not the render border.
+    """
+
+    matrix: np.ndarray  # (4, 4) float64, rigid: columns are right, up, backward, position
+    kind: str
+    frame: tuple[float, float, float, float]
+    clip_start: float
+    clip_end: float
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class World:
+    """Radiance from infinitely far away: `color` alone, or an equirectangular `image` times `color`.
+
+    For an image, a world direction d is looked up at `mapping[:, :3] @ d + mapping[:, 3]`, normalised, with
+    u = -atan2(y, x)/2pi + 0.5 and v = asin(z)/pi + 0.5 (Blender's equirectangular convention).
+    """
+
+    color: np.ndarray  # (3,) float64 radiance, or factor of the image
+    image: Image | None = None
+    mapping: np.ndarray = None  # (3, 4) float64
+    visibility: Visibility = Visibility()
+
+
+@dataclass(frozen=True)
+class Film:
+    """Size and sampling of the picture. `border` is (x0, y0, x1, y1) in pixels of the full picture."""
+
+    width: int
+    height: int
+    border: tuple[int, int, int, int]
+    filter_width: float = 1.5  # pixels, Blackman-Harris
+    transparent: bool = False
+    exposure: float = 1.0
+
+    @property
+    def border_size(self) -> tuple[int, int]:
+        return self.border[2] - self.border[0], self.border[3] - self.border[1]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """One frame of one view layer."""
+
+    meshes: dict[str, Mesh]
+    instances: tuple[Instance, ...]
+    materials: tuple[Material, ...]  # index 0 is the neutral default for empty slots
+    images: dict[str, Image]
+    lights: tuple[Light, ...]
+    world: World
+    camera: Camera | None
+    film: Film
+    notes: tuple[Note, ...] = ()
+    scene_name: str = ""
+    sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost

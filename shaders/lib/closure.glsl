@@ -1,0 +1,124 @@
+// Closures: what a surface point does with light, collected while the material graph is walked.
+// Diffuse weights add up. Of several glossy lobes one is kept per sample with probability proportional to its
+// weight (reservoir sampling) and carries all of their weight, so the lobes stay apart and the mean is exact.
+
+struct SurfacePoint {
+  vec3 position;          // world space, metres, relative to the render origin
+  vec3 normal;            // shading normal, unit, on the viewer's side
+  vec3 geometric_normal;  // unit, on the viewer's side
+  vec3 incoming;          // unit, towards the viewer
+  bool backfacing;
+  float object_random;
+  vec4 attributes[8];
+};
+
+#define FRESNEL_NONE 0        // reflectance = tint
+#define FRESNEL_DIELECTRIC 1  // reflectance runs from tint at normal incidence to 1, with the shape given by ior
+#define FRESNEL_F82 2         // metal: tint at normal incidence, edge at 82 degrees
+
+struct Closures {
+  vec3 diffuse;           // albedo weight
+  float diffuse_roughness;
+  vec3 diffuse_normal;
+  vec3 emission;          // radiance
+  vec3 transparency;      // fraction that passes straight through
+  float holdout;
+  int fresnel;
+  vec3 glossy_weight;     // multiplies the whole lobe
+  vec3 glossy_tint;       // see FRESNEL_*
+  vec3 glossy_edge;       // F82 only
+  float glossy_ior;
+  float glossy_roughness; // alpha = roughness^2
+  float glossy_anisotropy;
+  vec3 glossy_tangent;
+  vec3 glossy_normal;
+  float glossy_sum;       // reservoir state
+  float random;           // uniform 0..1, reused by rescaling
+};
+
+Closures closures_begin(vec3 normal, float random_number)
+{
+  Closures c;
+  c.diffuse = vec3(0.0);
+  c.diffuse_roughness = 0.0;
+  c.diffuse_normal = normal;
+  c.emission = vec3(0.0);
+  c.transparency = vec3(0.0);
+  c.holdout = 0.0;
+  c.fresnel = FRESNEL_NONE;
+  c.glossy_weight = vec3(0.0);
+  c.glossy_tint = vec3(0.0);
+  c.glossy_edge = vec3(1.0);
+  c.glossy_ior = 1.5;
+  c.glossy_roughness = 1.0;
+  c.glossy_anisotropy = 0.0;
+  c.glossy_tangent = vec3(0.0);
+  c.glossy_normal = normal;
+  c.glossy_sum = 0.0;
+  c.random = random_number;
+  return c;
+}
+
+void closure_diffuse(inout Closures c, vec3 weight, float roughness, vec3 normal)
+{
+  float before = dot(c.diffuse, vec3(1.0));
+  float added = dot(weight, vec3(1.0));
+  if (added <= 0.0) {
+    return;
+  }
+  float share = added / (before + added);
+  c.diffuse += weight;
+  c.diffuse_roughness = mix(c.diffuse_roughness, roughness, share);
+  c.diffuse_normal = normalize(mix(c.diffuse_normal, normal, share) + vec3(0.0, 0.0, 1e-20));
+}
+
+// True if this lobe replaces the one that is kept; the caller then fills in the lobe.
+// `importance` estimates the lobe's albedo and only steers noise.
+bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
+{
+  float w = max(max(weight.x, weight.y), weight.z) * max(importance, 1e-4);
+  if (!(w > 0.0)) {
+    return false;
+  }
+  c.glossy_sum += w;
+  float p = w / c.glossy_sum;
+  if (c.random < p) {
+    c.random = min(c.random / p, 0.9999999);
+    return true;
+  }
+  c.random = min((c.random - p) / max(1.0 - p, 1e-7), 0.9999999);
+  return false;
+}
+
+void closure_glossy(inout Closures c, vec3 weight, float importance, int fresnel, vec3 tint, vec3 edge, float ior,
+                    float roughness, float anisotropy, vec3 tangent, vec3 normal)
+{
+  if (closure_glossy_choose(c, weight, importance)) {
+    c.fresnel = fresnel;
+    // Kept with probability w / glossy_sum: the division by it is completed in closures_end, when the sum is final.
+    float w = max(max(weight.x, weight.y), weight.z) * max(importance, 1e-4);
+    c.glossy_weight = weight / w;
+    c.glossy_tint = tint;
+    c.glossy_edge = edge;
+    c.glossy_ior = ior;
+    c.glossy_roughness = roughness;
+    c.glossy_anisotropy = anisotropy;
+    c.glossy_tangent = tangent;
+    c.glossy_normal = normal;
+  }
+}
+
+void closure_emission(inout Closures c, vec3 radiance)
+{
+  c.emission += radiance;
+}
+
+void closure_transparent(inout Closures c, vec3 weight)
+{
+  c.transparency += weight;
+}
+
+void closures_end(inout Closures c)
+{
+  c.glossy_weight *= c.glossy_sum;
+}
