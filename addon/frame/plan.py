@@ -1,0 +1,73 @@
+"""From settings and what the scene holds to an ordered list of techniques, and the reasons for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..snapshot.scene import Snapshot
+from .ledger import SKIPPED, Row
+from .settings import AUTO, Settings
+from .technique import Technique
+
+
+class PlanError(ValueError):
+    """Techniques that do not fit together; a sentence says which and why."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Techniques in running order, and a ledger row for each one that is left out."""
+
+    techniques: tuple[Technique, ...]
+    skipped: tuple[Row, ...]
+
+    def text(self) -> str:
+        """As a list for the terminal."""
+        lines = [f"  {t.label:<28} runs" + (f" (slot {t.slot})" if t.slot else "") for t in self.techniques]
+        lines += [f"  {row.label:<28} skipped: {row.reason}" for row in self.skipped]
+        return "\n".join(lines)
+
+
+def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Settings) -> Plan:
+    """Choose by slot, skip what is not needed, order by what is read and written. Raises PlanError."""
+    chosen, skipped = [], []
+    filled: dict[str, str] = {}
+    for technique in registry:
+        reason = technique.skip(snapshot, settings)
+        wish = settings.slots.get(technique.slot, AUTO) if technique.slot else AUTO
+        if not reason and wish not in (AUTO, technique.name):
+            reason = f"the {technique.slot} slot is set to {wish}"
+        if not reason and technique.slot in filled:
+            reason = f"the {technique.slot} slot is filled by {filled[technique.slot]}"
+        if reason:
+            skipped.append(Row(technique.name, technique.label, SKIPPED, reason, slot=technique.slot))
+            continue
+        if technique.slot:
+            filled[technique.slot] = technique.name
+        chosen.append(technique)
+    return Plan(_ordered(chosen, skipped), tuple(skipped))
+
+
+def _ordered(techniques: list[Technique], skipped: list[Row]) -> tuple[Technique, ...]:
+    """Writers before readers; among free ones the registry's order. Images without any writer are an error."""
+    writers: dict[str, list[Technique]] = {}
+    for technique in techniques:
+        for write in technique.writes:
+            writers.setdefault(write.name, []).append(technique)
+    left, done = list(techniques), []
+    for technique in techniques:
+        for name in technique.reads:
+            if name not in writers:
+                without = ", ".join(row.label for row in skipped) or "none"
+                raise PlanError(f"{technique.label} reads {name}, which nothing writes (skipped: {without}).")
+    while left:
+        for technique in left:
+            needed = {w for name in technique.reads for w in writers[name] if w is not technique}
+            if needed.issubset(done):
+                done.append(technique)
+                left.remove(technique)
+                break
+        else:
+            raise PlanError(f"These techniques wait for each other: {', '.join(t.label for t in left)}.")
+    return tuple(done)

@@ -1,0 +1,55 @@
+"""The artist's settings as plain data: sample count, technique per slot, parameters by technique."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from .technique import Param, Technique
+
+SAMPLES = Param("samples", "Samples", 64, "Pictures that are averaged; error falls as the count grows", 1, 65536)
+SEED = Param("seed", "Seed", 0, "Another number gives other noise with the same mean", 0, 2**31 - 1)
+AUTO = "AUTO"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Values override declared defaults; `slots` maps slot to technique name or AUTO."""
+
+    samples: int = SAMPLES.default
+    seed: int = SEED.default
+    slots: dict[str, str] = field(default_factory=dict)
+    values: dict[tuple[str, str], object] = field(default_factory=dict)
+    profile: bool = False  # wait for the GPU after each step, so that times are true
+
+    def get(self, technique: Technique, name: str):
+        """Value of a technique's parameter; KeyError if it is not declared."""
+        for param in technique.params:
+            if param.name == name:
+                return self.values.get((technique.name, name), param.default)
+        raise KeyError(f"Technique {technique.name} declares no parameter '{name}'.")
+
+    def of(self, technique: Technique) -> tuple:
+        """All of a technique's values, for its key."""
+        return tuple(self.get(technique, param.name) for param in technique.params)
+
+    def override(self, techniques: Iterable[Technique], assignments: Iterable[str]) -> Settings:
+        """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown."""
+        settings = self
+        table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
+        for text in assignments:
+            name, equals, value = text.partition("=")
+            if not equals:
+                raise ValueError(f"'{text}' is not of the form name=value.")
+            if name in ("samples", "seed"):
+                param = SAMPLES if name == "samples" else SEED
+                settings = replace(settings, **{name: param.check(value)})
+            elif name in table:
+                technique, param = table[name]
+                settings = replace(
+                    settings, values={**settings.values, (technique.name, param.name): param.check(value)}
+                )
+            else:
+                known = ", ".join(["samples", "seed", *table])
+                raise ValueError(f"There is no setting '{name}'. Known settings: {known}.")
+        return settings

@@ -1,0 +1,91 @@
+"""A GPU context wherever Blender runs, and the order in which GPU resources die.
+
+In a window Blender has a context. In background mode 5.2 makes one on request (`gpu.init`); 4.5 to 5.1 only have
+one during a render by an engine with `bl_use_gpu_context`, and keep it afterwards, so one 4x4 render opens it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import gpu
+
+_releases: list[Callable[[], None]] = []
+
+
+def available() -> bool:
+    """True if GPU calls work right now."""
+    try:
+        gpu.platform.renderer_get()
+    except SystemError:
+        return False
+    return True
+
+
+def ensure() -> None:
+    """Make GPU calls work in this process, or raise RuntimeError with a sentence."""
+    if available():
+        return
+    try:
+        if hasattr(gpu, "init"):
+            gpu.init()
+        else:
+            _open_by_dummy_render()
+    except SystemError as error:
+        raise RuntimeError(
+            f"Candela found no GPU context ({error}). Install an OpenGL driver; for software rendering on Debian: "
+            "apt-get install libegl1 libgl1-mesa-dri."
+        ) from error
+    if not available():
+        raise RuntimeError("Candela found no GPU context: this Blender was started without OpenGL, Vulkan or Metal.")
+
+
+def describe() -> str:
+    """Renderer, driver and backend in one line, for reports."""
+    backend = gpu.platform.backend_type_get()
+    return f"{gpu.platform.renderer_get()}, {gpu.platform.version_get()}, {backend}"
+
+
+def on_release(function: Callable[[], None]) -> Callable[[], None]:
+    """Register (as a decorator) what frees a module's GPU resources. Called in reverse order of registration."""
+    _releases.append(function)
+    return function
+
+
+def release_all() -> None:
+    """Free every GPU resource that Candela holds. The next frame makes anew what it needs."""
+    if available():
+        gpu.shader.unbind()
+    for function in reversed(_releases):
+        function()
+
+
+class _ContextOpener(bpy.types.RenderEngine):
+    bl_idname = "CANDELA_CONTEXT"
+    bl_label = "Candela context"
+    bl_use_gpu_context = True
+
+    def render(self, depsgraph):
+        pass
+
+
+def _open_by_dummy_render() -> None:
+    """Render 4x4 pixels of an empty scene: Blender 4.5 to 5.1 open the context then and keep it."""
+    bpy.utils.register_class(_ContextOpener)
+    scene = bpy.data.scenes.new("Candela context")
+    try:
+        scene.render.engine = _ContextOpener.bl_idname
+        scene.render.resolution_x = scene.render.resolution_y = 4
+        scene.render.resolution_percentage = 100
+        scene.camera = None
+        camera = bpy.data.cameras.new("Candela context")
+        viewer = bpy.data.objects.new("Candela context", camera)
+        scene.collection.objects.link(viewer)
+        scene.camera = viewer
+        bpy.ops.render.render(scene=scene.name)
+        bpy.data.objects.remove(viewer)
+        bpy.data.cameras.remove(camera)
+    finally:
+        bpy.data.scenes.remove(scene)
+        bpy.utils.unregister_class(_ContextOpener)

@@ -1,0 +1,131 @@
+"""Float images on the GPU: allocation from a pool, render targets, upload and readback."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import gpu
+import numpy as np
+
+from .context import on_release
+
+_BYTES = {"RGBA32F": 16, "RGBA16F": 8, "RG32F": 8, "R32F": 4, "R16F": 2, "R32UI": 4, "DEPTH_COMPONENT32F": 4}
+_CHANNELS = {"RGBA32F": 4, "RGBA16F": 4, "RG32F": 2, "R32F": 1, "R16F": 1, "R32UI": 1, "DEPTH_COMPONENT32F": 1}
+
+
+@dataclass(eq=False)
+class Image:
+    """A two-dimensional GPU image. Row 0 is the bottom row."""
+
+    width: int
+    height: int
+    format: str
+    texture: gpu.types.GPUTexture
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.width, self.height
+
+    @property
+    def bytes(self) -> int:
+        return self.width * self.height * _BYTES[self.format]
+
+
+def create(width: int, height: int, image_format: str) -> Image:
+    """A new image with undefined content. Raises ValueError beyond what the device allows."""
+    limit = gpu.capabilities.max_texture_size_get()
+    if not (0 < width <= limit and 0 < height <= limit):
+        raise ValueError(f"An image of {width}x{height} pixels cannot be made: this GPU allows 1 to {limit}.")
+    return Image(width, height, image_format, gpu.types.GPUTexture((width, height), format=image_format))
+
+
+def upload(pixels: np.ndarray, image_format: str = "RGBA32F") -> Image:
+    """An image with the content of `pixels`, (H, W, channels) or (H, W) float, row 0 at the bottom."""
+    height, width = pixels.shape[:2]
+    channels = pixels.shape[2] if pixels.ndim == 3 else 1
+    if channels != _CHANNELS[image_format]:
+        raise ValueError(f"{channels} channels do not fit into {image_format}.")
+    flat = np.ascontiguousarray(pixels, np.float32).ravel()
+    if "16F" in image_format:
+        flat = np.clip(flat, -65504.0, 65504.0)
+    buffer = gpu.types.Buffer("FLOAT", flat.size, flat)
+    return Image(width, height, image_format, gpu.types.GPUTexture((width, height), format=image_format, data=buffer))
+
+
+def upload_list(rows: np.ndarray, width: int = 2048) -> Image:
+    """A long list of vec4, (N, 4) float, as an image that is read by `texelFetch(t, ivec2(i % width, i / width))`."""
+    count = max(len(rows), 1)
+    width = min(width, count)
+    height = -(-count // width)
+    padded = np.zeros((height * width, 4), np.float32)
+    padded[: len(rows)] = rows
+    return upload(padded.reshape(height, width, 4))
+
+
+def read(image: Image) -> np.ndarray:
+    """Copy to the CPU: (H, W, channels) float32 (uint32 for R32UI). Waits for the GPU."""
+    buffer = image.texture.read()
+    count = math.prod(buffer.dimensions)
+    buffer.dimensions = count  # strides of multi-dimensional buffers are wrong before Blender 5.2
+    kind = np.uint32 if image.format == "R32UI" else np.float32
+    return np.array(np.frombuffer(buffer, kind)).reshape(image.height, image.width, -1)
+
+
+@dataclass(eq=False)
+class Target:
+    """Images that a draw writes: colour attachments in slot order and an optional depth image."""
+
+    colors: tuple[Image, ...]
+    depth: Image | None = None
+    framebuffer: gpu.types.GPUFrameBuffer = field(init=False)
+
+    def __post_init__(self):
+        slots = {"color_slots": [image.texture for image in self.colors]} if self.colors else {}
+        if self.depth is not None:
+            slots["depth_slot"] = self.depth.texture
+        self.framebuffer = gpu.types.GPUFrameBuffer(**slots)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return (self.colors[0] if self.colors else self.depth).size
+
+    def clear(self, color=(0.0, 0.0, 0.0, 0.0), depth: float = 1.0) -> None:
+        """Set every colour attachment to `color` and the depth image to `depth`."""
+        with self.framebuffer.bind():
+            if self.colors and self.depth is not None:
+                self.framebuffer.clear(color=color, depth=depth)
+            elif self.colors:
+                self.framebuffer.clear(color=color)
+            else:
+                self.framebuffer.clear(depth=depth)
+
+
+class Pool:
+    """Images by size and format, given back after use and handed out again."""
+
+    def __init__(self):
+        self._free: dict[tuple[int, int, str], list[Image]] = {}
+        self.allocated_bytes = 0
+
+    def take(self, width: int, height: int, image_format: str) -> Image:
+        """An image with undefined content."""
+        stock = self._free.get((width, height, image_format))
+        if stock:
+            return stock.pop()
+        image = create(width, height, image_format)
+        self.allocated_bytes += image.bytes
+        return image
+
+    def give(self, image: Image) -> None:
+        self._free.setdefault((image.width, image.height, image.format), []).append(image)
+
+    def trim(self) -> None:
+        """Free all images that nobody holds."""
+        for stock in self._free.values():
+            self.allocated_bytes -= sum(image.bytes for image in stock)
+        self._free.clear()
+
+
+pool = Pool()
+on_release(pool.trim)

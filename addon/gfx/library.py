@@ -1,0 +1,277 @@
+"""The shader library: GLSL files with include-once, programs from one declaration, errors with file and line.
+
+A `Program` declares everything a shader sees; Blender's create-info, the binding checks and the cache key come from
+it. Sources stand under shaders/ and hold plain functions and `main`; they declare no resources.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import gpu
+
+from .context import on_release
+from .struct import Struct
+
+SHADER_ROOT = Path(__file__).resolve().parents[2] / "shaders"
+_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+_ERROR_LINE = re.compile(r"python_shader\.glsl:(\d+)(?::\d+)?:\s*(.*)")
+
+_SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D"}
+_CONSTANTS = {"FLOAT", "VEC2", "VEC3", "VEC4", "INT", "IVEC2", "IVEC4", "MAT4", "BOOL"}
+_PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 16, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
+
+
+class ShaderError(RuntimeError):
+    """A shader that does not compile, or a binding that the program does not declare."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """What a shader is made of. Sources are file names below shaders/.
+
+    `snippets` are generated texts, included by their name like files. `images` are (name, format, sampler type,
+    access) with access in READ, WRITE, READ_WRITE. `varyings` are (interpolation, GLSL type, name).
+    """
+
+    name: str
+    vertex: str = ""
+    fragment: str = ""
+    compute: str = ""
+    inputs: tuple[tuple[str, str], ...] = ()
+    varyings: tuple[tuple[str, str, str], ...] = ()
+    outputs: tuple[tuple[str, str], ...] = ()
+    textures: tuple[tuple[str, str], ...] = ()
+    images: tuple[tuple[str, str, str, str], ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+    blocks: tuple[tuple[Struct, str], ...] = ()
+    defines: tuple[tuple[str, str], ...] = ()
+    snippets: tuple[tuple[str, str], ...] = ()
+    group: tuple[int, int, int] = (8, 8, 1)
+
+    def __post_init__(self):
+        for kind, name in self.textures:
+            if kind not in _SAMPLERS:
+                raise ShaderError(f"Program {self.name}: texture '{name}' has the unknown type {kind}.")
+        for kind, name in self.constants:
+            if kind not in _CONSTANTS:
+                raise ShaderError(f"Program {self.name}: constant '{name}' has the unknown type {kind}.")
+        size = sum(_PUSH_BYTES[kind] for kind, _ in self.constants)
+        if size > 128:
+            raise ShaderError(f"Program {self.name}: {size} bytes of constants; above 128 put them into a block.")
+        if len(self.textures) > 16:
+            raise ShaderError(f"Program {self.name}: {len(self.textures)} textures; Metal allows 16.")
+        if bool(self.compute) == bool(self.fragment):
+            raise ShaderError(f"Program {self.name}: give either compute, or vertex and fragment.")
+
+
+@lru_cache(maxsize=None)
+def _read(name: str) -> str:
+    path = SHADER_ROOT / name
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ShaderError(f"Shader file '{name}' cannot be read: {error.strerror}.") from error
+
+
+def resolve(name: str, snippets: dict[str, str]) -> tuple[str, list[tuple[str, int]]]:
+    """Text of a source with each include once, and for every line of it the (file, line) that it came from."""
+    lines: list[str] = []
+    origin: list[tuple[str, int]] = []
+    seen: set[str] = set()
+
+    def add(current: str, chain: tuple[str, ...]) -> None:
+        if current in chain:
+            raise ShaderError(f"Shader files include each other: {' -> '.join((*chain, current))}.")
+        if current in seen:
+            return
+        text = snippets[current] if current in snippets else _read(current)
+        for number, line in enumerate(text.splitlines(), 1):
+            found = _INCLUDE.match(line)
+            if found:
+                add(found.group(1), (*chain, current))
+            else:
+                lines.append(line)
+                origin.append((current, number))
+        seen.add(current)
+
+    add(name, ())
+    return "\n".join(lines) + "\n", origin
+
+
+class Shader:
+    """A compiled program. `bind` sets everything it declares; forgetting a name or adding one is an error."""
+
+    def __init__(self, program: Program):
+        self.program = program
+        self.handle = _compile(program)
+        self._constants = {name: kind for kind, name in program.constants}
+        self._textures = {name for _, name in program.textures}
+        self._images = {name for name, *_ in program.images}
+        self._blocks = {name for _, name in program.blocks}
+
+    def bind(self, textures=None, images=None, blocks=None, constants=None) -> None:
+        """Bind the shader and all its resources. Values: gfx Images, gfx Blocks, numbers or arrays."""
+        textures, images, blocks, constants = textures or {}, images or {}, blocks or {}, constants or {}
+        self._check("texture", self._textures, textures)
+        self._check("image", self._images, images)
+        self._check("block", self._blocks, blocks)
+        self._check("constant", self._constants.keys(), constants)
+        shader = self.handle
+        shader.bind()
+        for name, block in blocks.items():
+            _set(shader.uniform_block, name, block.buffer)
+        for name, image in textures.items():
+            _set(shader.uniform_sampler, name, image.texture)
+        for name, image in images.items():
+            _set(shader.image, name, image.texture)
+        for name, value in constants.items():
+            self.set_constant(name, value)
+
+    def set_constant(self, name: str, value) -> None:
+        """Set one push constant between draws."""
+        kind = self._constants[name]
+        if kind in ("INT", "IVEC2", "IVEC4"):
+            _set(self.handle.uniform_int, name, value)
+        elif kind == "BOOL":
+            _set(self.handle.uniform_bool, name, bool(value))
+        else:
+            _set(self.handle.uniform_float, name, value)
+
+    def _check(self, what: str, declared, given: dict) -> None:
+        wrong = sorted(set(declared) ^ set(given))
+        if wrong:
+            raise ShaderError(f"Program {self.program.name}: {what} {', '.join(wrong)} is missing or not declared.")
+
+
+def _set(setter, name: str, value) -> None:
+    try:
+        setter(name, value)
+    except ValueError:
+        pass  # Declared but unused: the driver dropped it, which is no fault of the caller.
+
+
+_shaders: dict[Program, Shader] = {}
+compile_count = 0  # how many programs this process compiled; tests assert on its growth
+
+
+def get(program: Program) -> Shader:
+    """The compiled program, from the cache if an equal declaration was compiled before."""
+    shader = _shaders.get(program)
+    if shader is None:
+        shader = _shaders[program] = Shader(program)
+    return shader
+
+
+@on_release
+def _release() -> None:
+    _shaders.clear()
+
+
+def _compile(program: Program):
+    global compile_count
+    compile_count += 1
+    info = gpu.types.GPUShaderCreateInfo()
+    for key, value in program.defines:
+        info.define(key, value)
+    structs = {struct.name: struct.glsl for struct, _ in program.blocks}
+    if structs:
+        info.typedef_source("".join(structs.values()))
+    for slot, (struct, name) in enumerate(program.blocks):
+        info.uniform_buf(slot, struct.name, name)
+    for slot, (kind, name) in enumerate(program.textures):
+        info.sampler(slot, kind, name)
+    for slot, (name, image_format, kind, access) in enumerate(program.images):
+        qualifiers = {"READ", "WRITE"} if access == "READ_WRITE" else {access}
+        info.image(slot, image_format, kind, name, qualifiers=qualifiers)
+    for kind, name in program.constants:
+        info.push_constant(kind, name)
+
+    snippets = dict(program.snippets)
+    origins = []
+    if program.compute:
+        info.local_group_size(*program.group)
+        text, origin = resolve(program.compute, snippets)
+        info.compute_source(text)
+        origins.append(origin)
+    else:
+        for slot, (kind, name) in enumerate(program.inputs):
+            info.vertex_in(slot, kind, name)
+        if program.varyings:
+            # Keep a reference until the shader is made: Blender's create-info does not hold its own.
+            interface = gpu.types.GPUStageInterfaceInfo(re.sub(r"\W", "_", program.name) + "_varyings")
+            for mode, kind, name in program.varyings:
+                getattr(interface, mode)(kind, name)
+            info.vertex_out(interface)
+        for slot, (kind, name) in enumerate(program.outputs):
+            info.fragment_out(slot, kind, name)
+        text, origin = resolve(program.vertex, snippets)
+        info.vertex_source(text)
+        origins.append(origin)
+        text, origin = resolve(program.fragment, snippets)
+        info.fragment_source(text)
+        origins.append(origin)
+
+    with _CapturedOutput() as captured:
+        try:
+            handle = gpu.shader.create_from_info(info)
+            failure = None
+        except Exception as error:  # Blender raises a bare Exception
+            handle, failure = None, error
+    if failure is not None:
+        raise ShaderError(_explain(program, captured.text, origins)) from failure
+    return handle
+
+
+def _explain(program: Program, log: str, origins: list[list[tuple[str, int]]]) -> str:
+    """The driver's complaints with the file and line of the source that each is about."""
+    stage = 0 if "FragShader" not in log else len(origins) - 1
+    out = [f"Program {program.name} does not compile."]
+    for line in log.splitlines():
+        found = _ERROR_LINE.search(line)
+        if not found:
+            continue
+        number = int(found.group(1)) - 1
+        origin = origins[stage]
+        place = f"{origin[number][0]}:{origin[number][1]}" if 0 <= number < len(origin) else program.name
+        out.append(f"  {place}: {found.group(2)}")
+    if len(out) == 1:  # Blender 4.5 prints no line numbers: the raw log is all there is
+        out.append(log)
+    return "\n".join(out)
+
+
+class _CapturedOutput:
+    """Collects what C code prints to stdout and stderr: compile logs reach Python in no other way."""
+
+    text = ""
+
+    def __enter__(self):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self._file = tempfile.TemporaryFile()
+        try:
+            self._saved = os.dup(1), os.dup(2)
+        except OSError:  # a windowed Blender on Windows has no console
+            self._saved = None
+            return self
+        os.dup2(self._file.fileno(), 1)
+        os.dup2(self._file.fileno(), 2)
+        return self
+
+    def __exit__(self, *_exception):
+        if self._saved is not None:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os.dup2(self._saved[0], 1)
+            os.dup2(self._saved[1], 2)
+            os.close(self._saved[0])
+            os.close(self._saved[1])
+        self._file.seek(0)
+        self.text = self._file.read().decode("utf-8", "replace")
+        self._file.close()

@@ -1,0 +1,91 @@
+"""The three kinds of work on the GPU: a full-screen pass, a draw of meshes, a compute dispatch."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import gpu
+import numpy as np
+
+from .context import on_release
+from .geometry import Batch
+from .images import Target
+from .library import Program, Shader, get
+
+FULLSCREEN_VERTEX = "lib/fullscreen.vert.glsl"
+FULLSCREEN_INPUTS = (("VEC2", "corner"),)
+FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
+
+_triangle: list[gpu.types.GPUBatch] = []
+
+
+def fullscreen_program(name: str, fragment: str, **declared) -> Program:
+    """A program that runs once per pixel; `screen` is the position in 0..1."""
+    return Program(
+        name=name, vertex=FULLSCREEN_VERTEX, fragment=fragment, inputs=FULLSCREEN_INPUTS, varyings=FULLSCREEN_VARYINGS,
+        **declared,
+    )  # fmt: skip
+
+
+def fullscreen(program: Program, target: Target, *, blend: str = "NONE", **bindings) -> None:
+    """Run a full-screen program over the whole target. `bindings` as in Shader.bind."""
+    shader = get(program)
+    with _state(target, blend=blend, depth_test="NONE", depth_write=False):
+        shader.bind(**bindings)
+        _fullscreen_batch().draw(shader.handle)
+    gpu.shader.unbind()
+
+
+@contextmanager
+def drawing(target: Target, *, viewport=None, blend="NONE", depth_test="LESS_EQUAL", depth_write=True, cull="NONE"):
+    """State for mesh draws into `target`; inside, use `draw`. `viewport` = (x, y, width, height) in pixels."""
+    with _state(target, viewport, blend, depth_test, depth_write, cull):
+        yield
+    gpu.shader.unbind()
+
+
+def draw(shader: Shader, batch: Batch, instances: int = 1) -> None:
+    """Draw a batch with the bound shader. Only inside `drawing`."""
+    batch.handle.draw_instanced(shader.handle, instance_start=0, instance_count=instances)
+
+
+def compute(program: Program, size: tuple[int, int], **bindings) -> None:
+    """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
+    shader = get(program)
+    shader.bind(**bindings)
+    groups = [-(-extent // group) for extent, group in zip((*size, 1), program.group)]
+    gpu.compute.dispatch(shader.handle, *groups)
+    gpu.shader.unbind()
+
+
+@contextmanager
+def _state(target: Target, viewport=None, blend="NONE", depth_test="NONE", depth_write=False, cull="NONE"):
+    with target.framebuffer.bind():
+        target.framebuffer.viewport_set(*(viewport or (0, 0, *target.size)))
+        gpu.state.blend_set(blend)
+        gpu.state.depth_test_set(depth_test)
+        gpu.state.depth_mask_set(depth_write)
+        gpu.state.face_culling_set(cull)
+        gpu.state.color_mask_set(True, True, True, True)
+        try:
+            yield
+        finally:
+            gpu.state.blend_set("NONE")
+            gpu.state.depth_test_set("NONE")
+            gpu.state.depth_mask_set(False)
+            gpu.state.face_culling_set("NONE")
+
+
+def _fullscreen_batch() -> gpu.types.GPUBatch:
+    if not _triangle:
+        layout = gpu.types.GPUVertFormat()
+        layout.attr_add(id="corner", comp_type="F32", len=2, fetch_mode="FLOAT")
+        vertices = gpu.types.GPUVertBuf(format=layout, len=3)
+        vertices.attr_fill(id="corner", data=np.array([[-1, -1], [3, -1], [-1, 3]], np.float32))
+        _triangle.append(gpu.types.GPUBatch(type="TRIS", buf=vertices))
+    return _triangle[0]
+
+
+@on_release
+def _release() -> None:
+    _triangle.clear()

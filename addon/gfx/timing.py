@@ -1,0 +1,40 @@
+"""Time per named step. Blender offers no timer queries, so a profiled step waits for the GPU at its end."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+
+from .images import Image, Target, create
+
+
+class Profiler:
+    """Adds up seconds by step name. With `wait=False` it measures what the CPU spends to submit, at no cost.
+
+    With `wait=True` a one-pixel readback after each step forces the GPU to finish it: true times, slower frames.
+    """
+
+    def __init__(self, wait: bool = False):
+        self.seconds: dict[str, float] = {}
+        self.calls: dict[str, int] = {}
+        self.wait = wait
+        self._fence: Target | None = None
+
+    @contextmanager
+    def step(self, name: str):
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            if self.wait:
+                self.finish()
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            self.calls[name] = self.calls.get(name, 0) + 1
+
+    def finish(self) -> None:
+        """Wait until the GPU has done everything submitted so far."""
+        if self._fence is None:
+            image: Image = create(1, 1, "R32F")
+            self._fence = Target((image,))
+        self._fence.clear()
+        self._fence.colors[0].texture.read()
