@@ -1,0 +1,96 @@
+"""The names under which render passes are compared, and how each is compared.
+
+One table holds, for every picture, Candela's name, Blender's two spellings (the render passes were renamed in 5.0)
+and the view-layer switch that makes Blender produce it. Everything else in this package reads the table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PassName:
+    """`image` is Candela's name; `blender` is the name in files of Blender 5.0 and later, `before_5` in 4.x."""
+
+    image: str
+    blender: str
+    before_5: str
+    switch: str  # property of the view layer; "cycles.x" is property x of its Cycles settings
+
+
+PASS_NAMES = (
+    PassName("combined", "Combined", "Combined", "use_pass_combined"),
+    PassName("depth", "Depth", "Depth", "use_pass_z"),
+    PassName("normal", "Normal", "Normal", "use_pass_normal"),
+    PassName("diffuse_direct", "Diffuse Direct", "DiffDir", "use_pass_diffuse_direct"),
+    PassName("diffuse_indirect", "Diffuse Indirect", "DiffInd", "use_pass_diffuse_indirect"),
+    PassName("diffuse_color", "Diffuse Color", "DiffCol", "use_pass_diffuse_color"),
+    PassName("glossy_direct", "Glossy Direct", "GlossDir", "use_pass_glossy_direct"),
+    PassName("glossy_indirect", "Glossy Indirect", "GlossInd", "use_pass_glossy_indirect"),
+    PassName("glossy_color", "Glossy Color", "GlossCol", "use_pass_glossy_color"),
+    PassName("transmission_direct", "Transmission Direct", "TransDir", "use_pass_transmission_direct"),
+    PassName("transmission_indirect", "Transmission Indirect", "TransInd", "use_pass_transmission_indirect"),
+    PassName("transmission_color", "Transmission Color", "TransCol", "use_pass_transmission_color"),
+    PassName("volume_direct", "Volume Direct", "VolumeDir", "cycles.use_pass_volume_direct"),
+    PassName("volume_indirect", "Volume Indirect", "VolumeInd", "cycles.use_pass_volume_indirect"),
+    PassName("emission", "Emission", "Emit", "use_pass_emit"),
+    PassName("environment", "Environment", "Env", "use_pass_environment"),
+)
+IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES for name in (row.blender, row.before_5)}
+
+DIVIDED_BY_COLOR = ("diffuse", "glossy", "transmission")  # these light passes are stored divided by their colour
+
+
+@dataclass(frozen=True)
+class Passes:
+    """One render: pictures by Candela's names, linear, (H, W, C) float32, bottom row first, and how they came about.
+
+    Light passes are as in Blender's files: diffuse, glossy and transmission light is divided by the colour pass.
+    """
+
+    images: dict[str, np.ndarray]
+    engine: str
+    samples: int
+    seed: int
+    seconds: float  # wall time of the render, without writing and reading the file
+    film_transparent: bool = False
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        height, width = next(iter(self.images.values())).shape[:2]
+        return width, height
+
+
+def light_paths(images: dict[str, np.ndarray], film_transparent: bool = False) -> dict[str, np.ndarray]:
+    """Radiance per light path, (H, W, 3): what each path adds to the picture, so that paths can be weighed together.
+
+    `diffuse_direct` becomes light x colour; emission, environment and volume stand as they are. `direct_light` is the
+    sum of all direct paths, emission and environment: the Combined picture of a render without any bounce. The
+    environment pass is filled behind a transparent film too, where it is not part of the picture, and then left out
+    of the sum.
+    """
+    paths: dict[str, np.ndarray] = {}
+    for lobe in DIVIDED_BY_COLOR:
+        color = images.get(f"{lobe}_color")
+        for order in ("direct", "indirect"):
+            light = images.get(f"{lobe}_{order}")
+            if light is not None and color is not None:
+                paths[f"{lobe}_{order}"] = light[..., :3] * color[..., :3]
+    for name in ("volume_direct", "volume_indirect", "emission", "environment"):
+        if name in images:
+            paths[name] = images[name][..., :3]
+    direct = [
+        paths[name]
+        for name in ("diffuse_direct", "glossy_direct", "transmission_direct", "volume_direct", "emission")
+        if name in paths
+    ]
+    if "environment" in paths and not film_transparent:
+        direct.append(paths["environment"])
+    if "diffuse_direct" in paths and "emission" in paths:
+        paths["direct_light"] = np.sum(direct, axis=0, dtype=np.float32)
+    return paths
