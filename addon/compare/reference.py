@@ -195,7 +195,7 @@ def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, direct_only
         "volume_bounces": bounces,
         "transparent_max_bounces": MANY_TRANSPARENT_BOUNCES,
         "film_exposure": 1.0,
-        "use_pixel_jitter": True,
+        "use_pixel_jitter": False,  # its default; when on, all samples after the first meet the same point of a pixel
         "pixel_filter_type": "BLACKMAN_HARRIS",
         "filter_width": scene.render.filter_size,
     }
