@@ -1,0 +1,50 @@
+# Every target makes the environment that it needs first; see tools/environment.py.
+
+# 5.2 (the current LTS), 5.0 or 4.5 (the older LTS), each in an environment of its own.
+BLENDER ?= 5.2
+PYTHON3 ?= python3
+
+ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
+PYTHON := $(ENVIRONMENT)/bin/python
+ZIP := build/candela.zip
+
+.DEFAULT_GOAL := help
+.PHONY: help environment demo samples test test-fast check package test-window bench-quick clean
+
+help: ## this list
+	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1@\2/p' Makefile | column -t -s @
+
+environment: ## the virtual environment, with Blender as a Python module
+	@$(PYTHON3) tools/environment.py --blender $(BLENDER)
+
+demo: environment ## a sample scene by Candela and by Cycles, and a page that compares them
+	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --output out/demo
+	@echo "The page: $(CURDIR)/out/demo/index.html"
+
+samples: environment ## write the sample scenes anew
+	$(PYTHON) sample_blends/make.py
+
+test: environment ## every test that needs no window
+	$(PYTHON) -m pytest -m "not window"
+
+test-fast: environment ## the tests that take seconds
+	$(PYTHON) -m pytest -m "not window and not slow"
+
+check: environment ## format, lint, every shader compiled, fast tests
+	$(PYTHON) -m ruff format --check --quiet .
+	$(PYTHON) -m ruff check --quiet .
+	$(PYTHON) -m pytest -q -m "not window and not slow"
+
+package: environment ## the extension as a zip, in build/
+	$(PYTHON) tools/package.py --output build
+
+test-window: package ## the packaged extension in a real Blender with a window (REAL_BLENDER=command)
+	$(PYTHON) -m pytest -m window tests/window
+
+bench-quick: environment ## time against error, beside EEVEE and Cycles
+	$(PYTHON) -m bench.quick
+
+clean: ## what was made here, except the environments
+	rm -rf build out .pytest_cache .hypothesis .ruff_cache
+	find addon tests bench sample_blends tools -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,55 @@
+"""What every test may ask for, and how the test process ends."""
+
+import os
+import sys
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def gpu_context():
+    """A GPU context for code that draws outside a render; made once, since a process has only one."""
+    from addon.gfx import context
+
+    context.ensure()
+
+
+@pytest.fixture(scope="session")
+def registered():
+    """The extension's classes registered in this process, as Blender does on enabling it."""
+    import addon
+
+    addon.register()
+    yield
+    addon.unregister()
+
+
+@pytest.fixture
+def empty_scene():
+    """A scene without objects under factory settings."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy.context.scene
+
+
+session_key = pytest.StashKey[pytest.Session]()
+
+
+def pytest_sessionstart(session):
+    session.config.stash[session_key] = session
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """End the process here: Blender 4.5 as a module waits forever in its exit handlers once a GPU was used.
+
+    The summary is printed by now and the exit status final.
+    """
+    session = config.stash.get(session_key, None)
+    if session is None or "bpy" not in sys.modules:
+        return
+    config.get_terminal_writer().flush()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(int(session.exitstatus))

@@ -1,0 +1,168 @@
+"""Who may import whom. The table is the law; the tests read every import under addon/ and compare."""
+
+import ast
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ADDON = Path(__file__).resolve().parent.parent / "addon"
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a part of addon/ may import beside itself and the standard library."""
+
+    rooms: tuple[str, ...] = ()  # other parts of addon/
+    modules: tuple[str, ...] = ()  # packages that every Blender has
+    optional: tuple[str, ...] = ()  # packages that Blender lacks: only inside a function
+
+
+DATA = ("materials", "snapshot.scene")
+BELOW_TECHNIQUES = ("gfx", "frame", *DATA)
+BELOW_COMPARE = ("gfx", "frame", "materials", "snapshot", "techniques")
+BLENDER = ("bpy", "bpy_extras", "mathutils", "bl_math", "idprop", "numpy")
+
+# The longest name that fits is the one that counts: gfx.context has its own line, the rest of gfx another.
+ROOMS = {
+    "gfx": Room(modules=("gpu", "gpu_extras", "numpy")),
+    "gfx.context": Room(modules=("bpy", "gpu")),
+    "materials": Room(modules=("numpy",)),
+    "materials.reader": Room(modules=BLENDER),
+    "snapshot": Room(rooms=("materials",), modules=BLENDER),
+    "snapshot.scene": Room(rooms=("materials",), modules=("numpy",)),
+    "frame": Room(rooms=("gfx", *DATA), modules=("numpy",)),
+    "techniques": Room(rooms=BELOW_TECHNIQUES, modules=("numpy",)),
+    "compare": Room(rooms=BELOW_COMPARE, modules=("numpy",), optional=("flip_evaluator", "matplotlib")),
+    "compare.reference": Room(rooms=BELOW_COMPARE, modules=BLENDER),
+    "ui": Room(rooms=(*BELOW_COMPARE, "compare"), modules=(*BLENDER, "gpu")),
+    "engine": Room(rooms=(*BELOW_COMPARE, "ui"), modules=(*BLENDER, "gpu")),
+    "cli": Room(rooms=(*BELOW_COMPARE, "compare", "ui", "engine"), modules=BLENDER),
+    "__main__": Room(rooms=("cli", "engine", "ui", "gfx"), modules=("bpy",)),
+    "": Room(rooms=("cli", "engine", "ui", "gfx"), modules=("bpy",)),
+}
+
+
+@dataclass(frozen=True)
+class Import:
+    """One imported module: `room` is its dotted name below addon/, or None when it comes from outside."""
+
+    line: int
+    name: str
+    room: str | None
+    inside_function: bool
+
+
+def module_name(path: Path) -> str:
+    """addon/gfx/context.py -> gfx.context, addon/gfx/__init__.py -> gfx, addon/__init__.py -> ''."""
+    parts = path.relative_to(ADDON).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def is_module(name: str) -> bool:
+    path = ADDON.joinpath(*name.split("."))
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def imports_of(path: Path, source: str) -> Iterator[Import]:
+    """Every import in a module of addon/, also those inside functions and for type checkers."""
+    package = list(path.relative_to(ADDON).parent.parts)
+
+    def walk(node: ast.AST, inside_function: bool) -> Iterator[Import]:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(node.lineno, alias.name, None, inside_function)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield Import(node.lineno, node.module, None, inside_function)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - (node.level - 1)]
+            base = ".".join([*above, *(node.module.split(".") if node.module else [])])
+            for alias in node.names:
+                name = f"{base}.{alias.name}".lstrip(".")
+                # `from .a import b` may name a module or a value; `from . import b` takes a module.
+                room = name if node.module is None or is_module(name) else base
+                yield Import(node.lineno, "." * node.level + (node.module or alias.name), room, inside_function)
+        inside = inside_function or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        for child in ast.iter_child_nodes(node):
+            yield from walk(child, inside)
+
+    yield from walk(ast.parse(source), False)
+
+
+def stands_in(name: str, room: str) -> bool:
+    """Whether the module `name` is `room` or lies below it."""
+    return name == room or name.startswith(f"{room}.")
+
+
+def room_of(name: str) -> str | None:
+    fitting = [room for room in ROOMS if stands_in(name, room)]
+    return max(fitting, key=len, default=None)
+
+
+def breaches(path: Path, source: str) -> list[str]:
+    """One sentence for each import that the table does not allow."""
+    name = module_name(path)
+    room = room_of(name)
+    if room is None:
+        return [f"addon/{path.relative_to(ADDON)} stands in no room: give it a line in ROOMS."]
+    allowed, part = ROOMS[room], name.split(".")[0]
+    found = []
+    for entry in imports_of(path, source):
+        top = entry.name.split(".")[0]
+        if entry.room is not None:
+            fine = entry.room.split(".")[0] == part or any(stands_in(entry.room, other) for other in allowed.rooms)
+        elif top in sys.stdlib_module_names or top in allowed.modules:
+            fine = True
+        else:
+            fine = top in allowed.optional and entry.inside_function
+        if not fine:
+            where = f"addon/{path.relative_to(ADDON)}:{entry.line}"
+            found.append(f"{where} imports {entry.name}, which {room or 'addon/__init__.py'} may not.")
+    return found
+
+
+MODULES = sorted(ADDON.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ADDON).as_posix())
+def test_module_imports_only_what_its_room_may(path):
+    assert not breaches(path, path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("gfx/images.py", "import bpy"),
+        ("gfx/images.py", "from ..frame import plan"),
+        ("materials/compiler.py", "from ..gfx.library import get"),
+        ("snapshot/meshes.py", "from ..gfx import images"),
+        ("snapshot/scene.py", "import bpy"),
+        ("frame/plan.py", "from ..techniques import TECHNIQUES"),
+        ("frame/plan.py", "from ..snapshot import scene, meshes"),
+        ("techniques/surfaces.py", "import bpy"),
+        ("techniques/surfaces.py", "def run():\n    from ..compare import metrics"),
+        ("techniques/surfaces.py", "from .. import engine"),
+        ("compare/metrics.py", "import flip_evaluator"),
+        ("engine.py", "from .compare import report"),
+        ("engine.py", "from addon.gfx import images"),
+        ("scraps.py", "import math"),
+    ],
+)
+def test_breach_is_found(module, source):
+    assert breaches(ADDON / module, source)
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("gfx/context.py", "import bpy\nimport gpu"),
+        ("snapshot/meshes.py", "from . import scene\nfrom ..materials import reader"),
+        ("techniques/surfaces.py", "from ..gfx.images import Image\nfrom ..snapshot.scene import Snapshot"),
+        ("compare/metrics.py", "def flip():\n    import flip_evaluator"),
+        ("cli.py", "from .compare import report\nfrom . import engine"),
+    ],
+)
+def test_allowed_import_passes(module, source):
+    assert not breaches(ADDON / module, source)
