@@ -1,0 +1,1 @@
+"""Candela, a render engine for Blender: real-time global illumination, held against Cycles."""

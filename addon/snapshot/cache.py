@@ -1,0 +1,105 @@
+"""What one sync may take over from the last one, and the rule that decides it.
+
+Meshes. Blender gives an evaluated mesh a new `session_uid` each time it evaluates the geometry, so the same
+number means the same content, and nothing is read. A new number, or a data-block that an update names, only
+means "maybe changed": the arrays are read and compared by digest, and the mesh keeps its version when they
+are equal. (That is what happens in each F12 render, whose dependency graph evaluates everything anew.)
+
+Node graphs and images have no such number. They are taken over only when the caller has told all updates since
+the last sync (`invalidate`) and none of them can concern them; without that news they are read again.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from ..materials.graph import Graph
+from .scene import Image, Mesh, Note
+
+# Versions never repeat in this Blender session, not even across caches: a GPU mesh that is stored under
+# (key, version) by one engine instance can then never be mistaken for another content.
+_versions = itertools.count(1)
+
+# Updates of these types cannot change what a node tree says. Anything else (materials, node groups, textures,
+# images, actions, scripts' own data) lets all graphs be read again: reading is cheap, a stale one is a bug.
+_UNRELATED_TO_GRAPHS = frozenset(
+    (
+        *("Armature", "Camera", "Collection", "Curve", "Curves", "Key", "Lattice", "Mesh", "MetaBall", "Object"),
+        *("PointCloud", "Scene", "SurfaceCurve", "TextCurve", "Volume"),
+    )
+)
+
+
+def next_version() -> int:
+    """A number that was never a version before in this session."""
+    return next(_versions)
+
+
+@dataclass
+class MeshEntry:
+    """A mesh as it was read last: `evaluation` is the evaluated data-block's session_uid, 0 when unknown."""
+
+    mesh: Mesh
+    evaluation: int
+    digest: bytes
+    asked: frozenset  # names of tangents and attributes that the materials asked for
+    notes: tuple[Note, ...]
+
+
+@dataclass
+class ImageEntry:
+    """An image as it was read last; `state` is compared to decide whether the pixels must be read again."""
+
+    image: Image
+    state: tuple
+    notes: tuple[Note, ...]
+
+
+@dataclass
+class GraphEntry:
+    """A node tree as it was read last, with the (image session_uid, key) pairs that it shows."""
+
+    graph: Graph
+    notes: tuple[Note, ...]
+    images: tuple[tuple[int, str], ...]
+
+
+@dataclass
+class SnapshotCache:
+    """Holds the parts of the last snapshot. One cache serves any number of syncs of any scenes, one at a time."""
+
+    meshes: dict[str, MeshEntry] = field(default_factory=dict)
+    images: dict[str, ImageEntry] = field(default_factory=dict)
+    graphs: dict[str, GraphEntry] = field(default_factory=dict)
+    changed: set[int] = field(default_factory=set)  # session_uids of original data-blocks
+    informed: bool = False  # all updates since the last sync are in `changed`
+
+    def invalidate(self, updates: Iterable) -> None:
+        """Take note of `depsgraph.updates`; call it for every update, it only records.
+
+        Calling it is a promise: no update since the last sync was kept back.
+        """
+        for update in updates:
+            block = update.id.original
+            self.changed.add(block.session_uid)
+            if type(block).__name__ not in _UNRELATED_TO_GRAPHS:
+                self.graphs.clear()
+        self.informed = True
+
+    def finish(self, meshes: Iterable[str], images: Iterable[str], graphs: Iterable[str]) -> None:
+        """End a sync: forget what the scene no longer holds, and all news, which is now worked in."""
+        for entries, used in ((self.meshes, meshes), (self.images, images), (self.graphs, graphs)):
+            for key in entries.keys() - set(used):
+                del entries[key]
+        self.changed.clear()
+        self.informed = False
+
+    def clear(self) -> None:
+        """Forget everything; the next sync reads the whole scene."""
+        self.meshes.clear()
+        self.images.clear()
+        self.graphs.clear()
+        self.changed.clear()
+        self.informed = False

@@ -1,0 +1,125 @@
+"""Cameras: the scene's and the viewport's, both as a rigid matrix and a frustum one unit before the eye.
+
+The frustum comes from lens and sensor in double precision. `Object.calc_matrix_camera` gives the same one, but its
+float32 matrix loses it when the clip distances are extreme (1e-9 to 1e12), so it only serves the tests as truth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .errors import UnsupportedScene
+from .scene import Camera, Note
+
+
+def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> Camera:
+    """The view of `camera`, or of the scene's active camera, on a picture of `width` x `height` pixels.
+
+    Raises UnsupportedScene when there is no camera, or when it is neither perspective nor orthographic.
+    """
+    camera = camera or scene.camera
+    if camera is None:
+        raise UnsupportedScene(f"Scene '{scene.name}' has no camera: add one, or choose one in the Scene properties.")
+    if camera.type != "CAMERA":
+        raise UnsupportedScene(f"Object '{camera.name}' is the scene's camera but no camera object: choose another.")
+    camera = camera.evaluated_get(depsgraph)
+    data = camera.data
+    if data.type not in ("PERSP", "ORTHO"):
+        raise UnsupportedScene(
+            f"Camera '{camera.name}': lens type {data.type.title()} is not supported; choose Perspective or"
+            " Orthographic in the camera's Lens panel."
+        )
+    aspect = (scene.render.pixel_aspect_x, scene.render.pixel_aspect_y)
+    return Camera(
+        matrix=_rigid(np.array(camera.matrix_world, np.float64)),
+        kind="PERSPECTIVE" if data.type == "PERSP" else "ORTHOGRAPHIC",
+        frame=_frame(data, width, height, aspect),
+        clip_start=data.clip_start,
+        clip_end=data.clip_end,
+        name=camera.name,
+    )
+
+
+def camera_notes(camera, render) -> tuple[Note, ...]:
+    """What the camera object asks for that no technique draws; `render` is scene.render."""
+    subject, notes = f"Camera '{camera.name}'", []
+    if camera.data.dof.use_dof:
+        notes.append(Note(subject, "depth of field is not drawn; all is in focus."))
+    if render.use_motion_blur:
+        notes.append(Note(subject, "motion blur is not drawn; the picture shows the frame's own moment."))
+    return tuple(notes)
+
+
+def camera_of_view(region_data, space=None, camera=None) -> Camera:
+    """The view of a 3D viewport.
+
+    `region_data`: RegionView3D, or anything with its view_matrix, window_matrix and is_perspective. `space`: the
+    SpaceView3D, whose clip distances are exact where the window matrix has rounded them away. `camera`: the camera
+    object looked through, if any; its clip distances win then.
+    """
+    view = np.array(region_data.view_matrix, np.float64)
+    window = np.array(region_data.window_matrix, np.float64)
+    matrix = _rigid(np.linalg.inv(view))
+    # Inverting the projection row by row: a point at tangent t projects to (P00 t - P02), or to P00 x + P03.
+    if region_data.is_perspective:
+        frame = tuple(float((side + window[axis, 2]) / window[axis, axis]) for axis in (0, 1) for side in (-1, 1))
+        near = window[2, 3] / (window[2, 2] - 1.0)
+        far = window[2, 3] / (window[2, 2] + 1.0) if window[2, 2] < -1.0 else np.inf
+        lens = camera.data if camera is not None else space
+        if lens is not None:
+            near, far = lens.clip_start, lens.clip_end
+        elif not np.isfinite(far):
+            far = 1e7 * near  # where float32 rounds the far plane away
+        return Camera(matrix, "PERSPECTIVE", frame, float(near), float(far), name="")
+    frame = tuple(float((side - window[axis, 3]) / window[axis, axis]) for axis in (0, 1) for side in (-1, 1))
+    near = (window[2, 3] + 1.0) / window[2, 2]
+    far = (window[2, 3] - 1.0) / window[2, 2]
+    if near < 0.0:
+        # Blender's orthographic viewport also shows what lies behind the eye. Stepping back changes nothing in
+        # the picture, and nobody below has to know of negative distances.
+        matrix[:3, 3] -= matrix[:3, 2] * near
+        near, far = 0.0, far - near
+    return Camera(matrix, "ORTHOGRAPHIC", frame, float(near), float(far), name="")
+
+
+def _frame(data, width: int, height: int, aspect: tuple[float, float]) -> tuple[float, float, float, float]:
+    """(left, right, bottom, top) as in scene.Camera, by Blender's rules of sensor fit and lens shift.
+
+    One side of the picture is fitted: it spans sensor/lens (or ortho_scale), and shifts count in its length.
+    """
+    pixel_height = aspect[1] / aspect[0]
+    fit = data.sensor_fit
+    if fit == "AUTO":
+        fit = "HORIZONTAL" if aspect[0] * width >= aspect[1] * height else "VERTICAL"
+    fitted = width if fit == "HORIZONTAL" else pixel_height * height
+    # With AUTO the sensor's width is meant, whichever side is fitted.
+    sensor = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
+    span = data.ortho_scale if data.type == "ORTHO" else sensor / data.lens
+    per_pixel = span / fitted
+    middle_x, middle_y = data.shift_x * span, data.shift_y * span
+    half_x, half_y = 0.5 * width * per_pixel, 0.5 * height * pixel_height * per_pixel
+    return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
+
+
+def _rigid(matrix: np.ndarray) -> np.ndarray:
+    """The matrix without scale and shear, keeping the view direction; a mirroring stays, as in Blender.
+
+    A camera scaled to nothing looks along -Z: a picture that can be understood instead of one of NaN.
+    """
+    rigid = np.eye(4)
+    rigid[:3, 3] = matrix[:3, 3]
+    axes = matrix[:3, :3]
+    length = np.linalg.norm(axes, axis=0)
+    if not np.all(length > 0.0) or not np.isfinite(length).all():
+        return rigid
+    right, up, back = (axes / length).T
+    right = right - back * (right @ back)
+    up = up - back * (up @ back)
+    if np.linalg.norm(right) < 1e-6 or np.linalg.norm(up) < 1e-6:
+        return rigid
+    right /= np.linalg.norm(right)
+    up = up - right * (up @ right)
+    if np.linalg.norm(up) < 1e-6:
+        return rigid
+    rigid[:3, :3] = np.stack([right, up / np.linalg.norm(up), back], axis=1)
+    return rigid

@@ -1,0 +1,232 @@
+"""`take`: one evaluated dependency graph becomes one Snapshot."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from . import camera as cameras
+from .cache import MeshEntry, SnapshotCache
+from .images import ImageTable
+from .instances import LightPlace, MeshPlace, matrices, walk
+from .lights import emission_of_graph, read_light
+from .meshes import Wanted, build_mesh, read_mesh
+from .scene import Camera, Film, Instance, Light, Mesh, Note, Snapshot, Visibility, World
+from .shading import ShadingTable
+from .world import constant_world, read_world
+
+
+def take(
+    depsgraph,
+    cache: SnapshotCache,
+    width: int,
+    height: int,
+    camera=None,
+    view: Camera | None = None,
+    border: tuple[int, int, int, int] | None = None,
+    shown: Callable | None = None,
+) -> Snapshot:
+    """Read the evaluated scene for a picture of `width` x `height` pixels.
+
+    Which objects are visible is the dependency graph's business: one made for rendering leaves out what is disabled
+    in renders, a viewport's leaves out what is hidden there. `camera`: object that overrides the scene's camera.
+    `view`: a ready view (see `camera_of_view`), no camera is needed then. `border`: pixels (x0, y0, x1, y1);
+    without one the scene's render border counts, unless `view` is given. `shown`: predicate on objects, for a
+    viewport's local view. Raises UnsupportedScene when there is nothing to look through.
+    """
+    start = time.perf_counter()
+    scene = depsgraph.scene_eval
+    notes: list[Note] = []
+    if view is None:
+        camera = camera or scene.camera
+        view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)
+        notes += cameras.camera_notes(camera.evaluated_get(depsgraph), scene.render)
+        border = border or _scene_border(scene.render, width, height)
+
+    images = ImageTable(cache)
+    shading = ShadingTable(cache, images)
+    places, light_places, walk_notes = walk(depsgraph, shown)
+    notes += walk_notes
+    meshes, instances, mesh_notes, stats = _meshes(places, shading, cache, depsgraph)
+    notes += mesh_notes
+    lights = _lights(light_places, shading, notes)
+    world = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
+    notes += [*shading.notes, *images.notes]
+    cache.finish(meshes, images.images, shading.graphs)
+    stats.update(images_read=images.read, images_reused=images.reused, seconds=time.perf_counter() - start)
+    return Snapshot(
+        meshes=meshes,
+        instances=instances,
+        materials=tuple(shading.materials),
+        images=images.images,
+        lights=lights,
+        world=world,
+        camera=view,
+        film=_film(scene, width, height, border),
+        notes=tuple(dict.fromkeys(notes)),
+        scene_name=scene.name,
+        sync_stats=stats,
+    )
+
+
+def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache, depsgraph):
+    """(meshes by key, instances, notes, counts). Instances stand in order of their mesh's first appearance."""
+    override = depsgraph.view_layer_eval.material_override
+    wanted: dict[int, Wanted] = {}
+    materials: dict[int, tuple[int, ...]] = {}  # by identity of the facts, which all instances share
+    first: dict[int, MeshPlace] = {}
+    for place in places:
+        facts = place.facts
+        if id(facts) in materials:
+            continue
+        slots = facts.materials or (None,)
+        chosen = tuple(shading.index_of(override or material) for material in slots)
+        materials[id(facts)] = chosen
+        pointer = facts.data.as_pointer()
+        first.setdefault(pointer, place)
+        for index in chosen:
+            wanted[pointer] = wanted.get(pointer, Wanted()) | shading.wanted[index]
+
+    meshes: dict[str, Mesh] = {}
+    by_pointer: dict[int, Mesh] = {}
+    notes: list[Note] = []
+    read = 0
+    keys = _mesh_keys(first)
+    for pointer, place in first.items():
+        entry, was_read = _sync_mesh(keys[pointer], place, wanted[pointer], cache, depsgraph)
+        read += was_read
+        notes += entry.notes
+        meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
+
+    groups: dict[tuple, list[Instance]] = {}
+    worlds = matrices(places)
+    worlds[~np.isfinite(worlds).all(axis=(1, 2))] = 0.0  # an object at no place is drawn nowhere
+    resolved: dict[int, tuple[Mesh, tuple[int, ...]]] = {}
+    for place, matrix in zip(places, worlds, strict=True):
+        facts = place.facts
+        if id(facts) not in resolved:
+            mesh = by_pointer[facts.data.as_pointer()]
+            resolved[id(facts)] = mesh, _fitted(materials[id(facts)], mesh.slots)
+        mesh, chosen = resolved[id(facts)]
+        made = Instance(
+            facts.name,
+            mesh.key,
+            matrix,
+            chosen,
+            facts.visibility,
+            place.random,
+            facts.pass_index,
+            facts.holdout,
+            place.key,
+        )
+        groups.setdefault((mesh.key, chosen), []).append(made)
+    order = {key: number for number, key in enumerate(meshes)}
+    ordered = sorted(groups, key=lambda group: order[group[0]])
+    instances = tuple(instance for group in ordered for instance in groups[group])
+    stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
+    return meshes, instances, notes, stats
+
+
+def _fitted(materials: tuple[int, ...], slots: int) -> tuple[int, ...]:
+    """One material per slot of the mesh: missing ones are the default, surplus ones are never referred to."""
+    return (*materials[:slots], *(0,) * (slots - len(materials)))
+
+
+def _mesh_keys(first: dict[int, MeshPlace]) -> dict[int, str]:
+    """A lasting name for each evaluated mesh: its data-block where it is shown as it is, else its object.
+
+    One object may own several (geometry nodes): they are numbered in Blender's order.
+    """
+    keys: dict[int, str] = {}
+    taken: dict[str, int] = {}
+    for pointer, place in first.items():
+        facts = place.facts
+        unmodified = facts.data_uid and not len(facts.owner.original.modifiers)
+        base = f"mesh {facts.data_uid}" if unmodified else f"object {facts.uid}"
+        taken[base] = taken.get(base, 0) + 1
+        keys[pointer] = base if taken[base] == 1 else f"{base} #{taken[base]}"
+    return keys
+
+
+def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache, depsgraph) -> tuple[MeshEntry, bool]:
+    """The mesh as it is now, and whether its content is new."""
+    facts = place.facts
+    mesh, entry = facts.data, cache.meshes.get(key)
+    asked = wanted.names
+    named = facts.uid in cache.changed or facts.data_uid in cache.changed
+    # In edit mode the evaluated mesh is a shell around the edit mesh, which changes without a new evaluation.
+    editing = mesh.is_editmode
+    known = entry is not None and entry.asked == asked and not named and not editing
+    if known and mesh.session_uid and entry.evaluation == mesh.session_uid:
+        return entry, False
+    if editing:
+        mesh = facts.owner.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    try:
+        raw = read_mesh(mesh, wanted)
+        digest = raw.digest()
+        if entry is not None and entry.digest == digest and entry.asked == asked:
+            entry.evaluation = facts.data.session_uid
+            return entry, False
+        made, notes = build_mesh(key, raw, mesh, wanted, f"Object '{facts.name}'")
+    finally:
+        if editing:
+            facts.owner.to_mesh_clear()
+    entry = cache.meshes[key] = MeshEntry(made, facts.data.session_uid, digest, asked, notes)
+    return entry, True
+
+
+def _lights(places: list[LightPlace], shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
+    made = []
+    for place, matrix in zip(places, matrices(places), strict=True):
+        facts = place.facts
+        block = facts.data
+        key = f"light {(block.original or block).session_uid}"
+        graph = shading.graph_of(block, key, f"Light '{facts.name}'")
+        tint, remarks = emission_of_graph(graph, facts.name) if graph is not None else (np.ones(3), ())
+        notes.extend(remarks)
+        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint)
+        if light is not None:
+            made.append(light)
+    return tuple(made)
+
+
+def _world(scene, view_layer, shading: ShadingTable, images: ImageTable, notes: list[Note]) -> World:
+    block = getattr(view_layer, "world_override", None) or scene.world  # the override exists since Blender 5.0
+    if block is None or not view_layer.use_sky:
+        return constant_world((0.0, 0.0, 0.0), Visibility())
+    rays = getattr(block, "cycles_visibility", None)  # there while the Cycles add-on is enabled
+    visibility = Visibility()
+    if rays is not None:
+        # The world casts no shadow; its `shadow` switch does not exist.
+        visibility = Visibility(rays.camera, rays.diffuse, rays.glossy, rays.transmission, rays.scatter)
+    key = f"world {(block.original or block).session_uid}"
+    graph = shading.graph_of(block, key, f"World '{block.name}'")
+    if graph is None:
+        return constant_world(block.color[:], visibility)
+    world, remarks = read_world(graph, block.name, images.images, visibility)
+    notes.extend(remarks)
+    return world
+
+
+def _film(scene, width: int, height: int, border) -> Film:
+    cycles = getattr(scene, "cycles", None)  # there while the Cycles add-on is enabled
+    return Film(
+        width=width,
+        height=height,
+        border=border or (0, 0, width, height),
+        filter_width=scene.render.filter_size,
+        transparent=scene.render.film_transparent,
+        exposure=getattr(cycles, "film_exposure", 1.0),
+    )
+
+
+def _scene_border(render, width: int, height: int) -> tuple[int, int, int, int] | None:
+    """The render border in pixels, rounded down as Blender rounds it, and at least one pixel wide."""
+    if not render.use_border:
+        return None
+    x0, x1 = sorted((int(render.border_min_x * width), int(render.border_max_x * width)))
+    y0, y1 = sorted((int(render.border_min_y * height), int(render.border_max_y * height)))
+    x0, y0 = min(x0, width - 1), min(y0, height - 1)
+    return x0, y0, max(x1, x0 + 1), max(y1, y0 + 1)

@@ -1,0 +1,153 @@
+"""Image data-blocks to float arrays.
+
+Blender keeps 8-bit images as stored in the file, in the file's colour space and with straight alpha; all others as
+float in scene-linear colours with alpha multiplied in. Both are handed on as they are, and `encoding` and
+`alpha_mode` say which it is: 'PREMUL' where alpha is multiplied into the stored colours.
+"""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .cache import ImageEntry, SnapshotCache, next_version
+from .scene import Image, Note
+
+# Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
+_LINEAR_SPACES = ("Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data", "Utility - Raw", "scene_linear")
+MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not there
+
+
+class ImageTable:
+    """Images of one sync: hand it `bpy.types.Image`s, get keys, and at the end `images` and `notes`."""
+
+    def __init__(self, cache: SnapshotCache):
+        self.images: dict[str, Image] = {}
+        self.notes: list[Note] = []
+        self.read = self.reused = 0
+        self._cache = cache
+
+    def key_of(self, image, user=None) -> str:
+        """Image.key of a data-block, read at most once per sync. `user` (ImageUser) gives a sequence's frame."""
+        original = image.original or image
+        key = f"image {original.session_uid}"
+        if original.source in ("SEQUENCE", "MOVIE") and user is not None:
+            key += f" frame {original.filepath_from_user(image_user=user)}"
+        if key in self.images:
+            return key
+        entry = self._cache.images.get(key)
+        if entry is None or not self._is_current(entry, original):
+            state = _state(original)
+            if entry is None or _uncertain(state) or entry.state != state:
+                entry = self._read(key, original, user, entry)
+            else:
+                self.reused += 1
+        else:
+            self.reused += 1
+        self._cache.images[key] = entry
+        self.images[key] = entry.image
+        self.notes.extend(entry.notes)
+        return key
+
+    def _is_current(self, entry: ImageEntry, original) -> bool:
+        """Known to be unchanged without looking: all updates were told and none names it."""
+        cache = self._cache
+        return cache.informed and original.session_uid not in cache.changed and not original.is_dirty
+
+    def _read(self, key: str, original, user, old: ImageEntry | None) -> ImageEntry:
+        pixels, notes = _pixels(original, user)
+        # The state is taken after reading: asking for pixels makes Blender load the file.
+        state = _state(original)
+        encoding, space_notes = _encoding(original)
+        alpha = original.alpha_mode
+        if alpha in ("STRAIGHT", "PREMUL"):
+            alpha = "PREMUL" if original.is_float else "STRAIGHT"
+        same = (
+            old is not None
+            and (old.image.encoding, old.image.alpha_mode) == (encoding, alpha)
+            and np.array_equal(old.image.pixels, pixels)
+        )
+        if same:
+            self.reused += 1
+            return ImageEntry(old.image, state, (*notes, *space_notes))
+        self.read += 1
+        made = Image(key, next_version(), pixels, encoding, alpha, original.name)
+        return ImageEntry(made, state, (*notes, *space_notes))
+
+
+def _pixels(original, user) -> tuple[np.ndarray, tuple[Note, ...]]:
+    """(H, W, 4) float32, bottom row first, and what is to be said about it."""
+    subject, notes = f"Image '{original.name}'", ()
+    if original.source == "TILED" and len(original.tiles) > 1:
+        notes = (Note(subject, f"only the first UDIM tile of {len(original.tiles)} is drawn."),)
+    if original.source in ("SEQUENCE", "MOVIE"):
+        frame = _sequence_frame(original, user)
+        if frame is not None:
+            return frame, ()
+    width, height = original.size  # makes Blender load the file
+    count = len(original.pixels)
+    if width == 0 or height == 0 or count == 0:
+        text = "the image is missing or cannot be read and is drawn magenta; check its file path."
+        if original.source in ("SEQUENCE", "MOVIE"):
+            text = "image sequences and movies cannot be read by this Blender version and are drawn magenta."
+        return np.array([[MAGENTA]], np.float32), (Note(subject, text),)
+    flat = np.empty(count, np.float32)
+    original.pixels.foreach_get(flat)
+    return _four_channels(flat.reshape(height, width, count // (width * height))), notes
+
+
+def _four_channels(pixels: np.ndarray) -> np.ndarray:
+    """Grey and RGB made RGBA with alpha 1; two channels are grey and alpha."""
+    channels = pixels.shape[2]
+    if channels == 4:
+        return pixels
+    full = np.ones((*pixels.shape[:2], 4), np.float32)
+    full[..., :3] = pixels[..., :3] if channels == 3 else pixels[..., :1]
+    if channels == 2:
+        full[..., 3] = pixels[..., 1]
+    return full
+
+
+def _sequence_frame(original, user) -> np.ndarray | None:
+    """The frame that `user` points at. Image.pixels knows no frames; Blender 5.2 can load the file beside it."""
+    return None
+
+
+def _encoding(original) -> tuple[str, tuple[Note, ...]]:
+    space = original.colorspace_settings.name
+    if original.is_float or original.colorspace_settings.is_data or space in _LINEAR_SPACES:
+        return "LINEAR", ()
+    if space == "sRGB":
+        return "SRGB", ()
+    text = f"colour space '{space}' is not supported for 8-bit images and is drawn as sRGB."
+    return "SRGB", (Note(f"Image '{original.name}'", text),)
+
+
+def _state(original) -> tuple:
+    """Cheap facts that change when the pixels do; the first one says whether they can be trusted to."""
+    path = bpy.path.abspath(original.filepath_raw, library=original.library) if original.filepath_raw else ""
+    try:
+        file = Path(path).stat() if path and original.packed_file is None else None
+    except OSError:
+        file = None
+    packed = original.packed_file
+    return (
+        bool(original.is_dirty),
+        original.source,
+        path,
+        (file.st_mtime_ns, file.st_size) if file else None,
+        zlib.crc32(packed.data) if packed is not None else None,
+        tuple(original.size),
+        original.is_float,
+        original.alpha_mode,
+        original.colorspace_settings.name,
+        (original.generated_type, tuple(original.generated_color)) if original.source == "GENERATED" else None,
+    )
+
+
+def _uncertain(state: tuple) -> bool:
+    """A painted image changes without a trace in its state: its pixels have to be compared."""
+    return state[0]

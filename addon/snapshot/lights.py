@@ -1,0 +1,67 @@
+"""Light objects to `Light`: Blender's settings in Cycles' meaning, before any normalisation by size.
+
+What only EEVEE reads (diffuse and specular factors, custom distance, shadow resolution) is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..materials.graph import Graph
+from .constants import constant_color, constant_number
+from .scene import Light, Note, Visibility
+
+
+def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibility, tint: np.ndarray) -> Light | None:
+    """A `bpy.types.Light` placed by `matrix` (4, 4); `tint` (3,) is what its node tree emits (ones without one).
+
+    None when it gives no light: zero power, or an area light's portal, which in Cycles only guides sampling.
+    """
+    if getattr(getattr(data, "cycles", None), "is_portal", False) and data.type == "AREA":
+        return None
+    strength = tint * np.array(data.color[:], np.float64) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
+    if getattr(data, "use_temperature", False):
+        strength = strength * np.array(data.temperature_color[:3], np.float64)
+    if not np.any(strength):
+        return None
+    own = {}
+    if data.type in ("POINT", "SPOT"):
+        own.update(radius=data.shadow_soft_size, soft_falloff=data.use_soft_falloff)
+    if data.type == "SPOT":
+        own.update(spot_angle=data.spot_size, spot_blend=data.spot_blend)
+    if data.type == "SUN":
+        own.update(angle=data.angle)
+    if data.type == "AREA":
+        round_shape = data.shape in ("DISK", "ELLIPSE")
+        second = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
+        own.update(shape="ELLIPSE" if round_shape else "RECTANGLE", size=(data.size, second), spread=data.spread)
+    return Light(
+        key=key,
+        name=name,
+        kind=data.type,
+        matrix=matrix,
+        strength=strength,
+        normalize=getattr(data, "normalize", True),
+        cast_shadow=data.use_shadow,
+        visibility=visibility,
+        **own,
+    )
+
+
+def emission_of_graph(graph: Graph, name: str) -> tuple[np.ndarray, tuple[Note, ...]]:
+    """Colour x strength that a light's node tree emits; what varies over the light becomes the socket's own value."""
+    notes: list[Note] = []
+    node = graph.nodes.get(graph.surface[0]) if graph.surface else None
+    if node is None:
+        return np.zeros(3), ()  # an output with nothing linked emits nothing, as in Cycles
+    if node.type != "ShaderNodeEmission":
+        text = (
+            f"node '{node.label}' is not supported in a light's node tree; the light's own colour and power are used."
+        )
+        return np.ones(3), (Note(f"Light '{name}'", text, node=node.label),)
+    color, exact_color = constant_color(graph, node, "Color")
+    strength, exact_strength = constant_number(graph, node, "Strength")
+    if not (exact_color and exact_strength):
+        text = f"what is linked to node '{node.label}' varies over the light and is drawn as one constant value."
+        notes.append(Note(f"Light '{name}'", text, node=node.label))
+    return color * strength, tuple(notes)

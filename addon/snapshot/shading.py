@@ -1,0 +1,136 @@
+"""Materials and other node trees of one sync: which graph, which images, and what they want of the meshes."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..materials.graph import Graph, Input, Node
+from ..materials.reader import read_graph
+from .cache import GraphEntry, SnapshotCache
+from .images import ImageTable
+from .meshes import Wanted
+from .scene import Material, Note
+
+
+def node_tree_of(block):
+    """The node tree that shades a data-block, or None when nodes are off.
+
+    Blender 5.0 always uses nodes and warns at each question; before, `use_nodes` is off in new data-blocks.
+    """
+    if bpy.app.version < (5, 0) and not block.use_nodes:
+        return None
+    return block.node_tree
+
+
+def diffuse_graph(color) -> Graph:
+    """A Diffuse BSDF of one colour: what Cycles draws for an empty slot (0.8 grey) and a material without nodes."""
+    inputs = {
+        "Color": Input("COLOR", tuple(float(c) for c in (*color[:3], 1.0))),
+        "Roughness": Input("FLOAT", 0.0),
+        "Normal": Input("VECTOR", (0.0, 0.0, 0.0)),
+    }
+    node = Node("Diffuse", "Diffuse", "ShaderNodeBsdfDiffuse", inputs, {"BSDF": "SHADER"})
+    return Graph({"Diffuse": node}, surface=("Diffuse", "BSDF"))
+
+
+class ShadingTable:
+    """Collects materials in order of first use; index 0 is the neutral default."""
+
+    def __init__(self, cache: SnapshotCache, images: ImageTable):
+        self.materials: list[Material] = [Material("default", "Default", diffuse_graph((0.8, 0.8, 0.8)))]
+        self.wanted: list[Wanted] = [Wanted()]
+        self.notes: list[Note] = []
+        self.graphs: set[str] = set()
+        self._cache, self._images = cache, images
+        self._index: dict[int, int] = {}
+        self._images_by_uid: dict[int, object] | None = None
+
+    def index_of(self, material) -> int:
+        """Index of an evaluated material in `materials`; 0 for None."""
+        if material is None:
+            return 0
+        pointer = material.as_pointer()
+        if pointer not in self._index:
+            self._index[pointer] = self._add(material)
+        return self._index[pointer]
+
+    def _add(self, material) -> int:
+        key = f"material {(material.original or material).session_uid}"
+        graph = self.graph_of(material, key, f"Material '{material.name}'")
+        if graph is None:
+            graph = diffuse_graph(material.diffuse_color)
+        self.materials.append(Material(key, material.name, graph, material.pass_index))
+        self.wanted.append(wanted_by(graph))
+        return len(self.materials) - 1
+
+    def graph_of(self, block, key: str, subject: str) -> Graph | None:
+        """The flat graph of a material, world or light; None when it does not use nodes."""
+        if node_tree_of(block) is None:
+            return None
+        entry = self._cache.graphs.get(key)
+        if entry is None or not self._reusable(entry, block):
+            entry = self._read(block, subject, entry)
+            self._cache.graphs[key] = entry
+        self.graphs.add(key)
+        self.notes.extend(entry.notes)
+        return entry.graph
+
+    def _read(self, block, subject: str, old: GraphEntry | None) -> GraphEntry:
+        shown: list[tuple[int, str]] = []
+
+        def image_key(image, user) -> str:
+            key = self._images.key_of(image, user)
+            shown.append(((image.original or image).session_uid, key))
+            return key
+
+        graph, remarks = read_graph(block, image_key)
+        if old is not None and old.graph == graph:
+            graph = old.graph  # the same object, so that whoever compiled it need not compare again
+        name = block.name if isinstance(block, bpy.types.Material) else ""
+        notes = tuple(_note(remark, subject, name) for remark in remarks)
+        return GraphEntry(graph, notes, tuple(dict.fromkeys(shown)))
+
+    def _reusable(self, entry: GraphEntry, block) -> bool:
+        """Nothing was said about it since the last sync, and its images can be handed on again."""
+        cache = self._cache
+        if not cache.informed or (block.original or block).session_uid in cache.changed:
+            return False
+        if entry.images and self._images_by_uid is None:
+            self._images_by_uid = {image.session_uid: image for image in bpy.data.images}
+        for uid, key in entry.images:
+            image = self._images_by_uid.get(uid)
+            if image is None or image.source in ("SEQUENCE", "MOVIE") or self._images.key_of(image) != key:
+                return False
+        return True
+
+
+def _note(remark, subject: str, material: str) -> Note:
+    """The reader's remark as a Note: it hands out Notes, or (node label, sentence) pairs."""
+    if isinstance(remark, Note):
+        return remark
+    node, text = remark
+    return Note(subject, text, material=material, node=node)
+
+
+# Nodes that look up a tangent, and the setting that makes them.
+_TANGENT_NODES = {
+    "ShaderNodeNormalMap": ("space", "TANGENT"),
+    "ShaderNodeTangent": ("direction_type", "UV_MAP"),
+    "ShaderNodeVectorDisplacement": ("space", "TANGENT"),
+}
+
+
+def wanted_by(graph: Graph) -> Wanted:
+    """Tangents and attributes that the nodes of a graph look up in the mesh."""
+    tangents, attributes = set(), set()
+    for node in graph.nodes.values():
+        settings = node.properties
+        if node.type in _TANGENT_NODES:
+            name, value = _TANGENT_NODES[node.type]
+            if settings.get(name) == value:
+                tangents.add(settings.get("uv_map", ""))
+        elif node.type == "ShaderNodeAttribute" and settings.get("attribute_type", "GEOMETRY") == "GEOMETRY":
+            attributes.add(settings.get("attribute_name", ""))
+        elif node.type == "ShaderNodeVertexColor":
+            attributes.add(settings.get("layer_name", ""))
+    return Wanted(frozenset(tangents), frozenset(attributes - {""}))
