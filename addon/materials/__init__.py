@@ -1,0 +1,1 @@
+"""Shader node trees as plain data (`reader`), their translation to GLSL (`compiler`), and lobe albedos (`energy`)."""

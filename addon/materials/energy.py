@@ -1,0 +1,154 @@
+"""Directional albedos of GGX, as tables: what the layering of Principled and the multiple-scattering term need.
+
+A microfacet lobe does not reflect all the light that reaches it: single scattering loses what hits a second facet,
+and a dielectric layer takes from the layer below exactly what it reflects itself. Both are integrals over the lobe
+that depend on few parameters, so they are tabulated once, by deterministic quadrature, and looked up on the GPU.
+
+With alpha = roughness^2, D the GGX distribution, G the height-correlated Smith term, mu = normal . view and the
+half vector h drawn from the distribution of visible normals (so that the expectation is a mean over a uniform grid):
+
+    energy(mu, roughness)          = E_h[ G2 / G1 ]                  albedo of a lobe with reflectance 1
+    energy_average(roughness)      = 2 * integral of energy(mu) mu dmu
+    dielectric(mu, roughness, z)   = E_h[ s(view . h) ]              s = (F - F0) / (1 - F0), F the exact Fresnel term
+    schlick(mu, roughness)         = E_h[ (1 - view . h)^5 ]
+
+Directions that leave below the surface count as zero in all of them. The axis z = sqrt(|ior - 1| / (ior + 1)) is
+the fourth root of F0, which spaces the usual indices of refraction evenly. These are the quantities that Cycles
+tabulates (its closures estimate albedos this way), with the same node positions, so that interpolation errors agree.
+
+Sources: Heitz, "Understanding the masking-shadowing function", JCGT 2014; Dupuy & Benyoub, "Sampling visible GGX
+normals with spherical caps", HPG 2023; Turquin, "Practical multiple scattering compensation for microfacet models",
+2019; Cycles' kernel for the choice of axes.
+
+`python -m addon.materials.energy` writes `energy.npz` beside this file.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+ENERGY_SIZE = 32  # nodes along roughness and along mu
+LAYER_SIZE = 16  # nodes along roughness, mu and z
+TEXTURE_SIZE = 64  # texels along each side of the packed texture: 4 x 4 tiles of LAYER_SIZE
+
+SMALLEST_COSINE = 1e-4  # the node at mu = 0 stands just above the horizon, where the lobe is still defined
+SMALLEST_Z, LARGEST_Z = 1e-4, 0.99  # z = 0 has no reflection, z = 1 an infinite index of refraction
+GRID = 192  # quadrature points along each of the two dimensions of the half vector
+
+PATH = Path(__file__).with_name("energy.npz")
+
+
+def visible_half_vectors(mu: float, roughness: float, grid: int = GRID) -> tuple[np.ndarray, np.ndarray]:
+    """Half vectors seen from direction (sqrt(1-mu^2), 0, mu), equally likely: (view . h, z of the reflected ray).
+
+    Both arrays have shape (grid^2,). Sampling of spherical caps (Dupuy & Benyoub 2023) on a midpoint grid.
+    """
+    alpha = max(roughness * roughness, 1e-7)
+    steps = (np.arange(grid) + 0.5) / grid
+    first, second = np.meshgrid(steps, steps, indexing="ij")
+    sine = np.sqrt(max(0.0, 1.0 - mu * mu))
+    # The half circle is symmetric about the plane of incidence: one side is enough.
+    phi = np.pi * second
+    stretched = np.array([sine * alpha, 0.0, mu])
+    stretched /= np.linalg.norm(stretched)
+    z = 1.0 - first * (1.0 + stretched[2])
+    radius = np.sqrt(np.clip(1.0 - z * z, 0.0, 1.0))
+    hx, hy, hz = radius * np.cos(phi) + stretched[0], radius * np.sin(phi), z + stretched[2]
+    hx, hy = hx * alpha, hy * alpha
+    length = np.sqrt(hx * hx + hy * hy + hz * hz)
+    length = np.where(length > 0.0, length, 1.0)
+    hx, hz = hx / length, hz / length
+    cos_half = np.clip(hx * sine + hz * mu, 0.0, 1.0)
+    return cos_half.ravel(), (2.0 * cos_half * hz - mu).ravel()
+
+
+def smith_lambda(cosine: np.ndarray | float, alpha: float) -> np.ndarray:
+    """Smith's auxiliary function of GGX: G1 = 1 / (1 + lambda)."""
+    cosine_squared = np.maximum(np.square(cosine), 1e-16)
+    return 0.5 * (np.sqrt(1.0 + alpha * alpha * (1.0 - cosine_squared) / cosine_squared) - 1.0)
+
+
+def fresnel_dielectric(cosine: np.ndarray, ior: float) -> np.ndarray:
+    """Unpolarised reflectance of a smooth dielectric; `ior` is inside over outside, total reflection gives 1."""
+    squared = ior * ior - 1.0 + cosine * cosine
+    g = np.sqrt(np.maximum(squared, 0.0))
+    a = (g - cosine) / (g + cosine + 1e-300)
+    b = ((g + cosine) * cosine - 1.0) / ((g - cosine) * cosine + 1.0)
+    return np.where(squared > 0.0, 0.5 * a * a * (1.0 + b * b), 1.0)
+
+
+def ior_from_f0(f0: float) -> float:
+    """Index of refraction whose reflectance at normal incidence is `f0`."""
+    root = np.sqrt(min(f0, 0.99))
+    return (1.0 + root) / (1.0 - root)
+
+
+def ggx_energy(mu: float, roughness: float, grid: int = GRID) -> float:
+    """Albedo of the single-scattering GGX lobe with reflectance 1."""
+    alpha = max(roughness * roughness, 1e-7)
+    _, cos_out = visible_half_vectors(mu, roughness, grid)
+    lit = cos_out > 0.0
+    lambda_in = smith_lambda(mu, alpha)
+    lambda_out = smith_lambda(np.maximum(cos_out, 1e-8), alpha)
+    return float(np.mean(np.where(lit, (1.0 + lambda_in) / (1.0 + lambda_in + lambda_out), 0.0)))
+
+
+def make_tables() -> dict[str, np.ndarray]:
+    """All four tables: energy (32, 32) [roughness, mu], energy_average (32,), dielectric (16, 16, 16)
+    [roughness, mu, z], schlick (16, 16) [roughness, mu]; float32."""
+    axis = np.linspace(0.0, 1.0, ENERGY_SIZE)
+    energy = np.array([[ggx_energy(max(mu, SMALLEST_COSINE), r) for mu in axis] for r in axis])
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
+    average = np.array([sum(2.0 * w * m * ggx_energy(m, r) for m, w in zip(nodes, weights)) for r in axis])
+
+    layer_axis = np.linspace(0.0, 1.0, LAYER_SIZE)
+    dielectric = np.zeros((LAYER_SIZE,) * 3)
+    schlick = np.zeros((LAYER_SIZE,) * 2)
+    for i, roughness in enumerate(layer_axis):
+        for j, mu in enumerate(layer_axis):
+            cos_half, cos_out = visible_half_vectors(max(mu, SMALLEST_COSINE), roughness)
+            lit = cos_out > 0.0
+            schlick[i, j] = np.mean(np.where(lit, (1.0 - cos_half) ** 5, 0.0))
+            for k, z in enumerate(np.clip(layer_axis, SMALLEST_Z, LARGEST_Z)):
+                ior = ior_from_f0(z**4)
+                f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
+                shape = np.clip((fresnel_dielectric(cos_half, ior) - f0) / (1.0 - f0), 0.0, 1.0)
+                dielectric[i, j, k] = np.mean(np.where(lit, shape, 0.0))
+    tables = {"energy": energy, "energy_average": average, "dielectric": dielectric, "schlick": schlick}
+    return {name: table.astype(np.float32) for name, table in tables.items()}
+
+
+@lru_cache(maxsize=1)
+def tables() -> dict[str, np.ndarray]:
+    """The stored tables, see `make_tables`."""
+    with np.load(PATH) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def energy_texture() -> np.ndarray:
+    """The tables packed for the GPU: (64, 64, 4) float32, row first, to be bound as `energy_table`.
+
+    R: dielectric[i, j, k] at column i + 16 (k mod 4), row j + 16 (k div 4); G: the same for k + 1, so that one fetch
+    gives both ends of the interpolation along z. B: energy[i, j] at column i, row j; energy_average[i] at column i,
+    row 32; schlick[i, j] at column 32 + i, row j. A: unused. `shaders/lib/energy.glsl` reads exactly this.
+    """
+    stored = tables()
+    texture = np.zeros((TEXTURE_SIZE, TEXTURE_SIZE, 4), np.float32)
+    for k in range(LAYER_SIZE):
+        column, row = LAYER_SIZE * (k % 4), LAYER_SIZE * (k // 4)
+        tile = texture[row : row + LAYER_SIZE, column : column + LAYER_SIZE]
+        tile[..., 0] = stored["dielectric"][:, :, k].T
+        tile[..., 1] = stored["dielectric"][:, :, min(k + 1, LAYER_SIZE - 1)].T
+    texture[:ENERGY_SIZE, :ENERGY_SIZE, 2] = stored["energy"].T
+    texture[ENERGY_SIZE, :ENERGY_SIZE, 2] = stored["energy_average"]
+    texture[:LAYER_SIZE, ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, 2] = stored["schlick"].T
+    return texture
+
+
+if __name__ == "__main__":
+    np.savez_compressed(PATH, **make_tables())
+    print(f"Wrote {PATH.name}: {', '.join(f'{name} {table.shape}' for name, table in tables().items())}.")

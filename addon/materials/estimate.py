@@ -1,0 +1,138 @@
+"""Bounds and means of what a tree computes, without running it: is anything transparent, how much does it emit.
+
+A renderer must know before it draws whether a surface may let light pass and how bright it is on average. A constant
+is known exactly, an image by its pixels, everything else by wide bounds and a neutral mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MEAN_SIZE = 256  # pixels along each side that the mean of a large image is taken from
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Lowest, mean and highest value per channel, each (3,) float64; a scalar has three equal channels."""
+
+    low: np.ndarray
+    mean: np.ndarray
+    high: np.ndarray
+
+    @property
+    def constant(self) -> bool:
+        return bool(np.all(self.low == self.high))
+
+    def map(self, function) -> Estimate:
+        """The estimate of a rising function of this value."""
+        return Estimate(function(self.low), function(self.mean), function(self.high))
+
+    def clipped(self) -> Estimate:
+        return self.map(lambda value: np.clip(value, 0.0, 1.0))
+
+    def luminance(self) -> Estimate:
+        return self.map(lambda value: np.full(3, value @ np.array([0.2126390, 0.7151687, 0.0721923])))
+
+    def average(self) -> Estimate:
+        return self.map(lambda value: np.full(3, value.mean()))
+
+    def __mul__(self, other: Estimate) -> Estimate:
+        with np.errstate(invalid="ignore"):
+            corners = np.array([a * b for a in (self.low, self.high) for b in (other.low, other.high)])
+        corners = np.nan_to_num(corners, nan=0.0, posinf=np.inf, neginf=-np.inf)
+        return Estimate(corners.min(axis=0), self.mean * other.mean, corners.max(axis=0))
+
+    def __add__(self, other: Estimate) -> Estimate:
+        return Estimate(self.low + other.low, self.mean + other.mean, self.high + other.high)
+
+    def complement(self) -> Estimate:
+        """One minus the value."""
+        return Estimate(1.0 - self.high, 1.0 - self.mean, 1.0 - self.low)
+
+
+def constant(value) -> Estimate:
+    """A known value: a number, or the first three components of a sequence."""
+    number = np.asarray(value, float).ravel()
+    channels = np.full(3, number[0]) if number.size == 1 else np.resize(number[:3], 3)
+    return Estimate(channels, channels, channels)
+
+
+def unknown(mean: float = 0.5) -> Estimate:
+    return Estimate(np.full(3, -np.inf), np.full(3, float(mean)), np.full(3, np.inf))
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a shader leaf, or a whole surface, does with light."""
+
+    transparency: Estimate = constant(0.0)  # what passes straight through
+    emission: Estimate = constant(0.0)  # radiance
+    diffuse: bool = False
+    glossy: bool = False
+
+    def weighted(self, weight: Estimate) -> Summary:
+        seen = bool(np.any(weight.high > 0.0))
+        return Summary(self.transparency * weight, self.emission * weight, self.diffuse and seen, self.glossy and seen)
+
+    def __add__(self, other: Summary) -> Summary:
+        return Summary(
+            self.transparency + other.transparency,
+            self.emission + other.emission,
+            self.diffuse or other.diffuse,
+            self.glossy or other.glossy,
+        )
+
+
+def srgb_decode(encoded: np.ndarray) -> np.ndarray:
+    """Inverse of the sRGB transfer curve (IEC 61966-2-1)."""
+    encoded = np.asarray(encoded, float)
+    curve = ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(encoded < 0.04045, np.maximum(encoded, 0.0) / 12.92, curve)
+
+
+_image_estimates: dict[tuple[str, int, bool, str], Estimate] = {}
+_IMAGE_ESTIMATES_KEPT = 1024
+
+
+def image_estimate(image, clipped: bool, output: str) -> Estimate:
+    """Bounds and mean of what an image gives at its output "Color" (while alpha is not used) or "Alpha".
+
+    `clipped`: the lookup gives 0 outside of the image. Means are over at most 256 x 256 pixels; bounds of alpha are
+    exact, those of colour cover the pixels that were looked at. Kept per version of the image.
+    """
+    key = (image.key, image.version, clipped, output)
+    if key not in _image_estimates:
+        while len(_image_estimates) >= _IMAGE_ESTIMATES_KEPT:
+            _image_estimates.pop(next(iter(_image_estimates)))
+        _image_estimates[key] = (
+            _alpha_estimate(image, clipped) if output == "Alpha" else _color_estimate(image, clipped)
+        )
+    return _image_estimates[key]
+
+
+def _some_pixels(image) -> np.ndarray:
+    height, width = image.pixels.shape[:2]
+    return image.pixels[:: -(-height // MEAN_SIZE), :: -(-width // MEAN_SIZE)].astype(float)
+
+
+def _alpha_estimate(image, clipped: bool) -> Estimate:
+    if image.alpha_mode == "NONE":
+        low = mean = high = 1.0
+    else:
+        low, high = float(image.pixels[..., 3].min()), float(image.pixels[..., 3].max())
+        mean = float(np.clip(_some_pixels(image)[..., 3], 0.0, 1.0).mean())
+    return Estimate(np.full(3, min(low, 0.0) if clipped else low), np.full(3, mean), np.full(3, high))
+
+
+def _color_estimate(image, clipped: bool) -> Estimate:
+    pixels = _some_pixels(image)
+    color = pixels[..., :3]
+    if image.alpha_mode == "STRAIGHT":
+        color = color * pixels[..., 3:]
+    if image.encoding == "SRGB":
+        color = srgb_decode(color)
+    flat = color.reshape(-1, 3)
+    low = flat.min(axis=0)
+    return Estimate(np.minimum(low, 0.0) if clipped else low, flat.mean(axis=0), flat.max(axis=0))

@@ -1,0 +1,247 @@
+"""Shader nodes: closures and the nodes that mix them.
+
+Principled in Cycles' order, top layer first: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.
+Each layer takes weight * albedo and leaves weight * (1 - largest channel of its albedo) to the next; albedos come from
+the tables of `materials/energy.py`. Sources: Cycles' Principled closure; Blender manual, "Principled BSDF" (4.5, 5.2).
+"""
+
+from __future__ import annotations
+
+from ..estimate import Estimate, Summary, constant
+from .entry import Approximation, Choice, Entry, Expression, Socket
+
+WHITE = (1.0, 1.0, 1.0)
+GREY = (0.8, 0.8, 0.8)
+
+DISTRIBUTION = Choice("distribution", {"GGX": 0, "MULTI_GGX": 1, "BECKMANN": 0, "ASHIKHMIN_SHIRLEY": 0}, missing=1)
+OTHER_DISTRIBUTIONS = (
+    ("distribution", ("BECKMANN", "ASHIKHMIN_SHIRLEY"), "This distribution of microfacets is drawn as GGX."),
+)
+NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
+TANGENT = Socket("Tangent", "VECTOR", implicit="vec3(0.0)")
+
+OUTSIDE_TANGENT = "Without a Tangent node, anisotropy runs around the world's vertical axis instead of the object's."
+STRAIGHT_THROUGH = "Light passes straight through, without refraction or roughness."
+SUBSURFACE = "Subsurface scattering is drawn as diffuse."
+THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
+
+
+def _colored(name: str):
+    """The input's colour as it acts on light: never negative."""
+    return lambda sockets: sockets[name].map(lambda value: value.clip(0.0))
+
+
+def _diffuse(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(diffuse=True)
+
+
+def _glossy(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(glossy=True)
+
+
+def _emission(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(emission=sockets["Color"] * sockets["Strength"])
+
+
+def _transparent(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(transparency=_colored("Color")(sockets))
+
+
+def _glass(sockets: dict[str, Estimate]) -> Summary:
+    # A dielectric at the usual indices reflects a tenth of what comes from all sides; the rest passes.
+    return Summary(transparency=_colored("Color")(sockets) * constant(0.9), glossy=True)
+
+
+def _refraction(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(transparency=_colored("Color")(sockets))
+
+
+def _principled(sockets: dict[str, Estimate]) -> Summary:
+    alpha = sockets["Alpha"].clipped()
+    metallic = sockets["Metallic"].clipped()
+    transmission = sockets["Transmission Weight"].clipped()
+    transparency = alpha.complement()
+    if transmission.high.any():
+        through = alpha * metallic.complement() * transmission
+        root = _colored("Base Color")(sockets).map(lambda value: value**0.5)
+        transparency += through * root * constant(0.9)
+    emission = alpha * sockets["Emission Strength"]
+    # Images are only looked at where they matter.
+    if emission.high.any() or emission.low.any():
+        emission *= sockets["Emission Color"]
+    return Summary(
+        transparency=transparency,
+        emission=emission,
+        diffuse=bool((metallic.low < 1.0).any() and (transmission.low < 1.0).any() and (alpha.high > 0.0).any()),
+        glossy=bool((alpha.high > 0.0).any()),
+    )
+
+
+PRINCIPLED = Entry(
+    "ShaderNodeBsdfPrincipled",
+    "shader_principled",
+    (
+        Socket("Base Color", "COLOR", GREY),
+        Socket("Metallic", "FLOAT"),
+        Socket("Roughness", "FLOAT", 0.5),
+        Socket("IOR", "FLOAT", 1.5),
+        Socket("Alpha", "FLOAT", 1.0),
+        NORMAL,
+        Socket("Diffuse Roughness", "FLOAT"),
+        Socket("Specular IOR Level", "FLOAT", 0.5),
+        Socket("Specular Tint", "COLOR", WHITE),
+        Socket("Anisotropic", "FLOAT"),
+        Socket("Anisotropic Rotation", "FLOAT"),
+        TANGENT,
+        Socket("Transmission Weight", "FLOAT"),
+        Socket("Coat Weight", "FLOAT"),
+        Socket("Coat Roughness", "FLOAT", 0.03),
+        Socket("Coat IOR", "FLOAT", 1.5),
+        Socket("Coat Tint", "COLOR", WHITE),
+        Socket("Coat Normal", "VECTOR", implicit="vec3(0.0)"),
+        Socket("Emission Color", "COLOR", WHITE),
+        Socket("Emission Strength", "FLOAT"),
+        DISTRIBUTION,
+    ),
+    include="material/shader.glsl",
+    approximations=(
+        Approximation("Subsurface Weight", 0.0, SUBSURFACE),
+        Approximation("Transmission Weight", 0.0, STRAIGHT_THROUGH),
+        Approximation("Sheen Weight", 0.0, "Sheen is not drawn."),
+        THIN_FILM,
+        Approximation("Anisotropic", 0.0, OUTSIDE_TANGENT, unless_linked="Tangent"),
+    ),
+    summary=_principled,
+)
+
+ANISOTROPY = Approximation("Anisotropy", 0.0, OUTSIDE_TANGENT, unless_linked="Tangent")
+GLOSSY_SHAPE = (
+    Socket("Roughness", "FLOAT", 0.5),
+    Socket("Anisotropy", "FLOAT"),
+    Socket("Rotation", "FLOAT"),
+    NORMAL,
+    TANGENT,
+    DISTRIBUTION,
+)
+
+ENTRIES = (
+    PRINCIPLED,
+    Entry(
+        "ShaderNodeBsdfDiffuse",
+        "shader_diffuse",
+        (Socket("Color", "COLOR", GREY), Socket("Roughness", "FLOAT"), NORMAL),
+        include="material/shader.glsl",
+        summary=_diffuse,
+    ),
+    Entry(
+        "ShaderNodeBsdfAnisotropic",
+        "shader_glossy",
+        (Socket("Color", "COLOR", GREY), *GLOSSY_SHAPE),
+        include="material/shader.glsl",
+        approximations=(ANISOTROPY,),
+        setting_approximations=OTHER_DISTRIBUTIONS,
+        summary=_glossy,
+    ),
+    Entry(
+        "ShaderNodeBsdfMetallic",
+        "shader_metallic",
+        (Socket("Base Color", "COLOR", GREY), Socket("Edge Tint", "COLOR", WHITE), *GLOSSY_SHAPE),
+        include="material/shader.glsl",
+        when={"fresnel_type": "F82"},
+        approximations=(ANISOTROPY, THIN_FILM),
+        setting_approximations=OTHER_DISTRIBUTIONS,
+        summary=_glossy,
+    ),
+    Entry(
+        "ShaderNodeBsdfMetallic",
+        "shader_conductor",
+        (Socket("IOR", "VECTOR", (2.757, 2.513, 2.231)), Socket("Extinction", "VECTOR", (3.867, 3.404, 3.009)))
+        + GLOSSY_SHAPE,
+        include="material/shader.glsl",
+        approximations=(ANISOTROPY, THIN_FILM),
+        setting_approximations=OTHER_DISTRIBUTIONS,
+        note="The reflectance of the physical conductor is fitted by an F82 curve.",
+        summary=_glossy,
+    ),
+    Entry(
+        "ShaderNodeEmission",
+        "shader_emission",
+        (Socket("Color", "COLOR", WHITE), Socket("Strength", "FLOAT", 1.0)),
+        include="material/shader.glsl",
+        summary=_emission,
+    ),
+    Entry(
+        "ShaderNodeBackground",
+        "shader_emission",
+        (Socket("Color", "COLOR", GREY), Socket("Strength", "FLOAT", 1.0)),
+        include="material/shader.glsl",
+        summary=_emission,
+    ),
+    Entry(
+        "ShaderNodeBsdfTransparent",
+        "shader_transparent",
+        (Socket("Color", "COLOR", WHITE),),
+        include="material/shader.glsl",
+        summary=_transparent,
+    ),
+    Entry("ShaderNodeHoldout", "shader_holdout", include="material/shader.glsl", summary=lambda sockets: Summary()),
+    Entry("ShaderNodeMixShader", arguments=(Socket("Fac", "FLOAT", 0.5),), combine="MIX"),
+    Entry("ShaderNodeAddShader", combine="ADD"),
+    # Stand-ins: the nearest closure that can be drawn.
+    Entry(
+        "ShaderNodeBsdfGlass",
+        "shader_glass",
+        (
+            Socket("Color", "COLOR", WHITE),
+            Socket("Roughness", "FLOAT"),
+            Socket("IOR", "FLOAT", 1.5),
+            NORMAL,
+            DISTRIBUTION,
+        ),
+        include="material/shader.glsl",
+        note=STRAIGHT_THROUGH,
+        summary=_glass,
+    ),
+    Entry(
+        "ShaderNodeBsdfRefraction",
+        "shader_transparent",
+        (Socket("Color", "COLOR", WHITE),),
+        include="material/shader.glsl",
+        note=STRAIGHT_THROUGH,
+        summary=_refraction,
+    ),
+    *(
+        Entry(
+            type,
+            "shader_diffuse",
+            (Socket("Color", "COLOR", GREY), Expression("0.0"), NORMAL),
+            include="material/shader.glsl",
+            note=note,
+            summary=_diffuse,
+        )
+        for type, note in (
+            ("ShaderNodeSubsurfaceScattering", SUBSURFACE),
+            ("ShaderNodeBsdfTranslucent", "Translucency is drawn as diffuse, lit from the front."),
+            ("ShaderNodeBsdfSheen", "Sheen is drawn as diffuse."),
+            ("ShaderNodeBsdfToon", "The toon shader is drawn as diffuse."),
+        )
+    ),
+)
+
+# What any other shader node is drawn as: diffuse of its own colour, or grey where it has none.
+UNKNOWN_SHADER = Entry(
+    "",
+    "shader_diffuse",
+    (Socket("Color", "COLOR", GREY), Expression("0.0"), NORMAL),
+    include="material/shader.glsl",
+    summary=_diffuse,
+)
+
+# A colour or number that is plugged in where a shader belongs glows in that colour.
+IMPLICIT_EMISSION = Entry(
+    "",
+    "shader_emission",
+    (Socket("Color", "COLOR"), Socket("Strength", "FLOAT", 1.0)),
+    include="material/shader.glsl",
+    summary=_emission,
+)

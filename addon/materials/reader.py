@@ -1,0 +1,358 @@
+"""Reads a Blender shader tree into a `Graph`: the only module of materials that sees bpy.
+
+Only what the surface, volume or displacement needs is read, from the active output backwards. Groups are dissolved
+(nested, with the interface's own values), reroutes and muted nodes are followed through, muted and invalid links are
+treated as if nothing were linked. Node settings are read generically, so that a new node needs no change here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+
+from .graph import Graph, Input, Node
+from .values import to_kind
+
+Notes = tuple[tuple[str, str], ...]
+ImageKey = Callable[[object, object], str]  # (bpy Image, ImageUser or None) -> Image.key
+
+KINDS = {
+    "VALUE": "FLOAT",
+    "VECTOR": "VECTOR",
+    "RGBA": "COLOR",
+    "SHADER": "SHADER",
+    "INT": "INT",
+    "BOOLEAN": "BOOLEAN",
+    "ROTATION": "VECTOR",
+}
+
+# Nodes whose value stands in their output socket; it becomes an unlinked input of the same name.
+CONSTANT_NODES = {"ShaderNodeRGB", "ShaderNodeValue", "ShaderNodeNormal"}
+
+CURVE_SAMPLES = 257  # points at which a curve is tabulated between the ends of its range
+
+_BASE_SETTINGS = {prop.identifier for prop in bpy.types.Node.bl_rna.properties}
+_settings_of_type: dict[str, tuple] = {}
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a node stands: its tree and the chain of group nodes that lead there."""
+
+    tree: object
+    group: object = None  # the group node in `parent.tree` whose inside this is
+    parent: _Place | None = None
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        return () if self.parent is None else (*self.parent.path, self.group.name)
+
+
+def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
+    """The node tree of a material, world or light as a flat graph, and sentences about what could not be read.
+
+    `image_key(image, image_user)` names the pixels of an image node. An ID without a usable tree gives the graph that
+    Blender means by it: diffuse in the viewport colour for a material, the plain colour for a world.
+    """
+    tree = getattr(owner, "node_tree", None)
+    if tree is None or not _uses_nodes(owner):
+        return _graph_without_nodes(owner), ()
+    output = _active_output(tree)
+    if output is None:
+        return Graph(), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
+    reading = _Reading(image_key)
+    place = _Place(tree)
+    links = {}
+    for name in ("Surface", "Volume", "Displacement"):
+        socket = output.inputs.get(name)
+        links[name.lower()] = None if socket is None else reading.source(place, output, socket)[0]
+    reading.read_pending()
+    return Graph(reading.cut_cycles(links), **links), tuple(dict.fromkeys(reading.notes))
+
+
+def _uses_nodes(owner) -> bool:
+    """From 5.0 on every material uses its nodes and the property only warns that it will go."""
+    return bpy.app.version >= (5, 0, 0) or bool(getattr(owner, "use_nodes", True))
+
+
+def _graph_without_nodes(owner) -> Graph:
+    if isinstance(owner, bpy.types.Material):
+        inputs = {"Color": Input("COLOR", tuple(owner.diffuse_color))}
+        node = Node("Viewport", owner.name, "ShaderNodeBsdfDiffuse", inputs, {"BSDF": "SHADER"})
+        return Graph({node.key: node}, (node.key, "BSDF"))
+    if isinstance(owner, bpy.types.World):
+        inputs = {"Color": Input("COLOR", (*owner.color, 1.0)), "Strength": Input("FLOAT", 1.0)}
+        node = Node("World", owner.name, "ShaderNodeBackground", inputs, {"Background": "SHADER"})
+        return Graph({node.key: node}, (node.key, "Background"))
+    inputs = {"Color": Input("COLOR", (1.0, 1.0, 1.0, 1.0)), "Strength": Input("FLOAT", 1.0)}
+    node = Node("Light", owner.name, "ShaderNodeEmission", inputs, {"Emission": "SHADER"})
+    return Graph({node.key: node}, (node.key, "Emission"))
+
+
+def _active_output(tree):
+    """The output that Cycles renders, or the one for any other engine where a file has only that."""
+    for target in ("CYCLES", "EEVEE"):
+        output = tree.get_output_node(target)
+        if output is not None:
+            return output
+    return None
+
+
+class _Reading:
+    """State of one reading: nodes found so far, those still to be read, and the links of each tree."""
+
+    def __init__(self, image_key: ImageKey) -> None:
+        self.image_key = image_key
+        self.nodes: dict[str, Node] = {}
+        self.pending: list[tuple[str, _Place, object]] = []
+        self.seen: set[str] = set()
+        self.notes: list[tuple[str, str]] = []
+        self._links: dict[int, dict[int, object]] = {}
+
+    def _link_into(self, tree, socket):
+        """The link that feeds an input socket, or None; one pass per tree, because asking a socket searches the tree."""
+        links = self._links.get(tree.as_pointer())
+        if links is None:
+            links = {}
+            for link in tree.links:
+                if link.is_muted or not link.from_socket.enabled or not link.to_socket.enabled:
+                    continue
+                if not link.is_valid:
+                    self.notes.append(
+                        (link.to_node.name, f"The link into '{link.to_socket.name}' is not valid and was cut.")
+                    )
+                    continue
+                links[link.to_socket.as_pointer()] = link
+            self._links[tree.as_pointer()] = links
+        return links.get(socket.as_pointer())
+
+    def source(self, place: _Place, node, socket) -> tuple[tuple[str, str] | None, object, str]:
+        """What an input socket reads: (link, constant, kind of the constant). Follows groups, reroutes, muted nodes.
+
+        Where a group's socket has another kind than what is plugged in, the value is converted on the way, so a
+        `Convert` node is put in between.
+        """
+        constant, constant_kind = _default(socket), _kind(socket)
+        conversions: list[str] = []
+        passed: set[tuple] = set()
+        while True:
+            step = (place.path, socket.as_pointer())
+            if step in passed:
+                self.notes.append((node.name, "The links run in a circle and were cut."))
+                return None, constant, constant_kind
+            passed.add(step)
+            link = self._link_into(place.tree, socket)
+            if link is None:
+                value, kind = _default(socket), _kind(socket)
+                for wanted in conversions[::-1]:
+                    value, kind = _converted(value, kind, wanted), wanted
+                return (None, constant, constant_kind) if value is None else (None, value, kind)
+            node, output = link.from_node, link.from_socket
+            if node.mute:
+                socket = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
+                if socket is None:
+                    return None, constant, constant_kind
+            elif node.bl_idname == "NodeReroute":
+                socket = node.inputs[0]
+            elif node.bl_idname == "NodeGroupInput":
+                if place.parent is None:
+                    return None, constant, constant_kind
+                node, place = place.group, place.parent
+                socket = _by_identifier(node.inputs, output.identifier)
+                if socket is None:
+                    return None, constant, constant_kind
+                _pass_through(conversions, _kind(socket))
+            elif isinstance(node, bpy.types.ShaderNodeGroup) or node.bl_idname == "ShaderNodeGroup":
+                inside = self._inside(place, node)
+                exit = None if inside is None else _group_output(inside.tree)
+                socket = None if exit is None else _by_identifier(exit.inputs, output.identifier)
+                if socket is None:
+                    return None, constant, constant_kind
+                place = inside
+                _pass_through(conversions, _kind(socket))
+            else:
+                return self._plain_link(place, node, output, conversions), constant, constant_kind
+
+    def _inside(self, place: _Place, group) -> _Place | None:
+        """The tree of a group node; None, with a sentence, for a missing tree or one that contains itself."""
+        if group.node_tree is None:
+            self.notes.append((group.name, "The node group is missing; what it feeds keeps the value set there."))
+            return None
+        above = place
+        while above is not None:
+            if above.tree == group.node_tree:
+                self.notes.append((group.name, "The node group contains itself and was left out."))
+                return None
+            above = above.parent
+        return _Place(group.node_tree, group, place)
+
+    def _plain_link(self, place: _Place, node, output, conversions: list[str]) -> tuple[str, str]:
+        key = " / ".join((*place.path, node.name))
+        if key not in self.seen:
+            self.seen.add(key)
+            self.pending.append((key, place, node))
+        link, kind = (key, output.identifier), _kind(output)
+        for wanted in conversions[::-1]:
+            if wanted != kind and {wanted, kind} <= {"FLOAT", "VECTOR", "COLOR"}:
+                converter = f"{link[0]} . {link[1]} > {wanted}"
+                inputs = {"Value": Input(kind, None, link)}
+                self.nodes[converter] = Node(
+                    converter, node.name, "Convert", inputs, {"Value": wanted}, {"kind": wanted}
+                )
+                link, kind = (converter, "Value"), wanted
+        return link
+
+    def read_pending(self) -> None:
+        while self.pending:
+            key, place, node = self.pending.pop()
+            self.nodes[key] = self._node(key, place, node)
+
+    def _node(self, key: str, place: _Place, node) -> Node:
+        inputs = {}
+        for socket in node.inputs:
+            if not socket.enabled:
+                continue
+            link, value, kind = self.source(place, node, socket)
+            wanted = _kind(socket)
+            inputs[socket.identifier] = Input(wanted, _converted(value, kind, wanted), link)
+        if node.bl_idname in CONSTANT_NODES:
+            for socket in node.outputs:
+                if hasattr(socket, "default_value") and socket.identifier not in inputs:
+                    inputs[socket.identifier] = Input(_kind(socket), _default(socket))
+        outputs = {socket.identifier: _kind(socket) for socket in node.outputs}
+        label = node.label or node.name
+        image = getattr(node, "image", None)
+        return Node(
+            key,
+            " / ".join((*place.path, label)),
+            node.bl_idname,
+            inputs,
+            outputs,
+            _settings(node),
+            "" if image is None else self.image_key(image, getattr(node, "image_user", None)),
+        )
+
+    def cut_cycles(self, roots: dict) -> dict[str, Node]:
+        """All nodes, with every link removed that closes a circle, seen from the outputs."""
+        finished: set[str] = set()
+        for root in (link[0] for link in roots.values() if link is not None):
+            if root in finished:
+                continue
+            trail, waiting = {root}, [(root, list(self.nodes[root].inputs.items()))]
+            while waiting:
+                key, inputs = waiting[-1]
+                if not inputs:
+                    trail.discard(key)
+                    finished.add(key)
+                    waiting.pop()
+                    continue
+                identifier, input = inputs.pop()
+                target = None if input.link is None else input.link[0]
+                if target in trail:
+                    self._cut(key, identifier)
+                elif target is not None and target not in finished:
+                    trail.add(target)
+                    waiting.append((target, list(self.nodes[target].inputs.items())))
+        return self.nodes
+
+    def _cut(self, key: str, identifier: str) -> None:
+        node = self.nodes[key]
+        old = node.inputs[identifier]
+        self.nodes[key] = Node(
+            node.key,
+            node.label,
+            node.type,
+            {**node.inputs, identifier: Input(old.kind, old.value)},
+            node.outputs,
+            node.properties,
+            node.image,
+        )
+        self.notes.append((node.label, f"The link into '{identifier}' closes a circle and was cut."))
+
+
+def _pass_through(conversions: list[str], kind: str) -> None:
+    if not conversions or conversions[-1] != kind:
+        conversions.append(kind)
+
+
+def _group_output(tree):
+    outputs = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
+    return next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
+
+
+def _by_identifier(sockets, identifier: str):
+    return next((socket for socket in sockets if socket.identifier == identifier), None)
+
+
+def _kind(socket) -> str:
+    return KINDS.get(socket.type, "OTHER")
+
+
+def _default(socket) -> tuple[float, ...] | float | None:
+    """The constant of an unlinked socket; None for shaders and for kinds that are no numbers."""
+    value = getattr(socket, "default_value", None)
+    if socket.type in {"VECTOR", "RGBA", "ROTATION"} and value is not None:
+        return tuple(value)
+    return float(value) if isinstance(value, (bool, int, float)) else None
+
+
+def _converted(value, kind: str, wanted: str):
+    if value is None or kind == wanted or wanted not in {"FLOAT", "VECTOR", "COLOR", "INT", "BOOLEAN"}:
+        return value
+    if wanted in {"VECTOR", "COLOR"}:
+        triple = to_kind(value, kind, "VECTOR")
+        return (*triple, 1.0) if wanted == "COLOR" else triple
+    return to_kind(value, kind, "FLOAT")
+
+
+def _settings(node) -> dict[str, object]:
+    """The node's own properties as plain values; pointers to data-blocks as their names."""
+    names = _settings_of_type.get(node.bl_idname)
+    if names is None:
+        properties = type(node).bl_rna.properties
+        names = tuple((p.identifier, p.type) for p in properties if p.identifier not in _BASE_SETTINGS)
+        _settings_of_type[node.bl_idname] = names
+    settings = {}
+    for name, type_name in names:
+        value = _plain(getattr(node, name, None), type_name)
+        if value is not None:
+            settings[name] = value
+    return settings
+
+
+def _plain(value, type_name: str):
+    if type_name in {"ENUM", "STRING", "BOOLEAN", "INT", "FLOAT"}:
+        if isinstance(value, (str, bool, int, float)):
+            return value
+        if isinstance(value, (set, frozenset)):
+            return tuple(sorted(value))
+        try:
+            return tuple(value)
+        except TypeError:
+            return None
+    if isinstance(value, bpy.types.ColorRamp):
+        stops = tuple((stop.position, tuple(stop.color)) for stop in value.elements)
+        return (value.color_mode, value.interpolation, value.hue_interpolation, stops)
+    if isinstance(value, bpy.types.CurveMapping):
+        return _curves(value)
+    if isinstance(value, bpy.types.TexMapping):
+        return (value.vector_type, tuple(value.translation), tuple(value.rotation), tuple(value.scale))
+    if isinstance(value, bpy.types.ID):
+        return value.name
+    return None
+
+
+def _curves(mapping) -> tuple:
+    """(extension, first abscissa, last abscissa, one tuple of samples per curve); the curves as Blender evaluates them.
+
+    Between the ends of all control points the samples are evenly spaced; beyond them the curve is continued as the
+    extension says.
+    """
+    points = [point.location[0] for curve in mapping.curves for point in curve.points]
+    first, last = min(points), max(points)
+    mapping.initialize()
+    steps = [first + (last - first) * i / (CURVE_SAMPLES - 1) for i in range(CURVE_SAMPLES)]
+    tables = tuple(tuple(mapping.evaluate(curve, x) for x in steps) for curve in mapping.curves)
+    return (mapping.extend, first, last, tables)

@@ -1,0 +1,170 @@
+// Albedos of microfacet lobes from the table `energy_table`, and what follows from them: how much a layer leaves for
+// the layer below, and how much light a lobe must gain because it scatters more than once.
+//
+// The host binds `energy_table` (sampler2D, 64 x 64 RGBA32F, filled by addon/materials/energy.py, where the layout and
+// the sources are described) in every program that includes this file. `mu` is the cosine between the lobe's normal
+// and the viewer, `roughness` the artist's roughness (alpha = roughness^2; for anisotropic lobes (ax ay)^(1/4), which
+// is the same value).
+//
+// Multiple scattering after Turquin 2019, Fresnel averages and the F82 metal after Kulla & Conty 2017 and Kutz et al.
+// 2021, in the form in which Cycles combines them.
+
+#include "lib/closure.glsl"
+
+
+#define ENERGY_NODES 32.0
+#define LAYER_NODES 16.0
+
+// Column and row of a fractional node position: xy the lower node, zw the weight of the next one.
+vec4 energy_cell(float roughness, float mu, float nodes)
+{
+  vec2 position = clamp(vec2(roughness, mu), 0.0, 1.0) * (nodes - 1.0);
+  vec2 lower = min(floor(position), vec2(nodes - 2.0));
+  return vec4(lower, position - lower);
+}
+
+vec4 energy_bilinear(ivec2 origin, vec4 cell)
+{
+  ivec2 texel = origin + ivec2(cell.xy);
+  vec4 low = mix(texelFetch(energy_table, texel, 0), texelFetch(energy_table, texel + ivec2(1, 0), 0), cell.z);
+  vec4 high = mix(
+      texelFetch(energy_table, texel + ivec2(0, 1), 0), texelFetch(energy_table, texel + ivec2(1, 1), 0), cell.z);
+  return mix(low, high, cell.w);
+}
+
+// Albedo of the single-scattering GGX lobe with reflectance 1.
+float ggx_energy(float mu, float roughness)
+{
+  return energy_bilinear(ivec2(0, 0), energy_cell(roughness, mu, ENERGY_NODES)).z;
+}
+
+// Cosine-weighted mean of ggx_energy over the hemisphere.
+float ggx_energy_average(float roughness)
+{
+  vec4 cell = energy_cell(roughness, 0.0, ENERGY_NODES);
+  ivec2 texel = ivec2(int(cell.x), 32);
+  return mix(texelFetch(energy_table, texel, 0).z, texelFetch(energy_table, texel + ivec2(1, 0), 0).z, cell.z);
+}
+
+float dielectric_f0(float ior)
+{
+  float root = (ior - 1.0) / (ior + 1.0);
+  return root * root;
+}
+
+// Where between reflectance at normal incidence (0) and total reflection (1) the mean of a dielectric lobe lies.
+float dielectric_layer_shape(float mu, float roughness, float ior)
+{
+  float z = clamp(sqrt(abs((ior - 1.0) / (ior + 1.0))), 0.0, 1.0) * (LAYER_NODES - 1.0);
+  float slice = min(floor(z), LAYER_NODES - 2.0);
+  int k = int(slice);
+  vec4 ends = energy_bilinear(ivec2(16 * (k % 4), 16 * (k / 4)), energy_cell(roughness, mu, LAYER_NODES));
+  return mix(ends.x, ends.y, z - slice);
+}
+
+// Albedo of a dielectric layer without tint.
+float dielectric_layer_albedo(float mu, float roughness, float ior)
+{
+  return mix(dielectric_f0(ior), 1.0, dielectric_layer_shape(mu, roughness, ior));
+}
+
+// The same measure for a metal, whose reflectance rises with the fifth power.
+float schlick_layer_shape(float mu, float roughness)
+{
+  return energy_bilinear(ivec2(32, 0), energy_cell(roughness, mu, LAYER_NODES)).z;
+}
+
+// Unpolarised reflectance of a smooth dielectric; ior is inside over outside, total reflection gives 1.
+float fresnel_dielectric(float cos_h, float ior)
+{
+  float c = abs(cos_h);
+  float g_squared = ior * ior - 1.0 + c * c;
+  if (g_squared <= 0.0) {
+    return 1.0;
+  }
+  float g = sqrt(g_squared);
+  float a = (g - c) / max(g + c, 1e-20);
+  float b = ((g + c) * c - 1.0) / ((g - c) * c + 1.0);
+  return 0.5 * a * a * (1.0 + b * b);
+}
+
+// Fresnel term of a lobe at cos_h = view . half vector; the kinds are explained in lib/closure.glsl.
+vec3 fresnel_reflectance(int fresnel, vec3 tint, vec3 edge, float ior, float cos_h)
+{
+  if (fresnel == FRESNEL_DIELECTRIC) {
+    float f0 = dielectric_f0(ior);
+    float shape = clamp((fresnel_dielectric(cos_h, ior) - f0) / max(1.0 - f0, 1e-6), 0.0, 1.0);
+    return mix(tint, vec3(1.0), shape);
+  }
+  if (fresnel == FRESNEL_F82) {
+    float c = clamp(cos_h, 0.0, 1.0);
+    float grazing = 1.0 - c;
+    float power5 = grazing * grazing * grazing * grazing * grazing;
+    // The last term pulls the curve to edge * Schlick at cos = 1/7, about 82 degrees: 0.46266436 = (6/7)^5,
+    // 17.651384 = 7 / (6/7)^6.
+    vec3 pull = mix(tint, vec3(1.0), 0.46266436) * (17.651384 * (vec3(1.0) - edge));
+    return clamp(tint + (vec3(1.0) - tint) * power5 - pull * (c * power5 * grazing), vec3(0.0), vec3(1.0));
+  }
+  return tint;
+}
+
+// Mean reflectance of a dielectric over the hemisphere, cosine-weighted: rational fit for ior >= 1 and cubic below.
+float fresnel_average_dielectric(float ior)
+{
+  if (ior >= 1.0) {
+    return (ior - 1.0) / (4.08567 + 1.00071 * ior);
+  }
+  return 0.997118 + ior * (0.1014 - ior * (0.965241 + 0.130607 * ior));
+}
+
+// Cosine-weighted mean of fresnel_reflectance over the hemisphere.
+vec3 fresnel_average(int fresnel, vec3 tint, vec3 edge, float ior)
+{
+  if (fresnel == FRESNEL_DIELECTRIC) {
+    float f0 = dielectric_f0(ior);
+    float shape = clamp((fresnel_average_dielectric(ior) - f0) / max(1.0 - f0, 1e-6), 0.0, 1.0);
+    return mix(tint, vec3(1.0), shape);
+  }
+  if (fresnel == FRESNEL_F82) {
+    // 1/21 and 1/126: means of (1-c)^5 and c (1-c)^6 under the cosine weight.
+    vec3 pull = mix(tint, vec3(1.0), 0.46266436) * (17.651384 * (vec3(1.0) - edge));
+    return mix(tint, vec3(1.0), 1.0 / 21.0) - pull / 126.0;
+  }
+  return tint;
+}
+
+// Reflectance of all bounces after the first, as a share of the light that a lobe without absorption would have lost.
+vec3 multiscatter_reflectance(int fresnel, vec3 tint, vec3 edge, float ior, float roughness)
+{
+  float average = ggx_energy_average(roughness);
+  vec3 once = fresnel_average(fresnel, tint, edge, ior);
+  return once * average / max(vec3(1.0) - once * (1.0 - average), vec3(1e-6));
+}
+
+// Factor on the single-scattering lobe that restores what is scattered more than once; 1 for a smooth surface.
+vec3 multiscatter_scale(int fresnel, vec3 tint, vec3 edge, float ior, float roughness, float mu)
+{
+  float energy = max(ggx_energy(mu, roughness), 1e-4);
+  return vec3(1.0) + multiscatter_reflectance(fresnel, tint, edge, ior, roughness) * ((1.0 - energy) / energy);
+}
+
+// Share of the energy that survives when the lobe is scaled to lose none: multiscatter_scale * ggx_energy.
+vec3 multiscatter_darkening(int fresnel, vec3 tint, vec3 edge, float ior, float roughness, float mu)
+{
+  float energy = clamp(ggx_energy(mu, roughness), 1e-4, 1.0);
+  return vec3(energy) + multiscatter_reflectance(fresnel, tint, edge, ior, roughness) * (1.0 - energy);
+}
+
+// Estimated albedo of a glossy lobe with multiple scattering, as Cycles estimates it for its colour pass and for
+// layering. FRESNEL_NONE carries its tint in Fresnel and in the loss per bounce, so it appears once here.
+vec3 glossy_albedo(int fresnel, vec3 tint, vec3 edge, float ior, float roughness, float mu)
+{
+  vec3 darkening = multiscatter_darkening(fresnel, tint, edge, ior, roughness, mu);
+  if (fresnel == FRESNEL_DIELECTRIC) {
+    return darkening * mix(tint, vec3(1.0), dielectric_layer_shape(mu, roughness, ior));
+  }
+  if (fresnel == FRESNEL_F82) {
+    return darkening * mix(tint, vec3(1.0), schlick_layer_shape(mu, roughness));
+  }
+  return darkening * tint;
+}

@@ -1,0 +1,256 @@
+// One function per shader node: it turns the node's inputs into closures, scaled by `weight`, the share of the
+// surface that the node owns. Order of layers, clamps and weights as in Cycles (see materials/nodes/shader.py).
+
+#include "lib/closure.glsl"
+#include "lib/color.glsl"
+#include "lib/energy.glsl"
+
+#define DISTRIBUTION_SINGLE 0  // GGX as it is, which loses energy when rough
+#define DISTRIBUTION_MULTIPLE 1
+
+// A layer with less weight than this is not worth a lobe.
+#define SMALLEST_WEIGHT 1e-5
+
+vec3 unit_or(vec3 v, vec3 otherwise)
+{
+  float length_squared = dot(v, v);
+  return (length_squared > 1e-20) ? v * inversesqrt(length_squared) : otherwise;
+}
+
+// Bends a shading normal towards the geometric normal, just so far that the mirror direction leaves the surface:
+// a mirror direction below the surface would see its inside and show black at grazing angles.
+// In the plane of both normals with angle a from the geometric one, reflected . geometric =
+// x sin 2a + z cos 2a, where (x, z) is the incoming direction in that plane; solved for the smallest allowed value.
+vec3 reflecting_normal(SurfacePoint point, vec3 normal)
+{
+  vec3 up = point.geometric_normal;
+  float z = dot(point.incoming, up);
+  float smallest = min(0.9 * z, 0.01);
+  vec3 reflected = 2.0 * dot(normal, point.incoming) * normal - point.incoming;
+  if (z <= 0.0 || dot(reflected, up) >= smallest) {
+    return normal;
+  }
+  vec3 side = unit_or(normal - dot(normal, up) * up, vec3(0.0));
+  float x = dot(point.incoming, side);
+  float reach = sqrt(x * x + z * z);
+  float angle = 0.5 * (atan(x, z) + acos(clamp(smallest / max(reach, 1e-20), -1.0, 1.0)));
+  return unit_or(sin(angle) * side + cos(angle) * up, normal);
+}
+
+float view_cosine(SurfacePoint point, vec3 normal)
+{
+  return clamp(dot(normal, point.incoming), 0.0, 1.0);
+}
+
+// Around the vertical axis, which is the tangent of any surface of revolution about it, such as a lathed pan.
+vec3 default_tangent(vec3 normal)
+{
+  return unit_or(vec3(-normal.y, normal.x, 0.0), vec3(1.0, 0.0, 0.0));
+}
+
+// The tangent turned about the normal; `turns` counts full turns.
+vec3 rotated_tangent(vec3 tangent, vec3 normal, float turns)
+{
+  vec3 flat_tangent = unit_or(tangent - dot(tangent, normal) * normal, default_tangent(normal));
+  float angle = 6.283185307 * turns;
+  return cos(angle) * flat_tangent + sin(angle) * cross(normal, flat_tangent);
+}
+
+float largest(vec3 v)
+{
+  return max(max(v.x, v.y), v.z);
+}
+
+// Adds a glossy lobe and returns its albedo, weight included: what the layers below do not get.
+vec3 add_glossy(inout Closures closures, SurfacePoint point, vec3 weight, int distribution, int fresnel, vec3 tint,
+                vec3 edge, float ior, float roughness, float anisotropy, vec3 tangent, vec3 normal)
+{
+  float mu = view_cosine(point, normal);
+  vec3 albedo = glossy_albedo(fresnel, tint, edge, ior, roughness, mu);
+  vec3 lobe_weight = weight;
+  if (distribution == DISTRIBUTION_SINGLE) {
+    // The lobe is evaluated with multiple scattering, which the node excludes: taken out again by its weight.
+    albedo /= max(multiscatter_darkening(fresnel, tint, edge, ior, roughness, mu), vec3(1e-4));
+    lobe_weight /= multiscatter_scale(fresnel, tint, edge, ior, roughness, mu);
+  }
+  closure_glossy(closures, lobe_weight, color_luminance(albedo), fresnel, tint, edge, ior, roughness, anisotropy,
+                 tangent, normal);
+  return weight * albedo;
+}
+
+// What a layer of this albedo leaves of `weight`: one factor for all channels, so that a tinted layer does not
+// colour what lies below.
+vec3 below_layer(vec3 weight, vec3 albedo)
+{
+  vec3 share = albedo / max(weight, vec3(1e-10));
+  return weight * clamp(1.0 - largest(share), 0.0, 1.0);
+}
+
+void shader_diffuse(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
+{
+  closure_diffuse(closures, weight * max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));
+}
+
+// Glossy node: reflectance is the colour at all angles. Its anisotropy stretches the other way round than that of
+// Principled, ax = a (1 - A), ay = a / (1 - A), while closures use ax = a / sqrt(1 - 0.9 A'), ay = a sqrt(1 - 0.9 A').
+void shader_glossy(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness,
+                   float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution)
+{
+  vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
+  float amount = clamp(anisotropy, -0.99, 0.99);
+  float narrow = 1.0 - abs(amount);
+  float quarter = (amount > 0.0) ? 0.25 : 0.0;
+  vec3 t = rotated_tangent(tangent, n, rotation + quarter);
+  add_glossy(closures, point, weight, distribution, FRESNEL_NONE, max(color, vec3(0.0)), vec3(1.0), 1.5,
+             clamp(roughness, 0.0, 1.0), (1.0 - narrow * narrow) / 0.9, t, n);
+}
+
+void shader_metallic(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 edge, float roughness,
+                     float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution)
+{
+  vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
+  vec3 t = rotated_tangent(tangent, n, rotation);
+  add_glossy(closures, point, weight, distribution, FRESNEL_F82, clamp(color, vec3(0.0), vec3(1.0)),
+             clamp(edge, vec3(0.0), vec3(1.0)), 1.5, clamp(roughness, 0.0, 1.0), clamp(anisotropy, 0.0, 1.0), t, n);
+}
+
+float conductor_reflectance(float cos_i, float n, float k)
+{
+  float c = cos_i * cos_i;
+  float nk = n * n + k * k;
+  float s = (nk - 2.0 * n * cos_i + c) / (nk + 2.0 * n * cos_i + c);
+  float p = (nk * c - 2.0 * n * cos_i + 1.0) / (nk * c + 2.0 * n * cos_i + 1.0);
+  return 0.5 * (s + p);
+}
+
+// Metal by complex index of refraction: the F82 curve through its exact reflectance at 0 and at 82 degrees.
+void shader_conductor(inout Closures closures, SurfacePoint point, vec3 weight, vec3 ior, vec3 extinction,
+                      float roughness, float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution)
+{
+  vec3 f0 = vec3(conductor_reflectance(1.0, ior.x, extinction.x), conductor_reflectance(1.0, ior.y, extinction.y),
+                 conductor_reflectance(1.0, ior.z, extinction.z));
+  float c = 1.0 / 7.0;
+  vec3 f82 = vec3(conductor_reflectance(c, ior.x, extinction.x), conductor_reflectance(c, ior.y, extinction.y),
+                  conductor_reflectance(c, ior.z, extinction.z));
+  vec3 edge = f82 / max(mix(f0, vec3(1.0), 0.46266436), vec3(1e-6));
+  shader_metallic(closures, point, weight, f0, edge, roughness, anisotropy, rotation, normal, tangent, distribution);
+}
+
+void shader_emission(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float strength)
+{
+  closure_emission(closures, weight * color * strength);
+}
+
+void shader_transparent(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color)
+{
+  closure_transparent(closures, weight * max(color, vec3(0.0)));
+}
+
+void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
+{
+  closures.holdout += vector_average(weight);
+}
+
+// Glass without refraction: mirror as a dielectric, the rest passes straight through, tinted.
+void shader_thin_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 reflected, vec3 transmitted,
+                       vec3 tint, float ior, float roughness, vec3 normal, int distribution)
+{
+  vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
+  vec3 f0 = clamp(dielectric_f0(ior) * tint, vec3(0.0), vec3(1.0));
+  vec3 albedo = vec3(0.0);
+  if (largest(reflected) > 0.0) {
+    albedo = add_glossy(closures, point, weight * reflected, distribution, FRESNEL_DIELECTRIC, f0, vec3(1.0), ior,
+                        clamp(roughness, 0.0, 1.0), 0.0, default_tangent(n), n);
+  }
+  vec3 share = albedo / max(weight * reflected, vec3(1e-10));
+  closure_transparent(closures, weight * max(transmitted, vec3(0.0)) * clamp(1.0 - largest(share), 0.0, 1.0));
+}
+
+void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, float ior,
+                  vec3 normal, int distribution)
+{
+  vec3 positive = max(color, vec3(0.0));
+  shader_thin_glass(closures, point, weight, positive, positive, vec3(1.0), max(ior, 1e-5), roughness, normal,
+                    distribution);
+}
+
+// Specular term of Principled: the level scales the reflectance of the index of refraction, 0.5 leaves it.
+void principled_specular(float ior, float level, vec3 tint, out vec3 f0, out float adjusted_ior)
+{
+  float base = dielectric_f0(ior);
+  adjusted_ior = ior;
+  if (level != 0.5) {
+    base *= 2.0 * max(level, 0.0);
+    float root = sqrt(clamp(base, 0.0, 0.99));
+    adjusted_ior = (1.0 + root) / (1.0 - root);
+    if (ior < 1.0) {
+      adjusted_ior = 1.0 / adjusted_ior;
+    }
+  }
+  f0 = clamp(base * tint, vec3(0.0), vec3(1.0));
+}
+
+// Coat of Principled; returns what it leaves for the layers below, with the absorption on the way through it.
+vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, float coat_weight, float coat_roughness,
+                     float coat_ior, vec3 coat_tint, vec3 coat_normal)
+{
+  vec3 n = reflecting_normal(point, coat_normal);
+  float ior = max(coat_ior, 1.0);
+  vec3 albedo = add_glossy(closures, point, weight * coat_weight, DISTRIBUTION_MULTIPLE, FRESNEL_DIELECTRIC,
+                           vec3(dielectric_f0(ior)), vec3(1.0), ior, clamp(coat_roughness, 0.0, 1.0), 0.0,
+                           default_tangent(n), n);
+  vec3 below = below_layer(weight, albedo);
+  float mu = view_cosine(point, n);
+  float cos_inside = sqrt(max(1.0 - (1.0 - mu * mu) / (ior * ior), 1e-6));
+  vec3 absorption = pow(max(coat_tint, vec3(0.0)), vec3(1.0 / cos_inside));
+  return below * mix(vec3(1.0), absorption, clamp(coat_weight, 0.0, 1.0));
+}
+
+// Principled BSDF, from the top layer down: alpha, coat, emission, metal, transmission, specular, diffuse.
+// Not drawn: sheen, thin film. Drawn simpler: transmission passes straight through, subsurface is diffuse.
+void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
+                       float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
+                       float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
+                       float transmission, float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
+                       vec3 coat_normal, vec3 emission_color, float emission_strength, int distribution)
+{
+  vec3 n = unit_or(normal, point.normal);
+  vec3 mirror_normal = reflecting_normal(point, n);
+  vec3 base = max(base_color, vec3(0.0));
+  float r = clamp(roughness, 0.0, 1.0);
+  float coverage = clamp(alpha, 0.0, 1.0);
+  closure_transparent(closures, weight * (1.0 - coverage));
+  vec3 w = weight * coverage;
+
+  if (coat_weight > SMALLEST_WEIGHT) {
+    w = principled_coat(closures, point, w, coat_weight, coat_roughness, coat_ior, coat_tint, unit_or(coat_normal, n));
+  }
+  closure_emission(closures, w * emission_color * emission_strength);
+
+  vec3 t = rotated_tangent(tangent, mirror_normal, rotation);
+  float stretch = clamp(anisotropy, 0.0, 1.0);
+  float metal = clamp(metallic, 0.0, 1.0);
+  if (metal > SMALLEST_WEIGHT) {
+    add_glossy(closures, point, w * metal, distribution, FRESNEL_F82, min(base, vec3(1.0)),
+               clamp(specular_tint, vec3(0.0), vec3(1.0)), ior, r, stretch, t, mirror_normal);
+    w *= 1.0 - metal;
+  }
+  float through = clamp(transmission, 0.0, 1.0);
+  if (through > SMALLEST_WEIGHT) {
+    shader_thin_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)),
+                      max(ior, 1e-5), r, mirror_normal, distribution);
+    w *= 1.0 - through;
+  }
+  if (largest(w) < SMALLEST_WEIGHT) {
+    return;
+  }
+  vec3 f0;
+  float specular_ior;
+  principled_specular(max(ior, 1e-5), specular_level, max(specular_tint, vec3(0.0)), f0, specular_ior);
+  if (specular_ior != 1.0) {
+    vec3 albedo = add_glossy(closures, point, w, distribution, FRESNEL_DIELECTRIC, f0, vec3(1.0), specular_ior, r,
+                             stretch, t, mirror_normal);
+    w = below_layer(w, albedo);
+  }
+  closure_diffuse(closures, w * base, clamp(diffuse_roughness, 0.0, 1.0), n);
+}
