@@ -18,7 +18,7 @@ import importlib.util
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,7 @@ import numpy as np
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, of linear RGB
 DARK_FRACTION = 0.1  # of the mean luminance: below it, errors count as absolute
 WORST_PIXELS = 0.001  # share of pixels that the trimmed figure drops
-FLIP_SECONDS = 120  # a 4K picture takes about ten seconds
+FLIP_SECONDS = 120  # per picture; a 4K picture takes about ten seconds
 EMPTY_DEPTH = 1e9  # Blender writes 1e10 where no surface is
 BLACK = 1e-9  # mean radiance below this is black: a 100 W lamp a thousand kilometres away
 
@@ -64,7 +64,6 @@ def compare_radiance(
     x: np.ndarray | None,
     reference: np.ndarray | None,
     half_difference: np.ndarray | None = None,
-    with_flip: bool = False,
 ) -> PathError:
     """Compare two linear pictures (H, W, C >= 3); only the first three channels count.
 
@@ -85,7 +84,7 @@ def compare_radiance(
 
     if r_mean <= BLACK:
         if np.abs(x).max(initial=0) <= BLACK:
-            return PathError(name, 0.0, 0.0, 1.0, 0.0 if with_flip else None, remark="both black")
+            return PathError(name, 0.0, 0.0, 1.0, flip=0.0, remark="both black")
         said = f"the reference is black, this picture is not (mean {x_mean:.3g})"
         return PathError(
             name, float("inf"), float("inf"), negative=negative, remark="; ".join(filter(None, (said, remark)))
@@ -97,7 +96,6 @@ def compare_radiance(
         relmse=float(squared.mean()),
         relmse_trimmed=trimmed_mean(squared),
         bias=x_mean / r_mean,
-        flip=flip(x, r) if with_flip else None,
         floor=floor,
         bias_floor=bias_floor,
         negative=negative,
@@ -145,13 +143,14 @@ def trimmed_mean(values: np.ndarray, share: float = WORST_PIXELS) -> float:
 
 # FLIP ----------------------------------------------------------------------------------------------------------------
 
-# Runs in its own process: flip_evaluator's C code calls exit() on input it dislikes (an all-black reference among it).
+# Runs in its own process: flip_evaluator's C code calls exit() on input it dislikes.
 _FLIP_PROGRAM = """
 import sys
 import flip_evaluator, numpy
-pair = numpy.load(sys.argv[1])
-_, mean, _ = flip_evaluator.evaluate(pair["reference"], pair["test"], "LDR", inputsRGB=True, applyMagma=False)
-print("FLIP", float(mean))
+pairs = numpy.load(sys.argv[1])
+for name in sorted({key[1:] for key in pairs}):
+    _, mean, _ = flip_evaluator.evaluate(pairs["r" + name], pairs["x" + name], "LDR", inputsRGB=True, applyMagma=False)
+    print("FLIP", name, float(mean), flush=True)
 """
 
 
@@ -161,25 +160,48 @@ def flip_installed() -> bool:
     return importlib.util.find_spec("flip_evaluator") is not None
 
 
-def flip(x: np.ndarray, reference: np.ndarray) -> float | None:
-    """Mean FLIP of two linear pictures at exposure 0 on an sRGB display, 0 (equal) to 1. None when it cannot be had.
+def flips(pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[float | None]:
+    """Mean FLIP of each pair (picture, reference), both linear, (H, W, >= 3), finite and of one size; 0 is equal.
 
-    The exposure is fixed, so that figures of different techniques and days compare; the program picks its own
-    otherwise, from the reference. Source: Andersson et al., "FLIP: A Difference Evaluator for Alternating
-    Images", 2020.
+    Taken at exposure 0 on an sRGB display. The exposure is fixed, so that figures of different techniques and days
+    compare. None where it cannot be had: the package is missing, or it gave up.
+    Source: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020.
     """
-    if not flip_installed():
-        return None
+    found: list[float | None] = [None] * len(pairs)
+    if not flip_installed() or not pairs:
+        return found
     with tempfile.TemporaryDirectory(prefix="candela_flip_") as folder:
-        path = Path(folder) / "pair.npz"
-        np.savez(path, reference=display(reference), test=display(x))
+        path = Path(folder) / "pairs.npz"
+        arrays = {}
+        for number, (x, reference) in enumerate(pairs):
+            arrays[f"x{number}"], arrays[f"r{number}"] = display(x), display(reference)
+        np.savez(path, **arrays)
         command = [sys.executable, "-c", _FLIP_PROGRAM, str(path)]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=FLIP_SECONDS, check=False)
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=FLIP_SECONDS * len(pairs), check=False
+            )
         except (OSError, subprocess.TimeoutExpired):
-            return None
-    words = done.stdout.split()
-    return float(words[-1]) if done.returncode == 0 and words[-2:-1] == ["FLIP"] else None
+            return found
+    for line in done.stdout.splitlines():
+        words = line.split()
+        if len(words) == 3 and words[0] == "FLIP":
+            found[int(words[1])] = float(words[2])
+    return found
+
+
+def with_flip(errors: list[PathError], pictures: list[tuple[np.ndarray | None, np.ndarray | None]]) -> list[PathError]:
+    """The errors with FLIP added to every radiance row whose pictures can be compared, in one process for all."""
+    chosen = [
+        i
+        for i, error in enumerate(errors)
+        if np.isfinite(error.relmse) and error.flip is None and not is_surface(error)
+    ]
+    values = flips([pictures[i] for i in chosen])
+    result = list(errors)
+    for i, value in zip(chosen, values, strict=True):
+        result[i] = replace(errors[i], flip=value)
+    return result
 
 
 def display(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
@@ -237,7 +259,8 @@ def table(errors: list[PathError] | tuple[PathError, ...]) -> str:
     surface = [("surface", "median", "95 %", "", "", "", "remark")]
     for error in errors:
         if is_surface(error):
-            surface.append((error.name, f"{error.median:.2e}", f"{error.percentile_95:.2e}", "", "", "", error.remark))
+            percentiles = (_number(value, ".2e") for value in (error.median, error.percentile_95))
+            surface.append((error.name, *percentiles, "", "", "", error.remark))
         else:
             rows.append((error.name, *figures(error), error.remark))
     if len(surface) > 1:
@@ -256,6 +279,8 @@ def table(errors: list[PathError] | tuple[PathError, ...]) -> str:
 def figures(error: PathError) -> tuple[str, str, str, str, str]:
     """relMSE, trimmed, floor, bias, FLIP of a radiance row as text; the report's table shows the same."""
     relmse = f"≤ {error.floor:.2e}" if error.below_floor else _number(error.relmse, ".2e")
+    if np.isnan(error.relmse):
+        return ("–",) * 5
     if error.flip is None:
         flip_text = "–" if flip_installed() else "not installed"
     else:

@@ -45,6 +45,43 @@ DIVIDED_BY_COLOR = ("diffuse", "glossy", "transmission")  # these light passes a
 
 
 @dataclass(frozen=True)
+class Row:
+    """One line of the comparison: a light path as radiance, or one of Blender's own passes.
+
+    `always` rows are shown even when both pictures are black; the others only when there is something to see.
+    """
+
+    label: str
+    source: str  # "path": a name out of `light_paths`; "image": a name out of the render's images
+    name: str
+    always: bool = False
+    what: str = ""
+
+
+ROWS = (
+    Row("Combined", "image", "combined", True, "the picture as it is rendered"),
+    Row("Direct light", "path", "direct_light", True, "all direct paths, emission and world: a render without bounces"),
+    Row("Diffuse direct", "path", "diffuse_direct", True, "light x colour"),
+    Row("Glossy direct", "path", "glossy_direct", True, "light x colour"),
+    Row("Transmission direct", "path", "transmission_direct", False, "light x colour"),
+    Row("Volume direct", "path", "volume_direct"),
+    Row("Diffuse indirect", "path", "diffuse_indirect", False, "light x colour"),
+    Row("Glossy indirect", "path", "glossy_indirect", False, "light x colour"),
+    Row("Transmission indirect", "path", "transmission_indirect", False, "light x colour"),
+    Row("Volume indirect", "path", "volume_indirect"),
+    Row("Emission", "path", "emission", True),
+    Row("Environment", "path", "environment", True),
+    Row("Diffuse direct pass", "image", "diffuse_direct", True, "as in the file, divided by the colour"),
+    Row("Glossy direct pass", "image", "glossy_direct", True, "as in the file, divided by the colour"),
+    Row("Diffuse color", "image", "diffuse_color", True),
+    Row("Glossy color", "image", "glossy_color", True),
+    Row("Transmission color", "image", "transmission_color"),
+    Row("Normal", "image", "normal", True),
+    Row("Depth", "image", "depth", True),
+)
+
+
+@dataclass(frozen=True)
 class Passes:
     """One render: pictures by Candela's names, linear, (H, W, C) float32, bottom row first, and how they came about.
 

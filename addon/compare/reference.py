@@ -1,15 +1,25 @@
 """Rendering a scene through Blender and reading its passes back: the reference by Cycles, and Candela's own picture.
 
+The only module of this package that knows bpy.
+
 The render runs through `bpy.ops.render.render`, the way a user starts it, and its passes are read from a 32-bit
 multilayer EXR. Settings are changed for the time of the render and put back afterwards, whatever happens.
 
 What makes Cycles a reference here: no clamping, caustics on, no blurred gloss, no light threshold, no adaptive
 sampling, no denoising, no fast GI, bounces far beyond what still adds light, a fixed seed. The pixel filter is
 Blackman-Harris with the width of the scene's own filter size, so that both engines reconstruct alike.
+
+A reference is kept on disk under a hash of what was rendered. `bpy.data.is_dirty` cannot tell whether the open file
+was changed (scripts do not set it), so the scene itself is hashed, with the reference's settings in force: Blender
+writes it with all it refers to into a temporary file (`bpy.data.libraries.write`: no save handlers run, nothing of
+the interface is written, the open file stays as it is), and `content.py` hashes that file.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
+import platform
 import tempfile
 import time
 from collections.abc import Iterator
@@ -17,13 +27,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
+import numpy as np
 
+from . import cache
+from .cache import Reference
+from .content import blend_hash
 from .exr import read_exr
 from .passes import IMAGE_OF_PASS, PASS_NAMES, Passes
 
 MANY_BOUNCES = 32  # at albedo 0.8 the light left after 32 bounces is 0.08 %
 MANY_TRANSPARENT_BOUNCES = 128  # foliage: a ray may cross that many see-through surfaces before Cycles ends it
 SEEDS = (1, 2)
+KEY_VERSION = 1  # to be raised when the reference's settings change, so that older references are not taken for it
 EEVEE = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")  # 5.0 and later, 4.x
 
 
@@ -101,6 +116,97 @@ def active_view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     if current is not None and getattr(bpy.context, "scene", None) == scene:
         return current
     return next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
+
+
+# The reference and its cache ------------------------------------------------------------------------------------------
+
+
+def reference(
+    scene: bpy.types.Scene,
+    samples: int,
+    direct_only: bool = False,
+    size: tuple[int, int] | None = None,
+    view_layer: bpy.types.ViewLayer | None = None,
+    use_cache: bool = True,
+) -> Reference:
+    """The scene by Cycles, twice with `samples` samples and different seeds, from the cache when it was made before.
+
+    Arguments as in `render_passes`. A reference that cannot be kept (disk full, no permission) is returned all the
+    same. Raises `RenderFailed`.
+    """
+    view_layer = view_layer or active_view_layer(scene)
+    folder = cache_folder() if use_cache else None
+    key = reference_key(scene, samples, direct_only, size, view_layer) if folder else ""
+    found = cache.load(folder, key) if folder else None
+    if found:
+        return found
+    first, second = (render_passes(scene, "CYCLES", samples, seed, direct_only, size, view_layer) for seed in SEEDS)
+    images, half = cache.two_seeds(first.images, second.images)
+    made = Reference(images, half, samples, first.seconds + second.seconds, first.film_transparent, False, key)
+    if folder:
+        try:
+            cache.save(folder, made)
+        except OSError as error:
+            print(error)  # the comparison does not depend on it
+    return made
+
+
+def cache_folder() -> Path:
+    """Where references are kept: $CANDELA_CACHE if set, the extension's own folder if Candela is one, else out/cache.
+
+    The last is relative to the working directory.
+    """
+    given = os.environ.get("CANDELA_CACHE")
+    if given:
+        return Path(given)
+    parts = (__package__ or "").split(".")
+    if parts[0] == "bl_ext":
+        return Path(bpy.utils.extension_path_user(".".join(parts[:3]), path="references"))
+    return Path("out") / "cache"
+
+
+def reference_key(
+    scene: bpy.types.Scene,
+    samples: int,
+    direct_only: bool,
+    size: tuple[int, int] | None,
+    view_layer: bpy.types.ViewLayer,
+) -> str:
+    """Name of the cache entry: a hash of the scene as it will be rendered. Frame, size and samples are part of it."""
+    with overridden(render_settings(scene, view_layer, "CYCLES", samples, 0, direct_only, size)):
+        content = scene_hash(scene)
+    about = f"{KEY_VERSION} {SEEDS} {view_layer.name!r} {content}"
+    return hashlib.blake2b(about.encode(), digest_size=20).hexdigest()
+
+
+def scene_hash(scene: bpy.types.Scene) -> str:
+    """Hexadecimal hash of the scene with everything it refers to: data-blocks, external files, unsaved pixels."""
+    digest = hashlib.blake2b(digest_size=20)
+    digest.update(f"{bpy.app.version_string} {bpy.app.build_hash!r} {scene.name!r}".encode())
+    with tempfile.TemporaryDirectory(prefix="candela_") as folder:
+        path = Path(folder) / "scene.blend"
+        bpy.data.libraries.write(str(path), {scene}, path_remap="NONE", fake_user=False, compress=False)
+        digest.update(blend_hash(path.read_bytes()))
+    for name in sorted(set(bpy.utils.blend_paths(absolute=True, packed=False, local=False))):
+        for file in external_files(Path(name)):
+            digest.update(file.name.encode())
+            with file.open("rb") as stream:
+                digest.update(hashlib.file_digest(stream, "blake2b").digest())
+    for image in sorted(bpy.data.images, key=lambda image: image.name_full):
+        if image.is_dirty and image.users and image.type not in ("RENDER_RESULT", "COMPOSITING"):
+            pixels = np.empty(len(image.pixels), np.float32)  # painted and not saved: the file does not hold them
+            image.pixels.foreach_get(pixels)
+            digest.update(image.name_full.encode() + pixels.tobytes())
+    return digest.hexdigest()
+
+
+def external_files(path: Path) -> list[Path]:
+    """The files behind a path that a scene refers to: itself, or the tiles of a path with a <UDIM> mark."""
+    if path.is_file():
+        return [path]
+    if "<UDIM>" in path.name and path.parent.is_dir():
+        return sorted(path.parent.glob(path.name.replace("[", "[[]").replace("<UDIM>", "[0-9][0-9][0-9][0-9]")))
+    return []
 
 
 # Settings ------------------------------------------------------------------------------------------------------------
@@ -209,16 +315,18 @@ def overridden(settings: list[Setting]) -> Iterator[None]:
     They are put back in the order in which they were set, not in reverse: Blender refuses a file format that does
     not belong to the current media type, and setting a format changes the depth, which comes after it.
     """
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in settings]
+    before = [(owner, name, getattr(owner, name), owner.is_property_set(name)) for owner, name, _ in settings]
     try:
         for owner, name, value in settings:
             setattr(owner, name, value)
         yield
     finally:
         failed = []
-        for owner, name, value in before:
+        for owner, name, value, was_set in before:
             try:
                 setattr(owner, name, value)
+                if not was_set:  # a property of an add-on that still had its default: leave no trace in the file
+                    owner.property_unset(name)
             except (TypeError, AttributeError, ReferenceError) as error:
                 failed.append(f"{name} ({error})")
         if failed:
@@ -231,3 +339,20 @@ def _save_render_result(scene: bpy.types.Scene, path: Path) -> None:
     if result is None:
         raise RenderFailed("Blender kept no render result to read the passes from.")
     result.save_render(str(path), scene=scene)
+
+
+def describe(scene: bpy.types.Scene) -> dict:
+    """What a report says about where a picture comes from: file name, frame, Blender's version, device."""
+    device = f"{platform.processor() or platform.machine()}, {os.cpu_count()} threads"
+    try:
+        import gpu
+
+        device = f"{gpu.platform.renderer_get()} ({gpu.platform.backend_type_get().title()}); {device}"
+    except (ImportError, SystemError, AttributeError):
+        pass  # no GPU context in this process: nothing was drawn with it either
+    return {
+        "file": Path(bpy.data.filepath).name,
+        "frame": scene.frame_current,
+        "blender": bpy.app.version_string,
+        "device": device,
+    }
