@@ -10,7 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .values import LUMINANCE
+
 MEAN_SIZE = 256  # pixels along each side that the mean of a large image is taken from
+
+
+def _weighted(value: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The weighted sum of the channels, three times; infinite as soon as one channel is."""
+    infinite = value[np.isinf(value)]
+    return np.full(3, infinite[0] if infinite.size else value @ weights)
 
 
 @dataclass(frozen=True)
@@ -33,10 +41,10 @@ class Estimate:
         return self.map(lambda value: np.clip(value, 0.0, 1.0))
 
     def luminance(self) -> Estimate:
-        return self.map(lambda value: np.full(3, value @ np.array([0.2126390, 0.7151687, 0.0721923])))
+        return self.map(lambda value: _weighted(value, LUMINANCE))
 
     def average(self) -> Estimate:
-        return self.map(lambda value: np.full(3, value.mean()))
+        return self.map(lambda value: _weighted(value, np.full(3, 1.0 / 3.0)))
 
     def __mul__(self, other: Estimate) -> Estimate:
         with np.errstate(invalid="ignore"):
@@ -63,12 +71,15 @@ def unknown(mean: float = 0.5) -> Estimate:
     return Estimate(np.full(3, -np.inf), np.full(3, float(mean)), np.full(3, np.inf))
 
 
+ZERO = constant(0.0)
+
+
 @dataclass(frozen=True)
 class Summary:
     """What a shader leaf, or a whole surface, does with light."""
 
-    transparency: Estimate = constant(0.0)  # what passes straight through
-    emission: Estimate = constant(0.0)  # radiance
+    transparency: Estimate = ZERO  # what passes straight through
+    emission: Estimate = ZERO  # radiance
     diffuse: bool = False
     glossy: bool = False
 

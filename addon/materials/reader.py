@@ -112,7 +112,7 @@ class _Reading:
         self._links: dict[int, dict[int, object]] = {}
 
     def _link_into(self, tree, socket):
-        """The link that feeds an input socket, or None; one pass per tree, because asking a socket searches the tree."""
+        """The link that feeds an input socket, or None. One pass per tree: asking a socket searches the whole tree."""
         links = self._links.get(tree.as_pointer())
         if links is None:
             links = {}
@@ -166,8 +166,8 @@ class _Reading:
                 _pass_through(conversions, _kind(socket))
             elif isinstance(node, bpy.types.ShaderNodeGroup) or node.bl_idname == "ShaderNodeGroup":
                 inside = self._inside(place, node)
-                exit = None if inside is None else _group_output(inside.tree)
-                socket = None if exit is None else _by_identifier(exit.inputs, output.identifier)
+                end = None if inside is None else _group_output(inside.tree)
+                socket = None if end is None else _by_identifier(end.inputs, output.identifier)
                 if socket is None:
                     return None, constant, constant_kind
                 place = inside
@@ -248,8 +248,8 @@ class _Reading:
                     finished.add(key)
                     waiting.pop()
                     continue
-                identifier, input = inputs.pop()
-                target = None if input.link is None else input.link[0]
+                identifier, socket = inputs.pop()
+                target = None if socket.link is None else socket.link[0]
                 if target in trail:
                     self._cut(key, identifier)
                 elif target is not None and target not in finished:

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from . import converter, input, shader, texture, vector
+from . import converter, inputs, shader, texture, vector
 from .entry import Entry
 
-REGISTRY: tuple[Entry, ...] = shader.ENTRIES + texture.ENTRIES + input.ENTRIES + vector.ENTRIES + converter.ENTRIES
+REGISTRY: tuple[Entry, ...] = shader.ENTRIES + texture.ENTRIES + inputs.ENTRIES + vector.ENTRIES + converter.ENTRIES
 
 _BY_TYPE: dict[str, tuple[Entry, ...]] = {}
 for _entry in REGISTRY:
     _BY_TYPE[_entry.type] = (*_BY_TYPE.get(_entry.type, ()), _entry)
 
 
-def known(type: str) -> bool:
+def known(node_type: str) -> bool:
     """Is any variant of this node type in the table?"""
-    return type in _BY_TYPE
+    return node_type in _BY_TYPE
 
 
-def find(type: str, properties: dict[str, object]) -> Entry | None:
+def find(node_type: str, properties: dict[str, object]) -> Entry | None:
     """The entry that draws a node of this type with these properties, or None."""
-    for entry in _BY_TYPE.get(type, ()):
+    for entry in _BY_TYPE.get(node_type, ()):
         if entry.matches(properties):
             return entry
     return None

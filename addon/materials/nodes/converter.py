@@ -50,7 +50,7 @@ def _average(*names: str):
     return estimate
 
 
-def _mix(type: str, factor: str, a: str, b: str, output: str, clamp_factor: str, clamp_result: str, when: dict):
+def _mix(node_type: str, factor: str, a: str, b: str, output: str, clamp_factor: str, clamp_result: str, when: dict):
     """Blend of two colours; plain mixing has bounds, other modes do not."""
     arguments = (
         Socket(factor, "FLOAT", 0.5, clamp=clamp_factor),
@@ -61,7 +61,7 @@ def _mix(type: str, factor: str, a: str, b: str, output: str, clamp_factor: str,
     bounds = _between(factor, a, b, output)
     return (
         Entry(
-            type,
+            node_type,
             "blend_mix",
             arguments,
             outputs,
@@ -71,7 +71,7 @@ def _mix(type: str, factor: str, a: str, b: str, output: str, clamp_factor: str,
             estimate=bounds,
         ),
         Entry(
-            type,
+            node_type,
             "blend_{blend_type}",
             arguments,
             outputs,

@@ -212,14 +212,14 @@ ENTRIES = (
     ),
     *(
         Entry(
-            type,
+            node_type,
             "shader_diffuse",
             (Socket("Color", "COLOR", GREY), Expression("0.0"), NORMAL),
             include="material/shader.glsl",
             note=note,
             summary=_diffuse,
         )
-        for type, note in (
+        for node_type, note in (
             ("ShaderNodeSubsurfaceScattering", SUBSURFACE),
             ("ShaderNodeBsdfTranslucent", "Translucency is drawn as diffuse, lit from the front."),
             ("ShaderNodeBsdfSheen", "Sheen is drawn as diffuse."),

@@ -1,0 +1,214 @@
+"""GLSL for the value part of a tree: what the sockets of shaders read, each node computed once.
+
+Holds everything that a program collects on the way: constants, attributes, images, includes, lines of code, sentences.
+"""
+
+from __future__ import annotations
+
+from . import nodes
+from .compiled import Attribute
+from .graph import Graph, Node
+from .nodes import entry as words
+from .nodes.entry import Entry
+from .nodes.texture import IMAGE_FUNCTIONS, MISSING_COLOR
+from .values import ValueBlock, glsl_number, to_kind
+
+MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
+MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the programs that include the material
+
+IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
+
+GLSL_TYPES = {"FLOAT": "float", "VECTOR": "vec3", "COLOR": "vec3"}
+
+
+def convert(expression: str, kind: str, wanted: str) -> str:
+    """GLSL that turns a value of one kind into another, as Blender does between sockets."""
+    if kind == wanted or {kind, wanted} == {"VECTOR", "COLOR"}:
+        return expression
+    if wanted == "FLOAT":
+        return f"color_luminance({expression})" if kind == "COLOR" else f"vector_average({expression})"
+    return f"vec3({expression})"
+
+
+class Expressions:
+    """The program text of one material while it grows."""
+
+    def __init__(self, name: str, graph: Graph, images: dict | None) -> None:
+        self.name, self.graph, self.images = name, graph, images
+        self.fallbacks: dict[tuple[str, str], None] = {}
+        self.values = ValueBlock()
+        self.attributes: list[Attribute] = []
+        self.image_keys: list[str] = []
+        self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
+        self.lines: list[str] = []
+        self.outputs: dict[tuple[str, str], tuple[str, str]] = {}  # link -> GLSL variable, kind
+        self._done: set[str] = set()
+        self._read_outputs = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+
+    def text(self) -> str:
+        """The whole source: includes, the images' functions, evaluate_material."""
+        includes = "".join(f'#include "{path}"\n' for path in self.includes)
+        functions = "".join("\n" + IMAGE_FUNCTIONS.format(k=k) for k in range(len(self.image_keys)))
+        body = "".join(f"  {line}\n" for line in self.lines)
+        head = "void evaluate_material(in SurfacePoint point, inout Closures closures)"
+        return f"{includes}{functions}\n{head}\n{{\n{body}}}\n"
+
+    def note(self, node: Node, sentence: str) -> None:
+        self.fallbacks.setdefault((node.label, sentence))
+
+    def exists(self, link: tuple[str, str] | None) -> bool:
+        return link is not None and link[0] in self.graph.nodes
+
+    def describe(self, node: Node, entry: Entry) -> None:
+        """The sentences of a node that is drawn otherwise than Cycles would."""
+        if entry.note:
+            self.note(node, entry.note)
+        for approximation in entry.approximations:
+            socket = node.inputs.get(approximation.socket)
+            settled = node.inputs.get(approximation.unless_linked)
+            if socket is None or (settled is not None and self.exists(settled.link)):
+                continue
+            if self.exists(socket.link) or to_kind(socket.value, socket.kind, "FLOAT") != approximation.harmless:
+                self.note(node, approximation.sentence)
+        for name, values, sentence in entry.setting_approximations:
+            if node.properties.get(name) in values:
+                self.note(node, sentence)
+
+    def require(self, node: Node, entry: Entry) -> None:
+        """Emit all value nodes that this node's sockets read, deepest first; a loop, because trees can be deep."""
+        stack = self._sources(node, entry)[::-1]
+        while stack:
+            key = stack[-1]
+            if key in self._done:
+                stack.pop()
+                continue
+            source = self.graph.nodes[key]
+            found = nodes.find(source.type, source.properties)
+            missing = [] if found is None else [k for k in self._sources(source, found) if k not in self._done]
+            # A node on the stack waits for this one already: the reader cuts cycles, hand-made graphs may not.
+            missing = [k for k in missing if k not in stack]
+            if missing:
+                stack += missing[::-1]
+                continue
+            stack.pop()
+            self._done.add(key)
+            self._value_node(source, found)
+
+    def _sources(self, node: Node, entry: Entry) -> list[str]:
+        keys = []
+        for argument in entry.arguments:
+            if isinstance(argument, words.Socket):
+                socket = node.inputs.get(argument.identifier)
+                if socket is not None and self.exists(socket.link):
+                    keys.append(socket.link[0])
+        return keys
+
+    def _value_node(self, node: Node, entry: Entry | None) -> None:
+        if entry is None or entry.combine or entry.summary or not self._settings_known(node, entry):
+            if "SHADER" not in node.outputs.values():
+                self.note(node, f"'{node.label}' is not supported yet; what it feeds keeps the value set there.")
+            return
+        number = len(self._done)
+        names = {identifier: f"n{number}_{i}" for i, (identifier, _) in enumerate(entry.outputs)}
+        if entry.image and not self._image_index(node):
+            for identifier, kind in entry.outputs:
+                value = MISSING_COLOR if kind == "COLOR" else 1.0
+                self.lines.append(f"{GLSL_TYPES[kind]} {names[identifier]} = {glsl_number(value, kind)};")
+                self.outputs[node.key, identifier] = names[identifier], kind
+            return
+        self.include(entry)
+        arguments = [self.argument(node, entry, argument) for argument in entry.arguments]
+        for identifier, kind in entry.outputs:
+            self.lines.append(f"{GLSL_TYPES[kind]} {names[identifier]};")
+            self.outputs[node.key, identifier] = names[identifier], kind
+        self.lines.append(f"{self._function(node, entry)}({', '.join([*arguments, *names.values()])});")
+        if node.properties.get(entry.clamp_result):
+            for identifier, kind in entry.outputs:
+                zero, one = glsl_number(0.0, kind), glsl_number(1.0, kind)
+                self.lines.append(f"{names[identifier]} = clamp({names[identifier]}, {zero}, {one});")
+        self.describe(node, entry)
+
+    def _settings_known(self, node: Node, entry: Entry) -> bool:
+        return all(node.properties.get(name, allowed[0]) in allowed for name, allowed in entry.choices.items())
+
+    def _function(self, node: Node, entry: Entry) -> str:
+        settings = {name: str(node.properties.get(name, items[0])).lower() for name, items in entry.choices.items()}
+        if entry.image:
+            settings["image"] = str(self.image_keys.index(node.image))
+        return entry.function.format(**settings)
+
+    def _image_index(self, node: Node) -> bool:
+        """Give the node's image a sampler; False, with a sentence, where that is impossible."""
+        if node.image == "" or (self.images is not None and node.image not in self.images):
+            self.note(node, f"The image of '{node.label}' is missing; it is drawn pink.")
+            return False
+        if node.image not in self.image_keys:
+            if len(self.image_keys) >= MAX_IMAGES:
+                self.note(node, f"The material reads more than {MAX_IMAGES} images; '{node.label}' is drawn pink.")
+                return False
+            self.image_keys.append(node.image)
+        return True
+
+    def include(self, entry: Entry) -> None:
+        if entry.include:
+            self.includes.setdefault(entry.include)
+
+    def argument(self, node: Node, entry: Entry, argument: words.Argument) -> str:
+        if isinstance(argument, words.Socket):
+            return self.socket(node, argument)
+        if isinstance(argument, words.Expression):
+            return argument.glsl
+        if isinstance(argument, words.Choice):
+            return str(argument.items.get(node.properties.get(argument.property), argument.missing))
+        if isinstance(argument, words.Setting):
+            value = node.properties.get(argument.property, argument.default)
+            return self.values.add(to_kind(value, "FLOAT", "FLOAT"), "FLOAT")
+        if isinstance(argument, words.Attribute):
+            return self._attribute(node, argument.kind, str(node.properties.get(argument.property, "")))
+        if isinstance(argument, words.Used):
+            return "true" if (node.key, argument.output) in self._read_outputs else "false"
+        return self.values.add(float(self._image_flags(node.image)), "FLOAT")
+
+    def socket(self, node: Node, socket: words.Socket) -> str:
+        expression = self._socket_value(node, socket)
+        if socket.clamp and (socket.clamp == "*" or node.properties.get(socket.clamp, True)):
+            zero, one = glsl_number(0.0, socket.kind), glsl_number(1.0, socket.kind)
+            return f"clamp({expression}, {zero}, {one})"
+        return expression
+
+    def _socket_value(self, node: Node, socket: words.Socket) -> str:
+        given = node.inputs.get(socket.identifier)
+        if given is not None and self.exists(given.link):
+            if given.link in self.outputs:
+                return convert(*self.outputs[given.link], socket.kind)
+            source = self.graph.nodes[given.link[0]]
+            entry = nodes.find(source.type, source.properties)
+            if entry is not None and given.link[1] not in dict(entry.outputs):
+                self.note(
+                    source,
+                    f"The output '{given.link[1]}' of '{source.label}' is not supported yet; what it feeds keeps the "
+                    "value set there.",
+                )
+        if socket.implicit == "@UV":
+            return f"vec3({self._attribute(node, 'UV', '')}.xy, 0.0)"
+        if socket.implicit:
+            return socket.implicit
+        value, kind = (socket.default, socket.kind) if given is None else (given.value, given.kind)
+        return self.values.add(to_kind(socket.default if value is None else value, kind, socket.kind), socket.kind)
+
+    def _attribute(self, node: Node, kind: str, name: str) -> str:
+        attribute = Attribute(kind, name)
+        if attribute not in self.attributes:
+            if len(self.attributes) >= MAX_ATTRIBUTES:
+                self.note(
+                    node, f"The material reads more than {MAX_ATTRIBUTES} attributes; '{node.label}' reads zeros."
+                )
+                return "vec4(0.0)"
+            self.attributes.append(attribute)
+        return f"point.attributes[{self.attributes.index(attribute)}]"
+
+    def _image_flags(self, key: str) -> int:
+        image = (self.images or {}).get(key)
+        if image is None:
+            return IMAGE_FLAGS["NONE"]
+        return IMAGE_FLAGS.get(image.alpha_mode, 0) + (1 if image.encoding == "SRGB" else 0)
