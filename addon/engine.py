@@ -1,0 +1,186 @@
+"""The render engine that Blender sees: thin, owns nothing.
+
+Blender makes two instances per final render and throws viewport instances away on a mode change, so what lives longer
+(meshes, programs, accumulated frames) stands in `_sessions`, keyed by scene and use, and is freed in `free_sessions`.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from . import techniques
+from .frame import ledger as ledgers
+from .frame.run import Frame, Renderer
+from .gfx import context
+from .snapshot import SnapshotCache, UnsupportedScene, take
+from .ui.properties import settings_of
+
+ENGINE = "CANDELA"
+
+
+@dataclass
+class Session:
+    """What one scene's renders share: the renderer on the GPU, and what the sync may reuse."""
+
+    renderer: Renderer = field(default_factory=lambda: Renderer(techniques.make_registry))
+    cache: SnapshotCache = field(default_factory=SnapshotCache)
+
+
+_sessions: dict[tuple, Session] = {}
+
+
+def session(scene: bpy.types.Scene, use: str) -> Session:
+    """The session of a scene for 'final', 'preview' or a viewport."""
+    return _sessions.setdefault((scene.original.session_uid, use), Session())
+
+
+def free_sessions() -> None:
+    """Free all GPU resources and cached scene data."""
+    _sessions.clear()
+    context.release_all()
+
+
+class CandelaEngine(bpy.types.RenderEngine):
+    """Real-time global illumination, sample by sample."""
+
+    bl_idname = ENGINE
+    bl_label = "Candela"
+    bl_use_preview = True
+    bl_use_gpu_context = True
+    bl_use_shading_nodes_custom = False
+    bl_use_eevee_viewport = True
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+
+    # ---------------------------------------------------------------------------------------------- final render
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        """Tell Blender (and the compositor) which passes will come."""
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for render_pass in _wanted_passes(renderlayer):
+            name, channels, kind, _ = render_pass
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def update(self, data, depsgraph):
+        """Read the scene while Blender keeps it locked."""
+        started = time.perf_counter()
+        scene = depsgraph.scene
+        shared = session(scene, "preview" if self.is_preview else "final")
+        self._snapshot = None
+        self.update_stats("Candela", "Reading the scene")
+        try:
+            self._snapshot = take(
+                depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override
+            )
+        except UnsupportedScene as error:
+            self._fail(str(error))
+        self._sync_seconds = time.perf_counter() - started
+
+    def render(self, depsgraph):
+        """Draw all samples and hand the passes to Blender. The GPU context is active."""
+        started = time.perf_counter()
+        snapshot = getattr(self, "_snapshot", None)
+        if snapshot is None:
+            return
+        scene, layer = depsgraph.scene, depsgraph.view_layer
+        shared = session(scene, "preview" if self.is_preview else "final")
+        settings = settings_of(scene, viewport=False, preview=self.is_preview)
+        try:
+            frame = shared.renderer.begin(snapshot, settings, self._compiling)
+            frame.ledger.times["sync"] = self._sync_seconds
+            width, height = frame.size
+            result = self.begin_result(0, 0, width, height, layer=layer.name)
+            while frame.samples_done < settings.samples:
+                if self.test_break():
+                    self.end_result(result, cancel=True)
+                    shared.renderer.finish(frame, ())
+                    return
+                shared.renderer.advance(frame)
+                self.update_stats("Candela", f"Sample {frame.samples_done} of {settings.samples}")
+                self.update_progress(frame.samples_done / settings.samples)
+            wanted = _wanted_passes(layer)
+            pixels = _finished(shared.renderer, frame, wanted)
+            for name, array in pixels.items():
+                render_pass = result.layers[0].passes.find_by_name(name, "")
+                if render_pass is not None:
+                    render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())
+            self.end_result(result)
+        except (ValueError, RuntimeError) as error:
+            self._fail(str(error))
+            return
+        ledger = ledgers.latest()
+        ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
+        if not self.is_preview:
+            for note in ledger.notes:
+                self.report({"WARNING"}, note)
+            if ledger.bad_pixels:
+                self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
+
+    def _compiling(self, done: int, total: int) -> bool:
+        self.update_stats("Candela", f"Compiling shaders {done} of {total}")
+        return self.test_break()
+
+    def _fail(self, sentence: str) -> None:
+        self.error_set(sentence)
+        self.report({"ERROR"}, sentence)
+
+
+# ------------------------------------------------------------------------------------------------------------- passes
+
+# Switch of the view layer, Blender's name since 5.0 and before, channels, type, how it is made from the frame's images.
+_PASSES = (
+    ("use_pass_z", "Depth", "Depth", "Z", "VALUE", "film.depth"),
+    ("use_pass_normal", "Normal", "Normal", "XYZ", "VECTOR", "surface.normal_sum"),
+    ("use_pass_diffuse_direct", "Diffuse Direct", "DiffDir", "RGB", "COLOR", "radiance.diffuse_direct / color.diffuse"),
+    ("use_pass_diffuse_color", "Diffuse Color", "DiffCol", "RGB", "COLOR", "color.diffuse"),
+    ("use_pass_glossy_direct", "Glossy Direct", "GlossDir", "RGB", "COLOR", "radiance.glossy_direct / color.glossy"),
+    ("use_pass_glossy_color", "Glossy Color", "GlossCol", "RGB", "COLOR", "color.glossy"),
+    ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
+    ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),
+)  # fmt: skip
+
+
+def _wanted_passes(layer) -> list[tuple[str, str, str, str]]:
+    """(Blender's name, channels, type, source) of the passes that the view layer asks for."""
+    since_5 = bpy.app.version >= (5, 0)
+    return [
+        (name if since_5 else old, channels, kind, source)
+        for switch, name, old, channels, kind, source in _PASSES
+        if getattr(layer, switch)
+    ]
+
+
+def _finished(renderer: Renderer, frame: Frame, wanted) -> dict[str, np.ndarray]:
+    """Pass pixels by Blender's name, (H, W, channels) float32."""
+    from .techniques.film import resolve
+
+    resolve(frame)
+    names = {"film.combined"}
+    for _, _, _, source in wanted:
+        names.update(source.split(" / "))
+    arrays = renderer.finish(frame, sorted(names))
+    out = {"Combined": arrays["film.combined"]}
+    exposure = frame.snapshot.film.exposure
+    for name, channels, _, source in wanted:
+        image, _, color = source.partition(" / ")
+        pixels = arrays[image][..., : len(channels)]
+        if color:
+            pixels = divide_by_color(pixels, arrays[color][..., :3])
+        if image.startswith("radiance."):
+            pixels = pixels * exposure
+        out[name] = pixels
+    return out
+
+
+def divide_by_color(light: np.ndarray, color: np.ndarray) -> np.ndarray:
+    """Light over colour per channel, as Cycles writes its passes: a channel without colour takes the mean of others."""
+    has = color != 0.0
+    quotient = np.where(has, light / np.where(has, color, 1.0), 0.0)
+    count = has.sum(axis=-1, keepdims=True)
+    mean = quotient.sum(axis=-1, keepdims=True) / np.maximum(count, 1)
+    return np.where(has, quotient, mean).astype(np.float32)

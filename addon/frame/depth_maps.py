@@ -1,0 +1,265 @@
+"""Depth maps from points and directions of light: which views are needed, where they lie in the atlas, drawing them.
+
+A view covers what the camera sees (the receivers), not the scene, so that texels are not spent on what no pixel
+asks for. Receivers are given as boxes of screen tiles. Where the picture reaches from near to far, they are split by
+distance and the near part gets a view of its own; where a light sees them under wide angles, faces of a cube do.
+Every view is shifted and turned at random each sample, so that texel edges average out instead of standing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gfx import images, passes
+from ..gfx.library import Program
+from .geometry import SHADOW_FLAG, SceneGeometry
+
+VIEW_TEXELS = 5
+WIDEST_TANGENT = 2.5  # a single view up to 68 degrees half angle; beyond it, cube faces
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
+
+
+@dataclass(frozen=True)
+class Receivers:
+    """Boxes around what the camera sees, relative to the render origin, in order of distance from the camera."""
+
+    low: np.ndarray  # (T, 3)
+    high: np.ndarray  # (T, 3)
+    distance: np.ndarray  # (T,) from the camera, metres
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(T, 8, 3)"""
+        return self.low[:, None] + CORNERS[None] * (self.high - self.low)[:, None]
+
+    def groups(self) -> list[np.ndarray]:
+        """Indices by distance, each group reaching at most four times as far as the one before."""
+        if not len(self.distance):
+            return []
+        far = max(float(self.distance.max()), 1e-30)
+        level = np.clip(np.floor(np.log(far / np.maximum(self.distance, far * 1e-9)) / np.log(4.0)), 0, 3)
+        return [np.flatnonzero(level == k) for k in (3, 2, 1, 0) if (level == k).any()]
+
+
+@dataclass(frozen=True)
+class MapView:
+    """One projection: rows x, y, w, q (see addon/frame/view.py) and the near distance of its depth buffer."""
+
+    rows: np.ndarray  # (4, 4) float64
+    near: float
+    light_point: tuple[float, float, float, float]  # xyz, w: position (1) or direction (0)
+    scale: int = 1  # resolution is divided by this
+
+
+def directional_views(direction, receivers: Receivers, geometry: SceneGeometry, jitter, resolution) -> list[MapView]:
+    """Orthographic views for light from `direction` (unit, towards the light). `jitter`: four uniform numbers."""
+    if not len(receivers.distance):
+        return []
+    u, v = _frame(direction, jitter[2] * 2 * np.pi)
+    corners = receivers.corners
+    place = np.stack([corners @ u, corners @ v], axis=-1)  # (T, 8, 2)
+    scene_low, scene_high = geometry.bounds_min - geometry.origin, geometry.bounds_max - geometry.origin
+    heights = (scene_low + CORNERS * (scene_high - scene_low)) @ direction
+    bottom = min(float((corners @ direction).min()), float(heights.max()))
+    top = max(float(heights.max()), float((corners @ direction).max()))
+    margin = 1e-3 * max(top - bottom, 1e-6 * geometry.size)
+    bottom, top = bottom - margin, top + margin
+    one = np.array([0.0, 0.0, 0.0, 1.0])
+    row_q = np.append(direction, -bottom) / (top - bottom)
+    views = []
+    for low, high in _merged_rectangles(place, receivers.groups(), 1e-6 * geometry.size):
+        low, high = _padded(low, high, jitter, resolution)
+        row_x = np.append(2 * u, -(low[0] + high[0])) / (high[0] - low[0])
+        row_y = np.append(2 * v, -(low[1] + high[1])) / (high[1] - low[1])
+        views.append(MapView(np.stack([row_x, row_y, one, row_q]), 1.0, (*direction, 0.0)))
+    return views
+
+
+def point_views(
+    position, axis, cone_tangent: float, receivers: Receivers, geometry: SceneGeometry, jitter, resolution
+) -> list[MapView]:
+    """Perspective views from `position` (relative to the origin).
+
+    `axis` is None for a light that shines everywhere; else the unit axis of emission, and only receivers within
+    `cone_tangent` (inf for a half space) of it matter. Empty if no receiver can be lit.
+    """
+    near = 1e-4 * geometry.size
+    offsets = receivers.corners - position
+    if axis is not None:
+        keep = ((offsets @ axis) > 0).any(axis=1)
+        offsets = offsets[keep]
+        index = np.flatnonzero(keep)
+    else:
+        index = np.arange(len(offsets))
+    if not len(index):
+        return []
+    centre = offsets.mean(axis=(0, 1))
+    forward = axis if axis is not None else _unit(centre)
+    u, v = _frame(-forward, jitter[2] * 2 * np.pi)
+    depth = offsets @ forward
+    lateral = np.stack([offsets @ u, offsets @ v], axis=-1)
+    ahead = depth > 1e-6 * geometry.size
+    tangents = np.where(ahead[..., None], lateral / np.where(ahead, depth, 1.0)[..., None], np.inf)
+    if cone_tangent <= WIDEST_TANGENT:
+        tangents = np.clip(tangents, -cone_tangent, cone_tangent)
+    wide = ~np.isfinite(tangents).all(axis=(1, 2)) | (np.abs(tangents) > WIDEST_TANGENT).any(axis=(1, 2))
+    if not wide.any():
+        groups = [g for g in (np.flatnonzero(np.isin(index, group)) for group in receivers.groups()) if len(g)]
+        return [
+            _perspective(position, u, v, forward, *_padded(low, high, jitter, resolution), near)
+            for low, high in _merged_rectangles(tangents, groups, 1e-6)
+        ]
+    views = []
+    centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
+    for face_forward, face_u, face_v in (
+        (forward, u, v), (u, v, forward), (-u, v, -forward), (v, forward, u), (-v, forward, -u), (-forward, u, -v),
+    ):  # fmt: skip
+        # A box meets the face's pyramid if its sphere lies on the inner side of all four planes.
+        inside = np.ones(len(centre), bool)
+        for side in (face_u, -face_u, face_v, -face_v):
+            inside &= (centre @ (face_forward - side)) > -np.sqrt(2.0) * radius
+        if axis is not None and face_forward is not forward and not (offsets[inside] @ axis > 0).any():
+            continue
+        if inside.any():
+            size = max(resolution // 2, 1)
+            slack = 2.0 / size  # faces overlap by more than their jitter
+            low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
+            shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
+            views.append(_perspective(position, face_u, face_v, face_forward, low + shift, high + shift, near, 2))
+    return views
+
+
+def _perspective(position, u, v, forward, low, high, near, scale=1) -> MapView:
+    row_w = np.append(forward, -forward @ position)
+    x, y = np.append(u, -u @ position), np.append(v, -v @ position)
+    row_x = (2 * x - (low[0] + high[0]) * row_w) / (high[0] - low[0])
+    row_y = (2 * y - (low[1] + high[1]) * row_w) / (high[1] - low[1])
+    one = np.array([0.0, 0.0, 0.0, 1.0])
+    return MapView(np.stack([row_x, row_y, row_w, one]), near, (*position, 1.0), scale)
+
+
+def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float):
+    """Rectangles (low, high) for groups from near to far. A group joins the one before if that stays affordable."""
+    rectangles = []
+    for group in groups:
+        low, high = place[group].min(axis=(0, 1)), place[group].max(axis=(0, 1))
+        high = np.maximum(high, low + floor)
+        if rectangles:
+            last_low, last_high = rectangles[-1]
+            both_low, both_high = np.minimum(last_low, low), np.maximum(last_high, high)
+            if (both_high - both_low).max() <= 3.0 * (last_high - last_low).max():
+                rectangles[-1] = (both_low, both_high)
+                continue
+        rectangles.append((low, high))
+    return rectangles
+
+
+def _padded(low, high, jitter, resolution):
+    """Room for the film filter and for a shift below one texel."""
+    size = high - low
+    low, high = low - 0.02 * size, high + 0.02 * size
+    shift = (np.array(jitter[:2]) - 0.5) * (high - low) / resolution
+    return low + shift, high + shift
+
+
+def _frame(normal, turn: float):
+    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    a = _unit(np.cross(helper, normal))
+    b = np.cross(normal, a)
+    return np.cos(turn) * a + np.sin(turn) * b, np.cos(turn) * b - np.sin(turn) * a
+
+
+def _unit(v):
+    length = np.linalg.norm(v)
+    return v / length if length > 0 else np.array([0.0, 0.0, -1.0])
+
+
+# ------------------------------------------------------------------------------------------------ atlas and drawing
+
+PROJECTION_CONSTANTS = (
+    ("VEC4", "row_x"), ("VEC4", "row_y"), ("VEC4", "row_w"), ("VEC4", "row_q"), ("FLOAT", "near"),
+    ("INT", "first_instance"),
+)  # fmt: skip
+PROJECTION_DEFINES = (("PROJECTION", "row_x, row_y, row_w, row_q, near"), ("VISIBILITY_FLAG", str(SHADOW_FLAG)))
+
+OPAQUE = Program(
+    name="depth map",
+    vertex="depth_map/opaque.vert.glsl",
+    fragment="depth_map/opaque.frag.glsl",
+    inputs=(("VEC3", "position"), ("INT", "local_instance")),
+    varyings=(("smooth", "VEC2", "depth_terms"),),
+    outputs=(("VEC4", "out_depth"),),
+    textures=(("FLOAT_2D", "instances"),),
+    constants=PROJECTION_CONSTANTS,
+    defines=PROJECTION_DEFINES,
+)
+
+
+class Atlas:
+    """One square image of depth maps in equal cells, and the list of what each cell shows."""
+
+    def __init__(self):
+        self.target: images.Target | None = None
+        self.view_list: images.Image | None = None
+
+    def prepare(self, views: list[MapView], resolution: int) -> list[tuple[int, int, int]]:
+        """Cells (x, y, size) for the views; makes the images and uploads the list."""
+        columns = max(1, int(np.ceil(np.sqrt(len(views)))))
+        rows = max(1, -(-len(views) // columns))
+        size = (columns * resolution, rows * resolution)
+        if self.target is None or self.target.size != size:
+            self.release()
+            self.target = images.Target(
+                (images.pool.take(*size, "RGBA32F"),), images.pool.take(*size, "DEPTH_COMPONENT32F")
+            )
+        cells = []
+        texels = np.zeros((len(views), VIEW_TEXELS, 4))
+        for k, view in enumerate(views):
+            side = resolution // view.scale
+            cell = ((k % columns) * resolution, (k // columns) * resolution, side)
+            cells.append(cell)
+            texels[k, :4] = view.rows
+            texels[k, 4] = *cell, 0.0
+        self.view_list = images.upload_list(texels.reshape(-1, 4))
+        return cells
+
+    def release(self) -> None:
+        if self.target is not None:
+            images.pool.give(self.target.colors[0])
+            images.pool.give(self.target.depth)
+        self.target = self.view_list = None
+
+
+def draw_views(atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometry, alpha_casters, sample: int) -> int:
+    """Draw all casters into every view. `alpha_casters` is frame.materials' list of (Draw, shader, bindings).
+
+    Returns how many triangles were sent.
+    """
+    sent = 0
+    atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+    shader = passes.get(OPAQUE)
+    for view, cell in zip(views, cells):
+        constants = {
+            "row_x": view.rows[0], "row_y": view.rows[1], "row_w": view.rows[2], "row_q": view.rows[3],
+            "near": view.near,
+        }  # fmt: skip
+        with passes.drawing(atlas.target, viewport=(cell[0], cell[1], cell[2], cell[2])):
+            if geometry.opaque_casters:
+                shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
+                for draw in geometry.opaque_casters:
+                    shader.set_constant("first_instance", draw.first)
+                    passes.draw(shader, draw.batch, draw.count)
+                    sent += draw.triangles
+            for draw, alpha_shader, bindings in alpha_casters:
+                alpha_shader.bind(
+                    **bindings,
+                    constants={
+                        **constants, "first_instance": draw.first, "sample_index": sample,
+                        "light_point": view.light_point,
+                    },
+                )  # fmt: skip
+                passes.draw(alpha_shader, draw.batch, draw.count)
+                sent += draw.triangles
+    return sent

@@ -1,0 +1,128 @@
+"""The world as a light: its radiance as an image, and directions drawn in proportion to it.
+
+Directions are drawn from a grid over the equirectangular image, with a density per steradian that follows the mean
+luminance of each cell; a twentieth is spread evenly, so that no direction with light has zero density.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..gfx import images
+from ..gfx.struct import Block, Struct
+from ..snapshot.scene import World
+
+WORLD = Struct(
+    "World",
+    ("vec4", "color"),  # factor on the map; w = 1 if the camera sees the world
+    ("vec4", "map_x"),  # world direction -> map direction, row by row
+    ("vec4", "map_y"),
+    ("vec4", "map_z"),
+    ("vec4", "map_options"),  # x = 1 for a transparent film
+)
+LARGEST_GRID = (256, 512)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+class Environment:
+    """GPU images and sampling tables of one World."""
+
+    def __init__(self, world: World, transparent_film: bool):
+        self.color = np.asarray(world.color, np.float64)
+        pixels, mapping = _pixels(world)
+        self.pixels = pixels
+        self.rotation = mapping[:, :3]
+        luminance = np.maximum(pixels @ np.abs(LUMINANCE * np.sign(self.color)), 0.0)
+        self.power = float(np.abs(self.color).max() * luminance.max())
+        density = _density(luminance)
+        self.density = density  # per steradian, rows from the bottom
+        self.map = images.upload(np.dstack([pixels, np.ones(pixels.shape[:2])]).astype(np.float32))
+        self.density_map = images.upload(density.astype(np.float32), "R32F")
+        rows = np.concatenate([mapping, np.zeros((3, 4 - mapping.shape[1]))], axis=1)
+        self.block = Block(
+            WORLD, color=(*self.color, float(world.visibility.camera)), map_x=rows[0], map_y=rows[1], map_z=rows[2],
+            map_options=(float(transparent_film), 0, 0, 0),
+        )  # fmt: skip
+        height, width = density.shape
+        edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
+        mass = density * np.diff(edges)[:, None] * (2 * np.pi / width)
+        self._edges = edges
+        self._rows = np.concatenate([[0.0], np.cumsum(mass.sum(axis=1))])
+        self._columns = np.concatenate([np.zeros((height, 1)), np.cumsum(mass, axis=1)], axis=1)
+
+    def draw(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """From two uniform numbers: direction (unit, world), radiance from there, density per steradian."""
+        height, width = self.density.shape
+        y *= self._rows[-1]
+        row = int(np.clip(np.searchsorted(self._rows, y, side="right") - 1, 0, height - 1))
+        along = (y - self._rows[row]) / max(self._rows[row + 1] - self._rows[row], 1e-300)
+        columns = self._columns[row]
+        x *= columns[-1]
+        column = int(np.clip(np.searchsorted(columns, x, side="right") - 1, 0, width - 1))
+        across = (x - columns[column]) / max(columns[column + 1] - columns[column], 1e-300)
+        z = self._edges[row] + np.clip(along, 0, 1) * (self._edges[row + 1] - self._edges[row])
+        azimuth = (0.5 - (column + np.clip(across, 0, 1)) / width) * 2 * np.pi
+        ring = np.sqrt(max(1.0 - z * z, 0.0))
+        in_map = np.array([ring * np.cos(azimuth), ring * np.sin(azimuth), z])
+        direction = np.linalg.solve(self.rotation, in_map)
+        direction /= np.linalg.norm(direction)
+        return direction, self.lookup(in_map) * self.color, float(self.density[row, column])
+
+    def lookup(self, in_map: np.ndarray) -> np.ndarray:
+        """Bilinear radiance (without the factor) in a direction of the map's own frame."""
+        height, width = self.pixels.shape[:2]
+        u = 0.5 - np.arctan2(in_map[1], in_map[0]) / (2 * np.pi)
+        v = 0.5 + np.arcsin(np.clip(in_map[2], -1, 1)) / np.pi
+        px, py = u * width - 0.5, v * height - 0.5
+        x0, y0 = int(np.floor(px)), int(np.floor(py))
+        tx, ty = px - x0, py - y0
+        columns, rows = np.array([x0, x0 + 1]) % width, np.clip([y0, y0 + 1], 0, height - 1)
+        block = self.pixels[np.ix_(rows, columns)]
+        return np.einsum("ijk,i,j->k", block, [1 - ty, ty], [1 - tx, tx])
+
+
+def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """Radiance image (H, W, 3) finite and linear, and the mapping to it, which is a rotation (3, 3)."""
+    if world.image is None:
+        return np.ones((1, 1, 3)), np.eye(3)
+    pixels = np.nan_to_num(world.image.pixels[..., :3].astype(np.float64), nan=0.0, posinf=65504.0, neginf=0.0)
+    if world.image.encoding == "SRGB":
+        pixels = np.where(pixels < 0.04045, pixels / 12.92, ((np.maximum(pixels, 0) + 0.055) / 1.055) ** 2.4)
+    mapping = np.eye(3, 4) if world.mapping is None else np.asarray(world.mapping, np.float64)
+    linear, offset = mapping[:, :3], mapping[:, 3]
+    scale = np.cbrt(np.linalg.det(linear))
+    if scale > 0 and not offset.any() and np.allclose(linear @ linear.T, np.eye(3) * scale**2, atol=1e-5 * scale**2):
+        return pixels, linear / scale
+    # A sheared or shifted mapping is baked once into an image of the world itself.
+    height, width = pixels.shape[:2]
+    v, u = np.mgrid[0:height, 0:width]
+    latitude, azimuth = ((v + 0.5) / height - 0.5) * np.pi, (0.5 - (u + 0.5) / width) * 2 * np.pi
+    direction = np.stack(
+        [np.cos(latitude) * np.cos(azimuth), np.cos(latitude) * np.sin(azimuth), np.sin(latitude)], axis=-1
+    )
+    mapped = direction @ linear.T + offset
+    mapped /= np.maximum(np.linalg.norm(mapped, axis=-1, keepdims=True), 1e-20)
+    column = (0.5 - np.arctan2(mapped[..., 1], mapped[..., 0]) / (2 * np.pi)) * width
+    row = (0.5 + np.arcsin(np.clip(mapped[..., 2], -1, 1)) / np.pi) * height
+    return pixels[np.clip(row.astype(int), 0, height - 1), column.astype(int) % width], np.eye(3)
+
+
+def _density(luminance: np.ndarray) -> np.ndarray:
+    """Density per steradian on a grid of at most LARGEST_GRID cells."""
+    height, width = luminance.shape
+    rows, columns = min(height, LARGEST_GRID[0]), min(width, LARGEST_GRID[1])
+    row_of, column_of = np.arange(height) * rows // height, np.arange(width) * columns // width
+    total, count = np.zeros((rows, columns)), np.zeros((rows, columns))
+    np.add.at(total, (row_of[:, None], column_of[None]), luminance)
+    np.add.at(count, (row_of[:, None], column_of[None]), 1.0)
+    cells = total / count
+    # Radiance is filtered over the neighbours, so a cell beside a bright one holds light too.
+    cells = (cells + np.maximum(np.roll(cells, 1, 1), np.roll(cells, -1, 1)) * 0.25) / 1.25
+    padded = np.pad(cells, ((1, 1), (0, 0)), mode="edge")
+    cells = (cells + np.maximum(padded[:-2], padded[2:]) * 0.25) / 1.25
+    edges = np.sin((np.arange(rows + 1) / rows - 0.5) * np.pi)
+    solid_angle = np.diff(edges)[:, None] * (2 * np.pi / columns)
+    flux = float((cells * solid_angle).sum())
+    if not flux > 0:
+        return np.full((rows, columns), 1.0 / (4 * np.pi))
+    return 0.95 * cells / flux + 0.05 / (4 * np.pi)

@@ -1,0 +1,214 @@
+"""The snapshot's geometry on the GPU: vertex buffers by mesh, transforms in one image, draws by material.
+
+Meshes that are shown many times are drawn as instances. Meshes shown once would cost one draw call each in every
+pass, so they are joined: one vertex buffer, one draw per material, and each vertex knows its instance. Transforms
+always come from the instance image, so moving an object uploads a few numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gfx import geometry as gfx_geometry
+from ..gfx import images
+from ..materials.compiled import Attribute, CompiledMaterial
+from ..snapshot.scene import Instance, Mesh, Snapshot
+
+CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
+TEXELS_PER_INSTANCE = 4
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Triangles of one material: `count` instances from `first` on (joined meshes: one draw, instance per vertex)."""
+
+    material: int
+    batch: gfx_geometry.Batch
+    first: int
+    count: int
+
+    @property
+    def triangles(self) -> int:
+        return self.batch.triangles * self.count
+
+
+@dataclass
+class _Buffers:
+    """Corner arrays of one mesh, or of several joined ones, ready for the GPU."""
+
+    positions: np.ndarray  # (C, 3)
+    normals: np.ndarray
+    instance: np.ndarray  # (C,) int32 instance within the draw
+    meshes: list[Mesh]
+
+
+class SceneGeometry:
+    """Geometry of a snapshot on the GPU. `update` brings it to a new snapshot and uploads what differs."""
+
+    def __init__(self):
+        self.origin = np.zeros(3)
+        self.bounds_min = np.zeros(3)  # of all instances, world space, float64
+        self.bounds_max = np.zeros(3)
+        self.instances: images.Image | None = None
+        self.draws: list[Draw] = []  # by material, corner attributes: surfaces, and casters with alpha
+        self.opaque_casters: list[Draw] = []  # positions only, materials ignored
+        self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
+        self._draw_key = None
+        self._instance_key = None
+        self._mesh_draws: dict = {}
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the scene's bounds in metres; 1 for an empty scene."""
+        diagonal = float(np.linalg.norm(self.bounds_max - self.bounds_min))
+        return diagonal if diagonal > 0.0 else 1.0
+
+    @property
+    def triangles(self) -> int:
+        return sum(draw.triangles for draw in self.draws)
+
+    def update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
+        """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""
+        instances = [i for i in snapshot.instances if snapshot.meshes[i.mesh].triangle_count]
+        order = sorted(range(len(instances)), key=lambda k: (instances[k].mesh, instances[k].materials))
+        instances = [instances[k] for k in order]
+        changed = self._update_transforms(instances, snapshot)
+        key = (
+            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
+            tuple((m.attributes, m.transparent) for m in materials),
+        )
+        if key == self._draw_key:
+            return changed
+        self._draw_key = key
+        self._make_draws(instances, snapshot.meshes, materials)
+        return True
+
+    def _update_transforms(self, instances: list[Instance], snapshot: Snapshot) -> bool:
+        if not instances:
+            self.bounds_min = self.bounds_max = np.zeros(3)
+            matrices = np.zeros((0, 4, 4))
+        else:
+            matrices = np.stack([i.matrix for i in instances]).astype(np.float64)
+            finite = np.isfinite(matrices).all(axis=(1, 2))
+            matrices[~finite] = np.diag([0.0, 0.0, 0.0, 1.0])
+            low = np.stack([snapshot.meshes[i.mesh].bounds_min for i in instances])
+            high = np.stack([snapshot.meshes[i.mesh].bounds_max for i in instances])
+            centre, half = (low + high) / 2, (high - low) / 2
+            world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centre) + matrices[:, :3, 3]
+            reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
+            self.bounds_min, self.bounds_max = (world - reach).min(axis=0), (world + reach).max(axis=0)
+        camera = snapshot.camera.matrix[:3, 3] if snapshot.camera else (self.bounds_min + self.bounds_max) / 2
+        # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
+        grid = 2.0 ** np.ceil(np.log2(self.size)) if instances else 1.0
+        self.origin = np.round(camera / grid) * grid
+        rows = np.zeros((max(len(instances), 1), TEXELS_PER_INSTANCE, 4), np.float32)
+        for k, instance in enumerate(instances):
+            seen = instance.visibility
+            flags = (
+                CAMERA_FLAG * seen.camera + SHADOW_FLAG * seen.shadow + DIFFUSE_FLAG * seen.diffuse
+                + GLOSSY_FLAG * seen.glossy + HOLDOUT_FLAG * instance.holdout
+            )  # fmt: skip
+            rows[k, 3] = (instance.random, instance.pass_index, flags, 0.0)
+        if len(instances):
+            relative = matrices[:, :3, :].copy()
+            relative[:, :, 3] -= self.origin
+            rows[:, :3] = relative
+            rows[:, 3, 3] = np.where(np.linalg.det(matrices[:, :3, :3]) < 0.0, -1.0, 1.0)
+        key = rows.tobytes()
+        if key == self._instance_key:
+            return False
+        self._instance_key = key
+        self.instance_rows = rows
+        self.instances = images.upload_list(rows.reshape(-1, 4))
+        return True
+
+    def _make_draws(self, instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]):
+        runs: list[tuple[int, int]] = []  # first, count of equal (mesh, materials)
+        for k, instance in enumerate(instances):
+            if runs and (instances[runs[-1][0]].mesh, instances[runs[-1][0]].materials) == (
+                instance.mesh,
+                instance.materials,
+            ):
+                runs[-1] = (runs[-1][0], runs[-1][1] + 1)
+            else:
+                runs.append((k, 1))
+        joined = tuple(first for first, count in runs if count == 1)
+        made: dict = {}
+        if joined:
+            parts = [(k, meshes[instances[k].mesh], instances[k].materials) for k in joined]
+            key = ("joined", tuple((k, mesh.key, mesh.version, slots) for k, mesh, slots in parts))
+            made[key] = (parts, 0, 1)
+        for first, count in runs:
+            if count > 1:
+                mesh, slots = meshes[instances[first].mesh], instances[first].materials
+                made[(mesh.key, mesh.version, slots)] = ([(0, mesh, slots)], first, count)
+        attributes = tuple((m.attributes, m.transparent) for m in materials)
+        self.draws, self.opaque_casters = [], []
+        kept = {}
+        for key, (parts, first, count) in made.items():
+            cached = self._mesh_draws.get((key, attributes))
+            if cached is None:
+                self.uploads += len(parts)
+                cached = _draws_of(parts, materials)
+            kept[(key, attributes)] = cached
+            surfaces, casters = cached
+            self.draws += [Draw(material, batch, first, count) for material, batch in surfaces]
+            self.opaque_casters += [Draw(-1, batch, first, count) for batch in casters]
+        self.draws.sort(key=lambda draw: draw.material)
+        self._mesh_draws = kept
+
+    def release(self) -> None:
+        self.__init__()
+
+
+def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[CompiledMaterial]):
+    """GPU batches of meshes in one buffer: [(material, batch)], and position-only batches of what is opaque."""
+    corner_start = np.cumsum([0] + [len(mesh.corner_vertices) for _, mesh, _ in parts])
+    vertex_start = np.cumsum([0] + [len(mesh.positions) for _, mesh, _ in parts])
+    triangle_material = np.concatenate(
+        [np.asarray(slots, np.int64)[np.minimum(mesh.triangle_slots, len(slots) - 1)] for _, mesh, slots in parts]
+    )
+    corners = np.concatenate([mesh.triangle_corners + start for (_, mesh, _), start in zip(parts, corner_start)])
+    surface_vertices = gfx_geometry.vertex_buffer(
+        position=np.concatenate([mesh.positions[mesh.corner_vertices] for _, mesh, _ in parts]),
+        normal=np.concatenate([mesh.corner_normals for _, mesh, _ in parts]),
+        local_instance=np.concatenate([np.full(len(mesh.corner_vertices), k, np.int32) for k, mesh, _ in parts]),
+    )
+    surfaces = []
+    extra: dict[tuple[int, Attribute], object] = {}
+    for material in np.unique(triangle_material):
+        batch = gfx_geometry.triangle_batch(surface_vertices, corners[triangle_material == material])
+        for slot, attribute in enumerate(materials[material].attributes):
+            if (slot, attribute) not in extra:
+                data = np.concatenate([corner_attribute(mesh, attribute) for _, mesh, _ in parts])
+                extra[slot, attribute] = gfx_geometry.vertex_buffer(**{f"attribute{slot}": data})
+            batch.handle.vertbuf_add(extra[slot, attribute])
+        surfaces.append((int(material), batch))
+
+    opaque = ~np.array([material.transparent for material in materials])[triangle_material]
+    if not opaque.any():
+        return surfaces, []
+    vertices = gfx_geometry.vertex_buffer(
+        position=np.concatenate([mesh.positions for _, mesh, _ in parts]),
+        local_instance=np.concatenate([np.full(len(mesh.positions), k, np.int32) for k, mesh, _ in parts]),
+    )
+    indices = np.concatenate(
+        [mesh.corner_vertices[mesh.triangle_corners] + start for (_, mesh, _), start in zip(parts, vertex_start)]
+    )
+    return surfaces, [gfx_geometry.triangle_batch(vertices, indices[opaque])]
+
+
+def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
+    """A named attribute over the corners as (C, 4) float32; zeros where the mesh does not have it, as in Blender."""
+    out = np.zeros((len(mesh.corner_vertices), 4), np.float32)
+    if attribute.kind == "UV":
+        source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
+    elif attribute.kind == "COLOR":
+        source = mesh.colors.get(attribute.name or mesh.active_color)
+    else:
+        source = mesh.tangents.get(attribute.name or mesh.active_uv)
+    if source is not None:
+        out[:, : source.shape[1]] = source
+    return out

@@ -1,0 +1,160 @@
+"""Lights as rows of the light list that shaders/light/sources.glsl reads, and this sample's point on each.
+
+Radiance follows Cycles' conventions for every kind. All points inside a light come from the frame's sequence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..snapshot.scene import Light
+
+TEXELS = 8
+POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION = range(6)
+DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG = 1, 2, 4, 8, 16
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A light in the frame's units: positions relative to the render origin, radiance ready to use."""
+
+    light: Light
+    kind: int
+    flags: int
+    centre: np.ndarray  # (3,); for suns the unit vector towards the light
+    radius: float  # metres; for suns the half angle
+    radiance: np.ndarray  # (3,); radiant intensity for a radius of 0
+    area: float  # m2; for suns steradians
+    axis: np.ndarray  # (3,) unit, the direction of emission
+    spread: float  # tan of the half spread; 0 = Lambertian
+    u: np.ndarray  # (3,) half width vector, or (4,) rows for spots
+    v: np.ndarray
+    w: np.ndarray
+
+    @property
+    def power(self) -> float:
+        """For choosing among many lights: total strength, W (suns: W/m2)."""
+        return float(np.abs(self.light.strength).sum())
+
+    def sample(self, x: float, y: float) -> np.ndarray:
+        """This sample's point from two uniform numbers: position, offset from the centre, or direction."""
+        if self.kind in (POINT, SPHERE):
+            return _ball_offset(x, y) * self.radius
+        if self.kind == SUN:
+            return _cone_direction(self.centre, self.radius, x, y)
+        if self.kind == RECTANGLE:
+            return self.centre + (2 * x - 1) * self.u[:3] + (2 * y - 1) * self.v[:3]
+        radius, turn = np.sqrt(x), 2 * np.pi * y
+        return self.centre + radius * (np.cos(turn) * self.u[:3] + np.sin(turn) * self.v[:3])
+
+    def position(self, sample: np.ndarray) -> np.ndarray:
+        """World position (relative to the origin) of a sample; not for suns."""
+        return self.centre + sample if self.kind in (POINT, SPHERE) else sample
+
+    def row(self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0) -> np.ndarray:
+        """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen."""
+        flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
+        rows = np.zeros((TEXELS, 4))
+        rows[0] = self.kind, flags, first_view, view_count
+        rows[1] = *self.centre, self.radius
+        rows[2, :3] = sample
+        rows[3] = *(self.radiance * weight), self.area
+        rows[4] = *self.axis, self.spread
+        for k, row in enumerate((self.u, self.v, self.w)):
+            rows[5 + k, : len(row)] = row
+        return rows
+
+
+def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
+    """The light in the frame's units; None where it gives nothing (no power, no area, not finite)."""
+    matrix = light.matrix
+    strength = np.asarray(light.strength, np.float64)
+    if not (np.isfinite(matrix).all() and np.isfinite(strength).all()) or not strength.any():
+        return None
+    flags = (
+        DIFFUSE_FLAG * light.visibility.diffuse + GLOSSY_FLAG * light.visibility.glossy
+        + SHADOW_FLAG * light.cast_shadow + CAMERA_FLAG * light.visibility.camera
+    )  # fmt: skip
+    axis = -_unit(matrix[:3, 2])
+    centre = matrix[:3, 3] - origin
+    zero = np.zeros(3)
+    if light.kind == "SUN":
+        half = float(np.clip(light.angle, 0.0, np.pi)) / 2
+        disc = np.pi * np.sin(half) ** 2 if half > 0 else 1.0
+        radiance = strength / disc if light.normalize and half > 0 else strength
+        solid_angle = 4 * np.pi * np.sin(half / 2) ** 2 if half > 0 else 1.0
+        return Emitter(light, SUN, flags, -axis, half, radiance, solid_angle, axis, 0.0, zero, zero, zero)
+    if light.kind == "AREA":
+        u, v = _unit(matrix[:3, 0]), _unit(matrix[:3, 1])
+        width = abs(light.size[0]) * np.linalg.norm(matrix[:3, 0])
+        height = abs(light.size[1]) * np.linalg.norm(matrix[:3, 1])
+        area = width * height * (np.pi / 4 if light.shape == "ELLIPSE" else 1.0)
+        if not area > 0:
+            return None
+        radiance = strength / np.pi / (area if light.normalize else 1.0)
+        spread = 0.0 if light.spread >= np.pi - 1e-6 else float(np.tan(max(light.spread, 2e-4) / 2))
+        kind = ELLIPSE if light.shape == "ELLIPSE" else RECTANGLE
+        return Emitter(
+            light, kind, flags, centre, 0.0, radiance, area, axis, spread, u * width / 2, v * height / 2, zero
+        )
+    radius = max(light.radius, 0.0)
+    disc = np.pi * radius**2
+    if radius > 0:
+        radiance = strength / np.pi / (4 * disc if light.normalize else 1.0)
+    else:
+        radiance = strength / np.pi / (4.0 if light.normalize else 1.0)
+    kind = POINT if light.soft_falloff or radius == 0 else SPHERE
+    rows = [zero, zero, zero]
+    if light.kind == "SPOT":
+        flags |= SPOT_FLAG
+        try:
+            inverse = np.linalg.inv(matrix[:3, :3])
+        except np.linalg.LinAlgError:
+            return None
+        cosine = np.cos(np.clip(light.spot_angle, 0.0, np.pi) / 2)
+        soft = (1.0 - cosine) * light.spot_blend
+        rows = [np.append(inverse[0], cosine), np.append(inverse[1], 1.0 / soft if soft > 0 else 0.0), inverse[2]]
+    return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
+
+
+def direction_row(direction, radiance_over_density, density, flags, first_view: int, view_count: int) -> np.ndarray:
+    """A row for light from one direction at infinity, as the environment draws them."""
+    rows = np.zeros((TEXELS, 4))
+    rows[0] = DIRECTION, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
+    rows[1, :3] = direction
+    rows[3] = *radiance_over_density, density
+    return rows
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(v)
+    return v / length if length > 0 else np.zeros(3)
+
+
+# Radial quantiles of the ball density r^2 / sqrt(1 - r^2). It is the spherically symmetric density whose projection
+# along any axis is an even disc (inverse Abel transform of a constant), so that one point serves all receivers.
+_RADII = np.sin(np.linspace(0.0, np.pi / 2, 4097))
+_RADIAL_CDF = (np.arcsin(_RADII) - _RADII * np.sqrt(1 - _RADII**2)) / (np.pi / 2)
+
+
+def _ball_offset(x: float, y: float) -> np.ndarray:
+    """Offset in the unit ball. Two numbers make three: the radius uses the bits that the direction's turn leaves."""
+    z = 1.0 - 2.0 * x
+    turn = 2.0 * np.pi * y
+    ring = np.sqrt(max(1.0 - z * z, 0.0))
+    radius = np.interp((y * 977.0 + x * 379.0) % 1.0, _RADIAL_CDF, _RADII)
+    return radius * np.array([ring * np.cos(turn), ring * np.sin(turn), z])
+
+
+def _cone_direction(axis: np.ndarray, half_angle: float, x: float, y: float) -> np.ndarray:
+    """Uniform over the cone's solid angle; the disc map keeps neighbouring numbers neighbours."""
+    helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    u = _unit(np.cross(helper, axis))
+    v = np.cross(axis, u)
+    one_minus_cos = x * 2.0 * np.sin(half_angle / 2) ** 2
+    cos_theta = 1.0 - one_minus_cos
+    sin_theta = np.sqrt(max(one_minus_cos * (2.0 - one_minus_cos), 0.0))
+    turn = 2.0 * np.pi * y
+    return axis * cos_theta + sin_theta * (np.cos(turn) * u + np.sin(turn) * v)

@@ -1,0 +1,169 @@
+"""Materials on the GPU: one program per topology and use, one uniform block per material, images by content."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..gfx import images, library
+from ..gfx.library import Program
+from ..gfx.struct import Block, Struct
+from ..materials.compiled import CompiledMaterial
+from ..materials.compiler import compile_material
+from ..materials.energy import energy_texture
+from ..snapshot.scene import Image, Note, Snapshot
+from .depth_maps import PROJECTION_CONSTANTS, PROJECTION_DEFINES
+from .geometry import CAMERA_FLAG
+from .view import VIEW
+
+SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
+
+
+class MaterialSet:
+    """The snapshot's materials, compiled and ready to bind. `update` recompiles only what has another topology."""
+
+    def __init__(self):
+        self.compiled: list[CompiledMaterial] = []
+        self.notes: tuple[Note, ...] = ()
+        self.energy_table: images.Image | None = None
+        self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
+        self._blocks: dict[str, Block] = {}
+        self._images: dict[tuple[str, int], images.Image] = {}
+        self._used: list[str] = []
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Compile and upload what changed."""
+        if self.energy_table is None:
+            self.energy_table = images.upload(energy_texture())
+        cache, self.compiled, notes = {}, [], []
+        for material in snapshot.materials:
+            versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
+            cached = self._cache.get(material.key)
+            if cached is None or cached[0] != (material.graph, versions):
+                cached = (
+                    (material.graph, versions),
+                    compile_material(material.name, material.graph, snapshot.images),
+                )
+            cache[material.key] = cached
+            compiled = cached[1]
+            self.compiled.append(compiled)
+            notes += [Note(f"Material '{material.name}'", text, material.name, node) for node, text in compiled.fallbacks]
+        self._cache = cache
+        self.notes = tuple(notes)
+        needed = {key for compiled in self.compiled for key in compiled.images}
+        self._images = {
+            key: self._images.get(key) or _upload(snapshot.images[key[0]])
+            for key in ((name, _version(snapshot, name)) for name in needed)
+        }
+        self._versions = {name: version for name, version in self._images}
+        self._blocks = {key: block for key, block in self._blocks.items() if key in cache}
+        self._keys = [material.key for material in snapshot.materials]
+        for key, compiled in zip(self._keys, self.compiled):
+            block = self._blocks.get(key)
+            values = np.asarray(compiled.values, np.float32)
+            if block is None or block.struct is not _struct(len(values)):
+                self._blocks[key] = Block(_struct(len(values)), value=values)
+            else:
+                block.update(value=values)
+
+    def fingerprint(self) -> tuple:
+        """Equal in two frames if all materials shade alike."""
+        return tuple((c.program_key, c.values.tobytes(), c.images) for c in self.compiled) + tuple(self._images)
+
+    def surface_program(self, index: int) -> Program:
+        """Draws material `index` into the surface images."""
+        return _surface_program(self.compiled[index])
+
+    def caster_program(self, index: int) -> Program:
+        """Draws material `index`, which has alpha, into a depth map."""
+        return _caster_program(self.compiled[index])
+
+    def bindings(self, index: int, instances: images.Image) -> dict:
+        """Textures and blocks that both programs of a material need."""
+        compiled = self.compiled[index]
+        textures = {"instances": instances, "energy_table": self.energy_table}
+        for slot, name in enumerate(compiled.images):
+            textures[f"material_image{slot}"] = self._images[name, self._versions[name]]
+        return {"textures": textures, "blocks": {"material_values": self._blocks[self._keys[index]]}}
+
+    def release(self) -> None:
+        self.__init__()
+
+
+def _version(snapshot: Snapshot, name: str) -> int:
+    return snapshot.images[name].version if name in snapshot.images else 0
+
+
+def _upload(image: Image) -> images.Image:
+    # Eight-bit content fits a half float exactly enough only when it stays encoded; floats keep full precision.
+    return images.upload(image.pixels, "RGBA32F")
+
+
+_structs: dict[int, Struct] = {}
+
+
+def _struct(length: int) -> Struct:
+    return _structs.setdefault(length, Struct("MaterialValues", ("vec4", f"value[{length}]")))
+
+
+def _shared(compiled: CompiledMaterial) -> dict:
+    count = len(compiled.attributes)
+    copy = "".join(f"  varying_attribute{k} = attribute{k};\n" for k in range(count))
+    fill = "".join(f"  point.attributes[{k}] = varying_attribute{k};\n" for k in range(count))
+    return {
+        "inputs": (
+            ("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance"),
+            *(("VEC4", f"attribute{k}") for k in range(count)),
+        ),
+        "varyings": (
+            ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"), ("flat", "IVEC2", "instance_flat"),
+            *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
+        ),
+        "textures": (
+            ("FLOAT_2D", "instances"), ("FLOAT_2D", "energy_table"),
+            *(("FLOAT_2D", f"material_image{k}") for k in range(len(compiled.images))),
+        ),
+        "snippets": (
+            ("generated/attributes", f"void copy_attributes()\n{{\n{copy}}}\n"),
+            (
+                "generated/material",
+                f"{compiled.glsl}\nvoid fill_attributes(inout SurfacePoint point)\n{{\n{fill}}}\n",
+            ),
+        ),
+    }  # fmt: skip
+
+
+def _surface_program(compiled: CompiledMaterial) -> Program:
+    return Program(
+        name=f"surface {compiled.program_key[:8]}",
+        vertex="surface/surface.vert.glsl",
+        fragment="surface/surface.frag.glsl",
+        outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
+        blocks=((VIEW, "view"), (_struct(len(compiled.values)), "material_values")),
+        constants=(("INT", "first_instance"), ("INT", "transparent_mode")),
+        defines=(
+            ("PROJECTION", "view.row_x, view.row_y, view.row_w, view.row_q, view.backward.w"),
+            ("VISIBILITY_FLAG", str(CAMERA_FLAG)),
+        ),
+        **_shared(compiled),
+    )
+
+
+def _caster_program(compiled: CompiledMaterial) -> Program:
+    return Program(
+        name=f"alpha caster {compiled.program_key[:8]}",
+        vertex="surface/surface.vert.glsl",
+        fragment="depth_map/alpha.frag.glsl",
+        outputs=(("VEC4", "out_depth"),),
+        blocks=((_struct(len(compiled.values)), "material_values"),),
+        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
+        defines=PROJECTION_DEFINES,
+        **_shared(compiled),
+    )
+
+
+def compile_programs(programs: list[Program], progress=None) -> None:
+    """Compile what is not compiled yet. `progress(done, total)` returns True to stop."""
+    for done, program in enumerate(programs):
+        library.get(program)
+        if progress is not None and progress(done + 1, len(programs)):
+            return

@@ -1,0 +1,238 @@
+"""Runs a plan sample by sample: keeps what lives longer than a frame, allocates images, times each technique."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..gfx import context, images
+from ..gfx.struct import Block
+from ..gfx.timing import Profiler
+from ..snapshot.scene import Snapshot
+from . import ledger as ledger_module
+from .depth_maps import Receivers
+from .environment import Environment
+from .geometry import SceneGeometry
+from .ledger import RAN, REUSED, Ledger, Row
+from .materials import MaterialSet, compile_programs
+from .plan import Plan, make_plan
+from .sequence import point
+from .settings import Settings
+from .technique import Technique
+from .view import VIEW, View, blackman_harris_offset
+
+
+@dataclass
+class Frame:
+    """One picture in the making: what a technique sees while it runs."""
+
+    snapshot: Snapshot
+    settings: Settings
+    view: View
+    plan: Plan
+    geometry: SceneGeometry
+    materials: MaterialSet
+    environment: Environment
+    images: dict[str, images.Image]
+    profiler: Profiler
+    ledger: Ledger
+    view_block: Block
+    sample: int = 0  # the sample that is running
+    samples_done: int = 0
+    receivers: Receivers | None = None
+    services: dict[str, object] = field(default_factory=dict)  # what one technique offers to others, by slot
+    counters: dict[str, dict[str, int]] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.view.size
+
+    def random(self, use: str) -> tuple[float, float]:
+        """This sample's point of the sequence for `use`."""
+        return point(self.sample, use, self.settings.seed)
+
+    def count(self, technique: Technique, name: str, amount: int = 1) -> None:
+        """Add to a counter of the technique's ledger row."""
+        row = self.counters.setdefault(technique.name, {})
+        row[name] = row.get(name, 0) + amount
+
+    def target(self, *names: str, depth: str = "") -> images.Target:
+        """A render target over named images; kept with the frame."""
+        key = (*names, "depth:" + depth)
+        targets = self.services.setdefault("targets", {})
+        if key not in targets:
+            targets[key] = images.Target(
+                tuple(self.images[name] for name in names), self.images[depth] if depth else None
+            )
+        return targets[key]
+
+
+class Renderer:
+    """Draws frames of one scene. Keeps meshes, programs and prepared data from one frame to the next."""
+
+    def __init__(self, registry: Callable[[], Sequence[Technique]]):
+        self.techniques = tuple(registry())
+        self.geometry = SceneGeometry()
+        self.materials = MaterialSet()
+        self.frame: Frame | None = None
+        self._environment: tuple[object, Environment] | None = None
+        self._keys: dict[str, object] = {}
+        self._frame_key: object = None
+        self._view_block: Block | None = None
+        context.on_release(self.release)
+
+    def begin(self, snapshot: Snapshot, settings: Settings, progress=None) -> Frame:
+        """Make everything ready for samples of this snapshot. Raises ValueError if there is no camera.
+
+        If nothing differs from the frame before, that frame comes back with the samples it already has.
+        """
+        if snapshot.camera is None:
+            raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
+        started = time.perf_counter()
+        context.ensure()
+        ledger = Ledger(samples=0)
+        self.materials.update(snapshot)
+        geometry_changed = self.geometry.update(snapshot, self.materials.compiled)
+        view = View(snapshot.camera, snapshot.film, self.geometry.origin)
+        environment = self._update_environment(snapshot)
+        plan = make_plan(self.techniques, snapshot, settings)
+        compile_started = time.perf_counter()
+        ledger.times["upload"] = compile_started - started
+        compile_programs(self._programs(plan), progress)
+        ledger.times["compile"] = time.perf_counter() - compile_started
+        ledger.notes = tuple(str(note) for note in (*snapshot.notes, *self.materials.notes))
+
+        key = self._content_key(snapshot, settings, plan)
+        if self.frame is not None and not geometry_changed and key == self._frame_key:
+            ledger.rows = [Row(t.name, t.label, REUSED, "nothing changed", slot=t.slot) for t in plan.techniques]
+            ledger.rows += plan.skipped
+            self.frame.ledger = ledger
+            self.frame.settings = settings
+            return self.frame
+        self._frame_key = key
+        self._drop_frame()
+        values = view.values(0, settings.seed, (0.0, 0.0), self.geometry.size)
+        if self._view_block is None:
+            self._view_block = Block(VIEW, **values)
+        frame = Frame(
+            snapshot, settings, view, plan, self.geometry, self.materials, environment,
+            {}, Profiler(settings.profile), ledger, self._view_block,
+        )  # fmt: skip
+        self.frame = frame
+        for technique in plan.techniques:
+            for write in technique.writes:
+                if write.name not in frame.images:
+                    frame.images[write.name] = images.pool.take(*frame.size, write.format)
+        for technique in plan.techniques:
+            wanted = technique.key(snapshot, settings)
+            if technique.name not in self._keys or self._keys[technique.name] != wanted:
+                with frame.profiler.step(technique.name):
+                    technique.prepare(frame)
+                self._keys[technique.name] = wanted
+        return frame
+
+    def advance(self, frame: Frame) -> None:
+        """Render the next sample of the frame."""
+        frame.sample = frame.samples_done
+        width = frame.snapshot.film.filter_width
+        x, y = frame.random("film")
+        # As in Cycles, the first sample stands at the pixel's centre: depth is taken from it.
+        jitter = (0.0, 0.0) if frame.sample == 0 else tuple(blackman_harris_offset(u, width) for u in (x, y))
+        frame.view_block.update(**frame.view.values(frame.sample, frame.settings.seed, jitter, frame.geometry.size))
+        if frame.sample == 0:
+            self._clear_sums(frame)
+        for technique in frame.plan.techniques:
+            with frame.profiler.step(technique.name):
+                technique.run(frame)
+        frame.samples_done += 1
+
+    def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
+
+        Values that are not finite become 0; the ledger counts them.
+        """
+        started = time.perf_counter()
+        frame.profiler.finish()
+        waited = time.perf_counter()
+        sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
+        out, bad = {}, 0
+        for name in names:
+            pixels = images.read(frame.images[name])
+            finite = np.isfinite(pixels)
+            if not finite.all():
+                bad += int(pixels.size - finite.sum())
+                pixels = np.where(finite, pixels, 0.0).astype(np.float32)
+            if name in sums and frame.samples_done:
+                pixels /= frame.samples_done
+            out[name] = pixels
+        ledger = frame.ledger
+        if not any(row.state == REUSED for row in ledger.rows):
+            seconds = frame.profiler.seconds
+            ledger.rows = [
+                Row(t.name, t.label, RAN, "", 1000 * seconds.get(t.name, 0.0), t.slot, frame.counters.get(t.name, {}))
+                for t in frame.plan.techniques
+            ] + list(frame.plan.skipped)
+            ledger.times["passes"] = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques) + waited - started
+        ledger.times["readback"] = time.perf_counter() - waited
+        ledger.samples = frame.samples_done
+        ledger.bad_pixels = bad
+        ledger_module.publish(ledger)
+        return out
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        self._drop_frame()
+        for technique in self.techniques:
+            technique.release()
+        self.geometry.release()
+        self.materials.release()
+        self._environment = self._view_block = self._frame_key = None
+        self._keys.clear()
+
+    def _drop_frame(self) -> None:
+        if self.frame is not None:
+            for image in self.frame.images.values():
+                images.pool.give(image)
+            self.frame = None
+
+    def _update_environment(self, snapshot: Snapshot) -> Environment:
+        world = snapshot.world
+        image = (world.image.key, world.image.version) if world.image else None
+        mapping = None if world.mapping is None else np.asarray(world.mapping).tobytes()
+        key = (image, np.asarray(world.color).tobytes(), mapping, world.visibility, snapshot.film.transparent)
+        if self._environment is None or self._environment[0] != key:
+            self._environment = (key, Environment(world, snapshot.film.transparent))
+        return self._environment[1]
+
+    def _programs(self, plan: Plan) -> list:
+        wanted = [self.materials.surface_program(draw.material) for draw in self.geometry.draws]
+        wanted += [
+            self.materials.caster_program(draw.material)
+            for draw in self.geometry.draws
+            if self.materials.compiled[draw.material].transparent
+        ]
+        return list(dict.fromkeys(wanted))
+
+    def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
+        lights = tuple(
+            (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
+             light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
+             light.spot_blend, light.cast_shadow, light.visibility)
+            for light in snapshot.lights
+        )  # fmt: skip
+        camera = snapshot.camera
+        return (
+            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
+            settings.seed, tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
+            tuple(t.name for t in plan.techniques),
+        )  # fmt: skip
+
+    def _clear_sums(self, frame: Frame) -> None:
+        for technique in frame.plan.techniques:
+            for write in technique.writes:
+                if write.accumulates:
+                    frame.target(write.name).clear()

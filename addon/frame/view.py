@@ -1,0 +1,99 @@
+"""A camera as what the shaders need: one projection for perspective and orthographic, film offsets, and rays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gfx.struct import Struct
+from ..snapshot.scene import Camera, Film
+
+# `q` is the depth measure of every projection in Candela: it is an affine function of window coordinates on any
+# plane (1/distance for perspective, distance along the axis for orthographic), and grows towards the viewer.
+VIEW = Struct(
+    "View",
+    ("vec4", "row_x"),  # clip = dot(row, vec4(position, 1))
+    ("vec4", "row_y"),
+    ("vec4", "row_w"),
+    ("vec4", "row_q"),
+    ("vec4", "eye"),  # xyz position relative to the render origin; w = 1 for orthographic
+    ("vec4", "right"),  # w = jitter x, in pixels
+    ("vec4", "up"),  # w = jitter y, in pixels
+    ("vec4", "backward"),  # w = near distance of the depth buffer
+    ("vec4", "frame"),  # left, right, bottom, top one unit before the eye, without jitter
+    ("vec4", "film"),  # width, height in pixels; clip start, clip end in metres
+    ("int", "sample_index"),
+    ("int", "seed"),
+)
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera over one pixel grid. `origin` is subtracted from all world positions before they reach the GPU."""
+
+    camera: Camera
+    film: Film
+    origin: np.ndarray  # (3,) float64
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.film.border_size
+
+    def frame(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of the rendered rectangle (the border) one unit before the eye."""
+        left, right, bottom, top = self.camera.frame
+        x0, y0, x1, y1 = self.film.border
+        width, height = right - left, top - bottom
+        return (
+            left + width * x0 / self.film.width,
+            left + width * x1 / self.film.width,
+            bottom + height * y0 / self.film.height,
+            bottom + height * y1 / self.film.height,
+        )
+
+    def values(self, sample: int, seed: int, jitter: tuple[float, float], scene_size: float) -> dict:
+        """Fields of VIEW for one sample. `jitter` in pixels; `scene_size` in metres bounds the near plane below."""
+        left, right, bottom, top = frame = self.frame()
+        width, height = self.size
+        dx, dy = jitter[0] * (right - left) / width, jitter[1] * (top - bottom) / height
+        left, right, bottom, top = left + dx, right + dx, bottom + dy, top + dy
+        right_axis, up, backward, eye = (self.camera.matrix[:3, i] for i in range(4))
+        eye = eye - self.origin
+
+        def affine(direction, constant=0.0):
+            return np.append(direction, constant - direction @ eye)
+
+        depth = affine(-backward)  # distance along the axis
+        one = np.array([0.0, 0.0, 0.0, 1.0])
+        orthographic = self.camera.kind == "ORTHOGRAPHIC"
+        x, y = affine(right_axis), affine(up)
+        start, end = self.camera.clip_start, self.camera.clip_end
+        if orthographic:
+            w, centre = one, one
+            far = max(end, start + 1e-6)
+            q = (one * far - depth) / (far - start)
+            near = 1.0
+        else:
+            w, centre, q = depth, depth, one
+            # A tiny clip start would leave the depth buffer no precision; geometry closer than a
+            # hundred-thousandth of the scene's size is given up for it.
+            near = max(start, 1e-5 * scene_size)
+        row_x = (2.0 * x - (left + right) * centre) / (right - left)
+        row_y = (2.0 * y - (bottom + top) * centre) / (top - bottom)
+        return {
+            "row_x": row_x, "row_y": row_y, "row_w": w, "row_q": q,
+            "eye": (*eye, float(orthographic)), "right": (*right_axis, jitter[0]), "up": (*up, jitter[1]),
+            "backward": (*backward, near), "frame": frame, "film": (width, height, start, end),
+            "sample_index": sample, "seed": seed,
+        }  # fmt: skip
+
+
+def blackman_harris_offset(u: float, width: float) -> float:
+    """Film offset in pixels for a uniform number, distributed as the Blackman-Harris filter of support +-width."""
+    t = np.linspace(-1.0, 1.0, 2049)
+    phase = np.pi * (t + 1.0)
+    density = 0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)
+    cumulative = np.cumsum((density[1:] + density[:-1]) * 0.5)
+    cumulative = np.concatenate([[0.0], cumulative / cumulative[-1]])
+    return float(np.interp(u, cumulative, t) * width)

@@ -1,0 +1,23 @@
+"""The registry: every technique of Candela, in the order in which they run when nothing else decides."""
+
+from __future__ import annotations
+
+from ..frame.technique import Technique
+from .accumulated_maps import AccumulatedMaps
+from .direct_light import DirectLight
+from .environment_light import EnvironmentLight
+from .film import Film
+from .surfaces import Surfaces
+
+REGISTRY: tuple[type[Technique], ...] = (
+    Surfaces,
+    AccumulatedMaps,
+    DirectLight,
+    EnvironmentLight,
+    Film,
+)
+
+
+def make_registry() -> tuple[Technique, ...]:
+    """Fresh instances of all techniques, for one renderer."""
+    return tuple(technique() for technique in REGISTRY)

@@ -1,0 +1,153 @@
+"""Accumulated hard shadow maps: each sample, one point on each light and one depth map seen from it.
+
+Every single map gives the exact hard shadow of one point of the light; the mean over the points is the exact soft
+shadow. It converges to the truth for any light shape and any occluder, so all other shadow techniques are measured
+against it. The points form a low-discrepancy set over the light, the error of a penumbra falls nearly like 1/n.
+
+Maps are fitted to what the camera sees (addon/frame/depth_maps.py) and compared without a bias in metres by planes
+stored per texel (shaders/lib/shadow.glsl). Casters with alpha are drawn stochastically, texel by texel.
+
+| cost | per sample |
+|---|---|
+| maps | 1 view per light whose receivers lie within 68 degrees, up to 6 faces otherwise; more where depth asks for it |
+| vertices | those of all casters, once per view |
+| lookup per pixel and light | 1 texel of the map, 3 to 5 of the view list |
+| bytes | 20 per texel, (2 texels per picture pixel)^2 by default |
+
+Fails: with few samples penumbrae show steps; casters thinner than a texel are missed in single samples (their mean
+is right); a receiver that no fitted view contains counts as lit.
+
+Bias: none for the diffuse path. On soft-edged point and spot lights the depth map is drawn from a point in the ball
+while light arrives from its projection onto the disc that faces the receiver (as in Cycles): the difference is of
+the order of (radius / distance)^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..frame import depth_maps, lights
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique
+from ..gfx import passes
+from ..snapshot.scene import Snapshot
+
+RESOLUTION = Param(
+    "texels_per_pixel", "Map resolution", 2.0,
+    "Texels of a depth map per pixel of the picture's longer side; rounded up to a power of two", 0.125, 16.0,
+)  # fmt: skip
+ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
+
+
+def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
+    """Side of a depth map in texels."""
+    wished = max(frame.size) * texels_per_pixel
+    return int(np.clip(2 ** np.ceil(np.log2(max(wished, 1.0))), 16, 4096))
+
+
+class DepthMapService:
+    """Draws depth maps for any technique that needs visibility from points or directions."""
+
+    def __init__(self):
+        self._atlas = depth_maps.Atlas()
+
+    def alpha_casters(self, frame: Frame) -> list:
+        """Draws, shaders and bindings of casters whose material lets some light pass."""
+        casters = []
+        for draw in frame.geometry.draws:
+            if frame.materials.compiled[draw.material].transparent:
+                shader = passes.get(frame.materials.caster_program(draw.material))
+                casters.append((draw, shader, frame.materials.bindings(draw.material, frame.geometry.instances)))
+        return casters
+
+    def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> dict:
+        """Draw the views; returns the textures that shaders/lib/shadow.glsl reads."""
+        cells = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
+        if views:
+            sent = depth_maps.draw_views(
+                self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample
+            )
+            frame.count(technique, "maps", len(views))
+            frame.count(technique, "caster triangles", sent)
+        return {"depth_maps": self._atlas.target.colors[0], "depth_map_views": self._atlas.view_list}
+
+    def release(self) -> None:
+        self._atlas.release()
+
+
+_NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
+
+
+def rounds(items: list[tuple[np.ndarray, list]], resolution: int) -> Iterator[tuple[list[np.ndarray], list]]:
+    """Split lights (rows, views) so that the views of a round fit the atlas; fills in the view numbers."""
+    most = max(ATLAS_TEXELS // resolution**2, 6)
+    rows, views = [], []
+    for row, own in items:
+        if views and len(views) + len(own) > most:
+            yield rows, views
+            rows, views = [], []
+        row[0, 2:4] = len(views), len(own)
+        rows.append(row)
+        views += own
+    if rows:
+        yield rows, views
+
+
+class AccumulatedMaps(Technique):
+    name = "accumulated_maps"
+    label = "Accumulated shadow maps"
+    slot = "shadow"
+    params = (RESOLUTION,)
+
+    def __init__(self):
+        self.service = DepthMapService()
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if not any(light.cast_shadow and np.any(light.strength) for light in snapshot.lights):
+            return "no light casts a shadow"
+        if not any(instance.visibility.shadow for instance in snapshot.instances):
+            return "no object casts a shadow"
+        return None
+
+    def run(self, frame: Frame) -> None:
+        frame.services["shadow"] = self
+
+    def resolution(self, frame: Frame) -> int:
+        return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+
+    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray) -> list:
+        """Views that cover this sample of the light for all receivers."""
+        if not emitter.light.cast_shadow or frame.receivers is None:
+            return []
+        use = f"map/{emitter.light.key}"
+        jitter = (*frame.random(use), *frame.random(use + "/turn"))
+        if emitter.kind == lights.SUN:
+            return depth_maps.directional_views(
+                sample, frame.receivers, frame.geometry, jitter, self.resolution(frame)
+            )
+        axis, cone = None, np.inf
+        if emitter.kind in (lights.RECTANGLE, lights.ELLIPSE):
+            axis, cone = emitter.axis, emitter.spread or np.inf
+        elif emitter.flags & lights.SPOT_FLAG:
+            half = emitter.light.spot_angle / 2
+            if half < np.pi / 2 - 0.01:
+                axis, cone = emitter.axis, _spot_tangent(emitter, half)
+        return depth_maps.point_views(
+            emitter.position(sample), axis, cone, frame.receivers, frame.geometry, jitter, self.resolution(frame)
+        )
+
+    def draw(self, frame: Frame, views: list) -> dict:
+        return self.service.draw(frame, self, views, self.resolution(frame))
+
+    def release(self) -> None:
+        self.service.release()
+
+
+def _spot_tangent(emitter: lights.Emitter, half: float) -> float:
+    """Tangent of the cone's half angle; a scaled spot object has an elliptic cone, its wider side counts."""
+    scale = np.linalg.norm(emitter.light.matrix[:3, :3], axis=0)
+    stretch = max(scale[0], scale[1]) / max(scale[2], 1e-12)
+    return float(np.tan(half) * stretch) * 1.001

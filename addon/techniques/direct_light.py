@@ -1,0 +1,127 @@
+"""Direct light: point, spot, sun and area lights, by one point on each light per sample.
+
+For a point x with view v and a light sample y of density p (per steradian) in direction w,
+
+    L(x, v) = mean over samples of  f(x, v, w) cos(w) Le(y, -w) V(x, y) / p
+
+with Cycles' light shapes and units (addon/frame/lights.py) and Cycles' closures (shaders/lib/brdf.glsl). V comes from
+the technique in the shadow slot. All pixels share y, so there is no noise, only the quadrature error of a
+low-discrepancy set; where a narrow lobe would see dots, traced rays take over part of the light (see traced_glossy).
+
+More lights than `lights_per_sample` are drawn by lot, in proportion to power, each weighted by the inverse of its
+chance (systematic sampling); every light keeps a minimum chance.
+
+| cost | per sample |
+|---|---|
+| passes | 1 over the screen per round of lights (a round fills the depth-map atlas) |
+| fetches per pixel | 6 surface + per light: 5 to 8 list, 4 to 6 shadow |
+
+Bias: none that remains as samples grow. The clamp on 1 / distance^2 is 1e-30, far below any scene.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame import lights
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique, Write
+from ..frame.view import VIEW
+from ..gfx import images, passes
+from ..snapshot.scene import Snapshot
+from .accumulated_maps import DepthMapService, rounds
+from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
+
+LIGHTING = passes.fullscreen_program(
+    "direct light",
+    "light/direct.frag.glsl",
+    textures=(
+        *SURFACE_TEXTURES, ("FLOAT_2D", "light_list"), ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "depth_map_views"),
+        ("FLOAT_2D", "energy_table"),
+    ),
+    blocks=((VIEW, "view"),),
+    constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
+    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+)  # fmt: skip
+DIRECT_WRITES = (
+    Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
+    Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
+)
+
+
+def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], shadow_textures: dict) -> None:
+    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images."""
+    light_list = images.upload_list(np.concatenate(rows))
+    traced = frame.services.get("traced_roughness", 0.0)
+    passes.fullscreen(
+        LIGHTING,
+        frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
+        blend="ADDITIVE_PREMULT",
+        textures={
+            **surface_bindings(frame), **shadow_textures, "light_list": light_list,
+            "energy_table": frame.materials.energy_table,
+        },
+        blocks={"view": frame.view_block},
+        constants={"light_count": len(rows), "traced_roughness": traced},
+    )  # fmt: skip
+    frame.count(technique, "passes")
+    frame.count(technique, "light samples", len(rows))
+
+
+class DirectLight(Technique):
+    name = "direct_light"
+    label = "Direct light"
+    params = (
+        Param(
+            "lights_per_sample", "Lights per sample", 16,
+            "With more lights than this, each sample draws so many of them by lot", 1, 256,
+        ),
+    )  # fmt: skip
+    reads = SURFACES
+    writes = DIRECT_WRITES
+
+    def __init__(self):
+        self._emitters: list[lights.Emitter] = []
+        self._unshadowed = DepthMapService()
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if not any(np.any(light.strength) for light in snapshot.lights):
+            return "the scene has no light with power"
+        if not snapshot.instances:
+            return "the scene has no surface"
+        return None
+
+    def run(self, frame: Frame) -> None:
+        if frame.sample == 0:
+            found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+            self._emitters = [emitter for emitter in found if emitter is not None]
+        if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
+            return
+        shadow = frame.services.get("shadow")
+        items = []
+        for emitter, weight in self._chosen(frame):
+            sample = emitter.sample(*frame.random(f"light/{emitter.light.key}"))
+            views = shadow.views(frame, emitter, sample) if shadow else []
+            items.append((emitter.row(sample, 0, len(views), weight), views))
+        resolution = shadow.resolution(frame) if shadow else 16
+        for rows, views in rounds(items, resolution):
+            textures = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
+            shade(frame, self, rows, textures)
+
+    def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
+        """Lights of this sample with the inverse of their chance."""
+        most = frame.settings.get(self, "lights_per_sample")
+        if len(self._emitters) <= most:
+            return [(emitter, 1.0) for emitter in self._emitters]
+        power = np.array([emitter.power for emitter in self._emitters])
+        share = 0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)
+        chance = np.minimum(share * most, 1.0)
+        edges = np.concatenate([[0.0], np.cumsum(chance)])
+        marks = np.arange(int(np.ceil(edges[-1]))) + frame.random("choose lights")[0]
+        picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
+        return [(self._emitters[k], 1.0 / chance[k]) for k in picked]
+
+    def release(self) -> None:
+        self._unshadowed.release()
+        self._emitters = []

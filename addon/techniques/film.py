@@ -1,0 +1,114 @@
+"""Film: gathers the samples that need no light (emission, the visible world, colours, normals), depth, and the sum.
+
+Colours are what Cycles puts into its colour passes: diffuse albedo with all layer weights, and the estimated albedo
+of the glossy lobe. Direct light is stored with its colour; engine.py divides, after the mean, as Cycles does.
+Lights with extent that are visible to the camera are intersected analytically and land in emission.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame import lights
+from ..frame.environment import WORLD
+from ..frame.run import Frame
+from ..frame.technique import Technique, Write
+from ..frame.view import VIEW
+from ..gfx import images, passes
+from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
+
+SUMS = (
+    Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
+    Write("radiance.environment", "RGBA32F", "The world seen by the camera; alpha: coverage", True),
+    Write("color.diffuse", "RGBA32F", "Albedo of diffuse closures", True),
+    Write("color.glossy", "RGBA32F", "Albedo of glossy closures", True),
+    Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
+)
+COLLECT = passes.fullscreen_program(
+    "film collect",
+    "film/collect.frag.glsl",
+    textures=(
+        *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
+        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "light_list"),
+    ),
+    blocks=((VIEW, "view"), (WORLD, "world")),
+    constants=(("INT", "light_count"),),
+    outputs=tuple(
+        ("VEC4", name)
+        for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color", "out_normal")
+    ),
+)  # fmt: skip
+DEPTH = passes.fullscreen_program(
+    "film depth",
+    "film/depth.frag.glsl",
+    textures=(("FLOAT_2D", "surface_position"),),
+    blocks=((VIEW, "view"),),
+    outputs=(("VEC4", "out_depth"),),
+)
+RESOLVE = passes.fullscreen_program(
+    "film resolve",
+    "film/resolve.frag.glsl",
+    textures=(
+        ("FLOAT_2D", "diffuse"), ("FLOAT_2D", "glossy"), ("FLOAT_2D", "emission"), ("FLOAT_2D", "environment"),
+    ),
+    constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
+    outputs=(("VEC4", "out_combined"),),
+)  # fmt: skip
+
+
+class Film(Technique):
+    name = "film"
+    label = "Film"
+    reads = SURFACES
+    writes = (
+        *SUMS,
+        Write("radiance.diffuse_direct", "RGBA32F", "Cleared here, so that a scene without lights has it", True),
+        Write("radiance.glossy_direct", "RGBA32F", "Cleared here, so that a scene without lights has it", True),
+        Write("film.depth", "RGBA32F", "Depth along the camera axis at the pixel's centre, m; 1e10 for nothing"),
+        Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
+    )
+
+    def run(self, frame: Frame) -> None:
+        if frame.sample == 0:
+            found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+            seen = [e for e in found if e is not None and e.flags & lights.CAMERA_FLAG]
+            rows = [emitter.row(emitter.centre, 0, 0) for emitter in seen] or [np.zeros((lights.TEXELS, 4))]
+            self._lights, self._light_count = images.upload_list(np.concatenate(rows)), len(seen)
+            passes.fullscreen(
+                DEPTH,
+                frame.target("film.depth"),
+                textures={"surface_position": frame.images["surface.position"]},
+                blocks={"view": frame.view_block},
+            )
+        passes.fullscreen(
+            COLLECT,
+            frame.target(*(write.name for write in SUMS)),
+            blend="ADDITIVE_PREMULT",
+            textures={
+                **surface_bindings(frame), "energy_table": frame.materials.energy_table, "light_list": self._lights,
+                "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
+            },
+            blocks={"view": frame.view_block, "world": frame.environment.block},
+            constants={"light_count": self._light_count},
+        )  # fmt: skip
+        frame.count(self, "passes")
+
+    def release(self) -> None:
+        self._lights = None
+
+
+def resolve(frame: Frame) -> images.Image:
+    """The mean of all samples so far as one picture: scene-linear, premultiplied."""
+    passes.fullscreen(
+        RESOLVE,
+        frame.target("film.combined"),
+        textures={
+            "diffuse": frame.images["radiance.diffuse_direct"], "glossy": frame.images["radiance.glossy_direct"],
+            "emission": frame.images["radiance.emission"], "environment": frame.images["radiance.environment"],
+        },
+        constants={
+            "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
+            "transparent": int(frame.snapshot.film.transparent),
+        },
+    )  # fmt: skip
+    return frame.images["film.combined"]

@@ -1,0 +1,1 @@
+"""What the artist touches: properties, panels, operators."""

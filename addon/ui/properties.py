@@ -1,0 +1,95 @@
+"""Blender properties, generated from the parameters that the techniques declare."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..frame.settings import AUTO, SAMPLES, SEED, Settings
+from ..frame.technique import Param
+from ..techniques import REGISTRY
+
+
+def _property(param: Param, **changes):
+    """A bpy property for a declared parameter."""
+    common = {"name": param.label, "description": param.description, "default": param.default, **changes}
+    if isinstance(param.default, bool):
+        return bpy.props.BoolProperty(**common)
+    if isinstance(param.default, str):
+        items = [(identifier, label, "", number) for identifier, label, number in param.items]
+        return bpy.props.EnumProperty(items=items, **common)
+    limits = {}
+    if param.minimum is not None:
+        limits["min"] = param.minimum
+    if param.maximum is not None:
+        limits["max"] = param.maximum
+    make = bpy.props.IntProperty if isinstance(param.default, int) else bpy.props.FloatProperty
+    if param.unit:
+        limits["subtype"] = param.unit
+    return make(**common, **limits)
+
+
+def identifier(technique: str, param: str) -> str:
+    """Name of the scene property that holds a technique's parameter."""
+    return f"{technique}_{param}"
+
+
+def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
+    items = [(AUTO, "Auto", "Let Candela choose by what the scene holds", 0)]
+    for number, technique in enumerate((t for t in REGISTRY if t.slot == slot), 1):
+        summary = (technique.__module__ and __import__(technique.__module__, fromlist=["_"]).__doc__) or ""
+        items.append((technique.name, technique.label, summary.strip().splitlines()[0], number))
+    return items
+
+
+def slots() -> list[str]:
+    """Names of all slots, in the registry's order."""
+    return list(dict.fromkeys(t.slot for t in REGISTRY if t.slot))
+
+
+def _annotations() -> dict:
+    out = {
+        "samples": _property(SAMPLES),
+        "viewport_samples": _property(SAMPLES, name="Viewport Samples", default=32),
+        "seed": _property(SEED),
+    }
+    for slot in slots():
+        out[f"slot_{slot}"] = bpy.props.EnumProperty(
+            name=slot.capitalize(), description=f"Technique for the {slot} slot", items=_slot_items(slot), default=AUTO
+        )
+    for technique in REGISTRY:
+        for param in technique.params:
+            out[identifier(technique.name, param.name)] = _property(param)
+    return out
+
+
+CandelaSceneSettings = type(
+    "CandelaSceneSettings",
+    (bpy.types.PropertyGroup,),
+    {"__annotations__": _annotations(), "__doc__": "Candela's settings of a scene.", "__module__": __name__},
+)
+
+
+def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
+    """The scene's Blender properties as plain settings."""
+    group = scene.candela
+    samples = 8 if preview else (group.viewport_samples if viewport else group.samples)
+    return Settings(
+        samples=samples,
+        seed=group.seed,
+        slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
+        values={
+            (technique.name, param.name): getattr(group, identifier(technique.name, param.name))
+            for technique in REGISTRY
+            for param in technique.params
+        },
+    )
+
+
+def register() -> None:
+    bpy.utils.register_class(CandelaSceneSettings)
+    bpy.types.Scene.candela = bpy.props.PointerProperty(type=CandelaSceneSettings)
+
+
+def unregister() -> None:
+    del bpy.types.Scene.candela
+    bpy.utils.unregister_class(CandelaSceneSettings)

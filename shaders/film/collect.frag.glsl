@@ -1,0 +1,66 @@
+// What does not depend on lights: emission, the visible world, colours and normals of this sample.
+#include "lib/gbuffer.glsl"
+#include "lib/brdf.glsl"
+#include "lib/environment.glsl"
+#include "light/sources.glsl"
+
+vec3 view_direction(vec2 pixel)
+{
+  vec2 place = (pixel + vec2(view.right.w, view.up.w)) / view.film.xy;
+  vec2 on_frame = mix(view.frame.xz, view.frame.yw, place);
+  if (view.eye.w > 0.5) {
+    return -view.backward.xyz;
+  }
+  return safe_normalize(on_frame.x * view.right.xyz + on_frame.y * view.up.xyz - view.backward.xyz);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  Surface s = SURFACE_READ(pixel);
+  out_emission = vec4(0.0);
+  out_environment = vec4(0.0);
+  out_diffuse_color = vec4(0.0);
+  out_glossy_color = vec4(0.0);
+  out_normal = vec4(0.0);
+  vec3 direction = view_direction(gl_FragCoord.xy);
+  vec3 origin = view.eye.xyz;
+  if (view.eye.w > 0.5) {
+    vec2 on_frame = mix(view.frame.xz, view.frame.yw, (gl_FragCoord.xy + vec2(view.right.w, view.up.w)) / view.film.xy);
+    origin += on_frame.x * view.right.xyz + on_frame.y * view.up.xyz;
+  }
+  float limit = 1e30;
+  float coverage = 0.0;
+  if (s.hit) {
+    coverage = 1.0 - s.holdout;
+    limit = dot(s.position - origin, direction);
+    out_emission.rgb = s.emission;
+    out_diffuse_color.rgb = s.diffuse;
+    out_normal = vec4(s.normal, 1.0);
+    if (s.glossy_weight > 0.0) {
+      vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
+      float mu = max(dot(s.glossy_normal, -direction), 0.0);
+      out_glossy_color.rgb = s.glossy_weight * glossy_albedo(s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior,
+                                                             sqrt(sqrt(alpha.x * alpha.y)), mu);
+      if (max_component(s.diffuse) <= 0.0) {
+        out_normal.xyz = s.glossy_normal;
+      }
+    }
+  }
+  else {
+    out_environment.rgb = (world.color.w > 0.5) ? environment_radiance(direction) : vec3(0.0);
+    coverage = 1.0 - world.map_options.x;
+  }
+  out_environment.a = coverage;
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    if ((light.flags & LIGHT_CAMERA) != 0) {
+      float hit_distance;
+      float density;
+      vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
+      if (hit_distance < limit) {
+        out_emission.rgb += radiance;
+      }
+    }
+  }
+}

@@ -1,0 +1,152 @@
+// Reflection as Cycles has it: Lambert and energy-preserving Oren-Nayar, GGX with multiple-scattering compensation.
+// All return f * cos(normal, light); vectors are unit and point away from the surface.
+#include "lib/math.glsl"
+#include "lib/energy.glsl"
+
+// Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model.
+float oren_nayar_albedo_term(float c)
+{
+  c = clamp(c, 0.0, 1.0);
+  float s = sqrt(max(1.0 - c * c, 0.0));
+  if (c < 1e-6) {
+    return PI * 0.5 - 2.0 / 3.0 - c;
+  }
+  float theta = acos(c);
+  return s * (theta - 2.0 / 3.0 - s * c) + (2.0 / 3.0) * (s / c) * (1.0 - s * s * s);
+}
+
+vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, vec3 light)
+{
+  float nl = max(dot(normal, light), 0.0);
+  if (roughness < 1e-5) {
+    return albedo * (nl / PI);
+  }
+  float nv = max(dot(normal, view), 0.0);
+  float sigma = clamp(roughness, 0.0, 1.0);
+  float a = 1.0 / (PI + sigma * (PI * 0.5 - 2.0 / 3.0));
+  float b = sigma * a;
+  float t = dot(light, view) - nl * nv;
+  if (t > 0.0) {
+    t /= max(max(nl, nv), 1e-6);
+  }
+  float view_term = PI * a + b * oren_nayar_albedo_term(nv);
+  float light_term = PI * a + b * oren_nayar_albedo_term(nl);
+  float average = PI * a + b * (2.0 * PI - 5.6) / 3.0;
+  vec3 rho = clamp(albedo, vec3(0.0), vec3(1.0));
+  vec3 multiple = rho * rho * (average / (PI * max(1.0 - average, 1e-6))) / max(vec3(1.0) - rho * (1.0 - average), vec3(1e-6));
+  return albedo * (nl * (a + b * t)) + albedo * multiple * (nl * (1.0 - view_term) * (1.0 - light_term));
+}
+
+// A GGX lobe in its own frame: z along the normal, x along the tangent. Energy compensation is in `scale`.
+struct Lobe {
+  vec3 tangent;
+  vec3 bitangent;
+  vec3 normal;
+  vec2 alpha;
+  vec3 scale;  // weight x multiple scattering
+  int fresnel;
+  vec3 tint;
+  vec3 edge;
+  float ior;
+  vec3 view;   // in the lobe's frame
+};
+
+// Below this product of alphas a lobe is a mirror: only traced rays can see anything in it.
+#define MIRROR_ALPHA 2e-10
+
+vec3 lobe_to_local(Lobe lobe, vec3 v)
+{
+  return vec3(dot(v, lobe.tangent), dot(v, lobe.bitangent), dot(v, lobe.normal));
+}
+
+vec3 lobe_to_world(Lobe lobe, vec3 v)
+{
+  return v.x * lobe.tangent + v.y * lobe.bitangent + v.z * lobe.normal;
+}
+
+Lobe lobe_begin(vec3 normal, float tangent_angle, vec2 alpha, float weight, int fresnel, vec3 tint, vec3 edge,
+                float ior, vec3 view)
+{
+  Lobe lobe;
+  vec3 t;
+  vec3 b;
+  orthonormal_basis(normal, t, b);
+  float angle = 2.0 * PI * tangent_angle;
+  lobe.tangent = cos(angle) * t + sin(angle) * b;
+  lobe.bitangent = cross(normal, lobe.tangent);
+  lobe.normal = normal;
+  lobe.alpha = alpha;
+  lobe.fresnel = fresnel;
+  lobe.tint = tint;
+  lobe.edge = edge;
+  lobe.ior = ior;
+  lobe.view = lobe_to_local(lobe, view);
+  float roughness = sqrt(sqrt(alpha.x * alpha.y));
+  lobe.scale = weight * multiscatter_scale(fresnel, tint, edge, ior, roughness, lobe.view.z);
+  return lobe;
+}
+
+float ggx_lambda(vec3 w, vec2 alpha)
+{
+  float tan_squared = dot(w.xy * alpha, w.xy * alpha) / max(w.z * w.z, 1e-20);
+  return 0.5 * (sqrt(1.0 + tan_squared) - 1.0);
+}
+
+float ggx_distribution(vec3 h, vec2 alpha)
+{
+  vec2 slope = h.xy / alpha;
+  float d = dot(slope, slope) + h.z * h.z;
+  return 1.0 / max(PI * alpha.x * alpha.y * d * d, 1e-30);
+}
+
+bool lobe_is_mirror(Lobe lobe)
+{
+  return lobe.alpha.x * lobe.alpha.y <= MIRROR_ALPHA;
+}
+
+// f * cos for a light direction in world space; `pdf` is the density per steradian of lobe_sample for it.
+vec3 lobe_reflection(Lobe lobe, vec3 light_world, out float pdf)
+{
+  vec3 light = lobe_to_local(lobe, light_world);
+  vec3 view = lobe.view;
+  pdf = 0.0;
+  if (light.z <= 0.0 || view.z <= 0.0 || lobe_is_mirror(lobe)) {
+    return vec3(0.0);
+  }
+  vec3 h = safe_normalize(light + view);
+  float distribution = ggx_distribution(h, lobe.alpha);
+  float lambda_view = ggx_lambda(view, lobe.alpha);
+  float lambda_light = ggx_lambda(light, lobe.alpha);
+  float facet = distribution / (4.0 * view.z);
+  pdf = facet / (1.0 + lambda_view);
+  vec3 fresnel = fresnel_reflectance(lobe.fresnel, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
+  return lobe.scale * fresnel * (facet / (1.0 + lambda_view + lambda_light));
+}
+
+// A direction in world space drawn from the lobe by visible normals (Dupuy & Benyoub 2023, spherical caps), and
+// `weight` = f * cos / pdf for it. Zero weight where it would go below the surface.
+vec3 lobe_sample(Lobe lobe, vec2 u, out vec3 weight)
+{
+  vec3 view = lobe.view;
+  vec3 h = vec3(0.0, 0.0, 1.0);
+  bool mirror = lobe_is_mirror(lobe);
+  if (!mirror) {
+    vec3 stretched = safe_normalize(vec3(lobe.alpha * view.xy, view.z));
+    float phi = 2.0 * PI * u.x;
+    float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
+    float r = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    vec3 cap = vec3(r * cos(phi), r * sin(phi), z) + stretched;
+    h = safe_normalize(vec3(lobe.alpha * cap.xy, max(cap.z, 1e-7)));
+  }
+  vec3 light = 2.0 * dot(view, h) * h - view;
+  weight = vec3(0.0);
+  if (light.z > 0.0 && view.z > 0.0) {
+    float masking = 1.0;
+    if (!mirror) {
+      float lambda_view = ggx_lambda(view, lobe.alpha);
+      masking = (1.0 + lambda_view) / (1.0 + lambda_view + ggx_lambda(light, lobe.alpha));
+    }
+    weight = lobe.scale * masking * fresnel_reflectance(lobe.fresnel, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
+  }
+  return safe_normalize(lobe_to_world(lobe, light));
+}

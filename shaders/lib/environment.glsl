@@ -1,0 +1,41 @@
+// Radiance and sampling density of the world by direction. `environment_map` holds radiance over `world.color`,
+// `environment_density_map` the density per steradian with which addon/frame/environment.py draws directions.
+#include "lib/math.glsl"
+
+// Blender's equirectangular convention: u = 0.5 looks along +X, u grows towards -Y, v grows upwards.
+vec2 equirectangular_uv(vec3 direction)
+{
+  float azimuth = (direction.x == 0.0 && direction.y == 0.0) ? 0.0 : atan(direction.y, direction.x);
+  return vec2(0.5 - azimuth / (2.0 * PI), 0.5 + asin(clamp(direction.z, -1.0, 1.0)) / PI);
+}
+
+vec3 environment_lookup_direction(vec3 direction)
+{
+  vec4 d = vec4(direction, 1.0);
+  return safe_normalize(vec3(dot(world.map_x, d), dot(world.map_y, d), dot(world.map_z, d)));
+}
+
+vec3 environment_radiance(vec3 direction)
+{
+  ivec2 size = textureSize(environment_map, 0);
+  vec2 uv = equirectangular_uv(environment_lookup_direction(direction));
+  vec2 texel = uv * vec2(size) - 0.5;
+  vec2 corner = floor(texel);
+  vec2 t = texel - corner;
+  int x0 = int(mod(corner.x, float(size.x)));
+  int x1 = int(mod(corner.x + 1.0, float(size.x)));
+  int y0 = clamp(int(corner.y), 0, size.y - 1);
+  int y1 = clamp(int(corner.y) + 1, 0, size.y - 1);
+  vec3 low = mix(texelFetch(environment_map, ivec2(x0, y0), 0).rgb, texelFetch(environment_map, ivec2(x1, y0), 0).rgb, t.x);
+  vec3 high = mix(texelFetch(environment_map, ivec2(x0, y1), 0).rgb, texelFetch(environment_map, ivec2(x1, y1), 0).rgb, t.x);
+  return mix(low, high, t.y) * world.color.rgb;
+}
+
+// Density per steradian of the drawn directions; 0 where the world is not sampled.
+float environment_density(vec3 direction)
+{
+  ivec2 size = textureSize(environment_density_map, 0);
+  vec2 uv = equirectangular_uv(environment_lookup_direction(direction));
+  ivec2 cell = clamp(ivec2(uv * vec2(size)), ivec2(0), size - 1);
+  return texelFetch(environment_density_map, cell, 0).r;
+}

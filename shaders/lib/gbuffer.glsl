@@ -1,0 +1,85 @@
+// How a surface's closures are laid out in the images of the surface pass (surface.*), written and read here.
+//
+//   position  xyz relative to the render origin; w: 0 nothing hit, 1 surface, up to 2 held out
+//   normal    octahedral shading normal of the diffuse closure (xy) and of the triangle (zw)
+//   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
+//   tint      glossy reflectance at normal incidence; w: weight of the lobe
+//   lobe      octahedral glossy normal (xy); z: Fresnel kind (3 bits) and edge reflectance (7 bits each); w: ior
+//   emission  radiance; w: glossy roughness
+//
+// Blender's framebuffers take six colour images, hence the packing; integers up to 2^24 are exact in a float.
+#include "lib/math.glsl"
+#include "lib/closure.glsl"
+
+struct Surface {
+  bool hit;
+  vec3 position;          // relative to the render origin
+  vec3 geometric_normal;  // on the viewer's side
+  vec3 normal;            // of the diffuse closure
+  float diffuse_roughness;
+  vec3 diffuse;
+  vec3 emission;
+  float holdout;
+  int fresnel;
+  float glossy_weight;    // 0: no glossy closure
+  vec3 glossy_tint;
+  vec3 glossy_edge;
+  float glossy_ior;
+  float glossy_roughness;
+  float glossy_anisotropy;
+  float tangent_angle;    // of the tangent in the frame of orthonormal_basis(glossy_normal), 0..1 turns
+  vec3 glossy_normal;
+};
+
+#define SURFACE_READ(pixel) \
+  surface_decode(texelFetch(surface_position, pixel, 0), texelFetch(surface_normal, pixel, 0), \
+                 texelFetch(surface_diffuse, pixel, 0), texelFetch(surface_tint, pixel, 0), \
+                 texelFetch(surface_lobe, pixel, 0), texelFetch(surface_emission, pixel, 0))
+
+// Three numbers in 0..1 in one float, `steps` + 1 levels each; and back.
+float pack_three(vec3 v, float steps)
+{
+  vec3 level = floor(clamp(v, vec3(0.0), vec3(1.0)) * steps + 0.5);
+  return level.x + (steps + 1.0) * (level.y + (steps + 1.0) * level.z);
+}
+
+vec3 unpack_three(float packed_value, float steps)
+{
+  float n = steps + 1.0;
+  float z = floor(packed_value / (n * n));
+  float y = floor((packed_value - z * n * n) / n);
+  return vec3(packed_value - n * (y + n * z), y, z) / steps;
+}
+
+Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe, vec4 emission)
+{
+  Surface s;
+  s.hit = position.w != 0.0;
+  s.position = position.xyz;
+  s.holdout = position.w - 1.0;
+  s.normal = octahedral_decode(normal.xy);
+  s.geometric_normal = octahedral_decode(normal.zw);
+  s.diffuse = diffuse.xyz;
+  vec3 shape = unpack_three(diffuse.w, 255.0);
+  s.diffuse_roughness = shape.x;
+  s.glossy_anisotropy = shape.y;
+  s.tangent_angle = shape.z;
+  s.glossy_tint = tint.xyz;
+  s.glossy_weight = tint.w;
+  s.glossy_normal = octahedral_decode(lobe.xy);
+  float kind = floor(lobe.z / 2097152.0);
+  s.fresnel = int(kind);
+  s.glossy_edge = unpack_three(lobe.z - kind * 2097152.0, 127.0);
+  s.glossy_ior = lobe.w;
+  s.emission = emission.xyz;
+  s.glossy_roughness = emission.w;
+  return s;
+}
+
+// Half widths of the GGX lobe (alpha) along tangent and bitangent, after Cycles' two rules.
+vec2 lobe_alpha(float roughness, float anisotropy)
+{
+  float alpha = roughness * roughness;
+  float stretch = sqrt(1.0 - 0.9 * clamp(anisotropy, 0.0, 1.0));
+  return clamp(vec2(alpha / stretch, alpha * stretch), vec2(0.0), vec2(1.0));
+}

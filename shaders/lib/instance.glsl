@@ -1,0 +1,50 @@
+// Transforms from the instance image: three rows of the matrix, then random number, pass index, flags, orientation.
+
+#define FLAG_CAMERA 1
+#define FLAG_SHADOW 2
+#define FLAG_HOLDOUT 16
+
+struct Instance {
+  vec4 row0;
+  vec4 row1;
+  vec4 row2;
+  float random;
+  int flags;
+  bool mirrored;  // negative scale turns the winding around
+};
+
+Instance instance_read(int id)
+{
+  int width = textureSize(instances, 0).x;
+  int base = id * 4;
+  Instance instance;
+  instance.row0 = texelFetch(instances, ivec2(base % width, base / width), 0);
+  instance.row1 = texelFetch(instances, ivec2((base + 1) % width, (base + 1) / width), 0);
+  instance.row2 = texelFetch(instances, ivec2((base + 2) % width, (base + 2) / width), 0);
+  vec4 rest = texelFetch(instances, ivec2((base + 3) % width, (base + 3) / width), 0);
+  instance.random = rest.x;
+  instance.flags = int(rest.z);
+  instance.mirrored = rest.w < 0.0;
+  return instance;
+}
+
+vec3 instance_position(Instance instance, vec3 local)
+{
+  vec4 p = vec4(local, 1.0);
+  return vec3(dot(instance.row0, p), dot(instance.row1, p), dot(instance.row2, p));
+}
+
+// Inverse transpose by cofactors: right for any scale, and finite for a flattened one.
+vec3 instance_normal(Instance instance, vec3 local)
+{
+  vec3 a = instance.row0.xyz;
+  vec3 b = instance.row1.xyz;
+  vec3 c = instance.row2.xyz;
+  vec3 n = vec3(dot(cross(b, c), local), dot(cross(c, a), local), dot(cross(a, b), local));
+  return instance.mirrored ? -n : n;
+}
+
+bool instance_seen(Instance instance)
+{
+  return (instance.flags & VISIBILITY_FLAG) != 0;
+}

@@ -1,0 +1,69 @@
+// Random and low-discrepancy numbers per pixel. Hash: PCG3D (Jarzynski & Olano, JCGT 9(3), 2020).
+
+uvec3 hash3(uvec3 v)
+{
+  v = v * 1664525u + uvec3(1013904223u);
+  v.x += v.y * v.z;
+  v.y += v.z * v.x;
+  v.z += v.x * v.y;
+  v ^= v >> 16u;
+  v.x += v.y * v.z;
+  v.y += v.z * v.x;
+  v.z += v.x * v.y;
+  return v;
+}
+
+float to_unit(uint bits)
+{
+  return float(bits >> 8u) * (1.0 / 16777216.0);
+}
+
+// Bit reversal: the van der Corput sequence, first dimension of Sobol'.
+uint reverse_bits(uint x)
+{
+  x = ((x >> 1u) & 0x55555555u) | ((x & 0x55555555u) << 1u);
+  x = ((x >> 2u) & 0x33333333u) | ((x & 0x33333333u) << 2u);
+  x = ((x >> 4u) & 0x0F0F0F0Fu) | ((x & 0x0F0F0F0Fu) << 4u);
+  x = ((x >> 8u) & 0x00FF00FFu) | ((x & 0x00FF00FFu) << 8u);
+  return (x >> 16u) | (x << 16u);
+}
+
+// Owen scrambling by hashing (Burley 2020).
+uint owen_scramble(uint x, uint seed)
+{
+  x = reverse_bits(x) + seed;
+  x ^= x * 0x6C50B47Cu;
+  x ^= x * 0xB82F1E52u;
+  x ^= x * 0xC7AFE638u;
+  x ^= x * 0x8D22F6E6u;
+  return reverse_bits(x);
+}
+
+uint sobol_second(uint index)
+{
+  uint result = 0u;
+  uint direction = 0x80000000u;
+  for (int bit = 0; bit < 16; bit++) {
+    if ((index & 1u) != 0u) {
+      result ^= direction;
+    }
+    index >>= 1u;
+    direction ^= direction >> 1u;
+  }
+  return result;
+}
+
+// Point `index` of a (0,2)-sequence with its own scramble and order per `salt` (a pixel's hash).
+vec2 sobol_point(uint index, uvec2 salt)
+{
+  uint shuffled = owen_scramble(index, salt.x);
+  uvec3 seeds = hash3(uvec3(salt, 0x9E3779B9u));
+  return vec2(to_unit(owen_scramble(reverse_bits(shuffled), seeds.x)),
+              to_unit(owen_scramble(sobol_second(shuffled), seeds.y)));
+}
+
+// The same in one dimension.
+float stratified(uint index, uint salt)
+{
+  return to_unit(owen_scramble(reverse_bits(index), salt));
+}

@@ -1,0 +1,63 @@
+// Visibility of a light sample from its depth maps.
+//
+// A texel stores the plane of the nearest caster: depth measure q (affine in window coordinates, larger = nearer to
+// the light) with its gradient. The receiver is compared twice: with the caster's plane continued to the receiver, and
+// with the receiver's plane continued to the texel's centre. Only if both say "behind" there is shadow. A surface
+// therefore never shadows itself, flat or convex, and no bias in metres is needed.
+//
+// `depth_map_views` lists, per view, rows x, y, w, q and the rectangle (origin, size) in the atlas `depth_maps`.
+
+#define VIEW_TEXELS 5
+
+vec4 view_texel(int index)
+{
+  int width = textureSize(depth_map_views, 0).x;
+  return texelFetch(depth_map_views, ivec2(index % width, index / width), 0);
+}
+
+float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal)
+{
+  vec4 p = vec4(position, 1.0);
+  vec3 t1;
+  vec3 t2;
+  orthonormal_basis(normal, t1, t2);
+  for (int view = first_view; view < first_view + view_count; view++) {
+    vec4 row_w = view_texel(view * VIEW_TEXELS + 2);
+    float w = dot(row_w, p);
+    if (w <= 0.0) {
+      continue;
+    }
+    vec4 row_x = view_texel(view * VIEW_TEXELS);
+    vec4 row_y = view_texel(view * VIEW_TEXELS + 1);
+    vec2 ndc = vec2(dot(row_x, p), dot(row_y, p)) / w;
+    if (max(abs(ndc.x), abs(ndc.y)) >= 1.0) {
+      continue;
+    }
+    vec4 row_q = view_texel(view * VIEW_TEXELS + 3);
+    vec4 rectangle = view_texel(view * VIEW_TEXELS + 4);
+    float q = dot(row_q, p) / w;
+    vec2 texel = (ndc * 0.5 + 0.5) * rectangle.z;
+    vec2 cell = min(floor(texel), vec2(rectangle.z - 1.0));
+    vec2 offset = texel - cell - 0.5;
+
+    // Gradient of the receiver's plane in texels: two tangents give two equations for it.
+    float scale = 0.5 * rectangle.z / w;
+    vec2 d1 = (vec2(dot(row_x.xyz, t1), dot(row_y.xyz, t1)) - ndc * dot(row_w.xyz, t1)) * scale;
+    vec2 d2 = (vec2(dot(row_x.xyz, t2), dot(row_y.xyz, t2)) - ndc * dot(row_w.xyz, t2)) * scale;
+    float q1 = (dot(row_q.xyz, t1) - q * dot(row_w.xyz, t1)) / w;
+    float q2 = (dot(row_q.xyz, t2) - q * dot(row_w.xyz, t2)) / w;
+    float determinant = d1.x * d2.y - d1.y * d2.x;
+    vec2 receiver_gradient = vec2(0.0);
+    if (abs(determinant) > 1e-4 * dot(abs(d1), vec2(1.0)) * dot(abs(d2), vec2(1.0))) {
+      receiver_gradient = vec2(q1 * d2.y - q2 * d1.y, q2 * d1.x - q1 * d2.x) / determinant;
+    }
+
+    vec4 caster = texelFetch(depth_maps, ivec2(rectangle.xy + cell), 0);
+    // Rasterisers snap vertices to 1/256 texel: 2 % of the slopes covers it; 1e-5 covers float32 in q itself.
+    float slack = 1e-5 * abs(q) + 0.02 * (dot(abs(caster.yz), vec2(1.0)) + dot(abs(receiver_gradient), vec2(1.0)));
+    bool behind_plane = caster.x + dot(caster.yz, offset) > q + slack;
+    bool behind_centre = caster.x > q - dot(receiver_gradient, offset) + slack;
+    return (caster.w > 0.0 && behind_plane && behind_centre) ? 0.0 : 1.0;
+  }
+  return 1.0;
+}

@@ -1,0 +1,244 @@
+// Light sources as Cycles has them: where a sample of each lies for a receiver, how much it gives, and what a ray hits.
+//
+// `light_list` holds LIGHT_TEXELS vec4 per light (written by addon/frame/lights.py):
+//   0: kind, flags, first depth-map view, number of views
+//   1: centre, radius                 (sun, direction: unit vector towards the light, half angle)
+//   2: this sample's point            (point, spot: offset from the centre; area: position; sun: direction)
+//   3: radiance, area                 (radius 0: radiant intensity; direction: radiance / density, density)
+//   4: emission axis (unit)           w: tan of the half spread, 0 = Lambertian
+//   5: half width vector (area), or row 0 of the inverse spot matrix; w: cosine of the half cone
+//   6: half height vector, or row 1;  w: 1 / ((1 - cosine) blend), 0 = hard edge
+//   7: row 2
+#include "lib/math.glsl"
+
+#define LIGHT_TEXELS 8
+#define LIGHT_POINT 0
+#define LIGHT_SPHERE 1
+#define LIGHT_SUN 2
+#define LIGHT_RECTANGLE 3
+#define LIGHT_ELLIPSE 4
+#define LIGHT_DIRECTION 5
+
+#define LIGHT_DIFFUSE 1
+#define LIGHT_GLOSSY 2
+#define LIGHT_SHADOW 4
+#define LIGHT_SPOT 8
+#define LIGHT_CAMERA 16
+
+struct Light {
+  int kind;
+  int flags;
+  int first_view;
+  int view_count;
+  vec3 centre;
+  float radius;
+  vec3 point;
+  vec3 radiance;
+  float area;
+  vec3 axis;
+  float spread;
+  int base;
+};
+
+vec4 light_texel(int index)
+{
+  int width = textureSize(light_list, 0).x;
+  return texelFetch(light_list, ivec2(index % width, index / width), 0);
+}
+
+Light light_read(int index)
+{
+  Light light;
+  light.base = index * LIGHT_TEXELS;
+  vec4 a = light_texel(light.base);
+  vec4 b = light_texel(light.base + 1);
+  vec4 d = light_texel(light.base + 3);
+  vec4 e = light_texel(light.base + 4);
+  light.kind = int(a.x);
+  light.flags = int(a.y);
+  light.first_view = int(a.z);
+  light.view_count = int(a.w);
+  light.centre = b.xyz;
+  light.radius = b.w;
+  light.point = light_texel(light.base + 2).xyz;
+  light.radiance = d.xyz;
+  light.area = d.w;
+  light.axis = e.xyz;
+  light.spread = e.w;
+  return light;
+}
+
+// Falloff of a spot for a ray that leaves it along `direction`.
+float spot_attenuation(Light light, vec3 direction)
+{
+  vec4 r0 = light_texel(light.base + 5);
+  vec4 r1 = light_texel(light.base + 6);
+  vec4 r2 = light_texel(light.base + 7);
+  vec3 local = safe_normalize(vec3(dot(r0.xyz, direction), dot(r1.xyz, direction), dot(r2.xyz, direction)));
+  float inside = -local.z - r0.w;
+  if (inside <= 0.0) {
+    return 0.0;
+  }
+  if (r1.w <= 0.0) {
+    return 1.0;
+  }
+  float x = clamp(inside * r1.w, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+// Narrowed emission of an area light, normalised to the flux of a Lambertian one. cos_light > 0.
+float spread_attenuation(float tan_half, float cos_light)
+{
+  if (tan_half <= 0.0) {
+    return 1.0;
+  }
+  float half_angle = atan(tan_half);
+  float tan_theta = sqrt(max(1.0 - cos_light * cos_light, 0.0)) / max(cos_light, 1e-6);
+  // tan h - h cancels for small h: its series there.
+  float normalisation = (half_angle > 0.05) ? tan_half - half_angle : half_angle * half_angle * half_angle / 3.0;
+  return max(tan_half - tan_theta, 0.0) / normalisation;
+}
+
+// Light from this sample's point: returns radiance x (solid angle the sample stands for); the receiver multiplies by
+// f cos. `density` per steradian of choosing this direction, 0 for sources without extent.
+vec3 light_sample(Light light, vec3 position, out vec3 direction, out float density)
+{
+  density = 0.0;
+  direction = vec3(0.0, 0.0, 1.0);
+  if (light.kind == LIGHT_DIRECTION) {
+    direction = light.centre;
+    density = light.area;
+    return light.radiance;
+  }
+  if (light.kind == LIGHT_SUN) {
+    direction = light.point;
+    if (light.radius <= 0.0) {
+      return light.radiance;
+    }
+    density = 1.0 / light.area;
+    return light.radiance * light.area;
+  }
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+    vec3 to_light = light.point - position;
+    float squared = max(dot(to_light, to_light), 1e-30);
+    direction = to_light * inversesqrt(squared);
+    float cos_light = -dot(direction, light.axis);
+    if (cos_light <= 0.0) {
+      return vec3(0.0);
+    }
+    float solid_angle = light.area * cos_light / squared;
+    density = 1.0 / max(solid_angle, 1e-30);
+    return light.radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
+  }
+
+  vec3 to_centre = light.centre - position;
+  float distance_squared = max(dot(to_centre, to_centre), 1e-30);
+  vec3 axis = to_centre * inversesqrt(distance_squared);
+  vec3 result;
+  vec3 from_light;
+  if (light.radius <= 0.0) {
+    direction = axis;
+    result = light.radiance / distance_squared;
+    from_light = -axis;
+  }
+  else {
+    // The sample's offset is drawn in the ball such that its projection along any axis fills the disc evenly.
+    vec3 across = light.point - axis * dot(light.point, axis);
+    if (light.kind == LIGHT_SPHERE) {
+      float sin_squared = light.radius * light.radius / distance_squared;
+      if (sin_squared >= 1.0) {
+        direction = safe_normalize(light.point);
+        density = 1.0 / (4.0 * PI);
+        return light.radiance * (4.0 * PI);
+      }
+      float one_minus_cos = sin_squared / (1.0 + sqrt(1.0 - sin_squared));
+      float rho_squared = min(dot(across, across) / (light.radius * light.radius), 1.0);
+      float cos_theta = 1.0 - rho_squared * one_minus_cos;
+      float sin_theta = sqrt(max(1.0 - cos_theta * cos_theta, 0.0));
+      direction = safe_normalize(axis * cos_theta + safe_normalize(across) * sin_theta);
+      float solid_angle = 2.0 * PI * one_minus_cos;
+      density = 1.0 / solid_angle;
+      result = light.radiance * solid_angle;
+    }
+    else {
+      vec3 to_point = to_centre + across;
+      float squared = max(dot(to_point, to_point), 1e-30);
+      direction = to_point * inversesqrt(squared);
+      float solid_angle = light.area * max(dot(direction, axis), 0.0) / squared;
+      density = 1.0 / max(solid_angle, 1e-30);
+      result = light.radiance * solid_angle;
+    }
+    from_light = -direction;
+  }
+  if ((light.flags & LIGHT_SPOT) != 0) {
+    result *= spot_attenuation(light, from_light);
+  }
+  return result;
+}
+
+// What a ray sees of a light: radiance, distance (1e30 for suns) and the density that light_sample has for the
+// direction. Zero radiance = missed.
+vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance, out float density)
+{
+  hit_distance = 1e30;
+  density = 0.0;
+  if (light.kind == LIGHT_SUN) {
+    if (light.radius <= 0.0 || dot(direction, light.centre) < cos(light.radius)) {
+      return vec3(0.0);
+    }
+    density = 1.0 / light.area;
+    return light.radiance;
+  }
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+    float cos_light = -dot(direction, light.axis);
+    if (cos_light <= 0.0) {
+      return vec3(0.0);
+    }
+    float t = dot(origin - light.centre, light.axis) / cos_light;
+    vec3 u = light_texel(light.base + 5).xyz;
+    vec3 v = light_texel(light.base + 6).xyz;
+    vec3 offset = origin + t * direction - light.centre;
+    vec2 place = vec2(dot(offset, u) / max(dot(u, u), 1e-30), dot(offset, v) / max(dot(v, v), 1e-30));
+    bool inside = (light.kind == LIGHT_RECTANGLE) ? max(abs(place.x), abs(place.y)) <= 1.0 : dot(place, place) <= 1.0;
+    if (t <= 0.0 || !inside) {
+      return vec3(0.0);
+    }
+    hit_distance = t;
+    density = t * t / max(light.area * cos_light, 1e-30);
+    return light.radiance * spread_attenuation(light.spread, cos_light);
+  }
+  if (light.kind == LIGHT_DIRECTION || light.radius <= 0.0) {
+    return vec3(0.0);
+  }
+  vec3 to_centre = light.centre - origin;
+  float distance_squared = max(dot(to_centre, to_centre), 1e-30);
+  float along = dot(to_centre, direction);
+  if (light.kind == LIGHT_SPHERE) {
+    float miss_squared = max(distance_squared - along * along, 0.0);
+    float r_squared = light.radius * light.radius;
+    bool within = distance_squared < r_squared;
+    if (miss_squared > r_squared || (along <= 0.0 && !within)) {
+      return vec3(0.0);
+    }
+    float half_chord = sqrt(r_squared - miss_squared);
+    hit_distance = within ? along + half_chord : along - half_chord;
+    float sin_squared = r_squared / distance_squared;
+    density = within ? 1.0 / (4.0 * PI) : (1.0 + sqrt(1.0 - sin_squared)) / (2.0 * PI * sin_squared);
+  }
+  else {
+    vec3 axis = to_centre * inversesqrt(distance_squared);
+    float cos_light = dot(direction, axis);
+    if (cos_light <= 0.0) {
+      return vec3(0.0);
+    }
+    float t = sqrt(distance_squared) / cos_light;
+    vec3 offset = origin + t * direction - light.centre;
+    if (dot(offset, offset) > light.radius * light.radius) {
+      return vec3(0.0);
+    }
+    hit_distance = t;
+    density = t * t / max(light.area * cos_light, 1e-30);
+  }
+  float attenuation = ((light.flags & LIGHT_SPOT) != 0) ? spot_attenuation(light, -direction) : 1.0;
+  return light.radiance * attenuation;
+}

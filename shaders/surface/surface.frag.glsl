@@ -1,0 +1,57 @@
+// Surface pass: evaluates the material and stores its closures. Transparency is stochastic: a layer is drawn with the
+// probability of its opacity, so that the mean over samples is exact alpha blending.
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/instance.glsl"
+#include "generated/material"
+#include "surface/point.glsl"
+
+void main()
+{
+  vec3 eye = view.eye.xyz;
+  vec3 incoming = (view.eye.w > 0.5) ? view.backward.xyz : safe_normalize(eye - world_position);
+  float depth = dot(eye - world_position, view.backward.xyz);
+  if (depth < view.film.z || depth > view.film.w) {
+    discard;
+  }
+  Instance instance = instance_read(instance_flat.x);
+  SurfacePoint point = surface_point(incoming, instance);
+
+  uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(view.seed)));
+  uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
+  uint index = uint(view.sample_index);
+  Closures c = closures_begin(point.normal, stratified(index, bits.z));
+  evaluate_material(point, c);
+  closures_end(c);
+
+  float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+  // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
+  if (transparent_mode == 0 ? stratified(index, layer.x) < through : (transparent_mode == 2 && through > 0.0)) {
+    discard;
+  }
+  float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
+  float holdout = clamp(c.holdout * covered, 0.0, 1.0);
+  if ((instance.flags & FLAG_HOLDOUT) != 0) {
+    holdout = 1.0;
+    covered = 0.0;
+  }
+
+  vec3 tangent;
+  vec3 bitangent;
+  orthonormal_basis(c.glossy_normal, tangent, bitangent);
+  float turns = 0.0;
+  if (dot(c.glossy_tangent, c.glossy_tangent) > 0.0) {
+    turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / (2.0 * PI) + 1.0);
+  }
+  float weight = max_component(c.glossy_weight);
+  vec3 chroma = c.glossy_weight / max(weight, 1e-20);
+
+  out_position = vec4(world_position, 1.0 + holdout);
+  out_normal = vec4(octahedral_encode(c.diffuse_normal), octahedral_encode(point.geometric_normal));
+  out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, turns), 255.0));
+  out_tint = vec4(c.glossy_tint * chroma, weight * covered);
+  out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.fresnel) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
+                  c.glossy_ior);
+  out_emission = vec4(c.emission * covered, c.glossy_roughness);
+}
