@@ -14,13 +14,10 @@ import sys
 from pathlib import Path
 
 import bpy
-
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-
 from scenes import SCENES
 from scenes.construct import begin, finish
 
+HERE = Path(__file__).resolve().parent
 OLDEST_READER = (4, 5)  # files must open in this Blender
 
 
@@ -46,7 +43,10 @@ def main() -> int:
         if name not in SCENES:
             parser.error(f"there is no scene '{name}'; there are {', '.join(SCENES)}")
     if arguments.out is None and bpy.app.version[:2] != OLDEST_READER:
-        parser.error(f"Blender {bpy.app.version_string} would write files that 4.5 cannot open; give a folder by --out")
+        parser.error(
+            f"Blender {bpy.app.version_string} would write files that 4.5 cannot open: "
+            "run under 4.5 (`make samples BLENDER=4.5`) or give another folder by --out"
+        )
 
     folder = arguments.out or HERE
     folder.mkdir(parents=True, exist_ok=True)
