@@ -62,7 +62,7 @@ class Bounds:
 
 
 class NodeBounds:
-    """Estimates of one node's sockets by identifier, made when asked for: images are only looked at where it matters."""
+    """Estimates of one node's sockets by identifier, made when asked for: not every image must be looked at."""
 
     def __init__(self, bounds: Bounds, node: Node, entry: Entry, depth: int) -> None:
         self._bounds, self._node, self._depth = bounds, node, depth

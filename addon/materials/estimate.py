@@ -6,6 +6,7 @@ is known exactly, an image by its pixels, everything else by wide bounds and a n
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,24 +104,23 @@ def srgb_decode(encoded: np.ndarray) -> np.ndarray:
     return np.where(encoded < 0.04045, np.maximum(encoded, 0.0) / 12.92, curve)
 
 
-_image_estimates: dict[tuple[str, int, bool, str], Estimate] = {}
-_IMAGE_ESTIMATES_KEPT = 1024
+# Estimates of images that are still alive: (identity of the pixels, clipped, output) -> (the pixels, weakly; estimate).
+_image_estimates: dict[tuple[int, str, bool, str], tuple[weakref.ref, Estimate]] = {}
 
 
 def image_estimate(image, clipped: bool, output: str) -> Estimate:
     """Bounds and mean of what an image gives at its output "Color" (while alpha is not used) or "Alpha".
 
     `clipped`: the lookup gives 0 outside of the image. Means are over at most 256 x 256 pixels; bounds of alpha are
-    exact, those of colour cover the pixels that were looked at. Kept per version of the image.
+    exact, those of colour cover the pixels that were looked at. Remembered as long as the pixels exist.
     """
-    key = (image.key, image.version, clipped, output)
-    if key not in _image_estimates:
-        while len(_image_estimates) >= _IMAGE_ESTIMATES_KEPT:
-            _image_estimates.pop(next(iter(_image_estimates)))
-        _image_estimates[key] = (
-            _alpha_estimate(image, clipped) if output == "Alpha" else _color_estimate(image, clipped)
-        )
-    return _image_estimates[key]
+    key = (id(image.pixels), image.encoding + image.alpha_mode, clipped, output)
+    alive, estimate = _image_estimates.get(key, (None, None))
+    if alive is None or alive() is not image.pixels:
+        estimate = _alpha_estimate(image, clipped) if output == "Alpha" else _color_estimate(image, clipped)
+        forget = weakref.ref(image.pixels, lambda _: _image_estimates.pop(key, None))
+        _image_estimates[key] = forget, estimate
+    return estimate
 
 
 def _some_pixels(image) -> np.ndarray:

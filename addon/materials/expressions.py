@@ -104,7 +104,7 @@ class Expressions:
         return keys
 
     def _value_node(self, node: Node, entry: Entry | None) -> None:
-        if entry is None or entry.combine or entry.summary or not self._settings_known(node, entry):
+        if entry is None or entry.combine or entry.summary:
             if "SHADER" not in node.outputs.values():
                 self.note(node, f"'{node.label}' is not supported yet; what it feeds keeps the value set there.")
             return
@@ -127,9 +127,6 @@ class Expressions:
                 zero, one = glsl_number(0.0, kind), glsl_number(1.0, kind)
                 self.lines.append(f"{names[identifier]} = clamp({names[identifier]}, {zero}, {one});")
         self.describe(node, entry)
-
-    def _settings_known(self, node: Node, entry: Entry) -> bool:
-        return all(node.properties.get(name, allowed[0]) in allowed for name, allowed in entry.choices.items())
 
     def _function(self, node: Node, entry: Entry) -> str:
         settings = {name: str(node.properties.get(name, items[0])).lower() for name, items in entry.choices.items()}
@@ -167,6 +164,9 @@ class Expressions:
             return self._attribute(node, argument.kind, str(node.properties.get(argument.property, "")))
         if isinstance(argument, words.Used):
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
+        if isinstance(argument, words.Rows):
+            first, count = self.values.add_rows(argument.rows(node.properties.get(argument.property)))
+            return f"{first}, {count}"
         return self.values.add(float(self._image_flags(node.image)), "FLOAT")
 
     def socket(self, node: Node, socket: words.Socket) -> str:

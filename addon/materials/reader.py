@@ -316,10 +316,26 @@ def _settings(node) -> dict[str, object]:
         _settings_of_type[node.bl_idname] = names
     settings = {}
     for name, type_name in names:
-        value = _plain(getattr(node, name, None), type_name)
-        if value is not None:
-            settings[name] = value
+        value = getattr(node, name, None)
+        if isinstance(value, bpy.types.ColorRamp):
+            settings |= _color_ramp(name, value)
+        elif isinstance(value, bpy.types.CurveMapping):
+            settings |= _curves(name, value)
+        else:
+            value = _plain(value, type_name)
+            if value is not None:
+                settings[name] = value
     return settings
+
+
+def _color_ramp(name: str, ramp) -> dict[str, object]:
+    """The stops as (position, red, green, blue, alpha) in rising order, and how to go from one to the next."""
+    return {
+        name: tuple((stop.position, *stop.color) for stop in sorted(ramp.elements, key=lambda stop: stop.position)),
+        f"{name}_interpolation": ramp.interpolation,
+        f"{name}_mode": ramp.color_mode,
+        f"{name}_hue": ramp.hue_interpolation,
+    }
 
 
 def _plain(value, type_name: str):
@@ -332,11 +348,6 @@ def _plain(value, type_name: str):
             return tuple(value)
         except TypeError:
             return None
-    if isinstance(value, bpy.types.ColorRamp):
-        stops = tuple((stop.position, tuple(stop.color)) for stop in value.elements)
-        return (value.color_mode, value.interpolation, value.hue_interpolation, stops)
-    if isinstance(value, bpy.types.CurveMapping):
-        return _curves(value)
     if isinstance(value, bpy.types.TexMapping):
         return (value.vector_type, tuple(value.translation), tuple(value.rotation), tuple(value.scale))
     if isinstance(value, bpy.types.ID):
@@ -344,15 +355,14 @@ def _plain(value, type_name: str):
     return None
 
 
-def _curves(mapping) -> tuple:
-    """(extension, first abscissa, last abscissa, one tuple of samples per curve); the curves as Blender evaluates them.
-
-    Between the ends of all control points the samples are evenly spaced; beyond them the curve is continued as the
-    extension says.
-    """
+def _curves(name: str, mapping) -> dict[str, object]:
+    """Each curve as evenly spaced samples over `range`, as Blender evaluates it, and how it goes on beyond the ends."""
     points = [point.location[0] for curve in mapping.curves for point in curve.points]
     first, last = min(points), max(points)
     mapping.initialize()
     steps = [first + (last - first) * i / (CURVE_SAMPLES - 1) for i in range(CURVE_SAMPLES)]
-    tables = tuple(tuple(mapping.evaluate(curve, x) for x in steps) for curve in mapping.curves)
-    return (mapping.extend, first, last, tables)
+    return {
+        name: tuple(tuple(mapping.evaluate(curve, x) for x in steps) for curve in mapping.curves),
+        f"{name}_range": (first, last),
+        f"{name}_extend": mapping.extend,
+    }

@@ -62,6 +62,14 @@ class ValueBlock:
         self._rows[row][component] = value
         return f"material_values.value[{row}].{'xyzw'[component]}"
 
+    def add_rows(self, rows) -> tuple[int, int]:
+        """Whole rows of four that stand one after the other: (first row, how many fitted)."""
+        start = len(self._rows)
+        fitting = [[float(x) for x in row] for row in rows][: BLOCK_LIMIT - start]
+        self.overflow |= len(fitting) < len(rows)
+        self._rows += fitting
+        return start, len(fitting)
+
     def array(self) -> np.ndarray:
         """(P, 4) float32 with P >= 1, because a uniform block cannot be empty."""
         return np.array(self._rows or [[0.0] * 4], np.float32)

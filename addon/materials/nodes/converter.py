@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..estimate import Estimate, unknown
-from .entry import Entry, Socket
+from .entry import Entry, Rows, Socket
 
 SOURCE = "material/converter.glsl"
 
@@ -82,6 +82,12 @@ def _mix(node_type: str, factor: str, a: str, b: str, output: str, clamp_factor:
             estimate=_average(a, b),
         ),
     )
+
+
+def _stops(stops) -> list[tuple[float, float, float, float]]:
+    """Two rows per stop of a colour ramp: its colour, then its position."""
+    stops = stops or ((0.0, 0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0, 1.0))
+    return [row for position, *color in stops for row in (tuple(color), (position, 0.0, 0.0, 0.0))]
 
 
 ENTRIES = (
@@ -214,6 +220,22 @@ ENTRIES = (
         (("Color", "COLOR"),),
         SOURCE,
         estimate=_average("Color"),
+    ),
+    Entry(
+        "ShaderNodeValToRGB",
+        "color_ramp_{color_ramp_interpolation}",
+        (Socket("Fac", "FLOAT", 0.5), Rows("color_ramp", _stops)),
+        (("Color", "COLOR"), ("Alpha", "FLOAT")),
+        "material/color_ramp.glsl",
+        choices={"color_ramp_interpolation": ("LINEAR", "EASE", "CONSTANT"), "color_ramp_mode": ("RGB",)},
+    ),
+    Entry(
+        "ShaderNodeValToRGB",
+        "color_ramp_linear",
+        (Socket("Fac", "FLOAT", 0.5), Rows("color_ramp", _stops)),
+        (("Color", "COLOR"), ("Alpha", "FLOAT")),
+        "material/color_ramp.glsl",
+        note="This interpolation of the colour ramp is drawn as linear RGB.",
     ),
     # Made by the reader where a group's socket changes the kind of what passes through it.
     Entry("Convert", "convert_float", (Socket("Value", "FLOAT"),), (("Value", "FLOAT"),), SOURCE, {"kind": "FLOAT"}),

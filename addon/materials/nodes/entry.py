@@ -70,6 +70,17 @@ class ImageFlags:
 
 
 @dataclass(frozen=True)
+class Rows:
+    """A table out of a property, such as the stops of a colour ramp, as rows of `material_values.value`.
+
+    Gives two int literals, the first row and the number of rows; their number is topology, their content is not.
+    """
+
+    property: str
+    rows: Callable[[object], list[tuple[float, float, float, float]]]
+
+
+@dataclass(frozen=True)
 class Expression:
     """A GLSL expression as it stands, such as `point`."""
 
@@ -86,7 +97,7 @@ class Approximation:
     unless_linked: str = ""  # another socket that settles the matter
 
 
-Argument = Socket | Setting | Choice | Attribute | Used | ImageFlags | Expression
+Argument = Socket | Setting | Choice | Attribute | Used | ImageFlags | Rows | Expression
 
 POINT = Expression("point")
 
@@ -95,9 +106,9 @@ POINT = Expression("point")
 class Entry:
     """How one node type, or one variant of it, is drawn.
 
-    The first entry of a type whose `when` holds for the node's properties is taken; with none, the node falls back.
-    `function` may name properties in braces, which are replaced by the property's lower-case value, provided that
-    `choices` allows it.
+    The first entry of a type that matches the node's properties is taken; without one, the node falls back. It matches
+    if `when` holds and each property of `choices` has one of the values that stand there. `function` may name
+    properties of `choices` in braces, which are replaced by the property's lower-case value.
     """
 
     type: str  # bl_idname
@@ -121,4 +132,7 @@ class Entry:
     combine: str = ""
 
     def matches(self, properties: dict[str, object]) -> bool:
-        return all(properties.get(name) == value for name, value in self.when.items())
+        """A property that is not there counts as the first of its choices."""
+        return all(properties.get(name) == value for name, value in self.when.items()) and all(
+            properties.get(name, allowed[0]) in allowed for name, allowed in self.choices.items()
+        )
