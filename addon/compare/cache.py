@@ -96,7 +96,7 @@ def save(folder: Path, reference: Reference) -> None:
         handle, temporary = tempfile.mkstemp(dir=folder, prefix=".writing_", suffix=".npz")
         with os.fdopen(handle, "wb") as file:
             np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
-        os.replace(temporary, folder / f"{reference.key}.npz")
+        Path(temporary).replace(folder / f"{reference.key}.npz")
     except OSError as error:
         if temporary:
             Path(temporary).unlink(missing_ok=True)

@@ -25,9 +25,12 @@ SHORTEST_TEXT = 16  # bytes; shorter arrays of characters are numbers
 OWN_SETTINGS = b"candela"
 MEANINGLESS = {  # (struct, field)
     ("ID", "session_uid"),
+    ("bNode", "identifier"),  # random: lights of older files are given nodes when they are loaded; links are pointers
     ("PreviewImage", "changed_timestamp[2]"),
     ("CurveMapping", "changed_timestamp"),
     ("CurveProfile", "changed_timestamp"),
+    ("bNodeTree", "inputs"),  # 4.x writes these for older versions from memory that it reuses; the interface follows
+    ("bNodeTree", "outputs"),
     ("RenderData", "im_format"),
     ("RenderData", "pic[1024]"),
     ("IDProperty", "*next"),

@@ -29,6 +29,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..gfx import context
 from . import cache
 from .cache import Reference
 from .content import blend_hash
@@ -183,6 +184,9 @@ def scene_hash(scene: bpy.types.Scene) -> str:
     """Hexadecimal hash of the scene with everything it refers to: data-blocks, external files, unsaved pixels."""
     digest = hashlib.blake2b(digest_size=20)
     digest.update(f"{bpy.app.version_string} {bpy.app.build_hash!r} {scene.name!r}".encode())
+    for thing in scene.objects:
+        if thing.mode == "EDIT":
+            thing.update_from_editmode()  # the edit is in the picture, so it must be in the hash
     with tempfile.TemporaryDirectory(prefix="candela_") as folder:
         path = Path(folder) / "scene.blend"
         bpy.data.libraries.write(str(path), {scene}, path_remap="NONE", fake_user=False, compress=False)
@@ -344,12 +348,8 @@ def _save_render_result(scene: bpy.types.Scene, path: Path) -> None:
 def describe(scene: bpy.types.Scene) -> dict:
     """What a report says about where a picture comes from: file name, frame, Blender's version, device."""
     device = f"{platform.processor() or platform.machine()}, {os.cpu_count()} threads"
-    try:
-        import gpu
-
-        device = f"{gpu.platform.renderer_get()} ({gpu.platform.backend_type_get().title()}); {device}"
-    except (ImportError, SystemError, AttributeError):
-        pass  # no GPU context in this process: nothing was drawn with it either
+    if context.available():
+        device = f"{context.describe()}; {device}"
     return {
         "file": Path(bpy.data.filepath).name,
         "frame": scene.frame_current,
