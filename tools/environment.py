@@ -64,17 +64,14 @@ def main(arguments):
 
     folder = ROOT / FOLDER_OF[blender]
     stamp = read_stamp(folder)
-    if not is_current(stamp, blender, groups, folder):
-        with Alone():
-            stamp = read_stamp(folder)  # another make may have finished it while this one waited
-            if not is_current(stamp, blender, groups, folder):
-                stamp = bring_up(folder, blender, groups)
-    if stamp["blender"] != blender:
-        say(
-            "Using Blender %s under Python %s, because Blender %s needs a Python %s and none was found; "
-            "with one installed, delete %s and repeat."
-            % (stamp["blender"], PYTHON_OF[stamp["blender"]], blender, PYTHON_OF[blender], FOLDER_OF[blender])
-        )
+    if is_current(stamp, blender, groups, folder):
+        if stamp["blender"] != blender:
+            say_fallback(blender, stamp["blender"])
+        return
+    with Alone():
+        # Another make may have finished it while this one waited.
+        if not is_current(read_stamp(folder), blender, groups, folder):
+            bring_up(folder, blender, groups)
 
 
 def parse(arguments):
@@ -86,10 +83,13 @@ def parse(arguments):
 
 
 def bring_up(folder, blender, groups):
-    """Do what is missing of steps 1 to 4 and return the stamp."""
+    """Do what is missing of steps 1 to 4."""
     stamp = read_stamp(folder)
     if stamp is None or not is_installed(stamp, blender, groups, folder):
-        blender, python = find_blender_and_python(blender)
+        wanted = blender
+        blender, python = find_blender_and_python(wanted)
+        if blender != wanted:
+            say_fallback(wanted, blender)
         make_environment(folder, python, PYTHON_OF[blender])
         install(folder, requirements(groups, blender))
         stamp = {"blender": blender, "requirements": digest(requirements(groups, blender)), "libraries": False}
@@ -97,7 +97,6 @@ def bring_up(folder, blender, groups):
     check_libraries(folder)
     stamp["libraries"] = True
     write_stamp(folder, stamp)
-    return stamp
 
 
 # ------------------------------------------------------------------------------------------------ what is wanted
@@ -193,6 +192,14 @@ VERSION_PROBE = """
 import sys, sysconfig
 print("%d.%d" % sys.version_info[:2], sysconfig.get_config_var("Py_GIL_DISABLED"))
 """
+
+
+def say_fallback(wanted, blender):
+    say(
+        "Using Blender %s under Python %s, because Blender %s needs a Python %s and none was found; "
+        "with one installed, delete %s and repeat."
+        % (blender, PYTHON_OF[blender], wanted, PYTHON_OF[wanted], FOLDER_OF[wanted])
+    )
 
 
 def find_python(version):

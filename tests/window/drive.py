@@ -60,6 +60,9 @@ def render_as_f12(window, scene):
 def show_viewport(window):
     """The camera's view in "Rendered" shading, at rest; the whole window is pictured three times."""
     area = max((area for area in window.screen.areas if area.type == "VIEW_3D"), key=lambda a: a.width * a.height)
+    for other in window.screen.areas:
+        if other.type == "PROPERTIES":
+            other.spaces.active.context = "RENDER"
     space = area.spaces.active
     space.overlay.show_overlays = False
     space.region_3d.view_perspective = "CAMERA"

@@ -104,5 +104,8 @@ def test_viewport_shows_the_scene_and_refines_at_rest(driven):
 
 
 def test_opengl_and_vulkan_render_the_same_picture(installed):
+    """Within 1/255; one pixel in a thousand may differ more, where two rasterisers decide otherwise about an edge."""
     opengl, vulkan = (pixels(drive(backend)[0] / "render.png") for backend in BACKENDS)
-    assert np.abs(opengl - vulkan).max() <= 1
+    difference = np.abs(opengl - vulkan).max(axis=2)
+    assert (difference > 1).mean() <= 0.001
+    assert difference.mean() <= 0.05
