@@ -84,7 +84,7 @@ def picture(window, name):
     with bpy.context.temp_override(window=window):
         bpy.ops.screen.screenshot(filepath=str(path))
     image = bpy.data.images.load(str(path))
-    black = not any(image.pixels[0::388])  # red of every 97th pixel
+    black = not any(image.pixels[:][::388])  # red of every 97th pixel
     bpy.data.images.remove(image)
     if black and shutil.which("import"):  # ImageMagick's
         subprocess.run(["import", "-window", "root", str(path)], check=True)
