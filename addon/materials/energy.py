@@ -36,7 +36,7 @@ TEXTURE_SIZE = 64  # texels along each side of the packed texture: 4 x 4 tiles o
 
 SMALLEST_COSINE = 1e-4  # the node at mu = 0 stands just above the horizon, where the lobe is still defined
 SMALLEST_Z, LARGEST_Z = 1e-4, 0.99  # z = 0 has no reflection, z = 1 an infinite index of refraction
-GRID = 192  # quadrature points along each of the two dimensions of the half vector
+GRID = 384  # quadrature points along each of the two dimensions of the half vector
 
 PATH = Path(__file__).with_name("energy.npz")
 
