@@ -262,7 +262,8 @@ def build_trees(parts: bpy.types.Collection) -> None:
     settings.use_collection_pick_random = True
     settings.particle_size = 0.62
     settings.size_random = 0.5
-    settings.use_rotations = False  # upright, as the parts stand
+    settings.use_rotations = True
+    settings.rotation_mode = "NONE"  # upright, as the parts stand
 
 
 def build_cars(parts: bpy.types.Collection, random: np.random.Generator) -> None:

@@ -87,3 +87,78 @@ def sky(height: int, zenith, horizon, ground, glow, glow_azimuth: float) -> np.n
 
 def blend_images(low: np.ndarray, high: np.ndarray, share: np.ndarray) -> np.ndarray:
     return low + (high - low) * share[..., None]
+
+
+# Surfaces
+
+
+def noise(shape: tuple[int, int], cells: tuple[int, int], random: np.random.Generator) -> np.ndarray:
+    """Smooth random values in [0, 1] that repeat at the edges; `cells` lattice points down and across."""
+    lattice = random.random(cells)
+
+    def steps(size: int, count: int):
+        position = np.arange(size) * count / size
+        low = position.astype(int)
+        return low, (low + 1) % count, smoothstep(0, 1, position - low)
+
+    y0, y1, v = steps(shape[0], cells[0])
+    x0, x1, u = steps(shape[1], cells[1])
+    low = lattice[y0][:, x0] * (1 - u) + lattice[y0][:, x1] * u
+    high = lattice[y1][:, x0] * (1 - u) + lattice[y1][:, x1] * u
+    return low * (1 - v[:, None]) + high * v[:, None]
+
+
+def planks(size: int, rows: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Floor boards along u that tile: colour, and roughness in [0, 1]."""
+    y, x = np.mgrid[0:size, 0:size] / size
+    row = (y * rows).astype(int)
+    joint = random.random(rows)[row]  # where along u each row's boards end; two boards to a row
+    along = (x - joint) % 1.0
+    board = row * 2 + (along > 0.5)
+    tone = random.random(2 * rows)[board]
+    hue = random.random(2 * rows)[board]
+    drift = noise((size, size), (rows * 3, 4), random) + 0.5 * noise((size, size), (rows * 6, 12), random)
+    rings = 0.5 + 0.5 * np.sin((y * rows * 5.5 + 1.7 * drift + 9.0 * tone) * 2 * np.pi)
+    fibre = noise((size, size), (size // 3, 10), random)
+    value = 0.62 + 0.22 * (tone - 0.5) - 0.13 * rings**2 - 0.12 * (fibre - 0.5)
+    color = blend((0.30, 0.15, 0.07), (0.66, 0.42, 0.22), np.clip((value - 0.3) / 0.5, 0, 1))
+    color = color * blend((1.0, 0.94, 0.88), (0.94, 1.0, 1.02), hue)
+    to_edge = np.minimum(np.abs((y * rows) % 1.0 - 0.5) * -1 + 0.5, 0.5) / rows
+    to_end = np.minimum(along % 0.5, 0.5 - along % 0.5)
+    gap = np.minimum(smoothstep(0.0005, 0.0035, to_edge), smoothstep(0.0005, 0.0030, to_end))
+    rough = 0.34 + 0.14 * rings + 0.10 * fibre + 0.3 * (1 - gap)
+    return encode(color * (0.25 + 0.75 * gap[..., None])), np.clip(rough, 0, 1)
+
+
+def rug(height: int, width: int) -> np.ndarray:
+    """A woven rug of stripes and stepped diamonds."""
+    y, x = np.mgrid[0:height, 0:width] / width
+    y = np.floor(y * 64) / 64
+    x = np.floor(x * 64) / 64
+    diamonds = np.abs((x * 4) % 1 - 0.5) + np.abs((y * 4) % 1 - 0.5)
+    indigo, madder, wool, ochre = (0.07, 0.11, 0.22), (0.42, 0.09, 0.06), (0.66, 0.58, 0.45), (0.55, 0.32, 0.08)
+    color = np.broadcast_to(np.array(madder), (height, width, 3)).copy()
+    color[diamonds < 0.40] = wool
+    color[diamonds < 0.28] = indigo
+    color[diamonds < 0.12] = ochre
+    border = np.minimum(np.minimum(x, 1 - 1 / 64 - x), np.minimum(y, y.max() - y))
+    color[border < 0.09] = indigo
+    color[border < 0.06] = wool
+    color[border < 0.03] = madder
+    thread = 0.92 + 0.08 * ((np.mgrid[0:height, 0:width].sum(0)) % 2)
+    return encode(color * thread[..., None])
+
+
+def painting(height: int, width: int) -> np.ndarray:
+    """Hills in layers under a low sun."""
+    y, x = np.mgrid[0:height, 0:width] / np.array([height, width])[:, None, None]
+    color = blend((0.92, 0.62, 0.34), (0.22, 0.42, 0.52), smoothstep(0.35, 1.0, y))
+    sun = np.hypot((x - 0.66) * width / height, y - 0.62)
+    color = blend_images(color, np.broadcast_to((0.98, 0.86, 0.62), color.shape), 1 - smoothstep(0.115, 0.125, sun))
+    layers = [(0.52, 0.06, 2.2, 0.4, (0.55, 0.40, 0.38)), (0.40, 0.07, 1.6, 2.1, (0.30, 0.27, 0.33)),
+              (0.26, 0.06, 2.9, 4.0, (0.14, 0.17, 0.22)), (0.12, 0.05, 1.9, 5.2, (0.06, 0.08, 0.10))]  # fmt: skip
+    for level, swing, waves, phase, hill in layers:
+        ridge = level + swing * np.sin(waves * 2 * np.pi * x + phase) + 0.3 * swing * np.sin(7 * waves * x + phase)
+        share = 1 - smoothstep(-0.004, 0.004, y - ridge)
+        color = blend_images(color, np.broadcast_to(hill, color.shape), share)
+    return encode(color)
