@@ -3,23 +3,23 @@
 #include "lib/closure.glsl"
 #include "lib/color.glsl"
 
-void input_attribute(vec4 attribute, out vec3 color, out vec3 vector, out float average, out float alpha)
+void input_attribute(vec4 stored, out vec3 color, out vec3 vector, out float average, out float alpha)
 {
-  color = attribute.xyz;
-  vector = attribute.xyz;
-  average = vector_average(attribute.xyz);
-  alpha = attribute.w;
+  color = stored.xyz;
+  vector = stored.xyz;
+  average = vector_average(stored.xyz);
+  alpha = stored.w;
 }
 
-void input_color_attribute(vec4 attribute, out vec3 color, out float alpha)
+void input_color_attribute(vec4 stored, out vec3 color, out float alpha)
 {
-  color = attribute.xyz;
-  alpha = attribute.w;
+  color = stored.xyz;
+  alpha = stored.w;
 }
 
-void input_uv(vec4 attribute, out vec3 uv)
+void input_uv(vec4 stored, out vec3 uv)
 {
-  uv = vec3(attribute.xy, 0.0);
+  uv = vec3(stored.xy, 0.0);
 }
 
 void input_texture_coordinate(SurfacePoint point, vec4 uv_attribute, out vec3 uv, out vec3 reflection)
@@ -41,17 +41,17 @@ void input_object_info(SurfacePoint point, out float random)
   random = point.object_random;
 }
 
-void input_color(vec3 constant, out vec3 color)
+void input_color(vec3 chosen, out vec3 color)
 {
-  color = constant;
+  color = chosen;
 }
 
-void input_value(float constant, out float value)
+void input_value(float chosen, out float value)
 {
-  value = constant;
+  value = chosen;
 }
 
-void input_tangent(vec4 attribute, out vec3 tangent)
+void input_tangent(vec4 stored, out vec3 tangent)
 {
-  tangent = attribute.xyz;
+  tangent = stored.xyz;
 }
