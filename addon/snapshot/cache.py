@@ -5,8 +5,11 @@ number means the same content, and nothing is read. A new number, or a data-bloc
 means "maybe changed": the arrays are read and compared by digest, and the mesh keeps its version when they
 are equal. (That is what happens in each F12 render, whose dependency graph evaluates everything anew.)
 
-Node graphs and images have no such number. They are taken over only when the caller has told all updates since
-the last sync (`invalidate`) and none of them can concern them; without that news they are read again.
+Node graphs have no such number. They are taken over only when the caller has told all updates since the last sync
+(`invalidate`) and none of them can concern a graph; without that news they are read again.
+
+Images have neither: Blender tells no one when an image is painted, reloaded or gets another alpha mode. What can be
+asked cheaply (file time, packed data, settings) is compared at each sync, and the pixels of an unsaved one.
 """
 
 from __future__ import annotations
@@ -79,14 +82,15 @@ class SnapshotCache:
     def invalidate(self, updates: Iterable) -> None:
         """Take note of `depsgraph.updates`; call it for every update, it only records.
 
-        Calling it is a promise: no update since the last sync was kept back.
+        Calling it is a promise: no update since the last sync was kept back. An empty list promises nothing, since
+        Blender empties it once its handlers have run.
         """
         for update in updates:
             block = update.id.original
             self.changed.add(block.session_uid)
             if type(block).__name__ not in _UNRELATED_TO_GRAPHS:
                 self.graphs.clear()
-        self.informed = True
+            self.informed = True
 
     def finish(self, meshes: Iterable[str], images: Iterable[str], graphs: Iterable[str]) -> None:
         """End a sync: forget what the scene no longer holds, and all news, which is now worked in."""

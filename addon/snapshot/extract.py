@@ -95,7 +95,7 @@ def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache
     read = 0
     keys = _mesh_keys(first)
     for pointer, place in first.items():
-        entry, was_read = _sync_mesh(keys[pointer], place, wanted[pointer], cache, depsgraph)
+        entry, was_read = _sync_mesh(keys[pointer], place, wanted[pointer], cache)
         read += was_read
         notes += entry.notes
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
@@ -150,7 +150,7 @@ def _mesh_keys(first: dict[int, MeshPlace]) -> dict[int, str]:
     return keys
 
 
-def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache, depsgraph) -> tuple[MeshEntry, bool]:
+def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache) -> tuple[MeshEntry, bool]:
     """The mesh as it is now, and whether its content is new."""
     facts = place.facts
     mesh, entry = facts.data, cache.meshes.get(key)
@@ -162,7 +162,7 @@ def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache,
     if known and mesh.session_uid and entry.evaluation == mesh.session_uid:
         return entry, False
     if editing:
-        mesh = facts.owner.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+        mesh = facts.owner.to_mesh()  # asking it to preserve all layers would give the mesh before the edits
     try:
         raw = read_mesh(mesh, wanted)
         digest = raw.digest()

@@ -39,23 +39,15 @@ class ImageTable:
         if key in self.images:
             return key
         entry = self._cache.images.get(key)
-        if entry is None or not self._is_current(entry, original):
-            state = _state(original)
-            if entry is None or _uncertain(state) or entry.state != state:
-                entry = self._read(key, original, user, entry)
-            else:
-                self.reused += 1
+        # A painted image that is not saved changes without a trace: its pixels have to be compared.
+        if entry is None or original.is_dirty or entry.state != _state(original):
+            entry = self._read(key, original, user, entry)
         else:
             self.reused += 1
         self._cache.images[key] = entry
         self.images[key] = entry.image
         self.notes.extend(entry.notes)
         return key
-
-    def _is_current(self, entry: ImageEntry, original) -> bool:
-        """Known to be unchanged without looking: all updates were told and none names it."""
-        cache = self._cache
-        return cache.informed and original.session_uid not in cache.changed and not original.is_dirty
 
     def _read(self, key: str, original, user, old: ImageEntry | None) -> ImageEntry:
         pixels, notes = _pixels(original, user)
@@ -127,7 +119,7 @@ def _encoding(original) -> tuple[str, tuple[Note, ...]]:
 
 
 def _state(original) -> tuple:
-    """Cheap facts that change when the pixels do; the first one says whether they can be trusted to."""
+    """Facts that change when the pixels of a saved or generated image do."""
     path = bpy.path.abspath(original.filepath_raw, library=original.library) if original.filepath_raw else ""
     try:
         file = Path(path).stat() if path and original.packed_file is None else None
@@ -135,7 +127,6 @@ def _state(original) -> tuple:
         file = None
     packed = original.packed_file
     return (
-        bool(original.is_dirty),
         original.source,
         path,
         (file.st_mtime_ns, file.st_size) if file else None,
@@ -146,8 +137,3 @@ def _state(original) -> tuple:
         original.colorspace_settings.name,
         (original.generated_type, tuple(original.generated_color)) if original.source == "GENERATED" else None,
     )
-
-
-def _uncertain(state: tuple) -> bool:
-    """A painted image changes without a trace in its state: its pixels have to be compared."""
-    return state[0]

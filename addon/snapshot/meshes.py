@@ -16,6 +16,9 @@ from .cache import next_version
 from .scene import Mesh, Note
 from .tangents import corner_tangents
 
+# Metres. Beyond it the squared length of a position overflows float32 on the GPU; such a vertex is as broken as NaN.
+FARTHEST = 1e18
+
 
 @dataclass(frozen=True)
 class Wanted:
@@ -100,14 +103,9 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
 
     Triangles that touch a vertex which is not finite are left out, with a Note about `subject`.
     """
-    notes = []
     triangles, slots = _triangulate(raw, mesh)
     positions, triangles, slots, broken = _drop_broken(raw, triangles, slots)
-    if broken:
-        notes.append(
-            Note(subject, f"{broken} triangles have a corner that is not a finite number and are not drawn; check the"
-                 " modifiers, or use Mesh > Clean Up.")
-        )  # fmt: skip
+    notes = (_broken_note(subject, broken),) if broken else ()
     order = None if _ascending(slots) else np.argsort(slots, kind="stable")
     if order is not None:
         triangles, slots = triangles[order], slots[order]
@@ -134,7 +132,12 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
         bounds_min=low,
         bounds_max=high,
     )
-    return made, tuple(notes)
+    return made, notes
+
+
+def _broken_note(subject: str, count: int) -> Note:
+    text = f"{count} triangle(s) have a corner that is infinitely far or not a number, and are not drawn;"
+    return Note(subject, f"{text} check the modifiers, or delete those vertices.")
 
 
 def _attribute(mesh, name: str, field_name: str, count: int, dtype, width: int) -> np.ndarray:
@@ -219,9 +222,12 @@ def _triangulate(raw: RawMesh, mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _drop_broken(raw: RawMesh, triangles, slots):
-    """Positions made finite, and only the triangles whose vertices exist and are finite."""
+    """Positions made finite, and only the triangles whose vertices exist and lie at a place (see FARTHEST)."""
     positions, vertices = raw.positions, raw.corner_vertices
-    finite = np.isfinite(positions).all(axis=1) if not np.isfinite(positions).all() else None
+    finite = None
+    if len(positions) and not np.abs(positions).max() < FARTHEST:
+        with np.errstate(invalid="ignore"):
+            finite = (np.abs(positions) < FARTHEST).all(axis=1)
     in_range = len(vertices) == 0 or (vertices.min() >= 0 and vertices.max() < len(positions))
     if finite is None and in_range:
         return positions, triangles, slots, 0

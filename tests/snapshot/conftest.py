@@ -1,5 +1,6 @@
 """Small scenes for the snapshot's tests, and a stand-in for the node reader while it is not there."""
 
+import contextlib
 import importlib.util
 import sys
 import types
@@ -108,6 +109,20 @@ class Stage:
         if bpy.app.version < (5, 0):
             block.use_nodes = True
         return block.node_tree
+
+    @contextlib.contextmanager
+    def telling(self, cache):
+        """Hand Blender's updates on to the cache, as an engine does, and update at the end."""
+
+        def tell(scene, depsgraph):
+            cache.invalidate(depsgraph.updates)
+
+        bpy.app.handlers.depsgraph_update_post.append(tell)
+        try:
+            yield
+            bpy.context.view_layer.update()
+        finally:
+            bpy.app.handlers.depsgraph_update_post.remove(tell)
 
     def depsgraph(self):
         graph = bpy.context.evaluated_depsgraph_get()

@@ -1,0 +1,68 @@
+"""Size, border and filter of the picture."""
+
+import pytest
+
+
+def test_film_takes_the_scenes_settings(stage):
+    stage.scene.render.filter_size = 2.5
+    stage.scene.render.film_transparent = True
+    film = stage.take(width=320, height=200).film
+    assert (film.width, film.height, film.border) == (320, 200, (0, 0, 320, 200))
+    assert film.filter_width == pytest.approx(2.5)
+    assert film.transparent is True
+    assert film.exposure == 1.0
+
+
+@pytest.mark.parametrize("size", [(64, 48), (65, 49), (101, 7)])
+def test_the_border_is_rounded_down_as_blender_rounds_it(stage, size):
+    """The size of a bordered result is what Blender saves when it crops: asked by rendering one."""
+    import bpy
+
+    width, height = size
+    render = stage.scene.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x, render.border_max_x = 0.25, 0.8
+    render.border_min_y, render.border_max_y = 0.1, 0.55
+    render.resolution_x, render.resolution_y = size
+    stage.camera()
+    sizes = []
+
+    class Engine(bpy.types.RenderEngine):
+        bl_idname = "SNAPSHOT_FILM_TEST"
+        bl_label = "Snapshot test"
+
+        def render(self, depsgraph):
+            result = self.begin_result(0, 0, self.resolution_x, self.resolution_y)
+            sizes.append((result.resolution_x, result.resolution_y))
+            self.end_result(result)
+
+    bpy.utils.register_class(Engine)
+    try:
+        render.engine = Engine.bl_idname
+        bpy.ops.render.render()
+    finally:
+        bpy.utils.unregister_class(Engine)
+    film = stage.take(width=width, height=height).film
+    assert film.border_size == sizes[0]
+    assert film.border[:2] == (int(0.25 * width), int(0.1 * height))
+
+
+def test_a_border_of_the_caller_wins(stage):
+    stage.scene.render.use_border = True
+    assert stage.take(border=(1, 2, 30, 40)).film.border == (1, 2, 30, 40)
+
+
+def test_a_border_without_width_keeps_a_pixel(stage):
+    render = stage.scene.render
+    render.use_border = True
+    render.border_min_x = render.border_max_x = 1.0
+    x0, _, x1, _ = stage.take(width=64, height=48).film.border
+    assert (x0, x1) == (63, 64)
+
+
+def test_the_snapshot_names_its_scene_and_says_what_it_cost(stage):
+    stage.link("O", stage.mesh())
+    snapshot = stage.take()
+    assert snapshot.scene_name == stage.scene.name
+    assert snapshot.sync_stats["meshes_read"] == 1
+    assert snapshot.sync_stats["seconds"] > 0

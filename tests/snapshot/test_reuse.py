@@ -1,0 +1,191 @@
+"""What did not change is not read again, and what did is never stale."""
+
+import contextlib
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.snapshot import SnapshotCache
+
+
+def counts(snapshot):
+    return snapshot.sync_stats["meshes_read"], snapshot.sync_stats["meshes_reused"]
+
+
+def only_mesh(snapshot):
+    (mesh,) = snapshot.meshes.values()
+    return mesh
+
+
+def test_an_unchanged_mesh_is_the_same_object_again(stage):
+    cache = SnapshotCache()
+    stage.link("O", stage.mesh())
+    first, second = stage.take(cache), stage.take(cache)
+    assert counts(first) == (1, 0)
+    assert counts(second) == (0, 1)
+    assert only_mesh(second) is only_mesh(first)
+
+
+def test_moving_an_object_reads_no_mesh(stage):
+    cache = SnapshotCache()
+    placed = stage.link("O", stage.mesh())
+    stage.take(cache)
+    placed.location.x = 3.0
+    snapshot = stage.take(cache)
+    assert counts(snapshot) == (0, 1)
+    assert snapshot.instances[0].matrix[0, 3] == 3.0
+
+
+def alter(change, placed, data):
+    if change == "vertex":
+        data.vertices[0].co.z = 1.0
+    elif change == "uv":
+        data.uv_layers["uv"].data[0].uv = (0.5, 0.25)
+    elif change == "normals":
+        data.polygons.foreach_set("use_smooth", np.ones(4, bool))
+        data.vertices[4].co.z = 0.3
+    elif change == "material index":
+        data.polygons[3].material_index = 1
+    elif change == "slot":
+        data.materials.append(bpy.data.materials.new("c"))
+    elif change == "modifier":
+        placed.modifiers.new("Mirror", "MIRROR")
+    elif change == "color":
+        data.color_attributes["color"].data[0].color = (1, 0, 0, 1)
+
+
+@pytest.mark.parametrize("informed", [False, True])
+@pytest.mark.parametrize("change", ["vertex", "uv", "normals", "material index", "slot", "modifier", "color"])
+def test_every_change_of_content_gives_a_new_version(stage, change, informed):
+    cache = SnapshotCache()
+    data = stage.grid(2)
+    data.materials.append(bpy.data.materials.new("a"))
+    data.materials.append(bpy.data.materials.new("b"))
+    data.uv_layers.new(name="uv")
+    data.color_attributes.new("color", "FLOAT_COLOR", "POINT")
+    placed = stage.link("O", data)
+    old = only_mesh(stage.take(cache))
+    with stage.telling(cache) if informed else contextlib.nullcontext():
+        alter(change, placed, data)
+        data.update()
+    assert cache.informed == informed
+    new = only_mesh(stage.take(cache))
+    assert new.version != old.version
+    fresh = only_mesh(stage.take(SnapshotCache()))
+    assert np.array_equal(new.positions, fresh.positions)
+    assert np.array_equal(new.triangle_slots, fresh.triangle_slots)
+    assert new.slots == fresh.slots
+
+
+def test_a_new_evaluation_with_equal_content_keeps_the_version(stage):
+    cache = SnapshotCache()
+    data = stage.mesh()
+    stage.link("O", data)
+    old = only_mesh(stage.take(cache))
+    data.update_tag()
+    snapshot = stage.take(cache)
+    assert counts(snapshot) == (0, 1)
+    assert only_mesh(snapshot) is old
+
+
+def test_another_depsgraph_of_the_same_scene_reuses_the_mesh(stage):
+    """An F12 render evaluates everything anew, in a graph of its own."""
+    cache = SnapshotCache()
+    stage.link("O", stage.mesh())
+    old = only_mesh(stage.take(cache))
+    taken = []
+
+    class Engine(bpy.types.RenderEngine):
+        bl_idname = "SNAPSHOT_REUSE_TEST"
+        bl_label = "Snapshot test"
+
+        def render(self, depsgraph):
+            from addon.snapshot import take
+
+            taken.append(take(depsgraph, cache, 8, 8))
+
+    bpy.utils.register_class(Engine)
+    try:
+        stage.scene.render.engine = Engine.bl_idname
+        bpy.ops.render.render()
+    finally:
+        bpy.utils.unregister_class(Engine)
+    assert counts(taken[0]) == (0, 1)
+    assert only_mesh(taken[0]) is old
+
+
+def test_the_cache_forgets_what_left_the_scene(stage):
+    cache = SnapshotCache()
+    placed = stage.link("O", stage.mesh())
+    old = only_mesh(stage.take(cache))
+    stage.scene.collection.objects.unlink(placed)
+    assert stage.take(cache).meshes == {}
+    assert cache.meshes == {}
+    stage.scene.collection.objects.link(placed)
+    assert only_mesh(stage.take(cache)).version > old.version
+
+
+def test_versions_never_repeat_between_caches(stage):
+    stage.link("O", stage.mesh())
+    first, second = only_mesh(stage.take(SnapshotCache())), only_mesh(stage.take(SnapshotCache()))
+    assert first.key == second.key
+    assert first.version != second.version
+
+
+@pytest.mark.parametrize("informed", [False, True])
+def test_a_changed_node_value_is_seen(stage, informed):
+    cache = SnapshotCache()
+    data, material = stage.mesh(), stage.material()
+    data.materials.append(material)
+    stage.link("O", data)
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Roughness"].default_value = 0.25
+    stage.take(cache)
+    same = stage.take(cache).materials[1].graph
+    with stage.telling(cache) if informed else contextlib.nullcontext():
+        shader.inputs["Roughness"].default_value = 0.75
+    assert cache.informed == informed
+    changed = stage.take(cache).materials[1].graph
+    (node,) = (node for node in changed.nodes.values() if node.type == "ShaderNodeBsdfPrincipled")
+    assert node.inputs["Roughness"].value == 0.75
+    assert changed is not same
+
+
+def test_an_unchanged_graph_stays_the_same_object(stage):
+    cache = SnapshotCache()
+    data = stage.mesh()
+    data.materials.append(stage.material())
+    stage.link("O", data)
+    assert stage.take(cache).materials[1].graph is stage.take(cache).materials[1].graph
+
+
+def test_an_empty_list_of_updates_is_no_news(stage):
+    cache = SnapshotCache()
+    cache.invalidate([])
+    assert not cache.informed
+
+
+def test_a_sync_uses_up_the_news(stage):
+    cache = SnapshotCache()
+    placed = stage.link("O", stage.mesh())
+    stage.take(cache)
+    with stage.telling(cache):
+        placed.location.x = 1.0
+    assert cache.informed
+    stage.take(cache)
+    assert not cache.informed
+    assert cache.changed == set()
+
+
+def test_a_moved_object_leaves_the_graphs_unread(stage):
+    cache = SnapshotCache()
+    data = stage.mesh()
+    data.materials.append(stage.material())
+    placed = stage.link("O", data)
+    stage.take(cache)
+    entries = dict(cache.graphs)
+    with stage.telling(cache):
+        placed.location.x = 1.0
+    stage.take(cache)
+    assert all(cache.graphs[key] is entry for key, entry in entries.items())
