@@ -57,9 +57,12 @@ class Reference:
 
 def two_seeds(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> tuple[dict, dict]:
     """Mean and half difference of two renders, as `Reference` holds them."""
-    both = first.keys() & second.keys()
-    images = {k: first[k] if k == "depth" else (first[k] + second[k]) * np.float32(0.5) for k in first if k in both}
-    half = {k: np.zeros_like(first[k]) if k == "depth" else (first[k] - second[k]) * np.float32(0.5) for k in images}
+    images, half = {}, {}
+    for name in first.keys() & second.keys():
+        one, other = first[name], second[name]
+        with np.errstate(over="ignore", invalid="ignore"):  # the metrics count what is not finite
+            images[name] = one if name == "depth" else (one + other) * np.float32(0.5)
+            half[name] = np.zeros_like(one) if name == "depth" else (one - other) * np.float32(0.5)
     return images, half
 
 

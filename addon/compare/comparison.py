@@ -72,8 +72,9 @@ class Comparison:
 
 def compare_passes(passes: Passes, reference: Reference, with_flip: bool = True) -> tuple[Picture, ...]:
     """All rows that are worth showing, in the order of `ROWS`, each with its error."""
-    paths = light_paths(passes.images, passes.film_transparent)
-    reference_paths, half_paths = reference.paths()
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is counted below, by the metrics
+        paths = light_paths(passes.images, passes.film_transparent)
+        reference_paths, half_paths = reference.paths()
     pictures = []
     for row in ROWS:
         mine, theirs, half = (

@@ -31,6 +31,10 @@ MEANINGLESS = {  # (struct, field)
     ("CurveProfile", "changed_timestamp"),
     ("bNodeTree", "inputs"),  # 4.x writes these for older versions from memory that it reuses; the interface follows
     ("bNodeTree", "outputs"),
+    ("Object", "base_flag"),  # what is selected, and hidden in viewports
+    ("Object", "base_local_view_bits"),
+    ("Base", "flag"),
+    ("Base", "local_view_bits"),
     ("RenderData", "im_format"),
     ("RenderData", "pic[1024]"),
     ("IDProperty", "*next"),

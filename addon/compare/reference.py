@@ -68,7 +68,7 @@ def render_passes(
     view_layer = view_layer or active_view_layer(scene)
     with tempfile.TemporaryDirectory(prefix="candela_") as folder:
         path = Path(folder) / "passes.exr"
-        with overridden(render_settings(scene, view_layer, engine, samples, seed, direct_only, size)):
+        with overridden(render_settings(scene, view_layer, engine, samples, seed, direct_only, size)) as notes:
             transparent = scene.render.film_transparent
             start = time.perf_counter()
             try:
@@ -83,7 +83,7 @@ def render_passes(
         images = named_images(read_exr(path), view_layer.name)
     if "combined" not in images:
         raise RenderFailed(f"{engine} left no picture of view layer '{view_layer.name}' in scene '{scene.name}'.")
-    return Passes(images, engine, samples, seed, seconds, transparent)
+    return Passes(images, engine, samples, seed, seconds, transparent, tuple(notes))
 
 
 def named_images(layers: dict, view_layer: str) -> dict:
@@ -175,6 +175,7 @@ def reference_key(
 ) -> str:
     """Name of the cache entry: a hash of the scene as it will be rendered. Frame, size and samples are part of it."""
     with overridden(render_settings(scene, view_layer, "CYCLES", samples, 0, direct_only, size)):
+        view_layer.update()  # evaluation writes into the data (animated values, bounds): always hash what it left
         content = scene_hash(scene)
     about = f"{KEY_VERSION} {SEEDS} {view_layer.name!r} {content}"
     return hashlib.blake2b(about.encode(), digest_size=20).hexdigest()
@@ -313,28 +314,31 @@ def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, direct_only
 
 
 @contextmanager
-def overridden(settings: list[Setting]) -> Iterator[None]:
+def overridden(settings: list[Setting]) -> Iterator[list[str]]:
     """Set the properties for the time of the block and put them back afterwards, also after an error.
+
+    What cannot be put back is named in the list that the block receives: a file may hold a value that this Blender
+    does not know, such as the engine of an add-on that is not installed.
 
     They are put back in the order in which they were set, not in reverse: Blender refuses a file format that does
     not belong to the current media type, and setting a format changes the depth, which comes after it.
     """
     before = [(owner, name, getattr(owner, name), owner.is_property_set(name)) for owner, name, _ in settings]
+    notes: list[str] = []
     try:
         for owner, name, value in settings:
+            if isinstance(owner, bpy.types.PropertyGroup):
+                owner.property_unset(name)  # a group holds what is set in the order of setting: make it always the same
             setattr(owner, name, value)
-        yield
+        yield notes
     finally:
-        failed = []
         for owner, name, value, was_set in before:
             try:
                 setattr(owner, name, value)
                 if not was_set:  # a property of an add-on that still had its default: leave no trace in the file
                     owner.property_unset(name)
             except (TypeError, AttributeError, ReferenceError) as error:
-                failed.append(f"{name} ({error})")
-        if failed:
-            raise RenderFailed(f"These settings could not be put back after the render: {', '.join(failed)}.")
+                notes.append(f"The setting {name} could not be put back after the render: {error}.")
 
 
 def _save_render_result(scene: bpy.types.Scene, path: Path) -> None:

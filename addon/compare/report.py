@@ -119,11 +119,14 @@ def shown_pixels(name: str, image: np.ndarray, reference: np.ndarray) -> np.ndar
 def signed_difference(name: str, x: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """(H, W) in display units: the channel that differs most, signed; relative for depth, a length for normals."""
     if name == "depth":
-        both = (x[..., 0] < EMPTY_DEPTH) & (reference[..., 0] < EMPTY_DEPTH)
-        relative = (x[..., 0] - reference[..., 0]) / np.maximum(np.abs(reference[..., 0]), 1e-12)
-        return np.where(both, np.nan_to_num(relative), 0)
+        x, r = x[..., 0].astype(np.float64), reference[..., 0].astype(np.float64)
+        both = (np.abs(x) < EMPTY_DEPTH) & (np.abs(r) < EMPTY_DEPTH)
+        relative = np.zeros(x.shape)
+        relative[both] = (x[both] - r[both]) / np.maximum(np.abs(r[both]), 1e-12)
+        return relative
     if name == "normal":
-        return np.linalg.norm(np.nan_to_num(x[..., :3]) - np.nan_to_num(reference[..., :3]), axis=-1)
+        x, r = (np.clip(np.nan_to_num(n[..., :3].astype(np.float64)), -2, 2) for n in (x, reference))
+        return np.linalg.norm(x - r, axis=-1)
     difference = display(x) - display(reference)
     most = np.abs(difference).argmax(axis=-1)[..., None]
     return np.take_along_axis(difference, most, axis=-1)[..., 0]

@@ -1,0 +1,65 @@
+"""The hash of a .blend file's content."""
+
+import bpy
+import pytest
+
+from addon.compare.content import Dna, blend_hash, read_blocks
+
+
+def written(scene, path):
+    bpy.data.libraries.write(str(path), {scene}, path_remap="NONE", compress=False)
+    return path.read_bytes()
+
+
+def test_struct_sizes_add_up_to_what_the_file_states(room, tmp_path):
+    data = written(room, tmp_path / "a.blend")
+    block = next(block for block in read_blocks(data) if block.code == b"DNA1")
+    dna = Dna(data[block.start : block.start + block.length])
+    for name, size in dna.structs[1:]:  # the first stands for blocks without fields
+        _, _, offset, last = dna.layout(name)[-1]
+        assert offset + last == size, name
+
+
+def test_blocks_hold_the_scene(room, tmp_path):
+    codes = {block.code for block in read_blocks(written(room, tmp_path / "a.blend"))}
+    assert {b"SC", b"OB", b"ME", b"MA", b"LA", b"CA", b"WO", b"DATA", b"DNA1"} <= codes
+
+
+def test_the_same_scene_written_twice_has_one_hash(room, tmp_path):
+    bpy.context.view_layer.update()
+    assert blend_hash(written(room, tmp_path / "a.blend")) == blend_hash(written(room, tmp_path / "b.blend"))
+
+
+def test_another_order_of_memory_has_the_same_hash(room, tmp_path):
+    bpy.context.view_layer.update()
+    before = blend_hash(written(room, tmp_path / "a.blend"))
+    for number in range(50):
+        bpy.data.objects.remove(bpy.data.objects.new(f"Gone {number}", None))
+    assert blend_hash(written(room, tmp_path / "b.blend")) == before
+
+
+def test_selection_does_not_matter_and_visibility_does(room, tmp_path):
+    bpy.context.view_layer.update()
+    before = blend_hash(written(room, tmp_path / "a.blend"))
+    bpy.data.objects["Wall"].select_set(True)
+    bpy.context.view_layer.update()
+    assert blend_hash(written(room, tmp_path / "b.blend")) == before
+    bpy.data.objects["Wall"].hide_render = True
+    assert blend_hash(written(room, tmp_path / "c.blend")) != before
+
+
+def test_own_settings_are_left_out_and_others_are_not(registered, room, tmp_path):
+    room["zebra"] = 1
+    before = blend_hash(written(room, tmp_path / "a.blend"))
+    room.candela.samples = 3
+    room.candela.seed = 4
+    assert blend_hash(written(room, tmp_path / "b.blend")) == before
+    room["zebra"] = 2
+    assert blend_hash(written(room, tmp_path / "c.blend")) != before
+
+
+def test_what_is_no_blend_file_is_refused():
+    with pytest.raises(ValueError, match="not an uncompressed"):
+        blend_hash(b"\x28\xb5\x2f\xfd" + bytes(100))
+    with pytest.raises(ValueError, match="does not describe"):
+        blend_hash(b"BLENDER17-01v0502" + bytes(10))
