@@ -18,6 +18,10 @@ def begin(title: str) -> None:
     """Empty Blender and name its one scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.name = title
+    for screen in bpy.data.screens:
+        for area in screen.areas:
+            if area.type == "FILE_BROWSER" and area.spaces.active.params:
+                area.spaces.active.params.directory = b"//"  # otherwise the home folder of whoever runs this
 
 
 def finish() -> None:
@@ -173,8 +177,7 @@ def _image_node(tree, picture: bpy.types.Image, location):
     return node
 
 
-def _output(tree, shader, x: float = 320.0) -> None:
-    kind = "ShaderNodeOutputWorld" if tree.nodes.get("Background") else "ShaderNodeOutputMaterial"
+def _output(tree, shader, x: float = 320.0, kind: str = "ShaderNodeOutputMaterial") -> None:
     output = tree.nodes.new(kind)
     output.location = (x, 0)
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
@@ -268,7 +271,8 @@ def world(color=(0, 0, 0), strength: float = 1.0, picture: bpy.types.Image | Non
         texture = _node(tree, "ShaderNodeTexEnvironment", (-320, 0), Vector=mapping.outputs["Vector"])
         texture.image = picture
         color = texture.outputs["Color"]
-    _output(tree, _node(tree, "ShaderNodeBackground", (0, 0), Color=_color(color), Strength=strength))
+    background = _node(tree, "ShaderNodeBackground", (0, 0), Color=_color(color), Strength=strength)
+    _output(tree, background, kind="ShaderNodeOutputWorld")
     return data
 
 

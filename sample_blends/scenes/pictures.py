@@ -162,3 +162,85 @@ def painting(height: int, width: int) -> np.ndarray:
         share = 1 - smoothstep(-0.004, 0.004, y - ridge)
         color = blend_images(color, np.broadcast_to(hill, color.shape), share)
     return encode(color)
+
+
+# Leaves: (H, W, 4) with straight alpha
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One leaf of a drawn spray, in units of the image's width: it grows from (x, y) along `angle` degrees."""
+
+    x: float
+    y: float
+    angle: float
+    length: float
+    width: float  # half of it
+    tone: float  # 0 dark … 1 light
+    blunt: float = 0.75  # below 1: broadest near the stalk; above: near the tip
+
+
+def draw_leaves(height: int, width: int, leaves: list[Leaf], dark, light, vein) -> np.ndarray:
+    """Paint leaves over each other; where none covers, alpha is 0 and the colour their mean, so edges stay clean."""
+    y, x = np.mgrid[0:height, 0:width]
+    x, y = (x + 0.5) / width, (y + 0.5) / width
+    color = np.broadcast_to((np.array(dark) + np.array(light)) / 2, (height, width, 3)).copy()
+    alpha = np.zeros((height, width))
+    for leaf in leaves:
+        c, s = np.cos(np.radians(leaf.angle)), np.sin(np.radians(leaf.angle))
+        along = ((x - leaf.x) * c + (y - leaf.y) * s) / leaf.length
+        across = (y - leaf.y) * c - (x - leaf.x) * s
+        inside = np.clip(along, 0, 1)
+        half = leaf.width * np.sin(np.pi * inside**leaf.blunt) ** 0.85
+        share = smoothstep(-1.0, 1.0, (half - np.abs(across)) * width) * (along > 0) * (along < 1)
+        tint = blend(dark, light, np.clip(leaf.tone + 0.25 * np.sign(across) * 0.5 - 0.15 * along, 0, 1))
+        middle = np.exp(-((across * width / 1.3) ** 2))
+        ribs = 0.35 * (np.sin((along * 9 - np.abs(across) / max(leaf.width, 1e-6) * 1.2) * 2 * np.pi) > 0.75)
+        tint = blend_images(tint, np.broadcast_to(np.array(vein), tint.shape), np.clip(0.7 * middle + ribs * 0.5, 0, 1))
+        color = blend_images(color, tint, share)
+        alpha = alpha + (1 - alpha) * share
+    return np.concatenate([encode(color), alpha[..., None]], axis=2)
+
+
+def leaf_spray(size: int, random: np.random.Generator) -> np.ndarray:
+    """A twig with pointed leaves on both sides; the twig starts at the middle of the lower edge."""
+    leaves = [Leaf(0.5, 0.0, 90, 0.9, 0.009, 0.1, blunt=0.4)]
+    for i in range(11):
+        height = 0.06 + 0.068 * i
+        side = 1 if i % 2 else -1
+        angle = 90 - side * random.uniform(38, 62)
+        leaves.append(
+            Leaf(0.5, height, angle, random.uniform(0.36, 0.45), random.uniform(0.062, 0.08), random.random())
+        )
+    leaves.append(Leaf(0.5, 0.70, 90, 0.29, 0.06, 0.8))
+    return draw_leaves(size, size, leaves, (0.035, 0.11, 0.015), (0.16, 0.30, 0.035), (0.26, 0.36, 0.09))
+
+
+def blossom_spray(size: int, random: np.random.Generator) -> np.ndarray:
+    """Blunt dark leaves with a few five-petalled flowers over them."""
+    leaves = []
+    for _ in range(16):
+        x, y = random.uniform(0.25, 0.75), random.uniform(0.15, 0.7)
+        angle = np.degrees(np.arctan2(y - 0.3, x - 0.5)) + random.uniform(-40, 40)
+        leaves.append(Leaf(x, y, angle, random.uniform(0.2, 0.26), 0.06, random.random(), blunt=1.2))
+    green = draw_leaves(size, size, leaves, (0.02, 0.07, 0.02), (0.07, 0.19, 0.05), (0.14, 0.26, 0.10))
+    petals = []
+    for x, y in ((0.34, 0.62), (0.66, 0.68), (0.5, 0.36), (0.74, 0.34)):
+        start = random.uniform(0, 72)
+        petals += [Leaf(x, y, start + 72 * k, 0.125, 0.055, random.uniform(0.3, 1), blunt=1.6) for k in range(5)]
+    flowers = draw_leaves(size, size, petals, (0.45, 0.06, 0.14), (0.80, 0.34, 0.42), (0.85, 0.62, 0.2))
+    share = flowers[..., 3]
+    color = blend_images(green[..., :3], flowers[..., :3], share)
+    alpha = green[..., 3] + (1 - green[..., 3]) * share
+    return np.concatenate([color, alpha[..., None]], axis=2)
+
+
+def grass_tuft(height: int, width: int, random: np.random.Generator) -> np.ndarray:
+    """Blades that rise from the lower edge."""
+    blades = []
+    for _ in range(30):
+        x = random.uniform(0.08, 0.92)
+        lean = 90 + random.uniform(-20, 20) - (x - 0.5) * 30
+        length = random.uniform(0.5, 0.96) * height / width
+        blades.append(Leaf(x, -0.03, lean, length, random.uniform(0.012, 0.02), random.random(), blunt=0.5))
+    return draw_leaves(height, width, blades, (0.06, 0.12, 0.02), (0.28, 0.36, 0.07), (0.34, 0.40, 0.12))
