@@ -132,3 +132,28 @@ def test_single_scattering_energy_matches_cycles(empty_scene):
     # The pixel filter reaches 1.5 pixels far: the middle of a patch shows nothing of its neighbours.
     shown = passes["combined"][:, 4:8, 4:8, 0].mean(axis=(1, 2))
     assert shown == pytest.approx([energy.ggx_energy(0.5, r) for r in roughness], abs=0.005)
+
+
+@pytest.mark.parametrize("cosine", [0.9, 0.3])
+def test_coat_metal_and_specular_add_up_as_in_cycles(evaluate, empty_scene, cosine):
+    """Several lobes in one shader: the mean over their random choice, and the emission below the coat."""
+    common = {"Base_Color": BASE, "Emission_Strength": 1.0}
+    patches = [
+        shader_material(
+            "ShaderNodeBsdfPrincipled", **common, Coat_Weight=1.0, Coat_Roughness=0.2, Coat_IOR=1.8,
+            Coat_Tint=(1.0, 0.7, 0.3, 1.0),
+        ),
+        shader_material(
+            "ShaderNodeBsdfPrincipled", **common, Coat_Weight=0.5, Coat_Roughness=0.5, Metallic=0.5, Alpha=0.7
+        ),
+        shader_material("ShaderNodeBsdfPrincipled", **common, Metallic=0.5, Specular_IOR_Level=2.0, IOR=0.8),
+    ]  # fmt: skip
+    passes, incoming = render_patches(patches, cosine)
+    count = 4000
+    for i, material in enumerate(patches):
+        compiled = compile_material("Test", read_graph(material, lambda image, user: "")[0])
+        at = points(count, incoming=incoming, random=(np.arange(count) + 0.5) / count)
+        closures = evaluate(compiled, at)
+        for field, name in (("glossy_albedo", "glossy_color"), ("emission", "emission"), ("diffuse", "diffuse_color")):
+            expected = passes[name][i].mean(axis=(0, 1))[:3]
+            assert closures[field].mean(axis=0) == pytest.approx(expected, abs=2e-3), (i, field)
