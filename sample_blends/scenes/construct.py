@@ -46,11 +46,10 @@ def finish() -> None:
 # Objects
 
 
-def collection(name: str, parent: bpy.types.Collection | None = None, linked: bool = True) -> bpy.types.Collection:
-    """A new collection; `linked=False` keeps it out of the view layer, for things that only instances show."""
+def collection(name: str, parent: bpy.types.Collection | None = None) -> bpy.types.Collection:
+    """A new collection, in the scene's own unless a parent is named."""
     new = bpy.data.collections.new(name)
-    if linked:
-        (parent or bpy.context.scene.collection).children.link(new)
+    (parent or bpy.context.scene.collection).children.link(new)
     return new
 
 
@@ -221,13 +220,6 @@ def glossy(name: str, color, roughness: float) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     tree = _cleared_tree(material)
     _output(tree, _node(tree, "ShaderNodeBsdfAnisotropic", (0, 0), Color=_color(color), Roughness=roughness))
-    return material
-
-
-def emission(name: str, color, strength: float) -> bpy.types.Material:
-    material = bpy.data.materials.new(name)
-    tree = _cleared_tree(material)
-    _output(tree, _node(tree, "ShaderNodeEmission", (0, 0), Color=_color(color), Strength=strength))
     return material
 
 
