@@ -46,6 +46,7 @@ class Reference:
         height, width = self.images["combined"].shape[:2]
         return width, height
 
+    @np.errstate(over="ignore", invalid="ignore")
     def paths(self) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Light paths as radiance: the mean of the two renders' paths, and half their difference."""
         first = light_paths({k: v + self.half[k] for k, v in self.images.items()}, self.film_transparent)

@@ -72,9 +72,8 @@ class Comparison:
 
 def compare_passes(passes: Passes, reference: Reference, with_flip: bool = True) -> tuple[Picture, ...]:
     """All rows that are worth showing, in the order of `ROWS`, each with its error."""
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is counted below, by the metrics
-        paths = light_paths(passes.images, passes.film_transparent)
-        reference_paths, half_paths = reference.paths()
+    paths = light_paths(passes.images, passes.film_transparent)
+    reference_paths, half_paths = reference.paths()
     pictures = []
     for row in ROWS:
         mine, theirs, half = (
@@ -141,17 +140,34 @@ def compare_scene(
         device=about["device"],
         ledger=ledger_rows(ledger),
         times=dict(getattr(ledger, "times", None) or {}),
-        notes=tuple(str(note) for note in getattr(ledger, "notes", None) or ()) + passes.notes,
+        notes=tuple(str(note) for note in getattr(ledger, "notes", None) or ())
+        + passes.notes
+        + missing_paths(passes, truth),
         date=time.strftime("%Y-%m-%d %H:%M"),
     )
+
+
+def missing_paths(passes: Passes, reference: Reference) -> tuple[str, ...]:
+    """A sentence about the light paths that carry light in the reference and are not rendered by the engine at all."""
+    wanted = [row for row in ROWS if row.source == "path" and not row.always]
+    rendered, (there, _) = light_paths(passes.images, passes.film_transparent), reference.paths()
+    names = [row.label.lower() for row in wanted if row.name not in rendered and np.any(there.get(row.name, 0))]
+    if not names:
+        return ()
+    return (f"The reference has light in paths that {passes.engine.title()} does not render: {', '.join(names)}.",)
 
 
 def ledger_rows(ledger) -> tuple[LedgerRow, ...]:
     """Plain rows of a ledger object (or of none)."""
     return tuple(
-        LedgerRow(getattr(row, "label", "") or row.name, row.state, row.reason, row.milliseconds)
+        LedgerRow(getattr(row, "label", "") or row.name, row.state, row.reason or _counted(row), row.milliseconds)
         for row in getattr(ledger, "rows", None) or ()
     )
+
+
+def _counted(row) -> str:
+    """What a technique counted in the frame ("4 passes, 12 views"), in place of a reason."""
+    return ", ".join(f"{value} {name}" for name, value in (getattr(row, "counters", None) or {}).items())
 
 
 def _latest_ledger():

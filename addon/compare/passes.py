@@ -103,6 +103,7 @@ class Passes:
         return width, height
 
 
+@np.errstate(over="ignore", invalid="ignore")  # the metrics count what is not finite
 def light_paths(images: dict[str, np.ndarray], film_transparent: bool = False) -> dict[str, np.ndarray]:
     """Radiance per light path, (H, W, 3): what each path adds to the picture, so that paths can be weighed together.
 

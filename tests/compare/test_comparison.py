@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.compare.cache import Reference, two_seeds
-from addon.compare.comparison import compare_passes, compare_scene, ledger_rows
+from addon.compare.comparison import compare_passes, compare_scene, ledger_rows, missing_paths
 from addon.compare.passes import ROWS, Passes
 
 
@@ -86,3 +86,19 @@ def test_a_reference_that_is_not_finite_is_reported_and_not_averaged(images):
     errors = {p.row.label: p.error for p in compare_passes(passes_of(images), Reference(mean, half, 1, 0.0), False)}
     assert errors["Emission"].not_finite == errors["Diffuse direct"].not_finite == 1
     assert errors["Environment"].relmse == 0
+
+
+def test_a_path_that_the_engine_lacks_is_named(images):
+    other = {**images, "diffuse_indirect": images["diffuse_direct"], "glossy_indirect": images["glossy_direct"] * 0}
+    reference = Reference(*two_seeds(other, other), 1, 0.0)
+    assert missing_paths(passes_of(images), reference) == (
+        "The reference has light in paths that Candela does not render: diffuse indirect.",
+    )
+    assert missing_paths(passes_of(other), reference) == ()
+
+
+def test_what_a_technique_counted_stands_where_no_reason_is():
+    row = SimpleNamespace(
+        name="x", label="X", state="ran", reason="", milliseconds=1.0, counters={"views": 12, "passes": 4}
+    )
+    assert ledger_rows(SimpleNamespace(rows=[row]))[0].reason == "12 views, 4 passes"
