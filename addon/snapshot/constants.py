@@ -6,7 +6,7 @@ import numpy as np
 
 from ..materials.graph import Graph, Node
 
-# Nodes that hold one value: bl_idname -> where the reader may have put it (output default as property or input).
+# Nodes that are one value: bl_idname -> the input under which the reader keeps it.
 _VALUE_NODES = {"ShaderNodeRGB": "Color", "ShaderNodeValue": "Value"}
 
 
@@ -32,34 +32,45 @@ def _constant(graph: Graph, node: Node, socket: str):
         return source.value, True
     linked = graph.nodes.get(source.link[0])
     if linked is not None and linked.type in _VALUE_NODES:
-        name = _VALUE_NODES[linked.type]
-        for value in (linked.properties.get(name), linked.properties.get("value"), linked.properties.get("color")):
-            if value is not None:
-                return value, True
-        if name in linked.inputs:
-            return linked.inputs[name].value, True
+        return linked.inputs[_VALUE_NODES[linked.type]].value, True
     if linked is not None and linked.type == "ShaderNodeBlackbody":
         temperature, exact = constant_number(graph, linked, "Temperature")
         return blackbody(temperature), exact
     return source.value, False
 
 
+# Linear Rec.709 colours of black bodies at luminance 1, evenly spaced in 1e6 / kelvin from 12000 K to 800 K, where
+# Blender holds them. Measured from Light.temperature_color of Blender 5.2; in between linear to 0.012.
+_BLACK_BODIES = np.array(
+    [
+        (0.8263, 0.9945, 1.5663),
+        (0.9925, 0.9883, 1.1366),
+        (1.1917, 0.9642, 0.7918),
+        (1.4141, 0.9236, 0.5337),
+        (1.6491, 0.8729, 0.3452),
+        (1.8938, 0.8140, 0.2102),
+        (2.1426, 0.7496, 0.1141),
+        (2.3938, 0.6817, 0.0464),
+        (2.6453, 0.6118, 0.0000),
+        (2.8958, 0.5406, 0.0000),
+        (3.1423, 0.4695, 0.0000),
+        (3.3847, 0.3989, 0.0000),
+        (3.6222, 0.3292, 0.0000),
+        (3.8526, 0.2613, 0.0000),
+        (4.0762, 0.1951, 0.0000),
+        (4.2928, 0.1308, 0.0000),
+        (4.5004, 0.0691, 0.0000),
+        (4.7006, 0.0095, 0.0000),
+        (4.8917, 0.0000, 0.0000),
+        (5.0739, 0.0000, 0.0000),
+        (5.2476, 0.0000, 0.0000),
+        (5.4139, 0.0000, 0.0000),
+    ]
+)
+
+
 def blackbody(kelvin: float) -> np.ndarray:
-    """(3,) linear Rec.709 colour of a black body, luminance 1.
-
-    Planck's law integrated against the CIE 1931 observer in the Gaussian fits of Wyman, Sloan and Shirley (2013),
-    "Simple Analytic Approximations to the CIE XYZ Color Matching Functions". Held outside 800 to 12000 K, as in Cycles.
-    """
-    wavelength = np.arange(380.0, 781.0, 5.0)
-
-    def lobe(peak, below, above):
-        return np.exp(-0.5 * ((wavelength - peak) * np.where(wavelength < peak, below, above)) ** 2)
-
-    x = 0.362 * lobe(442.0, 0.0624, 0.0374) + 1.056 * lobe(599.8, 0.0264, 0.0323) - 0.065 * lobe(501.1, 0.049, 0.0382)
-    y = 0.821 * lobe(568.8, 0.0213, 0.0247) + 0.286 * lobe(530.9, 0.0613, 0.0322)
-    z = 1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725)
-    kelvin = min(max(kelvin, 800.0), 12000.0)
-    spectrum = wavelength**-5.0 / np.expm1(1.4387769e7 / (wavelength * kelvin))
-    xyz = np.array([spectrum @ x, spectrum @ y, spectrum @ z])
-    xyz_to_rgb = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
-    return np.maximum(xyz_to_rgb @ (xyz / xyz[1]), 0.0)  # deep red lies outside Rec.709
+    """(3,) linear colour of Blender's Blackbody node."""
+    mired = np.linspace(1e6 / 12000.0, 1e6 / 800.0, len(_BLACK_BODIES))
+    at = 1e6 / max(kelvin, 1.0)
+    return np.array([np.interp(at, mired, channel) for channel in _BLACK_BODIES.T])

@@ -11,7 +11,7 @@ from . import camera as cameras
 from .cache import MeshEntry, SnapshotCache
 from .images import ImageTable
 from .instances import LightPlace, MeshPlace, matrices, walk
-from .lights import emission_of_graph, read_light
+from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
 from .scene import Camera, Film, Instance, Light, Mesh, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
@@ -182,10 +182,12 @@ def _lights(places: list[LightPlace], shading: ShadingTable, notes: list[Note]) 
     for place, matrix in zip(places, matrices(places), strict=True):
         facts = place.facts
         block = facts.data
-        key = f"light {(block.original or block).session_uid}"
-        graph = shading.graph_of(block, key, f"Light '{facts.name}'")
-        tint, remarks = emission_of_graph(graph, facts.name) if graph is not None else (np.ones(3), ())
-        notes.extend(remarks)
+        tint = np.ones(3)
+        if uses_nodes(block):
+            key = f"light {(block.original or block).session_uid}"
+            graph = shading.graph_of(block, key, f"Light '{facts.name}'")
+            tint, remarks = emission_of_graph(graph, facts.name)
+            notes.extend(remarks)
         light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint)
         if light is not None:
             made.append(light)
@@ -203,8 +205,6 @@ def _world(scene, view_layer, shading: ShadingTable, images: ImageTable, notes: 
         visibility = Visibility(rays.camera, rays.diffuse, rays.glossy, rays.transmission, rays.scatter)
     key = f"world {(block.original or block).session_uid}"
     graph = shading.graph_of(block, key, f"World '{block.name}'")
-    if graph is None:
-        return constant_world(block.color[:], visibility)
     world, remarks = read_world(graph, block.name, images.images, visibility)
     notes.extend(remarks)
     return world

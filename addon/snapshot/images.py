@@ -31,17 +31,19 @@ class ImageTable:
         self._cache = cache
 
     def key_of(self, image, user=None) -> str:
-        """Image.key of a data-block, read at most once per sync. `user` (ImageUser) gives a sequence's frame."""
+        """Image.key of a data-block, which is read at most once per sync.
+
+        `user` (ImageUser) says which frame of a sequence is meant. It is not followed: Image.pixels knows no frames.
+        """
         original = image.original or image
         key = f"image {original.session_uid}"
-        if original.source in ("SEQUENCE", "MOVIE") and user is not None:
-            key += f" frame {original.filepath_from_user(image_user=user)}"
         if key in self.images:
             return key
         entry = self._cache.images.get(key)
-        # A painted image that is not saved changes without a trace: its pixels have to be compared.
-        if entry is None or original.is_dirty or entry.state != _state(original):
-            entry = self._read(key, original, user, entry)
+        # A painted image that is not saved, and one that moves, changes without a trace: the pixels are compared.
+        restless = original.is_dirty or original.source in ("SEQUENCE", "MOVIE")
+        if entry is None or restless or entry.state != _state(original):
+            entry = self._read(key, original, entry)
         else:
             self.reused += 1
         self._cache.images[key] = entry
@@ -49,8 +51,8 @@ class ImageTable:
         self.notes.extend(entry.notes)
         return key
 
-    def _read(self, key: str, original, user, old: ImageEntry | None) -> ImageEntry:
-        pixels, notes = _pixels(original, user)
+    def _read(self, key: str, original, old: ImageEntry | None) -> ImageEntry:
+        pixels, notes = _pixels(original)
         # The state is taken after reading: asking for pixels makes Blender load the file.
         state = _state(original)
         encoding, space_notes = _encoding(original)
@@ -70,21 +72,20 @@ class ImageTable:
         return ImageEntry(made, state, (*notes, *space_notes))
 
 
-def _pixels(original, user) -> tuple[np.ndarray, tuple[Note, ...]]:
+def _pixels(original) -> tuple[np.ndarray, tuple[Note, ...]]:
     """(H, W, 4) float32, bottom row first, and what is to be said about it."""
     subject, notes = f"Image '{original.name}'", ()
     if original.source == "TILED" and len(original.tiles) > 1:
         notes = (Note(subject, f"only the first UDIM tile of {len(original.tiles)} is drawn."),)
-    if original.source in ("SEQUENCE", "MOVIE"):
-        frame = _sequence_frame(original, user)
-        if frame is not None:
-            return frame, ()
+    moving = original.source in ("SEQUENCE", "MOVIE")
+    if moving:
+        notes = (Note(subject, "the image moves, but is drawn as the one frame that Blender has loaded."),)
     width, height = original.size  # makes Blender load the file
     count = len(original.pixels)
     if width == 0 or height == 0 or count == 0:
         text = "the image is missing or cannot be read and is drawn magenta; check its file path."
-        if original.source in ("SEQUENCE", "MOVIE"):
-            text = "image sequences and movies cannot be read by this Blender version and are drawn magenta."
+        if moving:
+            text = "frames of image sequences and movies cannot be read and are drawn magenta; use a still image."
         return np.array([[MAGENTA]], np.float32), (Note(subject, text),)
     flat = np.empty(count, np.float32)
     original.pixels.foreach_get(flat)
@@ -101,11 +102,6 @@ def _four_channels(pixels: np.ndarray) -> np.ndarray:
     if channels == 2:
         full[..., 3] = pixels[..., 1]
     return full
-
-
-def _sequence_frame(original, user) -> np.ndarray | None:
-    """The frame that `user` points at. Image.pixels knows no frames; Blender 5.2 can load the file beside it."""
-    return None
 
 
 def _encoding(original) -> tuple[str, tuple[Note, ...]]:

@@ -48,6 +48,13 @@ def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibi
     )
 
 
+def uses_nodes(data) -> bool:
+    """Whether a light's node tree counts: a choice, until Blender 5.2 made it always so and deprecated the property."""
+    switch = data.bl_rna.properties.get("use_nodes")
+    always = switch is None or getattr(switch, "is_deprecated", False)
+    return data.node_tree is not None and (always or data.use_nodes)
+
+
 def emission_of_graph(graph: Graph, name: str) -> tuple[np.ndarray, tuple[Note, ...]]:
     """Colour x strength that a light's node tree emits; what varies over the light becomes the socket's own value."""
     notes: list[Note] = []

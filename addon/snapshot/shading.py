@@ -11,19 +11,11 @@ from .images import ImageTable
 from .meshes import Wanted
 from .scene import Material, Note
 
-
-def node_tree_of(block):
-    """The node tree that shades a data-block, or None when nodes are off.
-
-    Blender 5.0 always uses nodes and warns at each question; before, `use_nodes` is off in new data-blocks.
-    """
-    if bpy.app.version < (5, 0) and not block.use_nodes:
-        return None
-    return block.node_tree
+EMPTY_SLOT = (0.8, 0.8, 0.8)  # what Cycles draws where no material is chosen
 
 
 def diffuse_graph(color) -> Graph:
-    """A Diffuse BSDF of one colour: what Cycles draws for an empty slot (0.8 grey) and a material without nodes."""
+    """A Diffuse BSDF of one colour."""
     inputs = {
         "Color": Input("COLOR", tuple(float(c) for c in (*color[:3], 1.0))),
         "Roughness": Input("FLOAT", 0.0),
@@ -37,7 +29,7 @@ class ShadingTable:
     """Collects materials in order of first use; index 0 is the neutral default."""
 
     def __init__(self, cache: SnapshotCache, images: ImageTable):
-        self.materials: list[Material] = [Material("default", "Default", diffuse_graph((0.8, 0.8, 0.8)))]
+        self.materials: list[Material] = [Material("default", "Default", diffuse_graph(EMPTY_SLOT))]
         self.wanted: list[Wanted] = [Wanted()]
         self.notes: list[Note] = []
         self.graphs: set[str] = set()
@@ -57,20 +49,17 @@ class ShadingTable:
     def _add(self, material) -> int:
         key = f"material {(material.original or material).session_uid}"
         graph = self.graph_of(material, key, f"Material '{material.name}'")
-        if graph is None:
-            graph = diffuse_graph(material.diffuse_color)
         self.materials.append(Material(key, material.name, graph, material.pass_index))
         self.wanted.append(wanted_by(graph))
         return len(self.materials) - 1
 
-    def graph_of(self, block, key: str, subject: str) -> Graph | None:
-        """The flat graph of a material, world or light; None when it does not use nodes."""
-        if node_tree_of(block) is None:
-            return None
+    def graph_of(self, block, key: str, subject: str) -> Graph:
+        """The flat graph of a material, world or light; one that stands for its plain settings without nodes."""
         entry = self._cache.graphs.get(key)
+        if key in self.graphs:
+            return entry.graph
         if entry is None or not self._reusable(entry, block):
-            entry = self._read(block, subject, entry)
-            self._cache.graphs[key] = entry
+            entry = self._cache.graphs[key] = self._read(block, subject, entry)
         self.graphs.add(key)
         self.notes.extend(entry.notes)
         return entry.graph
@@ -87,7 +76,7 @@ class ShadingTable:
         if old is not None and old.graph == graph:
             graph = old.graph  # the same object, so that whoever compiled it need not compare again
         name = block.name if isinstance(block, bpy.types.Material) else ""
-        notes = tuple(_note(remark, subject, name) for remark in remarks)
+        notes = tuple(Note(subject, text, material=name, node=node) for node, text in remarks)
         return GraphEntry(graph, notes, tuple(dict.fromkeys(shown)))
 
     def _reusable(self, entry: GraphEntry, block) -> bool:
@@ -99,17 +88,9 @@ class ShadingTable:
             self._images_by_uid = {image.session_uid: image for image in bpy.data.images}
         for uid, key in entry.images:
             image = self._images_by_uid.get(uid)
-            if image is None or image.source in ("SEQUENCE", "MOVIE") or self._images.key_of(image) != key:
+            if image is None or self._images.key_of(image) != key:
                 return False
         return True
-
-
-def _note(remark, subject: str, material: str) -> Note:
-    """The reader's remark as a Note: it hands out Notes, or (node label, sentence) pairs."""
-    if isinstance(remark, Note):
-        return remark
-    node, text = remark
-    return Note(subject, text, material=material, node=node)
 
 
 # Nodes that look up a tangent, and the setting that makes them.

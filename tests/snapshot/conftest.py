@@ -1,52 +1,11 @@
-"""Small scenes for the snapshot's tests, and a stand-in for the node reader while it is not there."""
+"""Small scenes for the snapshot's tests."""
 
 import contextlib
-import importlib.util
-import sys
-import types
 import warnings
 
 import bpy
 import numpy as np
 import pytest
-
-from addon.materials.graph import Graph, Input, Node
-
-_KINDS = {"RGBA": "COLOR", "VALUE": "FLOAT", "VECTOR": "VECTOR", "SHADER": "SHADER"}
-
-
-def _read_graph(block, image_key):
-    """Flat trees only: no groups, reroutes or muted nodes."""
-    nodes, surface = {}, None
-    for node in block.node_tree.nodes:
-        inputs = {}
-        for socket in node.inputs:
-            value = getattr(socket, "default_value", None)
-            value = tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
-            link = (socket.links[0].from_node.name, socket.links[0].from_socket.identifier) if socket.links else None
-            inputs[socket.identifier] = Input(_KINDS.get(socket.type, "OTHER"), value, link)
-        if node.bl_idname.startswith("ShaderNodeOutput"):
-            surface = inputs["Surface"].link
-            continue
-        properties = {
-            name: getattr(node, name)
-            for name in ("space", "uv_map", "vector_type", "projection", "attribute_name", "attribute_type")
-            if hasattr(node, name)
-        }
-        if node.bl_idname in ("ShaderNodeRGB", "ShaderNodeValue"):
-            value = node.outputs[0].default_value
-            properties["value"] = tuple(value) if hasattr(value, "__len__") else value
-        image = getattr(node, "image", None)
-        key = image_key(image, node.image_user) if image else ""
-        outputs = {socket.identifier: _KINDS.get(socket.type, "OTHER") for socket in node.outputs}
-        nodes[node.name] = Node(node.name, node.label or node.name, node.bl_idname, inputs, outputs, properties, key)
-    return Graph(nodes, surface), ()
-
-
-if importlib.util.find_spec("addon.materials.reader") is None:
-    stand_in = types.ModuleType("addon.materials.reader")
-    stand_in.read_graph = _read_graph
-    sys.modules["addon.materials.reader"] = stand_in
 
 
 class Stage:
@@ -106,7 +65,7 @@ class Stage:
         return made
 
     def use_nodes(self, block):
-        if bpy.app.version < (5, 0):
+        if bpy.app.version < (5, 0) or block.node_tree is None:  # lights without nodes exist until Blender 5.1
             block.use_nodes = True
         return block.node_tree
 

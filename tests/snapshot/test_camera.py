@@ -56,7 +56,8 @@ def test_frame_is_that_of_blenders_matrix(stage, kind, fit, data):
     lens.sensor_width, lens.sensor_height = number(1, 100), number(1, 100)
     lens.shift_x, lens.shift_y = number(-2, 2), number(-2, 2)
     stage.scene.render.pixel_aspect_x, stage.scene.render.pixel_aspect_y = number(1, 3), number(1, 3)
-    width, height = data.draw(st.integers(1, 4000)), data.draw(st.integers(1, 4000))
+    # Narrower pictures with a shift leave too few digits in Blender's float32 matrix to compare with.
+    width, height = data.draw(st.integers(64, 4000)), data.draw(st.integers(64, 4000))
     ours, theirs = projection(made(stage, width, height)), blenders(stage, width, height)
     assert np.allclose(ours, theirs, rtol=2e-4, atol=2e-4)
 

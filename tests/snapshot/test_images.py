@@ -1,0 +1,173 @@
+"""Images arrive as Blender stores them, with what it takes to decode them."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.snapshot import SnapshotCache
+
+
+def shown(stage, image):
+    """Put the image on a material, with its colour and alpha in use."""
+    material = stage.material()
+    tree = material.node_tree
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    shader = next(one for one in tree.nodes if one.type == "BSDF_PRINCIPLED")
+    tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    data = stage.mesh()
+    data.materials.append(material)
+    stage.link("O", data)
+    return node
+
+
+def only_image(snapshot):
+    (image,) = snapshot.images.values()
+    return image
+
+
+def generated(width=2, height=3, **options):
+    made = bpy.data.images.new("made", width, height, alpha=True, **options)
+    values = (np.arange(width * height * 4, dtype=np.float32) % 256) / 255
+    made.pixels.foreach_set(values)
+    return made, values.reshape(height, width, 4)
+
+
+def test_generated_bytes_are_kept_as_stored_bottom_row_first(stage):
+    image, values = generated()
+    node = shown(stage, image)
+    snapshot = stage.take()
+    taken = only_image(snapshot)
+    assert np.allclose(taken.pixels, values, atol=1e-6)
+    assert (taken.encoding, taken.alpha_mode, taken.name) == ("SRGB", "STRAIGHT", "made")
+    graph = snapshot.materials[1].graph
+    (texture,) = (one for one in graph.nodes.values() if one.type == node.bl_idname)
+    assert texture.image == taken.key
+
+
+@pytest.mark.parametrize("space", ["Non-Color", "Linear Rec.709"])
+def test_linear_and_data_bytes_need_no_decoding(stage, space):
+    image, values = generated()
+    image.colorspace_settings.name = space
+    image.pixels.foreach_set(values.reshape(-1))
+    shown(stage, image)
+    taken = only_image(stage.take())
+    assert taken.encoding == "LINEAR"
+    assert np.allclose(taken.pixels, values, atol=1e-6)
+
+
+def test_float_images_are_linear_with_alpha_multiplied_in(stage):
+    image, values = generated(float_buffer=True)
+    shown(stage, image)
+    taken = only_image(stage.take())
+    assert (taken.encoding, taken.alpha_mode) == ("LINEAR", "PREMUL")
+    assert np.array_equal(taken.pixels, values)
+
+
+def saved(tmp_path, name="file.png"):
+    image, values = generated()
+    values[..., 3] = 1.0
+    image.pixels.foreach_set(values.reshape(-1))
+    image.filepath_raw, image.file_format = str(tmp_path / name), "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+    return str(tmp_path / name), values
+
+
+def test_a_file_is_loaded_on_demand(stage, tmp_path):
+    path, values = saved(tmp_path)
+    shown(stage, bpy.data.images.load(path))
+    assert np.allclose(only_image(stage.take()).pixels, values, atol=1e-6)
+
+
+def test_a_packed_image_needs_no_file(stage, tmp_path):
+    path, values = saved(tmp_path)
+    image = bpy.data.images.load(path)
+    image.pack()
+    (tmp_path / "file.png").unlink()
+    shown(stage, image)
+    assert np.allclose(only_image(stage.take()).pixels, values, atol=1e-6)
+
+
+def test_a_missing_image_is_magenta_and_named(stage, tmp_path):
+    path, _ = saved(tmp_path)
+    image = bpy.data.images.load(path)
+    (tmp_path / "file.png").unlink()
+    image.reload()
+    shown(stage, image)
+    snapshot = stage.take()
+    assert only_image(snapshot).pixels.tolist() == [[[1, 0, 1, 1]]]
+    (note,) = snapshot.notes
+    assert "file.png" in note.subject
+    assert "missing" in note.text
+
+
+def test_an_unsupported_colour_space_is_named(stage):
+    image, _ = generated()
+    image.colorspace_settings.name = "Filmic sRGB"
+    shown(stage, image)
+    (note,) = stage.take().notes
+    assert "Filmic sRGB" in note.text
+
+
+def test_udim_tiles_beyond_the_first_are_named(stage):
+    image = bpy.data.images.new("tiles", 4, 4, tiled=True)
+    image.tiles.new(1002)
+    shown(stage, image)
+    snapshot = stage.take()
+    assert only_image(snapshot).pixels.shape == (4, 4, 4)
+    assert "UDIM" in snapshot.notes[0].text
+
+
+def test_a_sequence_is_named(stage, tmp_path):
+    path, _ = saved(tmp_path, "frame0001.png")
+    image = bpy.data.images.load(path)
+    image.source = "SEQUENCE"
+    shown(stage, image)
+    assert "sequences" in stage.take().notes[0].text
+
+
+def test_an_unchanged_image_is_not_read_again(stage, tmp_path):
+    path, _ = saved(tmp_path)
+    shown(stage, bpy.data.images.load(path))
+    cache = SnapshotCache()
+    first, second = stage.take(cache), stage.take(cache)
+    assert (first.sync_stats["images_read"], second.sync_stats["images_read"]) == (1, 0)
+    assert only_image(second) is only_image(first)
+
+
+@pytest.mark.parametrize("change", ["paint", "alpha", "space", "reload", "repack"])
+def test_changed_images_are_read_even_though_blender_tells_no_one(stage, tmp_path, change):
+    path, _ = saved(tmp_path)
+    image = bpy.data.images.load(path)
+    if change == "repack":
+        image.pack()
+    shown(stage, image)
+    cache = SnapshotCache()
+    before = only_image(stage.take(cache))
+    with stage.telling(cache):
+        stage.scene.camera.location.x += 1.0  # some news, but none of the image
+        if change in ("paint", "repack"):
+            image.pixels[0] = 0.5
+        if change == "repack":
+            image.pack()
+        elif change == "alpha":
+            image.alpha_mode = "NONE"
+        elif change == "space":
+            image.colorspace_settings.name = "Non-Color"
+        elif change == "reload":
+            other = bpy.data.images.new("other", 5, 5)
+            other.filepath_raw, other.file_format = path, "PNG"
+            other.save()
+            image.reload()
+    after = only_image(stage.take(cache))
+    assert after.version > before.version
+
+
+def test_painting_without_change_keeps_the_version(stage):
+    image, _ = generated()
+    shown(stage, image)
+    cache = SnapshotCache()
+    before = only_image(stage.take(cache))
+    image.update()
+    assert only_image(stage.take(cache)) is before
