@@ -1,8 +1,13 @@
 """The one low-discrepancy sequence that all techniques draw from, indexed by sample number.
 
-Sobol' (0,2)-points, Owen-scrambled by hashing; each use ("dimension") has its own scramble and its own shuffle of
-the order, so that pairs of uses are independent while every prefix of each is well spread.
-Source: Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020 (method; the code is our own).
+Sobol' points, Owen-scrambled by hashing. The film takes dimensions 1 and 2, every other use dimensions 3 and 4 with a
+scramble of its own. So the film and any one use form a four-dimensional net together: at an edge, where only some of
+the samples see a surface, those still cover the light evenly. (Pairs shuffled independently leave a random subset
+there, and the error at edges falls only like 1 / sqrt(n).) Shaders get dimensions 3 to 6 unscrambled and scramble
+them per pixel.
+
+Sources: Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; Joe & Kuo, "Constructing Sobol sequences
+with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (direction numbers).
 """
 
 from __future__ import annotations
@@ -12,6 +17,7 @@ import zlib
 import numpy as np
 
 _U32 = np.uint64(0xFFFFFFFF)
+FILM = "film"
 
 
 def _reverse_bits(x: np.ndarray) -> np.ndarray:
@@ -33,25 +39,46 @@ def _owen(x: np.ndarray, seed: int) -> np.ndarray:
     return _reverse_bits(_laine_karras(_reverse_bits(x), seed))
 
 
-def _sobol_second(index: np.ndarray) -> np.ndarray:
-    """Second Sobol' dimension: direction numbers v_k = v_{k-1} ^ (v_{k-1} >> 1)."""
+# Primitive polynomials and initial numbers of dimensions 2 to 6 (Joe & Kuo 2008, new-joe-kuo-6): degree, a, m.
+_JOE_KUO = ((1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)), (3, 2, (1, 1, 1)), (4, 1, (1, 1, 3, 3)))
+DIMENSIONS = 1 + len(_JOE_KUO)
+
+
+def _direction_numbers() -> np.ndarray:
+    """(DIMENSIONS, 32) uint64 direction numbers, as 32-bit fractions."""
+    out = np.zeros((DIMENSIONS, 32), np.uint64)
+    out[0] = [1 << (31 - k) for k in range(32)]
+    for dimension, (degree, a, initial) in enumerate(_JOE_KUO, 1):
+        v = [m << (31 - k) for k, m in enumerate(initial)]
+        for k in range(degree, 32):
+            new = v[k - degree] ^ (v[k - degree] >> degree)
+            for j in range(1, degree):
+                if (a >> (degree - 1 - j)) & 1:
+                    new ^= v[k - j]
+            v.append(new)
+        out[dimension] = v
+    return out
+
+
+_DIRECTIONS = _direction_numbers()
+
+
+def bits(index: np.ndarray, dimension: int) -> np.ndarray:
+    """Unscrambled Sobol' numbers of `dimension` as 32-bit fractions (uint64)."""
+    index = np.asarray(index, np.uint64)
     result = np.zeros_like(index)
-    direction = np.uint64(0x80000000)
-    bits = index.copy()
-    while bits.any():
-        result = np.where(bits & np.uint64(1), result ^ direction, result)
-        bits >>= np.uint64(1)
-        direction ^= direction >> np.uint64(1)
+    for k in range(32):
+        result ^= np.where((index >> np.uint64(k)) & np.uint64(1), _DIRECTIONS[dimension, k], np.uint64(0))
     return result
 
 
 def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
-    """Points `first` … `first + count - 1` of the sequence for `use`, (count, 2) float64 in [0, 1)."""
+    """Points `first` ... `first + count - 1` of the sequence for `use`, (count, 2) float64 in [0, 1)."""
     salt = zlib.crc32(f"{use}/{seed}".encode())
     index = np.arange(first, first + count, dtype=np.uint64)
-    shuffled = _owen(index, salt)
-    x = _owen(_reverse_bits(shuffled), salt * 2654435761 + 1)
-    y = _owen(_sobol_second(shuffled), salt * 2246822519 + 2)
+    pair = 0 if use == FILM else 2
+    x = _owen(bits(index, pair), salt * 2654435761 + 1)
+    y = _owen(bits(index, pair + 1), salt * 2246822519 + 2)
     return np.stack([x, y], axis=-1).astype(np.float64) / 4294967296.0
 
 
@@ -59,3 +86,9 @@ def point(index: int, use: str, seed: int = 0) -> tuple[float, float]:
     """One point of the sequence for `use`."""
     x, y = points(index, 1, use, seed)[0]
     return float(x), float(y)
+
+
+def pixel_bits(index: int) -> tuple[int, int, int, int]:
+    """Dimensions 3 to 6 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
+    values = [int(bits(np.uint64(index), dimension)) for dimension in range(2, 6)]
+    return tuple(value - 2**32 if value >= 2**31 else value for value in values)

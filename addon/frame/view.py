@@ -8,6 +8,7 @@ import numpy as np
 
 from ..gfx.struct import Struct
 from ..snapshot.scene import Camera, Film
+from .sequence import pixel_bits
 
 # `q` is the depth measure of every projection in Candela: it is an affine function of window coordinates on any
 # plane (1/distance for perspective, distance along the axis for orthographic), and grows towards the viewer.
@@ -25,6 +26,10 @@ VIEW = Struct(
     ("vec4", "film"),  # width, height in pixels; clip start, clip end in metres
     ("int", "sample_index"),
     ("int", "seed"),
+    ("int", "bits_x"),  # this sample's Sobol' numbers, to be scrambled per pixel (lib/random.glsl)
+    ("int", "bits_y"),
+    ("int", "bits_z"),
+    ("int", "bits_w"),
 )
 
 
@@ -86,6 +91,7 @@ class View:
             "eye": (*eye, float(orthographic)), "right": (*right_axis, jitter[0]), "up": (*up, jitter[1]),
             "backward": (*backward, near), "frame": frame, "film": (width, height, start, end),
             "sample_index": sample, "seed": seed,
+            **dict(zip(("bits_x", "bits_y", "bits_z", "bits_w"), pixel_bits(sample))),
         }  # fmt: skip
 
 

@@ -8,10 +8,12 @@ from .direct_light import DirectLight
 from .environment_light import EnvironmentLight
 from .film import Film
 from .surfaces import Surfaces
+from .traced_glossy import TracedGlossy
 
 REGISTRY: tuple[type[Technique], ...] = (
     Surfaces,
     AccumulatedMaps,
+    TracedGlossy,
     DirectLight,
     EnvironmentLight,
     Film,

@@ -61,11 +61,13 @@ class EnvironmentLight(Technique):
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         count = frame.settings.get(self, "directions")
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
+        stride = 1 << max(frame.settings.samples - 1, 0).bit_length()
         items = []
         for k in range(count):
-            # One long sequence over all directions of all samples, so that they are spread together.
+            # Further directions of a sample continue the sequence beyond the last sample, so that all directions
+            # are spread together and each set of them with the film.
 
-            x, y = point(frame.sample * count + k, "environment", frame.settings.seed)
+            x, y = point(frame.sample + k * stride, "environment", frame.settings.seed)
             direction, radiance, density = frame.environment.draw(x, y)
             views = []
             if shadows:

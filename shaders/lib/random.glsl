@@ -39,31 +39,8 @@ uint owen_scramble(uint x, uint seed)
   return reverse_bits(x);
 }
 
-uint sobol_second(uint index)
+// A number of this sample, from its unscrambled Sobol' bits, with a scramble of its own per pixel or layer (`salt`).
+float scrambled(int bits, uint salt)
 {
-  uint result = 0u;
-  uint direction = 0x80000000u;
-  for (int bit = 0; bit < 16; bit++) {
-    if ((index & 1u) != 0u) {
-      result ^= direction;
-    }
-    index >>= 1u;
-    direction ^= direction >> 1u;
-  }
-  return result;
-}
-
-// Point `index` of a (0,2)-sequence with its own scramble and order per `salt` (a pixel's hash).
-vec2 sobol_point(uint index, uvec2 salt)
-{
-  uint shuffled = owen_scramble(index, salt.x);
-  uvec3 seeds = hash3(uvec3(salt, 0x9E3779B9u));
-  return vec2(to_unit(owen_scramble(reverse_bits(shuffled), seeds.x)),
-              to_unit(owen_scramble(sobol_second(shuffled), seeds.y)));
-}
-
-// The same in one dimension.
-float stratified(uint index, uint salt)
-{
-  return to_unit(owen_scramble(reverse_bits(index), salt));
+  return to_unit(owen_scramble(uint(bits), salt));
 }

@@ -20,14 +20,13 @@ void main()
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
-  uint index = uint(view.sample_index);
-  Closures c = closures_begin(point.normal, stratified(index, bits.z));
+  Closures c = closures_begin(point.normal, scrambled(view.bits_w, bits.z));
   evaluate_material(point, c);
   closures_end(c);
 
   float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
-  if (transparent_mode == 0 ? stratified(index, layer.x) < through : (transparent_mode == 2 && through > 0.0)) {
+  if (transparent_mode == 0 ? scrambled(view.bits_z, layer.x) < through : (transparent_mode == 2 && through > 0.0)) {
     discard;
   }
   float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;

@@ -1,0 +1,115 @@
+"""A bounding volume hierarchy over all triangles, for rays that no depth map can answer (one direction per pixel).
+
+Triangles are sorted along a Morton curve of their centroids, four to a leaf, and the leaves fill a complete tree with
+four children per node. The tree needs no pointers: child c of node i of a level is node 4 i + c of the next, so the
+whole build is a sort and a few reductions in numpy, and the shader walks it with a bit mask instead of a stack.
+
+Instances are expanded here, at 3 x 12 bytes a triangle and copy; above LARGEST triangles there is no hierarchy.
+Sources: Lauterbach et al. 2009 (linear BVH); the implicit four-wide layout is our own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gfx import images
+from ..materials.compiled import CompiledMaterial
+from ..snapshot.scene import Instance, Mesh
+
+LARGEST = 4_000_000  # triangles
+LEAF = 4
+NODE_TEXELS = 6  # min x, y, z, max x, y, z of the four children
+LEAF_TEXELS = 10  # corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; their opacities
+EMPTY = 1e30
+
+
+@dataclass(frozen=True)
+class Hierarchy:
+    """The tree in two images; `levels` counts inner levels (the root is level 0), `leaves` on level `levels`."""
+
+    nodes: images.Image
+    leaves: images.Image
+    levels: int
+    triangles: int
+
+
+def world_triangles(
+    instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial], origin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (T, 3, 3) float32 relative to `origin`, and opacity (T,) of all triangles that reflections can show."""
+    corners, opacities = [], []
+    opacity = np.array([material.opacity if material.transparent else 1.0 for material in materials])
+    for instance in instances:
+        mesh = meshes[instance.mesh]
+        if not instance.visibility.glossy or not mesh.triangle_count:
+            continue
+        matrix = instance.matrix.copy()
+        matrix[:3, 3] -= origin
+        world = mesh.positions @ matrix[:3, :3].T.astype(np.float32) + matrix[:3, 3].astype(np.float32)
+        corners.append(world[mesh.corner_vertices[mesh.triangle_corners]])
+        slots = np.asarray(instance.materials)
+        opacities.append(opacity[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]])
+    if not corners:
+        return np.zeros((0, 3, 3), np.float32), np.zeros(0)
+    return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(opacities)
+
+
+def build(corners: np.ndarray, opacity: np.ndarray) -> Hierarchy:
+    """The hierarchy of `corners` (T, 3, 3)."""
+    finite = np.isfinite(corners).all(axis=(1, 2))
+    corners, opacity = corners[finite], opacity[finite]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    order = np.argsort(_morton((low + high) * 0.5), kind="stable")
+    count = len(corners)
+    levels = 1
+    while LEAF * 4**levels < count:
+        levels += 1
+    slots = LEAF * 4**levels
+    used = -(-max(count, 1) // LEAF)
+    packed = np.zeros((used, LEAF_TEXELS, LEAF), np.float32)  # zero edges: never hit
+    sorted_corners = np.zeros((used * LEAF, 3, 3), np.float32)
+    sorted_corners[:count] = corners[order]
+    first = sorted_corners[:, 0]
+    edges = sorted_corners[:, 1:] - first[:, None]
+    for axis in range(3):
+        packed[:, axis] = first[:, axis].reshape(used, LEAF)
+        packed[:, 3 + axis] = edges[:, 0, axis].reshape(used, LEAF)
+        packed[:, 6 + axis] = edges[:, 1, axis].reshape(used, LEAF)
+    weights = np.zeros(used * LEAF, np.float32)
+    weights[:count] = opacity[order]
+    packed[:, 9] = weights.reshape(used, LEAF)
+
+    box_low = np.full((slots, 3), EMPTY, np.float32)
+    box_high = np.full((slots, 3), -EMPTY, np.float32)
+    box_low[:count], box_high[:count] = low[order], high[order]
+    box_low, box_high = box_low.reshape(-1, LEAF, 3).min(axis=1), box_high.reshape(-1, LEAF, 3).max(axis=1)
+    nodes = []
+    for _ in range(levels):
+        children_low, children_high = box_low.reshape(-1, 4, 3), box_high.reshape(-1, 4, 3)
+        nodes.append(np.concatenate([children_low.transpose(0, 2, 1), children_high.transpose(0, 2, 1)], axis=1))
+        box_low, box_high = children_low.min(axis=1), children_high.max(axis=1)
+    rows = np.concatenate(nodes[::-1]).reshape(-1, 4)  # root first
+    return Hierarchy(images.upload_list(rows), images.upload_list(packed.reshape(-1, 4)), levels, count)
+
+
+def _morton(points: np.ndarray) -> np.ndarray:
+    """63-bit Morton codes of (N, 3) points within their own bounds."""
+    if not len(points):
+        return np.zeros(0, np.uint64)
+    low = points.min(axis=0)
+    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
+    grid = np.clip((points - low) / extent * (2**21 - 1), 0, 2**21 - 1).astype(np.uint64)
+    code = np.zeros(len(points), np.uint64)
+    for axis in range(3):
+        x = grid[:, axis]
+        for shift, mask in (
+            (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
+            (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
+        ):  # fmt: skip
+            x = (x | (x << np.uint64(shift))) & np.uint64(mask)
+        code |= x << np.uint64(axis)
+    return code
+
+
