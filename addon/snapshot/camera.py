@@ -29,9 +29,13 @@ def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> C
             f"Camera '{camera.name}': lens type {data.type.title()} is not supported; choose Perspective or"
             " Orthographic in the camera's Lens panel."
         )
+    placed = np.array(camera.matrix_world, np.float64)
+    if not np.isfinite(placed).all():
+        text = "has a position that is not a finite number; check its drivers and constraints."
+        raise UnsupportedScene(f"Camera '{camera.name}' {text}")
     aspect = (scene.render.pixel_aspect_x, scene.render.pixel_aspect_y)
     return Camera(
-        matrix=_rigid(np.array(camera.matrix_world, np.float64)),
+        matrix=_rigid(placed),
         kind="PERSPECTIVE" if data.type == "PERSP" else "ORTHOGRAPHIC",
         frame=_frame(data, width, height, aspect),
         clip_start=data.clip_start,
@@ -110,7 +114,7 @@ def _rigid(matrix: np.ndarray) -> np.ndarray:
     rigid[:3, 3] = matrix[:3, 3]
     axes = matrix[:3, :3]
     length = np.linalg.norm(axes, axis=0)
-    if not np.all(length > 0.0) or not np.isfinite(length).all():
+    if not np.all(length > 0.0):
         return rigid
     right, up, back = (axes / length).T
     right = right - back * (right @ back)

@@ -49,6 +49,7 @@ def take(
     shading = ShadingTable(cache, images)
     places, light_places, walk_notes = walk(depsgraph, shown)
     notes += walk_notes
+    places, light_places = _at_a_place(places, notes), _at_a_place(light_places, notes)
     meshes, instances, mesh_notes, stats = _meshes(places, shading, cache, depsgraph)
     notes += mesh_notes
     lights = _lights(light_places, shading, notes)
@@ -69,6 +70,15 @@ def take(
         scene_name=scene.name,
         sync_stats=stats,
     )
+
+
+def _at_a_place(places: list, notes: list[Note]) -> list:
+    """Without the objects whose matrix holds a NaN or infinity, as a driver or constraint may make it."""
+    finite = np.isfinite(matrices(places)).all(axis=(1, 2))
+    for index in np.flatnonzero(~finite):
+        text = "its position is not a finite number and it is not drawn; check its drivers and constraints."
+        notes.append(Note(f"Object '{places[index].facts.name}'", text))
+    return places if finite.all() else [place for place, good in zip(places, finite, strict=True) if good]
 
 
 def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache, depsgraph):
@@ -101,10 +111,8 @@ def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
 
     groups: dict[tuple, list[Instance]] = {}
-    worlds = matrices(places)
-    worlds[~np.isfinite(worlds).all(axis=(1, 2))] = 0.0  # an object at no place is drawn nowhere
     resolved: dict[int, tuple[Mesh, tuple[int, ...]]] = {}
-    for place, matrix in zip(places, worlds, strict=True):
+    for place, matrix in zip(places, matrices(places), strict=True):
         facts = place.facts
         if id(facts) not in resolved:
             mesh = by_pointer[facts.data.as_pointer()]

@@ -90,7 +90,8 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
         face_slots,
         slots=max(1, len(mesh.materials)),
         uv_maps={
-            layer.name: _attribute(mesh, layer.name, "vector", corners, np.float32, 2) for layer in mesh.uv_layers
+            layer.name: _finite(_attribute(mesh, layer.name, "vector", corners, np.float32, 2))
+            for layer in mesh.uv_layers
         },
         active_uv=next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
         colors=colors,
@@ -147,6 +148,11 @@ def _attribute(mesh, name: str, field_name: str, count: int, dtype, width: int) 
     return array.reshape(count, width) if width > 1 else array
 
 
+def _finite(values: np.ndarray) -> np.ndarray:
+    """Zero where a geometry node has left a NaN or infinity, which a texture look-up would spread over the picture."""
+    return values if np.isfinite(values).all() else np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+
+
 def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[dict[str, np.ndarray], str]:
     """Colour attributes, and other attributes that a node asks for, as RGBA per corner.
 
@@ -169,7 +175,7 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
             values = np.repeat(values, sizes, axis=0)
         elif attribute.domain != "CORNER":
             continue
-        colors[name] = np.ascontiguousarray(values)
+        colors[name] = np.ascontiguousarray(_finite(values))
     return colors, active
 
 

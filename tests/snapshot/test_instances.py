@@ -239,6 +239,16 @@ def test_negative_and_zero_scale_are_kept(stage):
     assert np.diag(one.matrix).tolist() == [-1, 0, 2, 1]
 
 
+@pytest.mark.parametrize("data", ["mesh", "light"])
+def test_what_stands_at_no_finite_place_is_left_out_and_named(stage, data):
+    placed = stage.link("Lost", stage.mesh() if data == "mesh" else bpy.data.lights.new("Lost", "POINT"))
+    placed.parent = stage.link("Parent")
+    placed.parent.scale, placed.location = (1e30,) * 3, (1e30,) * 3  # the product overflows
+    snapshot = stage.take()
+    assert snapshot.instances == snapshot.lights == ()
+    assert snapshot.notes[0].subject == "Object 'Lost'"
+
+
 def test_random_is_the_one_that_cycles_gives_the_object(stage):
     """Object Info > Random drawn as emission by Cycles, one pixel."""
     if not hasattr(stage.scene, "cycles"):

@@ -4,6 +4,8 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 PENTAGON = [(np.cos(a), np.sin(a), 0) for a in np.linspace(0, 2 * np.pi, 5, endpoint=False)]
 
@@ -179,6 +181,49 @@ def test_triangles_without_area_stay_and_their_normals_are_unit(stage):
     mesh = only_mesh(stage.take())
     assert mesh.triangle_count == 1
     assert np.linalg.norm(mesh.corner_normals, axis=1) == pytest.approx([1, 1, 1])
+
+
+def test_uvs_and_colors_that_are_not_numbers_become_zero(stage):
+    data = stage.mesh()
+    data.uv_layers.new(name="uv").data.foreach_set("uv", np.array([np.nan, np.inf, 1, 2, 3, 4], np.float32))
+    data.color_attributes.new("c", "FLOAT_COLOR", "POINT").data.foreach_set("color", np.full(12, np.nan, np.float32))
+    stage.link("O", data)
+    mesh = only_mesh(stage.take())
+    assert mesh.uv_maps["uv"].tolist() == [[0, 0], [1, 2], [3, 4]]
+    assert mesh.colors["c"].tolist() == [[0, 0, 0, 0]] * 3
+
+
+NUMBERS = st.one_of(st.floats(-10, 10, width=32), st.sampled_from([0.0, np.nan, np.inf, 1e30]))
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_mesh_gives_arrays_that_are_safe_to_draw(stage, data):
+    count = data.draw(st.integers(0, 8))
+    points = data.draw(st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=count, max_size=count))
+    vertex = st.integers(0, max(count - 1, 0))
+    face = st.lists(vertex, min_size=3, max_size=5, unique=True)
+    faces = data.draw(st.lists(face, max_size=5)) if count >= 5 else []
+    made = stage.mesh(vertices=np.zeros((count, 3)).tolist(), faces=faces)
+    for name in "ab":
+        made.materials.append(bpy.data.materials.new(name))
+    slots = data.draw(st.lists(st.integers(-3, 5), min_size=len(faces), max_size=len(faces)))
+    if faces:
+        made.attributes.new("material_index", "INT", "FACE").data.foreach_set("value", slots)
+    if count:
+        made.attributes["position"].data.foreach_set("vector", np.array(points, np.float32).reshape(-1))
+    made.update()
+    placed = stage.link("O", made)
+    mesh = only_mesh(stage.take())
+    bpy.data.objects.remove(placed)
+    assert mesh.triangle_corners.size == 0 or mesh.triangle_corners.max() < len(mesh.corner_vertices)
+    assert mesh.corner_vertices.size == 0 or mesh.corner_vertices.max() < len(mesh.positions)
+    assert np.isfinite(mesh.positions).all()
+    assert np.linalg.norm(mesh.corner_normals, axis=1) == pytest.approx(np.ones(len(mesh.corner_normals)), abs=1e-3)
+    assert (np.diff(mesh.triangle_slots) >= 0).all()
+    assert set(mesh.triangle_slots) <= {0, 1}
+    assert (mesh.bounds_min <= mesh.bounds_max).all()
+    assert np.isfinite([mesh.bounds_min, mesh.bounds_max]).all()
 
 
 def test_a_mesh_in_edit_mode_shows_its_unsaved_edits(stage):
