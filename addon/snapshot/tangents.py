@@ -20,33 +20,34 @@ def corner_tangents(positions, corner_vertices, corner_normals, uv, triangles) -
     positions (V, 3), corner_vertices (C,), corner_normals (C, 3) unit, uv (C, 2), triangles (T, 3) corners.
     A corner whose UVs have no area gets some tangent of its normal plane and sign +1.
     """
-    count = len(corner_vertices)
-    normals = corner_normals.astype(np.float64)
-    result = np.empty((count, 4), np.float32)
-    result[:, :3] = _any_perpendicular(normals)
+    result = np.zeros((len(corner_vertices), 4), np.float32)
     result[:, 3] = 1.0
-    if len(triangles) == 0:
-        return result
-    points = positions[corner_vertices[triangles]].astype(np.float64)  # (T, 3 corners, 3)
-    texture = np.nan_to_num(uv[triangles].astype(np.float64))
-    du1, dv1 = (texture[:, 1] - texture[:, 0]).T
-    du2, dv2 = (texture[:, 2] - texture[:, 0]).T
-    area = du1 * dv2 - du2 * dv1
-    direction = (points[:, 1] - points[:, 0]) * dv2[:, None] - (points[:, 2] - points[:, 0]) * dv1[:, None]
-    direction = _normalized(direction * np.sign(area)[:, None])
-    corners = triangles.reshape(-1)
-    at = normals[corners]
-    tangent = np.repeat(direction, 3, axis=0)
-    tangent = _normalized(tangent - at * np.einsum("ij,ij->i", at, tangent)[:, None])
-    tangent *= _angles(points).reshape(-1)[:, None]
-    mirrored = np.repeat(area < 0.0, 3)
-    group = _groups(positions, corner_vertices, corner_normals, uv, corners, mirrored)
-    total = np.stack([np.bincount(group, weights=tangent[:, axis]) for axis in range(3)], axis=1)
-    summed = total[group]
-    valid = np.einsum("ij,ij->i", summed, summed) > 0.0
-    result[corners[valid], :3] = _normalized(summed[valid])
-    result[corners, 3] = np.where(mirrored, -1.0, 1.0)
+    if len(triangles):
+        # In units of the mesh's own size, so that no product over- or underflows float32.
+        points = (positions / max(np.abs(positions).max(), 1e-30))[corner_vertices[triangles]]  # (T, 3 corners, 3)
+        direction, mirrored = _texture_directions(points, uv[triangles])
+        corners = triangles.reshape(-1)
+        at = corner_normals[triangles]
+        along = np.einsum("tcx,tx->tc", at, direction)[..., None]
+        tangent = _normalized(direction[:, None, :] - at * along) * _angles(points)[..., None]
+        group = _groups(positions, corner_vertices, corner_normals, uv, corners, np.repeat(mirrored, 3))
+        flat = tangent.reshape(-1, 3)
+        total = np.stack([np.bincount(group, weights=flat[:, axis]) for axis in range(3)], axis=1)
+        result[corners, :3] = _normalized(total).astype(np.float32)[group]
+        result[corners, 3] = np.repeat(np.where(mirrored, np.float32(-1.0), np.float32(1.0)), 3)
+    lost = np.flatnonzero(np.einsum("ij,ij->i", result[:, :3], result[:, :3]) < 0.5)
+    result[lost, :3] = _any_perpendicular(corner_normals[lost])
     return result
+
+
+def _texture_directions(points, texture) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 3) unit dP/du of each triangle, zero without UV area, and (T,) whether its map is mirrored."""
+    first, second = texture[:, 1] - texture[:, 0], texture[:, 2] - texture[:, 0]
+    area = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
+    along, across = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+    sign = np.sign(area)
+    direction = along * (second[:, 1] * sign)[:, None] - across * (first[:, 1] * sign)[:, None]
+    return _normalized(direction), area < 0.0
 
 
 def _groups(positions, corner_vertices, corner_normals, uv, corners, mirrored) -> np.ndarray:
@@ -54,29 +55,34 @@ def _groups(positions, corner_vertices, corner_normals, uv, corners, mirrored) -
 
     Keyed by a 64-bit mix of the eight floats instead of sorting the rows themselves, which is ten times as slow.
     """
-    values = np.concatenate([positions[corner_vertices], corner_normals, uv], axis=1)[corners]
-    bits = np.ascontiguousarray(values + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0: one kind of zero
-    key = mirrored.astype(np.uint64)
-    for column in range(bits.shape[1]):
-        key = (key ^ bits[:, column]) * np.uint64(0x9E3779B97F4A7C15)
+    key = _mixed(np.zeros(len(positions), np.uint64), positions)[corner_vertices]
+    key = _mixed(_mixed(key, corner_normals), uv)
+    return np.unique(key[corners] ^ mirrored, return_inverse=True)[1].reshape(-1)
+
+
+def _mixed(key: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Fold the columns of float32 `values` (N, K) into 64-bit keys (N,); both zeros count as one number."""
+    bits = np.ascontiguousarray(values + np.float32(0.0)).view(np.uint32)
+    for column in bits.T:
+        key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(29)
-    return np.unique(key, return_inverse=True)[1].reshape(-1)
+    return key
 
 
 def _angles(points: np.ndarray) -> np.ndarray:
     """(T, 3) angle of each triangle at each of its corners, radians."""
-    edges = _normalized(np.roll(points, -1, axis=1) - points)  # corner i to corner i + 1
-    cosine = -np.einsum("tij,tij->ti", edges, np.roll(edges, 1, axis=1))
-    return np.arccos(np.clip(cosine, -1.0, 1.0))
+    edges = [_normalized(points[:, (i + 1) % 3] - points[:, i]) for i in range(3)]  # corner i to corner i + 1
+    cosine = [-np.einsum("tx,tx->t", edges[i], edges[i - 1]) for i in range(3)]
+    return np.arccos(np.clip(np.stack(cosine, axis=1), -1.0, 1.0))
 
 
 def _normalized(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors; zero stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(length > 0.0, length, 1.0)
+    length = np.sqrt(np.einsum("...x,...x->...", vectors, vectors))
+    return vectors / np.where(length > 0.0, length, 1.0)[..., None]
 
 
 def _any_perpendicular(normals: np.ndarray) -> np.ndarray:
     """A unit vector in each normal's plane: the world axis that leans least on the normal, projected."""
-    axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)] if len(normals) else np.zeros((0, 3))
+    axis = np.eye(3, dtype=np.float32)[np.argmin(np.abs(normals), axis=1)]
     return _normalized(axis - normals * np.einsum("ij,ij->i", axis, normals)[:, None])

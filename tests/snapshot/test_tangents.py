@@ -65,6 +65,17 @@ def test_tangents_follow_u_on_a_plane_and_turn_with_a_mirrored_map():
     assert np.allclose(tangents, [[-1, 0, 0, -1]] * 3)
 
 
+@pytest.mark.parametrize("size", [1e-15, 1e-3, 1e6, 1e17])
+def test_tangents_do_not_depend_on_the_size_of_the_mesh(size):
+    positions = np.array([(0, 0, 0), (2, 0, 0), (0, 3, 0)], np.float32) * np.float32(size)
+    corners = np.arange(3, dtype=np.int32)
+    normals = np.tile(np.float32((0, 0, 1)), (3, 1))
+    uv = np.array([(0, 0), (1, 0.5), (0, 1)], np.float32)
+    tangents = corner_tangents(positions, corners, normals, uv, corners.reshape(1, 3))
+    # dP/du = (2, -1.5, 0): one step in u alone goes from the first corner to (2, -1.5, 0).
+    assert np.allclose(tangents, [[0.8, -0.6, 0, 1]] * 3, atol=1e-6)
+
+
 def test_a_map_without_area_still_gives_unit_tangents_in_the_plane():
     positions = np.array([(0, 0, 0), (2, 0, 0), (0, 3, 0)], np.float32)
     corners = np.arange(3, dtype=np.int32)
