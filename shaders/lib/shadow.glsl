@@ -15,6 +15,16 @@ vec4 view_texel(int index)
   return texelFetch(depth_map_views, ivec2(index % width, index / width), 0);
 }
 
+// How far a caster is nearer to the light than the receiver: by the caster's plane at the receiver (x), and at the
+// centre of the caster's cell, `offset` texels away, by the receiver's plane (y). Far negative where nothing was drawn.
+vec2 shadow_behind(vec4 caster, vec2 offset, float q, vec2 receiver_gradient)
+{
+  if (caster.w <= 0.0) {
+    return vec2(-1e30);
+  }
+  return vec2(caster.x + dot(caster.yz, offset) - q, caster.x - q + dot(receiver_gradient, offset));
+}
+
 float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal)
 {
   vec4 p = vec4(position, 1.0);
@@ -38,7 +48,6 @@ float shadow_visibility(int first_view, int view_count, vec3 position, vec3 norm
     float q = dot(row_q, p) / w;
     vec2 texel = (ndc * 0.5 + 0.5) * rectangle.z;
     vec2 cell = min(floor(texel), vec2(rectangle.z - 1.0));
-    vec2 offset = texel - cell - 0.5;
 
     // Gradient of the receiver's plane in texels: two tangents give two equations for it.
     float scale = 0.5 * rectangle.z / w;
@@ -52,12 +61,22 @@ float shadow_visibility(int first_view, int view_count, vec3 position, vec3 norm
       receiver_gradient = vec2(q1 * d2.y - q2 * d1.y, q2 * d1.x - q1 * d2.x) / determinant;
     }
 
+    // Rasterisers snap vertices to 1/256 texel: 3 % of the slope covers it; 1e-5 covers float32 in q itself.
+    float slack = 1e-5 * abs(q) + 0.03 * dot(abs(receiver_gradient), vec2(1.0));
     vec4 caster = texelFetch(depth_maps, ivec2(rectangle.xy + cell), 0);
-    // Rasterisers snap vertices to 1/256 texel: 2 % of the slopes covers it; 1e-5 covers float32 in q itself.
-    float slack = 1e-5 * abs(q) + 0.02 * (dot(abs(caster.yz), vec2(1.0)) + dot(abs(receiver_gradient), vec2(1.0)));
-    bool behind_plane = caster.x + dot(caster.yz, offset) > q + slack;
-    bool behind_centre = caster.x > q - dot(receiver_gradient, offset) + slack;
-    return (caster.w > 0.0 && behind_plane && behind_centre) ? 0.0 : 1.0;
+    vec2 behind = shadow_behind(caster, texel - cell - 0.5, q, receiver_gradient);
+    float turn = length(caster.yz - receiver_gradient);
+    if (behind.x > slack && behind.y <= slack && turn > 0.6 * (length(caster.yz) + length(receiver_gradient))) {
+      // Only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
+      // convex edge, or it overhangs a steep receiver. One texel out along the receiver's normal the edge is gone, the
+      // overhang is not.
+      vec2 outward = vec2(dot(row_x.xyz, normal), dot(row_y.xyz, normal)) - ndc * dot(row_w.xyz, normal);
+      outward *= inversesqrt(max(dot(outward, outward), 1e-30));
+      vec2 beside = clamp(floor(texel + outward), vec2(0.0), vec2(rectangle.z - 1.0));
+      caster = texelFetch(depth_maps, ivec2(rectangle.xy + beside), 0);
+      behind = shadow_behind(caster, texel - beside - 0.5, q, receiver_gradient);
+    }
+    return (behind.x > slack && behind.y > slack) ? 0.0 : 1.0;
   }
   return 1.0;
 }
