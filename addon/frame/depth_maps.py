@@ -15,8 +15,8 @@ import numpy as np
 from ..gfx import images, passes
 from ..gfx.library import Program
 from .geometry import SHADOW_FLAG, SceneGeometry
+from .lights import VIEW_TEXELS
 
-VIEW_TEXELS = 5
 WIDEST_TANGENT = 2.5  # a single view up to 68 degrees half angle; beyond it, cube faces
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
 
@@ -198,14 +198,13 @@ OPAQUE = Program(
 
 
 class Atlas:
-    """One square image of depth maps in equal cells, and the list of what each cell shows."""
+    """One image of depth maps in equal cells."""
 
     def __init__(self):
         self.target: images.Target | None = None
-        self.view_list: images.Image | None = None
 
-    def prepare(self, views: list[MapView], resolution: int) -> list[tuple[int, int, int]]:
-        """Cells (x, y, size) for the views; makes the images and uploads the list."""
+    def prepare(self, views: list[MapView], resolution: int) -> tuple[list[tuple[int, int, int]], np.ndarray]:
+        """Cells (x, y, size) for the views, and what shaders must know of them, (V, VIEW_TEXELS, 4)."""
         columns = max(1, int(np.ceil(np.sqrt(len(views)))))
         rows = max(1, -(-len(views) // columns))
         size = (columns * resolution, rows * resolution)
@@ -222,14 +221,13 @@ class Atlas:
             cells.append(cell)
             texels[k, :4] = view.rows
             texels[k, 4] = *cell, 0.0
-        self.view_list = images.upload_list(texels.reshape(-1, 4))
-        return cells
+        return cells, texels
 
     def release(self) -> None:
         if self.target is not None:
             images.pool.give(self.target.colors[0])
             images.pool.give(self.target.depth)
-        self.target = self.view_list = None
+        self.target = None
 
 
 def draw_views(atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometry, alpha_casters, sample: int) -> int:

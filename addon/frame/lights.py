@@ -1,4 +1,4 @@
-"""Lights as rows of the light list that shaders/light/sources.glsl reads, and this sample's point on each.
+"""Lights as rows of the uniform block that shaders/light/sources.glsl reads, and this sample's point on each.
 
 Radiance follows Cycles' conventions for every kind. All points inside a light come from the frame's sequence.
 """
@@ -9,11 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Light
 
 TEXELS = 8
+VIEW_TEXELS = 5
+MOST_LIGHTS, MOST_VIEWS = 64, 96  # together just below the 16 KiB that every GPU grants a uniform block
+SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4", f"view[{MOST_VIEWS * VIEW_TEXELS}]"))
 POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION = range(6)
-DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG = 1, 2, 4, 8, 16
+DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG = 1, 2, 4, 8, 16, 32
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,36 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
         soft = (1.0 - cosine) * light.spot_blend
         rows = [np.append(inverse[0], cosine), np.append(inverse[1], 1.0 / soft if soft > 0 else 0.0), inverse[2]]
     return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
+
+
+def traceable(emitters: list[Emitter]) -> list[Emitter]:
+    """The lights that rays of narrow lobes look for: those with extent, the strongest where a block cannot hold all."""
+    extended = [e for e in emitters if e.kind in (RECTANGLE, ELLIPSE) or e.radius > 0]
+    return sorted(extended, key=lambda e: (-e.power, e.light.key))[:MOST_LIGHTS]
+
+
+class Sources:
+    """The uniform block of lights and depth-map views that the lighting shaders read."""
+
+    def __init__(self):
+        self._block: Block | None = None
+
+    def set(self, rows: list[np.ndarray], views: np.ndarray | None = None) -> Block:
+        """At most MOST_LIGHTS rows of (TEXELS, 4), and (V, VIEW_TEXELS, 4) views, V <= MOST_VIEWS."""
+        light = np.zeros((MOST_LIGHTS * TEXELS, 4), np.float32)
+        view = np.zeros((MOST_VIEWS * VIEW_TEXELS, 4), np.float32)
+        if rows:
+            light[: len(rows) * TEXELS] = np.concatenate(rows)
+        if views is not None:
+            view[: views.shape[0] * VIEW_TEXELS] = views.reshape(-1, 4)
+        if self._block is None:
+            self._block = Block(SOURCES, light=light, view=view)
+        else:
+            self._block.update(light=light, view=view)
+        return self._block
+
+    def release(self) -> None:
+        self._block = None
 
 
 def direction_row(direction, radiance_over_density, density, flags, first_view: int, view_count: int) -> np.ndarray:

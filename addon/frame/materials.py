@@ -138,10 +138,10 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
         vertex="surface/surface.vert.glsl",
         fragment="surface/surface.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
-        blocks=((VIEW, "view"), (_struct(len(compiled.values)), "material_values")),
+        blocks=((VIEW, "film_view"), (_struct(len(compiled.values)), "material_values")),
         constants=(("INT", "first_instance"), ("INT", "transparent_mode")),
         defines=(
-            ("PROJECTION", "view.row_x, view.row_y, view.row_w, view.row_q, view.backward.w"),
+            ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
             ("VISIBILITY_FLAG", str(CAMERA_FLAG)),
         ),
         **_shared(compiled),

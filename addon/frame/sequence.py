@@ -13,6 +13,7 @@ with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (directi
 from __future__ import annotations
 
 import zlib
+from functools import lru_cache
 
 import numpy as np
 
@@ -61,15 +62,14 @@ def _direction_numbers() -> np.ndarray:
 
 
 _DIRECTIONS = _direction_numbers()
+_PLACES = np.arange(32, dtype=np.uint64)
 
 
 def bits(index: np.ndarray, dimension: int) -> np.ndarray:
     """Unscrambled Sobol' numbers of `dimension` as 32-bit fractions (uint64)."""
     index = np.asarray(index, np.uint64)
-    result = np.zeros_like(index)
-    for k in range(32):
-        result ^= np.where((index >> np.uint64(k)) & np.uint64(1), _DIRECTIONS[dimension, k], np.uint64(0))
-    return result
+    taken = (index[..., None] >> _PLACES) & np.uint64(1)
+    return np.bitwise_xor.reduce(taken * _DIRECTIONS[dimension], axis=-1)
 
 
 def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
@@ -82,6 +82,7 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     return np.stack([x, y], axis=-1).astype(np.float64) / 4294967296.0
 
 
+@lru_cache(maxsize=4096)
 def point(index: int, use: str, seed: int = 0) -> tuple[float, float]:
     """One point of the sequence for `use`."""
     x, y = points(index, 1, use, seed)[0]

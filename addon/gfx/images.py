@@ -53,14 +53,15 @@ def upload(pixels: np.ndarray, image_format: str = "RGBA32F") -> Image:
     return Image(width, height, image_format, gpu.types.GPUTexture((width, height), format=image_format, data=buffer))
 
 
-def upload_list(rows: np.ndarray, width: int = 2048) -> Image:
-    """A long list of vec4, (N, 4) float, as an image that is read by `texelFetch(t, ivec2(i % width, i / width))`."""
-    count = max(len(rows), 1)
-    width = min(width, count)
-    height = -(-count // width)
-    padded = np.zeros((height * width, 4), np.float32)
+LIST_WIDTH = 2048  # a power of two, so that shaders address lists by shift and mask
+
+
+def upload_list(rows: np.ndarray) -> Image:
+    """A long list of vec4, (N, 4) float, as an image: entry i stands at column i & 2047, row i >> 11."""
+    height = max(-(-len(rows) // LIST_WIDTH), 1)
+    padded = np.zeros((height * LIST_WIDTH, 4), np.float32)
     padded[: len(rows)] = rows
-    return upload(padded.reshape(height, width, 4))
+    return upload(padded.reshape(height, LIST_WIDTH, 4))
 
 
 def read(image: Image) -> np.ndarray:

@@ -32,7 +32,7 @@ from ..frame import depth_maps, lights
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..gfx import passes
+from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 
 RESOLUTION = Param(
@@ -63,16 +63,16 @@ class DepthMapService:
                 casters.append((draw, shader, frame.materials.bindings(draw.material, frame.geometry.instances)))
         return casters
 
-    def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> dict:
-        """Draw the views; returns the textures that shaders/lib/shadow.glsl reads."""
-        cells = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
+    def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> tuple[images.Image, np.ndarray]:
+        """Draw the views; returns the atlas and the views' part of the uniform block `sources`."""
+        cells, texels = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
         if views:
             sent = depth_maps.draw_views(
                 self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample
             )
             frame.count(technique, "maps", len(views))
             frame.count(technique, "caster triangles", sent)
-        return {"depth_maps": self._atlas.target.colors[0], "depth_map_views": self._atlas.view_list}
+        return self._atlas.target.colors[0], texels
 
     def release(self) -> None:
         self._atlas.release()
@@ -82,11 +82,11 @@ _NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
 
 
 def rounds(items: list[tuple[np.ndarray, list]], resolution: int) -> Iterator[tuple[list[np.ndarray], list]]:
-    """Split lights (rows, views) so that the views of a round fit the atlas; fills in the view numbers."""
-    most = max(ATLAS_TEXELS // resolution**2, 6)
+    """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers."""
+    most = min(max(ATLAS_TEXELS // resolution**2, 6), lights.MOST_VIEWS)
     rows, views = [], []
     for row, own in items:
-        if views and len(views) + len(own) > most:
+        if rows and (len(views) + len(own) > most or len(rows) == lights.MOST_LIGHTS):
             yield rows, views
             rows, views = [], []
         row[0, 2:4] = len(views), len(own)
@@ -139,7 +139,7 @@ class AccumulatedMaps(Technique):
             emitter.position(sample), axis, cone, frame.receivers, frame.geometry, jitter, self.resolution(frame)
         )
 
-    def draw(self, frame: Frame, views: list) -> dict:
+    def draw(self, frame: Frame, views: list) -> tuple[images.Image, np.ndarray]:
         return self.service.draw(frame, self, views, self.resolution(frame))
 
     def release(self) -> None:

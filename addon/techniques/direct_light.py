@@ -28,7 +28,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..frame.view import VIEW
-from ..gfx import images, passes
+from ..gfx import passes
 from ..snapshot.scene import Snapshot
 from .accumulated_maps import DepthMapService, rounds
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
@@ -37,10 +37,9 @@ LIGHTING = passes.fullscreen_program(
     "direct light",
     "light/direct.frag.glsl",
     textures=(
-        *SURFACE_TEXTURES, ("FLOAT_2D", "light_list"), ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "depth_map_views"),
-        ("FLOAT_2D", "energy_table"),
+        *SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"),
     ),
-    blocks=((VIEW, "view"),),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
     constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
@@ -50,21 +49,17 @@ DIRECT_WRITES = (
 )
 
 
-def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], shadow_textures: dict) -> None:
-    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images."""
-    light_list = images.upload_list(np.concatenate(rows))
-    traced = frame.services.get("traced_roughness", 0.0)
+def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: lights.Sources, maps) -> None:
+    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images. `maps` = (atlas, views) of depth maps."""
+    atlas, views = maps
     passes.fullscreen(
         LIGHTING,
         frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
         blend="ADDITIVE_PREMULT",
-        textures={
-            **surface_bindings(frame), **shadow_textures, "light_list": light_list,
-            "energy_table": frame.materials.energy_table,
-        },
-        blocks={"view": frame.view_block},
-        constants={"light_count": len(rows), "traced_roughness": traced},
-    )  # fmt: skip
+        textures={**surface_bindings(frame), "depth_maps": atlas, "energy_table": frame.materials.energy_table},
+        blocks={"film_view": frame.view_block, "sources": sources.set(rows, views)},
+        constants={"light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", 0.0)},
+    )
     frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
 
@@ -84,6 +79,7 @@ class DirectLight(Technique):
     def __init__(self):
         self._emitters: list[lights.Emitter] = []
         self._unshadowed = DepthMapService()
+        self._sources = lights.Sources()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not any(np.any(light.strength) for light in snapshot.lights):
@@ -96,6 +92,7 @@ class DirectLight(Technique):
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             self._emitters = [emitter for emitter in found if emitter is not None]
+            self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         shadow = frame.services.get("shadow")
@@ -103,11 +100,13 @@ class DirectLight(Technique):
         for emitter, weight in self._chosen(frame):
             sample = emitter.sample(*frame.random(f"light/{emitter.light.key}"))
             views = shadow.views(frame, emitter, sample) if shadow else []
-            items.append((emitter.row(sample, 0, len(views), weight), views))
+            row = emitter.row(sample, 0, len(views), weight)
+            row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
+            items.append((row, views))
         resolution = shadow.resolution(frame) if shadow else 16
         for rows, views in rounds(items, resolution):
-            textures = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
-            shade(frame, self, rows, textures)
+            maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
+            shade(frame, self, rows, self._sources, maps)
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
         """Lights of this sample with the inverse of their chance."""
@@ -124,4 +123,5 @@ class DirectLight(Technique):
 
     def release(self) -> None:
         self._unshadowed.release()
+        self._sources.release()
         self._emitters = []

@@ -42,6 +42,7 @@ class EnvironmentLight(Technique):
 
     def __init__(self):
         self.service = DepthMapService()
+        self._sources = lights.Sources()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         world = snapshot.world
@@ -57,7 +58,7 @@ class EnvironmentLight(Technique):
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         seen = frame.snapshot.world.visibility
-        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG * seen.diffuse + lights.GLOSSY_FLAG * seen.glossy
+        flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.DIFFUSE_FLAG * seen.diffuse + lights.GLOSSY_FLAG * seen.glossy
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         count = frame.settings.get(self, "directions")
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
@@ -76,7 +77,8 @@ class EnvironmentLight(Technique):
             row = lights.direction_row(direction, radiance / (density * count), density, flags, 0, len(views))
             items.append((row, views))
         for rows, views in rounds(items, resolution):
-            shade(frame, self, rows, self.service.draw(frame, self, views, resolution))
+            shade(frame, self, rows, self._sources, self.service.draw(frame, self, views, resolution))
 
     def release(self) -> None:
         self.service.release()
+        self._sources.release()

@@ -7,8 +7,6 @@ Lights with extent that are visible to the camera are intersected analytically a
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..frame import lights
 from ..frame.environment import WORLD
 from ..frame.run import Frame
@@ -29,9 +27,9 @@ COLLECT = passes.fullscreen_program(
     "film/collect.frag.glsl",
     textures=(
         *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
-        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "light_list"),
+        ("FLOAT_2D", "environment_density_map"),
     ),
-    blocks=((VIEW, "view"), (WORLD, "world")),
+    blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(("INT", "light_count"),),
     outputs=tuple(
         ("VEC4", name)
@@ -42,7 +40,7 @@ DEPTH = passes.fullscreen_program(
     "film depth",
     "film/depth.frag.glsl",
     textures=(("FLOAT_2D", "surface_position"),),
-    blocks=((VIEW, "view"),),
+    blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_depth"),),
 )
 RESOLVE = passes.fullscreen_program(
@@ -68,33 +66,38 @@ class Film(Technique):
         Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
     )
 
+    def __init__(self):
+        self._sources = lights.Sources()
+
     def run(self, frame: Frame) -> None:
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-            seen = [e for e in found if e is not None and e.flags & lights.CAMERA_FLAG]
-            rows = [emitter.row(emitter.centre, 0, 0) for emitter in seen] or [np.zeros((lights.TEXELS, 4))]
-            self._lights, self._light_count = images.upload_list(np.concatenate(rows)), len(seen)
+            seen = lights.traceable([e for e in found if e is not None and e.flags & lights.CAMERA_FLAG])
+            self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
+            self._light_count = len(seen)
             passes.fullscreen(
                 DEPTH,
                 frame.target("film.depth"),
                 textures={"surface_position": frame.images["surface.position"]},
-                blocks={"view": frame.view_block},
+                blocks={"film_view": frame.view_block},
             )
         passes.fullscreen(
             COLLECT,
             frame.target(*(write.name for write in SUMS)),
             blend="ADDITIVE_PREMULT",
             textures={
-                **surface_bindings(frame), "energy_table": frame.materials.energy_table, "light_list": self._lights,
+                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
             },
-            blocks={"view": frame.view_block, "world": frame.environment.block},
+            blocks={
+                "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
+            },
             constants={"light_count": self._light_count},
         )  # fmt: skip
         frame.count(self, "passes")
 
     def release(self) -> None:
-        self._lights = None
+        self._sources.release()
 
 
 def resolve(frame: Frame) -> images.Image:

@@ -53,7 +53,7 @@ TILE_BOUNDS = passes.fullscreen_program(
     "tile bounds",
     "surface/tile_bounds.frag.glsl",
     textures=(("FLOAT_2D", "surface_position"),),
-    blocks=((VIEW, "view"),),
+    blocks=((VIEW, "film_view"),),
     constants=(("INT", "tile"),),
     outputs=(("VEC4", "out_low"), ("VEC4", "out_high")),
 )
@@ -82,7 +82,7 @@ class Surfaces(Technique):
             for draw in frame.geometry.draws:
                 shader = passes.get(frame.materials.surface_program(draw.material))
                 bindings = frame.materials.bindings(draw.material, frame.geometry.instances)
-                bindings["blocks"]["view"] = frame.view_block
+                bindings["blocks"]["film_view"] = frame.view_block
                 shader.bind(**bindings, constants={"first_instance": draw.first, "transparent_mode": mode})
                 passes.draw(shader, draw.batch, draw.count)
                 frame.count(self, "triangles", draw.triangles)
@@ -100,7 +100,7 @@ class Surfaces(Technique):
                 TILE_BOUNDS,
                 target,
                 textures={"surface_position": frame.images["surface.position"]},
-                blocks={"view": frame.view_block},
+                blocks={"film_view": frame.view_block},
                 constants={"tile": TILE},
             )
             low = np.minimum(low, images.read(target.colors[0]))

@@ -33,7 +33,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
-from ..gfx import images, passes
+from ..gfx import passes
 from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
@@ -42,10 +42,10 @@ TRACED = passes.fullscreen_program(
     "traced glossy",
     "light/traced.frag.glsl",
     textures=(
-        *SURFACE_TEXTURES, ("FLOAT_2D", "light_list"), ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
+        *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
         ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
     ),
-    blocks=((VIEW, "view"), (WORLD, "world")),
+    blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"), ("INT", "trace_levels"),
         ("INT", "world_glossy"), ("INT", "world_sampled"),
@@ -69,7 +69,8 @@ class TracedGlossy(Technique):
 
     def __init__(self):
         self._hierarchy: acceleration.Hierarchy | None = None
-        self._lights: images.Image | None = None
+        self._sources = lights.Sources()
+        self._lights = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
@@ -104,9 +105,9 @@ class TracedGlossy(Technique):
         frame.services["traced_roughness"] = roughness
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-            shown = [e for e in found if e is not None and (e.kind == lights.SUN or e.kind > lights.SUN or e.radius > 0)]
-            rows = [emitter.row(emitter.centre, 0, 0) for emitter in shown] or [np.zeros((lights.TEXELS, 4))]
-            self._lights, self._light_count = images.upload_list(np.concatenate(rows)), len(shown)
+            shown = lights.traceable([emitter for emitter in found if emitter is not None])
+            self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in shown])
+            self._light_count = len(shown)
         world = frame.snapshot.world
         sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
         passes.fullscreen(
@@ -114,11 +115,13 @@ class TracedGlossy(Technique):
             frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
             blend="ADDITIVE_PREMULT",
             textures={
-                **surface_bindings(frame), "light_list": self._lights, "energy_table": frame.materials.energy_table,
+                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 "trace_nodes": self._hierarchy.nodes, "trace_leaves": self._hierarchy.leaves,
             },
-            blocks={"view": frame.view_block, "world": frame.environment.block},
+            blocks={
+                "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
+            },
             constants={
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size, "trace_levels": self._hierarchy.levels,
@@ -130,6 +133,7 @@ class TracedGlossy(Technique):
 
     def release(self) -> None:
         self._hierarchy = self._lights = None
+        self._sources.release()
 
 
 def _may_be_glossy(material) -> bool:

@@ -6,12 +6,12 @@
 
 vec3 view_direction(vec2 pixel)
 {
-  vec2 place = (pixel + vec2(view.right.w, view.up.w)) / view.film.xy;
-  vec2 on_frame = mix(view.frame.xz, view.frame.yw, place);
-  if (view.eye.w > 0.5) {
-    return -view.backward.xyz;
+  vec2 place = (pixel + vec2(film_view.right.w, film_view.up.w)) / film_view.film.xy;
+  vec2 on_frame = mix(film_view.frame.xz, film_view.frame.yw, place);
+  if (film_view.eye.w > 0.5) {
+    return -film_view.backward.xyz;
   }
-  return safe_normalize(on_frame.x * view.right.xyz + on_frame.y * view.up.xyz - view.backward.xyz);
+  return safe_normalize(on_frame.x * film_view.right.xyz + on_frame.y * film_view.up.xyz - film_view.backward.xyz);
 }
 
 void main()
@@ -24,10 +24,10 @@ void main()
   out_glossy_color = vec4(0.0);
   out_normal = vec4(0.0);
   vec3 direction = view_direction(gl_FragCoord.xy);
-  vec3 origin = view.eye.xyz;
-  if (view.eye.w > 0.5) {
-    vec2 on_frame = mix(view.frame.xz, view.frame.yw, (gl_FragCoord.xy + vec2(view.right.w, view.up.w)) / view.film.xy);
-    origin += on_frame.x * view.right.xyz + on_frame.y * view.up.xyz;
+  vec3 origin = film_view.eye.xyz;
+  if (film_view.eye.w > 0.5) {
+    vec2 on_frame = mix(film_view.frame.xz, film_view.frame.yw, (gl_FragCoord.xy + vec2(film_view.right.w, film_view.up.w)) / film_view.film.xy);
+    origin += on_frame.x * film_view.right.xyz + on_frame.y * film_view.up.xyz;
   }
   float limit = 1e30;
   float coverage = 0.0;
@@ -48,8 +48,8 @@ void main()
     }
   }
   else {
-    out_environment.rgb = (world.color.w > 0.5) ? environment_radiance(direction) : vec3(0.0);
-    coverage = 1.0 - world.map_options.x;
+    out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) : vec3(0.0);
+    coverage = 1.0 - world_light.map_options.x;
   }
   out_environment.a = coverage;
   for (int i = 0; i < light_count; i++) {

@@ -3,5 +3,5 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 position = texelFetch(surface_position, pixel, 0);
-  out_depth = vec4(position.w != 0.0 ? dot(view.eye.xyz - position.xyz, view.backward.xyz) : 1e10);
+  out_depth = vec4(position.w != 0.0 ? dot(film_view.eye.xyz - position.xyz, film_view.backward.xyz) : 1e10);
 }

@@ -1,4 +1,4 @@
-// Radiance and sampling density of the world by direction. `environment_map` holds radiance over `world.color`,
+// Radiance and sampling density of the world by direction. `environment_map` holds radiance over `world_light.color`,
 // `environment_density_map` the density per steradian with which addon/frame/environment.py draws directions.
 #include "lib/math.glsl"
 
@@ -12,7 +12,7 @@ vec2 equirectangular_uv(vec3 direction)
 vec3 environment_lookup_direction(vec3 direction)
 {
   vec4 d = vec4(direction, 1.0);
-  return safe_normalize(vec3(dot(world.map_x, d), dot(world.map_y, d), dot(world.map_z, d)));
+  return safe_normalize(vec3(dot(world_light.map_x, d), dot(world_light.map_y, d), dot(world_light.map_z, d)));
 }
 
 vec3 environment_radiance(vec3 direction)
@@ -28,7 +28,7 @@ vec3 environment_radiance(vec3 direction)
   int y1 = clamp(int(corner.y) + 1, 0, size.y - 1);
   vec3 low = mix(texelFetch(environment_map, ivec2(x0, y0), 0).rgb, texelFetch(environment_map, ivec2(x1, y0), 0).rgb, t.x);
   vec3 high = mix(texelFetch(environment_map, ivec2(x0, y1), 0).rgb, texelFetch(environment_map, ivec2(x1, y1), 0).rgb, t.x);
-  return mix(low, high, t.y) * world.color.rgb;
+  return mix(low, high, t.y) * world_light.color.rgb;
 }
 
 // Density per steradian of the drawn directions; 0 where the world is not sampled.

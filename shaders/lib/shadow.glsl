@@ -5,15 +5,10 @@
 // with the receiver's plane continued to the texel's centre. Only if both say "behind" there is shadow. A surface
 // therefore never shadows itself, flat or convex, and no bias in metres is needed.
 //
-// `depth_map_views` lists, per view, rows x, y, w, q and the rectangle (origin, size) in the atlas `depth_maps`.
+// The uniform block `sources` (addon/frame/lights.py) lists in `view[]`, per view, rows x, y, w, q and the rectangle
+// (origin, size) in the atlas `depth_maps`.
 
 #define VIEW_TEXELS 5
-
-vec4 view_texel(int index)
-{
-  int width = textureSize(depth_map_views, 0).x;
-  return texelFetch(depth_map_views, ivec2(index % width, index / width), 0);
-}
 
 // How far a caster is nearer to the light than the receiver: by the caster's plane at the receiver (x), and at the
 // centre of the caster's cell, `offset` texels away, by the receiver's plane (y). Far negative where nothing was drawn.
@@ -32,19 +27,19 @@ float shadow_visibility(int first_view, int view_count, vec3 position, vec3 norm
   vec3 t2;
   orthonormal_basis(normal, t1, t2);
   for (int view = first_view; view < first_view + view_count; view++) {
-    vec4 row_w = view_texel(view * VIEW_TEXELS + 2);
+    vec4 row_w = sources.view[view * VIEW_TEXELS + 2];
     float w = dot(row_w, p);
     if (w <= 0.0) {
       continue;
     }
-    vec4 row_x = view_texel(view * VIEW_TEXELS);
-    vec4 row_y = view_texel(view * VIEW_TEXELS + 1);
+    vec4 row_x = sources.view[view * VIEW_TEXELS];
+    vec4 row_y = sources.view[view * VIEW_TEXELS + 1];
     vec2 ndc = vec2(dot(row_x, p), dot(row_y, p)) / w;
     if (max(abs(ndc.x), abs(ndc.y)) >= 1.0) {
       continue;
     }
-    vec4 row_q = view_texel(view * VIEW_TEXELS + 3);
-    vec4 rectangle = view_texel(view * VIEW_TEXELS + 4);
+    vec4 row_q = sources.view[view * VIEW_TEXELS + 3];
+    vec4 rectangle = sources.view[view * VIEW_TEXELS + 4];
     float q = dot(row_q, p) / w;
     vec2 texel = (ndc * 0.5 + 0.5) * rectangle.z;
     vec2 cell = min(floor(texel), vec2(rectangle.z - 1.0));

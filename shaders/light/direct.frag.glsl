@@ -17,7 +17,7 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  vec3 to_viewer = (view.eye.w > 0.5) ? view.backward.xyz : safe_normalize(view.eye.xyz - s.position);
+  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   bool has_diffuse = max_component(s.diffuse) > 0.0;
   bool has_glossy = s.glossy_weight > 0.0;
   Lobe lobe;
@@ -42,7 +42,7 @@ void main()
     if (has_glossy && (light.flags & LIGHT_GLOSSY) != 0) {
       float lobe_density;
       from_glossy = lobe_reflection(lobe, direction, lobe_density);
-      if (traced && density > 0.0) {
+      if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
         float ratio = lobe_density / density;
         from_glossy /= 1.0 + ratio * ratio;
       }

@@ -1,6 +1,6 @@
 // Light sources as Cycles has them: where a sample of each lies for a receiver, how much it gives, and what a ray hits.
 //
-// `light_list` holds LIGHT_TEXELS vec4 per light (written by addon/frame/lights.py):
+// The uniform block `sources` (addon/frame/lights.py) holds LIGHT_TEXELS vec4 per light, in `light[]`:
 //   0: kind, flags, first depth-map view, number of views
 //   1: centre, radius                 (sun, direction: unit vector towards the light, half angle)
 //   2: this sample's point            (point, spot: offset from the centre; area: position; sun: direction)
@@ -24,6 +24,7 @@
 #define LIGHT_SHADOW 4
 #define LIGHT_SPOT 8
 #define LIGHT_CAMERA 16
+#define LIGHT_TRACED 32  // rays of narrow lobes look for it (light/traced.frag.glsl)
 
 struct Light {
   int kind;
@@ -40,27 +41,21 @@ struct Light {
   int base;
 };
 
-vec4 light_texel(int index)
-{
-  int width = textureSize(light_list, 0).x;
-  return texelFetch(light_list, ivec2(index % width, index / width), 0);
-}
-
 Light light_read(int index)
 {
   Light light;
   light.base = index * LIGHT_TEXELS;
-  vec4 a = light_texel(light.base);
-  vec4 b = light_texel(light.base + 1);
-  vec4 d = light_texel(light.base + 3);
-  vec4 e = light_texel(light.base + 4);
+  vec4 a = sources.light[light.base];
+  vec4 b = sources.light[light.base + 1];
+  vec4 d = sources.light[light.base + 3];
+  vec4 e = sources.light[light.base + 4];
   light.kind = int(a.x);
   light.flags = int(a.y);
   light.first_view = int(a.z);
   light.view_count = int(a.w);
   light.centre = b.xyz;
   light.radius = b.w;
-  light.point = light_texel(light.base + 2).xyz;
+  light.point = sources.light[light.base + 2].xyz;
   light.radiance = d.xyz;
   light.area = d.w;
   light.axis = e.xyz;
@@ -71,9 +66,9 @@ Light light_read(int index)
 // Falloff of a spot for a ray that leaves it along `direction`.
 float spot_attenuation(Light light, vec3 direction)
 {
-  vec4 r0 = light_texel(light.base + 5);
-  vec4 r1 = light_texel(light.base + 6);
-  vec4 r2 = light_texel(light.base + 7);
+  vec4 r0 = sources.light[light.base + 5];
+  vec4 r1 = sources.light[light.base + 6];
+  vec4 r2 = sources.light[light.base + 7];
   vec3 local = safe_normalize(vec3(dot(r0.xyz, direction), dot(r1.xyz, direction), dot(r2.xyz, direction)));
   float inside = -local.z - r0.w;
   if (inside <= 0.0) {
@@ -195,8 +190,8 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
       return vec3(0.0);
     }
     float t = dot(origin - light.centre, light.axis) / cos_light;
-    vec3 u = light_texel(light.base + 5).xyz;
-    vec3 v = light_texel(light.base + 6).xyz;
+    vec3 u = sources.light[light.base + 5].xyz;
+    vec3 v = sources.light[light.base + 6].xyz;
     vec3 offset = origin + t * direction - light.centre;
     vec2 place = vec2(dot(offset, u) / max(dot(u, u), 1e-30), dot(offset, v) / max(dot(v, v), 1e-30));
     bool inside = (light.kind == LIGHT_RECTANGLE) ? max(abs(place.x), abs(place.y)) <= 1.0 : dot(place, place) <= 1.0;

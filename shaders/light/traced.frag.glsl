@@ -25,11 +25,11 @@ void main()
   if (s.glossy_roughness >= traced_roughness) {
     return;
   }
-  vec3 to_viewer = (view.eye.w > 0.5) ? view.backward.xyz : safe_normalize(view.eye.xyz - s.position);
+  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   Lobe lobe = lobe_begin(s.glossy_normal, s.tangent_angle, lobe_alpha(s.glossy_roughness, s.glossy_anisotropy),
                          s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
-  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(view.seed) + 11u));
-  vec2 u = vec2(scrambled(view.bits_x, salt.x), scrambled(view.bits_y, salt.y));
+  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));
+  vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   vec3 weight;
   vec3 direction = lobe_sample(lobe, u, weight);
   if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
@@ -41,8 +41,8 @@ void main()
     lobe_reflection(lobe, direction, lobe_density);
   }
   // Away from the surface by what float32 positions of this size cannot tell apart.
-  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - view.eye.xyz));
-  float blocked = trace_nearest(origin, direction, 1e29, salt.z + uint(view.sample_index));
+  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+  float blocked = trace_nearest(origin, direction, 1e29, salt.z + uint(film_view.sample_index));
   vec3 sum = vec3(0.0);
   if (blocked >= 1e29 && world_glossy != 0) {
     float share = 1.0;

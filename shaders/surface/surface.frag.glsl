@@ -9,24 +9,24 @@
 
 void main()
 {
-  vec3 eye = view.eye.xyz;
-  vec3 incoming = (view.eye.w > 0.5) ? view.backward.xyz : safe_normalize(eye - world_position);
-  float depth = dot(eye - world_position, view.backward.xyz);
-  if (depth < view.film.z || depth > view.film.w) {
+  vec3 eye = film_view.eye.xyz;
+  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
+  float depth = dot(eye - world_position, film_view.backward.xyz);
+  if (depth < film_view.film.z || depth > film_view.film.w) {
     discard;
   }
   Instance instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(incoming, instance);
 
-  uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(view.seed)));
+  uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
-  Closures c = closures_begin(point.normal, scrambled(view.bits_w, bits.z));
+  Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z));
   evaluate_material(point, c);
   closures_end(c);
 
   float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
-  if (transparent_mode == 0 ? scrambled(view.bits_z, layer.x) < through : (transparent_mode == 2 && through > 0.0)) {
+  if (transparent_mode == 0 ? scrambled(film_view.bits_z, layer.x) < through : (transparent_mode == 2 && through > 0.0)) {
     discard;
   }
   float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;

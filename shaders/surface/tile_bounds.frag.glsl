@@ -11,7 +11,7 @@ void main()
       if (pixel.x < size.x && pixel.y < size.y) {
         vec4 position = texelFetch(surface_position, pixel, 0);
         if (position.w != 0.0) {
-          vec4 place = vec4(position.xyz, dot(view.eye.xyz - position.xyz, view.backward.xyz));
+          vec4 place = vec4(position.xyz, dot(film_view.eye.xyz - position.xyz, film_view.backward.xyz));
           low = min(low, place);
           high = max(high, place);
         }

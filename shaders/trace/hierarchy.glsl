@@ -10,14 +10,12 @@
 
 vec4 node_texel(int index)
 {
-  int width = textureSize(trace_nodes, 0).x;
-  return texelFetch(trace_nodes, ivec2(index % width, index / width), 0);
+  return texelFetch(trace_nodes, ivec2(index & 2047, index >> 11), 0);
 }
 
 vec4 leaf_texel(int index)
 {
-  int width = textureSize(trace_leaves, 0).x;
-  return texelFetch(trace_leaves, ivec2(index % width, index / width), 0);
+  return texelFetch(trace_leaves, ivec2(index & 2047, index >> 11), 0);
 }
 
 // Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed.
@@ -88,7 +86,7 @@ float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt)
       }
       level--;
       node >>= 2;
-      level_start = (level_start - 1) / 4;
+      level_start = (level_start - 1) >> 2;
       continue;
     }
     int child = ((here & 1u) != 0u) ? 0 : ((here & 2u) != 0u) ? 1 : ((here & 4u) != 0u) ? 2 : 3;
