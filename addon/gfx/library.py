@@ -21,7 +21,10 @@ from .struct import Struct
 
 SHADER_ROOT = Path(__file__).resolve().parents[2] / "shaders"
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
-_ERROR_LINE = re.compile(r"python_shader\.glsl:(\d+)(?::\d+)?:\s*(.*)")
+# What Blender prints of the driver's complaints: 5.2 "python_shader.glsl:4:10: Error: …", 5.0 "| :4:10: Error: …", both
+# with lines of our source; 4.5 quotes the line, "251 |   return x;", with its number in the text it generated.
+_ERROR_LINE = re.compile(r"(?:python_shader\.glsl|\|\s*):(\d+)(?::\d+)?:\s*(.*)")
+_QUOTED_LINE = re.compile(r"^\s*\d+ \| (.*\S)")
 
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D"}
 _CONSTANTS = {"FLOAT", "VEC2", "VEC3", "VEC4", "INT", "IVEC2", "IVEC4", "MAT4", "BOOL"}
@@ -194,12 +197,11 @@ def _compile(program: Program):
         info.push_constant(kind, name)
 
     snippets = dict(program.snippets)
-    origins = []
+    sources = []
     if program.compute:
         info.local_group_size(*program.group)
-        text, origin = resolve(program.compute, snippets)
-        info.compute_source(text)
-        origins.append(origin)
+        sources.append(resolve(program.compute, snippets))
+        info.compute_source(sources[0][0])
     else:
         for slot, (kind, name) in enumerate(program.inputs):
             info.vertex_in(slot, kind, name)
@@ -211,12 +213,9 @@ def _compile(program: Program):
             info.vertex_out(interface)
         for slot, (kind, name) in enumerate(program.outputs):
             info.fragment_out(slot, kind, name)
-        text, origin = resolve(program.vertex, snippets)
-        info.vertex_source(text)
-        origins.append(origin)
-        text, origin = resolve(program.fragment, snippets)
-        info.fragment_source(text)
-        origins.append(origin)
+        sources = [resolve(program.vertex, snippets), resolve(program.fragment, snippets)]
+        info.vertex_source(sources[0][0])
+        info.fragment_source(sources[1][0])
 
     with _CapturedOutput() as captured:
         try:
@@ -225,23 +224,27 @@ def _compile(program: Program):
         except Exception as error:  # Blender raises a bare Exception
             handle, failure = None, error
     if failure is not None:
-        raise ShaderError(_explain(program, captured.text, origins)) from failure
+        raise ShaderError(_explain(program, captured.text, sources)) from failure
     return handle
 
 
-def _explain(program: Program, log: str, origins: list[list[tuple[str, int]]]) -> str:
+def _explain(program: Program, log: str, sources: list[tuple[str, list[tuple[str, int]]]]) -> str:
     """The driver's complaints with the file and line of the source that each is about."""
-    stage = 0 if "FragShader" not in log else len(origins) - 1
+    text, origin = sources[-1 if "FragShader" in log else 0]
+    places = [f"{file}:{line}" for file, line in origin]
     out = [f"Program {program.name} does not compile."]
     for line in log.splitlines():
         found = _ERROR_LINE.search(line)
-        if not found:
-            continue
-        number = int(found.group(1)) - 1
-        origin = origins[stage]
-        place = f"{origin[number][0]}:{origin[number][1]}" if 0 <= number < len(origin) else program.name
-        out.append(f"  {place}: {found.group(2)}")
-    if len(out) == 1:  # Blender 4.5 prints no line numbers: the raw log is all there is
+        if found:
+            number = int(found.group(1)) - 1
+            out.append(f"  {places[number] if 0 <= number < len(places) else program.name}: {found.group(2)}")
+    if len(out) == 1:  # Blender 4.5: the quoted lines tell the place, if no other line reads the same
+        lines = [line.strip() for line in text.splitlines()]
+        for quoted in dict.fromkeys(
+            match.group(1).strip() for match in map(_QUOTED_LINE.match, log.splitlines()) if match
+        ):
+            if lines.count(quoted) == 1:
+                out.append(f"  {places[lines.index(quoted)]}: {quoted}")
         out.append(log)
     return "\n".join(out)
 

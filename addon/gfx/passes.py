@@ -61,7 +61,8 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 @contextmanager
 def _state(target: Target, viewport=None, blend="NONE", depth_test="NONE", depth_write=False, cull="NONE"):
     with target.framebuffer.bind():
-        target.framebuffer.viewport_set(*(viewport or (0, 0, *target.size)))
+        # Of the bound framebuffer. GPUFrameBuffer.viewport_set says the same but takes no arguments before Blender 5.2.
+        gpu.state.viewport_set(*(viewport or (0, 0, *target.size)))
         gpu.state.blend_set(blend)
         gpu.state.depth_test_set(depth_test)
         gpu.state.depth_mask_set(depth_write)
