@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import gpu
 import numpy as np
@@ -73,19 +76,39 @@ def read(image: Image) -> np.ndarray:
     return np.array(np.frombuffer(buffer, kind)).reshape(image.height, image.width, -1)
 
 
+# A framebuffer works in one GPU context only and must end before it. Images, programs and buffers are shared by all
+# contexts, and outlive the one of a final render, which Blender makes for each render anew.
+_lasting: WeakKeyDictionary[Target, gpu.types.GPUFrameBuffer] = WeakKeyDictionary()
+_thread = threading.local()
+
+
+@contextmanager
+def passing_context():
+    """For work in a GPU context that may end afterwards: framebuffers made inside are freed at the end."""
+    _thread.framebuffers = WeakKeyDictionary()
+    try:
+        yield
+    finally:
+        del _thread.framebuffers
+
+
 @dataclass(eq=False)
 class Target:
     """Images that a draw writes: colour attachments in slot order and an optional depth image."""
 
     colors: tuple[Image, ...]
     depth: Image | None = None
-    framebuffer: gpu.types.GPUFrameBuffer = field(init=False)
 
-    def __post_init__(self):
-        slots = {"color_slots": [image.texture for image in self.colors]} if self.colors else {}
-        if self.depth is not None:
-            slots["depth_slot"] = self.depth.texture
-        self.framebuffer = gpu.types.GPUFrameBuffer(**slots)
+    @property
+    def framebuffer(self) -> gpu.types.GPUFrameBuffer:
+        """The attachments as an object of the current GPU context, made when first asked for."""
+        known = getattr(_thread, "framebuffers", _lasting)
+        if self not in known:
+            slots = {"color_slots": [image.texture for image in self.colors]} if self.colors else {}
+            if self.depth is not None:
+                slots["depth_slot"] = self.depth.texture
+            known[self] = gpu.types.GPUFrameBuffer(**slots)
+        return known[self]
 
     @property
     def size(self) -> tuple[int, int]:
@@ -93,13 +116,14 @@ class Target:
 
     def clear(self, color=(0.0, 0.0, 0.0, 0.0), depth: float = 1.0) -> None:
         """Set every colour attachment to `color` and the depth image to `depth`."""
-        with self.framebuffer.bind():
+        framebuffer = self.framebuffer
+        with framebuffer.bind():
             if self.colors and self.depth is not None:
-                self.framebuffer.clear(color=color, depth=depth)
+                framebuffer.clear(color=color, depth=depth)
             elif self.colors:
-                self.framebuffer.clear(color=color)
+                framebuffer.clear(color=color)
             else:
-                self.framebuffer.clear(depth=depth)
+                framebuffer.clear(depth=depth)
 
 
 class Pool:

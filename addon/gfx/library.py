@@ -11,7 +11,7 @@ import re
 import sys
 import tempfile
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import gpu
@@ -74,7 +74,7 @@ class Program:
             raise ShaderError(f"Program {self.name}: give either compute, or vertex and fragment.")
 
 
-@lru_cache(maxsize=None)
+@cache
 def _read(name: str) -> str:
     path = SHADER_ROOT / name
     try:

@@ -1,0 +1,157 @@
+"""The shader library: includes, declarations, errors that name file and line, and the cache."""
+
+from dataclasses import replace
+
+import pytest
+
+from addon.gfx import library
+from addon.gfx.library import SHADER_ROOT, Program, ShaderError, resolve
+from addon.gfx.struct import Struct
+from tests.gfx.declared import programs
+
+TRIVIAL = "void main() { imageStore(seen, ivec2(0), vec4(1.0)); }"
+
+
+def compute_program(source=TRIVIAL, name="test", snippets=(), **declared):
+    return Program(
+        name=name,
+        compute="generated/main",
+        snippets=(("generated/main", source), *snippets),
+        images=(("seen", "RGBA32F", "FLOAT_2D", "WRITE"),),
+        **declared,
+    )
+
+
+# Includes ------------------------------------------------------------------------------------------------------------
+
+
+def test_an_include_reached_twice_stands_in_the_text_once_and_before_its_users():
+    snippets = {
+        "main": '#include "left"\n#include "right"\nlast',
+        "left": '#include "shared"\nleft text',
+        "right": '#include "shared"\nright text',
+        "shared": "shared text",
+    }
+    text, origin = resolve("main", snippets)
+    assert text.split("\n")[:-1] == ["shared text", "left text", "right text", "last"]
+    assert origin == [("shared", 1), ("left", 2), ("right", 2), ("main", 3)]
+
+
+def test_files_that_include_each_other_are_an_error_that_shows_the_circle():
+    snippets = {"a": '#include "b"', "b": '#include "c"', "c": '#include "a"'}
+    with pytest.raises(ShaderError, match=r"include each other: a -> b -> c -> a"):
+        resolve("a", snippets)
+
+
+def test_an_unknown_include_is_an_error_that_names_the_file():
+    with pytest.raises(ShaderError, match=r"'lib/no_such_file\.glsl' cannot be read"):
+        resolve("a", {"a": '#include "lib/no_such_file.glsl"'})
+
+
+# Declarations --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"textures": (("CUBE", "sky"),)}, "texture 'sky' has the unknown type CUBE"),
+        ({"constants": (("VEC7", "size"),)}, "constant 'size' has the unknown type VEC7"),
+        ({"constants": tuple(("MAT4", f"m{k}") for k in range(3))}, "192 bytes of constants"),
+        ({"textures": tuple(("FLOAT_2D", f"t{k}") for k in range(17))}, "17 textures; Metal allows 16"),
+        ({"fragment": "x"}, "give either compute, or vertex and fragment"),
+    ],
+)
+def test_a_declaration_that_cannot_work_is_refused_before_it_is_compiled(changes, sentence):
+    with pytest.raises(ShaderError, match=sentence):
+        replace(compute_program(), **changes)
+
+
+@pytest.fixture
+def bound(gpu_context):
+    """A program with one of each resource, and a right set of bindings."""
+    from addon.gfx import images
+    from addon.gfx.struct import Block
+
+    struct = Struct("Options", ("vec4", "factor"))
+    source = "void main() { imageStore(seen, ivec2(0), texelFetch(picture, ivec2(0), 0) * options.factor * scale); }"
+    program = compute_program(
+        source, textures=(("FLOAT_2D", "picture"),), constants=(("FLOAT", "scale"),), blocks=((struct, "options"),)
+    )
+    given = {
+        "textures": {"picture": images.create(1, 1, "RGBA32F")},
+        "images": {"seen": images.create(1, 1, "RGBA32F")},
+        "blocks": {"options": Block(struct, factor=(1, 1, 1, 1))},
+        "constants": {"scale": 1.0},
+    }
+    return library.get(program), given
+
+
+@pytest.mark.parametrize("kind", ["textures", "images", "blocks", "constants"])
+def test_forgetting_a_binding_is_an_error_that_names_it(bound, kind):
+    shader, given = bound
+    name = next(iter(given[kind]))
+    with pytest.raises(ShaderError, match=rf"Program test: {kind[:-1]} {name} is missing or not declared"):
+        shader.bind(**{**given, kind: {}})
+
+
+@pytest.mark.parametrize("kind", ["textures", "images", "blocks", "constants"])
+def test_a_binding_that_is_not_declared_is_an_error_that_names_it(bound, kind):
+    shader, given = bound
+    with pytest.raises(ShaderError, match=rf"{kind[:-1]} misspelt is missing or not declared"):
+        shader.bind(**{**given, kind: {**given[kind], "misspelt": next(iter(given[kind].values()))}})
+
+
+# Compiling -----------------------------------------------------------------------------------------------------------
+
+WRONG = ("generated/wrong", "// One line above\nfloat f()\n{\n  return no_such_variable + 1.0;\n}\n")
+
+
+def test_a_compile_error_names_file_and_line_of_the_include(gpu_context):
+    source = '#include "generated/wrong"\nvoid main() { imageStore(seen, ivec2(0), vec4(f())); }'
+    with pytest.raises(ShaderError, match=r"Program broken does not compile.(?s:.)*generated/wrong:4: ") as caught:
+        library.get(compute_program(source, name="broken", snippets=(WRONG,)))
+    assert "no_such_variable" in str(caught.value)
+
+
+def test_an_error_in_a_fragment_shader_is_not_blamed_on_the_vertex_shader(gpu_context):
+    from addon.gfx import passes
+
+    source = '\n\n#include "generated/wrong"\nvoid main() { out_color = vec4(f()); }'
+    program = passes.fullscreen_program(
+        "broken", "generated/main", outputs=(("VEC4", "out_color"),), snippets=(("generated/main", source), WRONG)
+    )
+    with pytest.raises(ShaderError, match=r"generated/wrong:4: "):
+        library.get(program)
+
+
+def test_an_equal_declaration_is_compiled_once(gpu_context):
+    before = library.compile_count
+    first = library.get(compute_program(name="cached"))
+    assert library.get(compute_program(name="cached")) is first
+    assert library.compile_count == before + 1
+    assert library.get(compute_program(name="cached", defines=(("OTHER", "1"),))) is not first
+    assert library.compile_count == before + 2
+
+
+def test_a_program_that_failed_is_tried_again(gpu_context):
+    for _ in range(2):
+        with pytest.raises(ShaderError):
+            library.get(compute_program("void main() { nonsense(); }", name="fails"))
+
+
+# The project's shaders -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("program", programs(), ids=lambda p: p.name)
+def test_every_declared_program_compiles(program, gpu_context):
+    library.get(program)
+
+
+def test_every_shader_file_is_part_of_a_program():
+    used = set()
+    for program in programs():
+        for source in filter(None, (program.vertex, program.fragment, program.compute)):
+            _, origin = resolve(source, dict(program.snippets))
+            used |= {file for file, _ in origin}
+    files = {path.relative_to(SHADER_ROOT).as_posix() for path in SHADER_ROOT.rglob("*.glsl")}
+    assert not sorted(files - used), "these shader files are in no program: no test compiles them"
