@@ -1,7 +1,8 @@
 """The render engine that Blender sees: thin, owns nothing.
 
 Blender makes two instances per final render and throws viewport instances away on a mode change, so what lives longer
-(meshes, programs, accumulated frames) stands in `_sessions`, keyed by scene and use, and is freed in `free_sessions`.
+(meshes, programs, accumulated frames) stands in `_sessions`, keyed by scene and use, and for the 3D regions in
+viewport.py. All of it is freed in `free_sessions`.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from . import techniques
+from . import techniques, viewport
 from .frame import ledger as ledgers
 from .frame.run import Frame, Renderer
-from .gfx import context
+from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
+from .snapshot.scene import Snapshot
+from .ui import notes
 from .ui.properties import settings_of
 
 ENGINE = "CANDELA"
@@ -34,13 +37,14 @@ _sessions: dict[tuple, Session] = {}
 
 
 def session(scene: bpy.types.Scene, use: str) -> Session:
-    """The session of a scene for 'final', 'preview' or a viewport."""
+    """The session of a scene for 'final' or 'preview'."""
     return _sessions.setdefault((scene.original.session_uid, use), Session())
 
 
 def free_sessions() -> None:
     """Free all GPU resources and cached scene data."""
     _sessions.clear()
+    viewport.free_all()
     context.release_all()
 
 
@@ -82,29 +86,36 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._sync_seconds = time.perf_counter() - started
 
     def render(self, depsgraph):
-        """Draw all samples and hand the passes to Blender. The GPU context is active."""
-        started = time.perf_counter()
+        """Draw all samples and hand the passes to Blender. The GPU context is active, and ends afterwards."""
         snapshot = getattr(self, "_snapshot", None)
-        if snapshot is None:
-            return
+        if snapshot is not None:
+            with images.passing_context():
+                self._render(depsgraph, snapshot)
+
+    def _render(self, depsgraph, snapshot: Snapshot) -> None:
+        started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
         shared = session(scene, "preview" if self.is_preview else "final")
         settings = settings_of(scene, viewport=False, preview=self.is_preview)
         try:
-            frame = shared.renderer.begin(snapshot, settings, self._compiling)
+            with viewport.turn:
+                frame = shared.renderer.begin(snapshot, settings, self._compiling)
             frame.ledger.times["sync"] = self._sync_seconds
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name)
             while frame.samples_done < settings.samples:
                 if self.test_break():
                     self.end_result(result, cancel=True)
-                    shared.renderer.finish(frame, ())
+                    with viewport.turn:
+                        shared.renderer.finish(frame, ())
                     return
-                shared.renderer.advance(frame)
+                with viewport.turn:
+                    shared.renderer.advance(frame)
                 self.update_stats("Candela", f"Sample {frame.samples_done} of {settings.samples}")
                 self.update_progress(frame.samples_done / settings.samples)
             wanted = _wanted_passes(layer)
-            pixels = _finished(shared.renderer, frame, wanted)
+            with viewport.turn:
+                pixels = _finished(shared.renderer, frame, wanted)
             for name, array in pixels.items():
                 render_pass = result.layers[0].passes.find_by_name(name, "")
                 if render_pass is not None:
@@ -116,10 +127,23 @@ class CandelaEngine(bpy.types.RenderEngine):
         ledger = ledgers.latest()
         ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
         if not self.is_preview:
+            notes.publish((*frame.snapshot.notes, *frame.materials.notes))
             for note in ledger.notes:
                 self.report({"WARNING"}, note)
             if ledger.bad_pixels:
                 self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
+
+    # -------------------------------------------------------------------------------------------------- viewport
+
+    def view_update(self, context, depsgraph):
+        """Take note of a change. Comes in the middle of the scene's evaluation: nothing may be drawn here."""
+        viewport.changed(self, context, depsgraph)
+
+    def view_draw(self, context, depsgraph):
+        """Draw a 3D region, whose framebuffer is bound."""
+        viewport.draw(self, context, depsgraph)
+
+    # --------------------------------------------------------------------------------------------------- reports
 
     def _compiling(self, done: int, total: int) -> bool:
         self.update_stats("Candela", f"Compiling shaders {done} of {total}")

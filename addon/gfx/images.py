@@ -36,11 +36,18 @@ class Image:
 
 
 def create(width: int, height: int, image_format: str) -> Image:
-    """A new image with undefined content. Raises ValueError beyond what the device allows."""
+    """A new image with undefined content. Raises ValueError beyond the device's limits, RuntimeError if it is full."""
     limit = gpu.capabilities.max_texture_size_get()
     if not (0 < width <= limit and 0 < height <= limit):
         raise ValueError(f"An image of {width}x{height} pixels cannot be made: this GPU allows 1 to {limit}.")
-    return Image(width, height, image_format, gpu.types.GPUTexture((width, height), format=image_format))
+    try:
+        texture = gpu.types.GPUTexture((width, height), format=image_format)
+    except RuntimeError as error:  # without a reason, but size and format are right
+        need = width * height * _BYTES[image_format] / 2**20
+        raise RuntimeError(
+            f"The GPU has no memory for an image of {width}x{height} pixels ({need:.0f} MiB)."
+        ) from error
+    return Image(width, height, image_format, texture)
 
 
 def upload(pixels: np.ndarray, image_format: str = "RGBA32F") -> Image:
