@@ -39,13 +39,14 @@ RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
     "Texels of a depth map per pixel of the picture's longer side; rounded up to a power of two", 0.125, 16.0,
 )  # fmt: skip
+MOST_RESOLUTION = 2048  # six maps of one point light take 500 MB then; with 4096, 2 GB, which no software GPU gives
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
 
 
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     """Side of a depth map in texels."""
     wished = max(frame.size) * texels_per_pixel
-    return int(np.clip(2 ** np.ceil(np.log2(max(wished, 1.0))), 16, 4096))
+    return int(np.clip(2 ** np.ceil(np.log2(max(wished, 1.0))), 16, MOST_RESOLUTION))
 
 
 class DepthMapService:
@@ -125,9 +126,7 @@ class AccumulatedMaps(Technique):
         use = f"map/{emitter.light.key}"
         jitter = (*frame.random(use), *frame.random(use + "/turn"))
         if emitter.kind == lights.SUN:
-            return depth_maps.directional_views(
-                sample, frame.receivers, frame.geometry, jitter, self.resolution(frame)
-            )
+            return depth_maps.directional_views(sample, frame.receivers, frame.geometry, jitter, self.resolution(frame))
         axis, cone = None, np.inf
         if emitter.kind in (lights.RECTANGLE, lights.ELLIPSE):
             axis, cone = emitter.axis, emitter.spread or np.inf
