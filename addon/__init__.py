@@ -5,20 +5,22 @@ def register():
     """Called by Blender when the extension is enabled."""
     import bpy
 
-    from . import engine
+    from . import cli, engine
     from .ui import properties
 
     properties.register()
     bpy.utils.register_class(engine.CandelaEngine)
+    cli.register()
 
 
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
     import bpy
 
-    from . import engine
+    from . import cli, engine
     from .ui import properties
 
+    cli.unregister()
     bpy.utils.unregister_class(engine.CandelaEngine)
     engine.free_sessions()
     properties.unregister()

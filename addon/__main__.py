@@ -1,0 +1,23 @@
+"""`python -m addon render | compare | plan FILE.blend …`, where Blender is installed as a Python module."""
+
+import os
+import sys
+
+
+def main() -> int:
+    try:
+        import bpy  # noqa: F401
+    except ImportError as error:
+        print(f"Blender could not be loaded as a Python module: {error}.", file=sys.stderr)
+        return 1
+    from . import cli, register
+
+    register()
+    return cli.main(sys.argv[1:], "python -m addon")
+
+
+if __name__ == "__main__":
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # Blender 4.5 as a module waits forever in its exit handlers once a GPU was used

@@ -1,0 +1,156 @@
+"""`blender --command candela render | compare | plan FILE.blend …`, and the same as `python -m addon …`.
+
+What a person may get wrong ends in one sentence on standard error: exit code 2 when the command line cannot be meant
+as it stands, 1 when the file, the scene or the output will not do. Results are written beside their final place and
+renamed, so that nothing half-written is ever seen. The opened file is changed in memory only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+
+from ..frame.settings import SAMPLES
+from ..techniques import REGISTRY
+from . import verbs
+from .refused import FAILURE, USAGE, Refused
+from .terminal import STDOUT
+
+COMMAND = "candela"
+OK = 0
+SIZES = range(4, 65537)  # pixels; Blender's own limits of a resolution
+FRAMES = range(-1048574, 1048575)  # Blender's own limits of a frame number
+
+
+# ----------------------------------------------------------------------------------------------------------- the call
+
+
+def main(arguments: list[str], program: str = f"blender --command {COMMAND}") -> int:
+    """Do what the command line says and return the exit code. The add-on is registered."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal without × shows a question mark
+    try:
+        options = _parser(program).parse_args(arguments)
+        job = verbs.open_job(options)
+        options.verb(job)
+        sys.stdout.flush()
+    except Refused as refusal:
+        return _end(str(refusal), refusal.code)
+    except KeyboardInterrupt:
+        return _end("Interrupted; nothing was written.", FAILURE)
+    except BrokenPipeError:  # `… | head`: who reads has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), STDOUT)
+        return FAILURE
+    except OSError as error:  # a full disk, a temporary folder that is not there
+        return _end(f"{error.filename or 'A file'} could not be used: {error.strerror or error}.", FAILURE)
+    except SystemExit as end:  # --help
+        return int(end.code or OK)
+    return OK
+
+
+def _end(sentence: str, code: int) -> int:
+    sys.stdout.flush()
+    print(sentence, file=sys.stderr, flush=True)
+    return code
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str):
+        raise Refused(f"{message[:1].upper()}{message[1:].rstrip('.')} (see --help).", USAGE)
+
+
+def _parser(program: str) -> argparse.ArgumentParser:
+    shared = _Parser(add_help=False)
+    shared.add_argument("file", metavar="FILE.blend", type=Path)
+    shared.add_argument("--samples", metavar="N", help="samples per pixel (default: the file's)")
+    shared.add_argument("--size", metavar="WxH", type=_size, help="pixels (default: the file's resolution)")
+    shared.add_argument("--frame", metavar="N", type=_frame, help="frame of the animation (default: the file's)")
+    shared.add_argument("--scene", metavar="NAME", help="default: the scene that was active when the file was saved")
+    shared.add_argument("--view-layer", metavar="NAME", help="default: all that are rendered; compare: the active one")
+    shared.add_argument(
+        "--set", metavar="NAME=VALUE", action="append", default=[], dest="assignments",
+        help=f"a setting of Candela, such as {_example()}; may be repeated; a wrong name gets the list",
+    )  # fmt: skip
+    shared.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
+
+    parser = _Parser(prog=program, description="Candela, a render engine for Blender.", allow_abbrev=False)
+    commands = parser.add_subparsers(metavar="render|compare|plan", required=True)
+    add = {"parents": [shared], "allow_abbrev": False}
+    render = commands.add_parser("render", help="render a picture", **add)
+    render.add_argument("--output", metavar="PATH", type=Path, help=".png, or .exr with all passes of the file")
+    render.set_defaults(verb=verbs.render)
+    against = commands.add_parser("compare", help="render by Candela and by Cycles, and compare", **add)
+    against.add_argument("--output", metavar="FOLDER", type=Path, help="for index.html and the pictures")
+    against.add_argument(
+        "--reference-samples",
+        metavar="N",
+        type=_count,
+        default=256,
+        help="of Cycles, each of two renders (default 256)",
+    )
+    against.add_argument(
+        "--direct-only", action=argparse.BooleanOptionalAction, default=not _renders_indirect_light(),
+        help="let Cycles stop after the first surface, so that Combined compares like with like "
+        "(the default while Candela renders direct light only)",
+    )  # fmt: skip
+    against.add_argument("--no-cache", action="store_true", help="render the reference anew and do not keep it")
+    against.set_defaults(verb=verbs.compare)
+    plan = commands.add_parser("plan", help="print what would run and why the rest is skipped", **add)
+    plan.set_defaults(verb=verbs.plan)
+    return parser
+
+
+def _renders_indirect_light() -> bool:
+    return any(technique.slot == "indirect" for technique in REGISTRY)
+
+
+def _example() -> str:
+    return next(f"{t.name}.{p.name}={p.default}" for t in REGISTRY for p in t.params)
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)[xX×](\d+)", text)
+    size = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not all(edge in SIZES for edge in size):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not a size: two whole numbers from {SIZES[0]} to {SIZES[-1]} are, such as 640x480"
+        )
+    return size
+
+
+def _frame(text: str) -> int:
+    try:
+        if int(text) in FRAMES:
+            return int(text)
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"'{text}' is not a frame: whole numbers from {FRAMES[0]} to {FRAMES[-1]} are")
+
+
+def _count(text: str) -> int:
+    try:
+        return replace(SAMPLES, name="reference-samples").check(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+
+
+# ------------------------------------------------------------------------------------------------------- registration
+
+_handle: list = []  # of the registered command
+
+
+def register() -> None:
+    """Make `blender --command candela` known."""
+    _handle.append(bpy.utils.register_cli_command(COMMAND, main))
+
+
+def unregister() -> None:
+    while _handle:
+        bpy.utils.unregister_cli_command(_handle.pop())

@@ -1,0 +1,296 @@
+"""The three verbs, on a file that is opened with the options applied."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from .. import engine
+from ..compare import compare_scene, metrics, png, reference, table, write_report
+from ..frame import ledger as ledgers
+from ..frame.plan import PlanError, make_plan
+from ..gfx import context
+from ..materials.compiler import compile_material
+from ..snapshot import SnapshotCache, UnsupportedScene, take
+from ..snapshot.scene import Note, Snapshot
+from ..techniques import REGISTRY, make_registry
+from ..ui.properties import identifier, settings_of
+from .files import output, placed_in, refuse_blend
+from .refused import USAGE, Refused, reason
+from .terminal import progress, quiet
+
+# ------------------------------------------------------------------------------------------------------ the open file
+
+
+@dataclass(frozen=True)
+class Job:
+    """The opened file with the options applied, in memory."""
+
+    options: argparse.Namespace
+    scene: bpy.types.Scene
+    layer: bpy.types.ViewLayer | None  # None: all that are rendered
+
+    @property
+    def title(self) -> str:
+        render = self.scene.render
+        width, height = (
+            edge * render.resolution_percentage // 100 for edge in (render.resolution_x, render.resolution_y)
+        )
+        layer = f", view layer {self.layer.name}" if self.layer else ""
+        samples = self.scene.candela.samples
+        return (
+            f"{self.options.file.name}, scene {self.scene.name}{layer}, frame {self.scene.frame_current}, "
+            f"{width} × {height}, {samples} {'sample' if samples == 1 else 'samples'}"
+        )
+
+
+def open_job(options: argparse.Namespace) -> Job:
+    """Check the file, open it and apply the options. Raises Refused."""
+    refuse_blend(options.file)
+    with quiet(options.verbose):
+        why = _open_mainfile(options.file)
+    if why:
+        raise Refused(f"{options.file} could not be opened: {why}.")
+    scene = _named("scene", options.scene, bpy.data.scenes) or bpy.context.scene
+    layer = _named("view layer", options.view_layer, scene.view_layers)
+    try:
+        _apply_settings(scene, options)
+    except ValueError as error:
+        raise Refused(str(error), USAGE) from None
+    if options.size:
+        scene.render.resolution_x, scene.render.resolution_y = options.size
+        scene.render.resolution_percentage = 100
+    scene.render.engine = engine.ENGINE
+    scene.render.use_sequencer = scene.render.use_multiview = False  # strips and stereo are not Candela's pictures
+    if options.frame is not None:
+        with quiet(options.verbose):
+            scene.frame_set(options.frame)
+    if scene.camera is None:
+        raise Refused(f"Scene '{scene.name}' in {options.file} has no camera: add one, or make one active.")
+    return Job(options, scene, layer)
+
+
+def _open_mainfile(path: Path) -> str:
+    """Open the file in Blender; why it could not be opened, or an empty string."""
+    full = str(path.resolve())
+    try:
+        bpy.ops.wm.open_mainfile(filepath=full)
+    except RuntimeError as error:
+        if bpy.data.filepath != full:  # else it is open, and only something that it links to is missing
+            return reason(error)
+    return ""
+
+
+def _named(kind: str, name: str | None, among):
+    if name is None or name in among:
+        return among[name] if name is not None else None
+    known = ", ".join(f"'{thing.name}'" for thing in among)
+    raise Refused(f"There is no {kind} '{name}'; there is {known}.", USAGE)
+
+
+def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
+    """Put the given settings into the scene's properties. Raises ValueError with a sentence."""
+    given = list(options.assignments)
+    if options.samples is not None:
+        given.append(f"samples={options.samples}")
+    settings = settings_of(scene, viewport=False).override(REGISTRY, given)
+    group = scene.candela
+    group.samples, group.seed = settings.samples, settings.seed
+    for slot, technique in settings.slots.items():
+        setattr(group, f"slot_{slot}", technique)
+    for (technique, param), value in settings.values.items():
+        setattr(group, identifier(technique, param), value)
+
+
+# ------------------------------------------------------------------------------------------------------------- render
+
+
+def render(job: Job) -> None:
+    path = output(job.options.output or Path(f"{job.options.file.stem}.png"), folder=False)
+    if path.suffix.lower() not in (".png", ".exr"):
+        raise Refused(f"The output must end in .png or .exr, and {path.name} does not.", USAGE)
+    target = {"layer": job.layer.name} if job.layer else {}
+    with _watched(job):
+        try:
+            bpy.ops.render.render(scene=job.scene.name, **target)
+        except RuntimeError as error:
+            raise Refused(f"{job.options.file} could not be rendered: {reason(error)}.") from None
+    _choose_format(job.scene.render.image_settings, path.suffix.lower(), job.scene.render.film_transparent)
+    with placed_in(path.parent) as folder, quiet(job.options.verbose):
+        result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
+        result.save_render(str(folder / path.name), scene=job.scene)
+        if not (folder / path.name).is_file():
+            raise OSError(None, "Blender wrote no file")
+    print(job.title)
+    _print_ledger()
+    print(path)
+
+
+def _choose_format(image, suffix: str, transparent: bool) -> None:
+    """Eight-bit PNG with the scene's view transform, or multilayer EXR in 32-bit float."""
+    layers = suffix == ".exr"
+    if hasattr(image, "media_type"):  # 5.0 and later: decides which formats may be set
+        image.media_type = "MULTI_LAYER_IMAGE" if layers else "IMAGE"
+    image.file_format = "OPEN_EXR_MULTILAYER" if layers else "PNG"
+    image.color_mode = "RGBA" if layers or transparent else "RGB"
+    image.color_depth = "32" if layers else "8"
+
+
+def _print_ledger() -> None:
+    ledger = ledgers.latest()
+    print(ledger.text())
+    _print_notes(ledger.notes)
+
+
+def _print_notes(notes) -> None:
+    texts = dict.fromkeys(str(note) for note in notes)
+    if texts:
+        print("Drawn otherwise than in Cycles:")
+    for text in texts:
+        print(f"  {text}")
+
+
+# ------------------------------------------------------------------------------------------------------------ compare
+
+
+def compare(job: Job) -> None:
+    options = job.options
+    folder = output(options.output or Path(f"{options.file.stem}_compare"), folder=True)
+    try:
+        with _watched(job, f"Cycles renders the reference, 2 × {options.reference_samples} samples"):
+            data = compare_scene(
+                job.scene,
+                job.scene.candela.samples,
+                options.reference_samples,
+                direct_only=options.direct_only,
+                use_cache=not options.no_cache,
+                view_layer=job.layer,
+                seed=job.scene.candela.seed,
+            )
+    except reference.RenderFailed as error:
+        raise Refused(f"{options.file} could not be compared: {reason(error.__cause__ or error)}.") from None
+    with placed_in(folder) as place:
+        write_report(place / "index.html", data)
+        combined = data.pictures[0]
+        for name, pixels in (("candela.png", combined.x), ("cycles.png", combined.reference)):
+            if pixels is not None:
+                shown = metrics.display(pixels[::-1])
+                (place / name).write_bytes(png.png((shown * 255 + 0.5).astype("uint8")))
+    bounces = "without bounces (direct light, emission and world)" if data.direct_only else "with all bounces"
+    kept = ", from the cache" if data.reference_cached else ""
+    print(job.title)
+    print(f"Against Cycles {bounces}; 2 × {data.reference_samples} samples{kept}")
+    print(table(data.errors))
+    print(f"Candela {data.seconds:.2f} s, Cycles {data.reference_seconds / 2:.2f} s per reference")
+    print(ledgers.latest().text())
+    _print_notes(data.notes)
+    print(folder / "index.html")
+
+
+# --------------------------------------------------------------------------------------------------------------- plan
+
+
+class CandelaPlanEngine(bpy.types.RenderEngine):
+    """Reads the scene as a final render would and draws nothing."""
+
+    bl_idname = "CANDELA_PLAN"
+    bl_label = "Candela plan"
+    bl_use_shading_nodes_custom = False
+
+    found: list[tuple[str, Snapshot]] = []  # view layer and what it holds
+    refusal = ""
+
+    def update(self, data, depsgraph):
+        try:
+            snapshot = take(
+                depsgraph, SnapshotCache(), self.resolution_x, self.resolution_y, camera=self.camera_override
+            )
+            self.found.append((depsgraph.view_layer.name, snapshot))
+        except UnsupportedScene as error:
+            CandelaPlanEngine.refusal = str(error)
+
+    def render(self, depsgraph):
+        pass
+
+
+def plan(job: Job) -> None:
+    settings, snapshots = settings_of(job.scene, viewport=False), _snapshots(job)
+    print(job.title)
+    for layer, snapshot in snapshots:
+        try:
+            found = make_plan(make_registry(), snapshot, settings)
+        except PlanError as error:
+            raise Refused(str(error)) from None
+        triangles = sum(len(snapshot.meshes[instance.mesh].triangle_corners) for instance in snapshot.instances)
+        print(
+            f"View layer {layer}: {len(snapshot.meshes)} meshes in {len(snapshot.instances)} places, "
+            f"{triangles} triangles, {len(snapshot.materials)} materials, {len(snapshot.lights)} lights"
+        )
+        print(found.text())
+        _print_notes([*snapshot.notes, *_material_notes(snapshot)])
+
+
+def _snapshots(job: Job) -> list[tuple[str, Snapshot]]:
+    """What each view layer holds in a final render. Raises Refused."""
+    CandelaPlanEngine.found, CandelaPlanEngine.refusal = [], ""
+    bpy.utils.register_class(CandelaPlanEngine)
+    try:
+        job.scene.render.engine = CandelaPlanEngine.bl_idname
+        job.scene.render.use_compositing = False
+        target = {"layer": job.layer.name} if job.layer else {}
+        with quiet(job.options.verbose):
+            bpy.ops.render.render(scene=job.scene.name, **target)
+    except RuntimeError as error:
+        raise Refused(f"{job.options.file} could not be read: {reason(error)}.") from None
+    finally:
+        job.scene.render.engine = engine.ENGINE
+        bpy.utils.unregister_class(CandelaPlanEngine)
+    if CandelaPlanEngine.refusal:
+        raise Refused(CandelaPlanEngine.refusal)
+    return CandelaPlanEngine.found
+
+
+def _material_notes(snapshot: Snapshot) -> list[Note]:
+    return [
+        Note(f"Material '{material.name}'", text, material.name, node)
+        for material in snapshot.materials
+        for node, text in compile_material(material.name, material.graph, snapshot.images).fallbacks
+    ]
+
+
+# ----------------------------------------------------------------------------------------------- Blender, kept in check
+
+
+@contextlib.contextmanager
+def _watched(job: Job, then: str = "") -> Iterator[None]:
+    """Candela renders inside: with progress on a terminal, without Blender's chatter, and to the last sample.
+
+    `then` is said when the last sample is done. Raises Refused when the render ended before it.
+    """
+    with quiet(job.options.verbose) as terminal:
+        try:
+            context.ensure()
+        except RuntimeError as error:
+            raise Refused(str(error)) from None
+        renderer = engine.session(job.scene, "final").renderer
+        advance, seen, wanted = renderer.advance, 0, job.scene.candela.samples
+
+        def advance_and_tell(frame) -> None:
+            nonlocal seen
+            advance(frame)
+            seen = frame.samples_done
+            progress(terminal, f"Sample {seen} of {wanted}" if seen < wanted else then)
+
+        renderer.advance = advance_and_tell
+        try:
+            yield
+        finally:
+            del renderer.advance
+            progress(terminal, "")
+    if seen < wanted:
+        raise Refused(f"The render of {job.options.file} ended after {seen} of {wanted} samples.")
