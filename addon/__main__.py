@@ -1,5 +1,6 @@
 """`python -m addon render | compare | plan FILE.blend …`, where Blender is installed as a Python module."""
 
+import importlib
 import os
 import sys
 
@@ -10,9 +11,9 @@ def main() -> int:
     except ImportError as error:
         print(f"Blender could not be loaded as a Python module: {error}.", file=sys.stderr)
         return 1
-    from . import cli, register
+    from . import cli
 
-    register()
+    importlib.import_module(__package__).register()
     return cli.main(sys.argv[1:], "python -m addon")
 
 

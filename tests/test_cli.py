@@ -1,0 +1,211 @@
+"""The command line, as a person meets it: what it prints, what it leaves on disk, how it ends."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+CORNELL = ROOT / "sample_blends" / "cornell_box.blend"
+TINY = ("--size", "32x24", "--samples", "2")
+
+
+def candela(*arguments, folder: Path) -> subprocess.CompletedProcess:
+    """Run `python -m addon …` in `folder`."""
+    return subprocess.run(
+        [sys.executable, "-m", "addon", *map(str, arguments)],
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "CANDELA_CACHE": str(folder / "cache")},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def assert_refused(done: subprocess.CompletedProcess, code: int, *words: str) -> None:
+    """One sentence on standard error that holds the words, nothing on standard output, and the exit code."""
+    assert done.returncode == code, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1 and done.stderr.endswith(".\n"), done.stderr
+    for word in words:
+        assert word in done.stderr
+
+
+@pytest.fixture(scope="module")
+def blends(tmp_path_factory):
+    """A folder of files that cannot be rendered, made by a Blender of its own."""
+    folder = tmp_path_factory.mktemp("blends")
+    done = subprocess.run(
+        [sys.executable, "-c", MAKE_BLENDS, str(folder)], check=False, capture_output=True, text=True, timeout=120
+    )
+    assert (folder / "newer.blend").exists(), done.stderr
+    (folder / "truncated.blend").write_bytes(CORNELL.read_bytes()[:20000])
+    (folder / "text.blend").write_text("not a scene")
+    (folder / "empty.blend").touch()
+    (folder / "folder.blend").mkdir()
+    return folder
+
+
+MAKE_BLENDS = """
+import os, struct, sys
+from pathlib import Path
+import bpy
+
+folder = Path(sys.argv[1])
+bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+
+def save(name, **options):
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / name), **options)
+
+save("no_camera.blend")
+eye = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
+scene.collection.objects.link(eye)
+scene.camera = eye
+eye.data.type = "PANO"
+save("panoramic.blend")
+eye.data.type = "PERSP"
+bpy.ops.mesh.primitive_cube_add(location=(0, 0, -5))
+material = bpy.data.materials.new("Marble")
+material.use_nodes = True
+nodes, links = material.node_tree.nodes, material.node_tree.links
+unknown = nodes.new("ShaderNodeBsdfHairPrincipled")
+links.new(unknown.outputs[0], next(n for n in nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+bpy.context.object.data.materials.append(material)
+save("unknown_node.blend")
+save("newer.blend", compress=False)
+content = bytearray((folder / "newer.blend").read_bytes())
+# The block GLOB begins with its code; 32 bytes on: subversion as text, then three 16-bit numbers, the second of which
+# is the oldest Blender that may open the file.
+struct.pack_into("<h", content, content.find(b"GLOB") + 32 + 6, 9990)
+(folder / "newer.blend").write_bytes(content)
+os._exit(0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), ["render|compare|plan"]),
+        (("render",), ["FILE.blend"]),
+        (("plot", CORNELL), ["plot"]),
+        (("render", CORNELL, "--colour", "red"), ["--colour"]),
+        (("render", CORNELL, "--size", "0x24"), ["--size", "0x24"]),
+        (("render", CORNELL, "--size", "-32x24"), ["--size"]),
+        (("plan", CORNELL, "--frame", "later"), ["--frame", "later"]),
+        (("compare", CORNELL, "--reference-samples", "0"), ["reference-samples"]),
+    ],
+    ids=lambda value: " ".join(map(str, value[2:])) if isinstance(value, tuple) else "",
+)
+@pytest.mark.slow
+def test_bad_usage_is_refused_before_the_file_is_opened(arguments, words, tmp_path):
+    assert_refused(candela(*arguments, folder=tmp_path), 2, *words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--samples", "0"), ["samples", "at least 1"]),
+        (("--set", "direct_light.nonsense=1"), ["direct_light.nonsense", "Known settings"]),
+        (("--set", "samples"), ["name=value"]),
+        (("--scene", "Nowhere"), ["Nowhere", "Cornell Box"]),
+        (("--view-layer", "Nothing"), ["Nothing", "ViewLayer"]),
+        (("--output", "picture.gif"), [".png", "picture.gif"]),
+    ],
+    ids=lambda value: value[1] if isinstance(value, tuple) else "",
+)
+@pytest.mark.slow
+def test_options_that_do_not_fit_the_file_are_refused(options, words, tmp_path):
+    assert_refused(candela("render", CORNELL, *options, folder=tmp_path), 2, *words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("missing", ["no file"]),
+        ("folder", ["folder"]),
+        ("text", ["not a .blend file"]),
+        ("empty", ["not a .blend file"]),
+        ("truncated", ["could not be opened"]),
+        ("newer", ["could not be opened", "newer version"]),
+        ("no_camera", ["no camera"]),
+        ("panoramic", ["'Eye'", "Perspective"]),
+    ],
+)
+@pytest.mark.slow
+def test_file_that_cannot_be_rendered_is_refused(name, words, blends, tmp_path):
+    done = candela("compare", blends / f"{name}.blend", *TINY, "--output", "page", folder=tmp_path)
+    assert_refused(done, 1, *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_plan_refuses_a_panoramic_camera(blends, tmp_path):
+    assert_refused(candela("plan", blends / "panoramic.blend", folder=tmp_path), 1, "'Eye'", "Perspective")
+
+
+@pytest.mark.slow
+def test_output_that_cannot_be_written_is_refused_and_stays(tmp_path):
+    kept = tmp_path / "kept.png"
+    kept.write_text("mine")
+    kept.chmod(0o444)
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o555)
+    for output in (kept, locked / "picture.png", tmp_path, kept / "below.png", tmp_path / ("long" * 100 + ".png")):
+        assert_refused(candela("render", CORNELL, *TINY, "--output", output, folder=tmp_path), 1)
+    assert kept.read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["kept.png", "locked"]
+
+
+def test_plan_says_what_runs_and_why_the_rest_does_not(tmp_path):
+    done = candela("plan", CORNELL, folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert "Direct light" in done.stdout and "runs" in done.stdout
+    assert "skipped: the world is black" in done.stdout
+    assert not list(tmp_path.iterdir())
+
+
+def test_plan_names_material_and_node(blends, tmp_path):
+    done = candela("plan", blends / "unknown_node.blend", folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert "'Marble'" in done.stdout and "Principled Hair BSDF" in done.stdout
+
+
+def test_render_writes_the_picture_and_prints_the_ledger(tmp_path):
+    output = tmp_path / "made" / "picture.png"
+    done = candela("render", CORNELL, *TINY, "--set", "seed=3", "--output", output, folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert "Direct light" in done.stdout and "32 × 24, 2 samples" in done.stdout
+    assert done.stdout.splitlines()[-1] == str(output)
+    assert output.read_bytes()[16:24] == bytes((0, 0, 0, 32, 0, 0, 0, 24))  # width and height in PNG's header
+    assert [path.name for path in tmp_path.rglob("*")] == ["made", "picture.png"]
+
+
+@pytest.mark.slow
+def test_render_writes_the_files_passes_as_multilayer_exr(tmp_path):
+    output = tmp_path / "picture.exr"
+    done = candela("render", CORNELL, *TINY, "--output", output, folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    from addon.compare.exr import read_exr
+
+    layers = read_exr(output)
+    assert layers["ViewLayer.Combined"].shape == (24, 32, 4)
+
+
+@pytest.mark.slow
+def test_compare_writes_a_page_and_prints_every_light_path(tmp_path):
+    options = ("--reference-samples", "2", "--output", "page")
+    done = candela("compare", CORNELL, *TINY, *options, folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    for word in ("relMSE", "FLIP", "bias", "floor", "Combined", "Diffuse direct", "without bounces", "Direct light"):
+        assert word in done.stdout
+    assert done.stdout.splitlines()[-1] == str(tmp_path / "page" / "index.html")
+    assert sorted(path.name for path in (tmp_path / "page").iterdir()) == ["candela.png", "cycles.png", "index.html"]
+    assert "without bounces" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+    again = candela("compare", CORNELL, *TINY, *options, folder=tmp_path)
+    assert again.returncode == 0 and "from the cache" in again.stdout
