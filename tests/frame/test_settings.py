@@ -1,0 +1,89 @@
+"""Settings from texts, as the command line gives them; every mistake is answered with a sentence."""
+
+import pytest
+
+from addon.frame.settings import SAMPLES, Settings
+from addon.frame.technique import Param, Technique
+from addon.techniques import make_registry
+
+
+class Rays(Technique):
+    name, label = "rays", "Rays"
+    params = (
+        Param("count", "Count", 4, "Rays per pixel", 1, 64),
+        Param("reach", "Reach", 0.5, "Share of the scene", 0.0, 1.0),
+        Param("jitter", "Jitter", True, "Turn each pixel"),
+        Param("kind", "Kind", "COSINE", "Distribution", items=(("COSINE", "Cosine", 0), ("EVEN", "Even", 1))),
+    )
+
+
+RAYS = Rays()
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("rays.count=8", 8),
+        ("rays.reach=0.25", 0.25),
+        ("rays.reach=1", 1.0),
+        ("rays.jitter=off", False),
+        ("rays.jitter=True", True),
+        ("rays.kind=EVEN", "EVEN"),
+    ],
+)
+def test_a_text_sets_a_parameter_in_its_own_type(text, value):
+    name = text.partition("=")[0].partition(".")[2]
+    found = Settings().override([RAYS], [text]).get(RAYS, name)
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_samples_and_seed_are_settings_too():
+    settings = Settings().override([RAYS], ["samples=7", "seed=3"])
+    assert (settings.samples, settings.seed) == (7, 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("rays.count", "'rays.count' is not of the form name=value"),
+        ("rays.counts=2", "There is no setting 'rays.counts'. Known settings: samples, seed, .*rays.count"),
+        ("rays.count=many", "'count' needs a int, not 'many'"),
+        ("rays.count=0", "'count' must be at least 1, not 0"),
+        ("rays.count=65", "'count' must be at most 64, not 65"),
+        ("rays.reach=nan", "'reach' must be at least 0.0, not nan"),
+        ("rays.jitter=perhaps", "'jitter' needs a bool, not 'perhaps'"),
+        ("rays.kind=ODD", "'kind' must be one of COSINE, EVEN, not 'ODD'"),
+        ("samples=0", "'samples' must be at least 1, not 0"),
+        ("samples=1e3", "'samples' needs a int, not '1e3'"),
+    ],
+)
+def test_a_mistake_is_answered_with_a_sentence_that_names_it(text, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Settings().override([RAYS], [text])
+
+
+def test_overriding_changes_a_copy():
+    before = Settings()
+    after = before.override([RAYS], ["rays.count=8", "samples=2"])
+    assert before == Settings()
+    assert after != before
+
+
+def test_what_is_not_set_has_its_declared_default():
+    assert Settings().of(RAYS) == (4, 0.5, True, "COSINE")
+    assert Settings().samples == SAMPLES.default
+
+
+def test_asking_for_an_undeclared_parameter_is_an_error():
+    with pytest.raises(KeyError, match="Technique rays declares no parameter 'bounces'"):
+        Settings().get(RAYS, "bounces")
+
+
+@pytest.mark.parametrize("technique", make_registry(), ids=lambda t: t.name)
+def test_every_declared_default_passes_its_own_check(technique):
+    for param in technique.params:
+        assert param.check(param.default) == param.default
+        assert param.description
+        for limit in filter(lambda x: x is not None, (param.minimum, param.maximum)):
+            assert param.check(limit) == limit
