@@ -1,0 +1,1 @@
+"""Time against error, beside the engines that Blender brings along. Not part of the extension."""
