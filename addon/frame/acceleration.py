@@ -88,7 +88,10 @@ def build(corners: np.ndarray, opacity: np.ndarray) -> Hierarchy:
     nodes = []
     for _ in range(levels):
         children_low, children_high = box_low.reshape(-1, 4, 3), box_high.reshape(-1, 4, 3)
-        nodes.append(np.concatenate([children_low.transpose(0, 2, 1), children_high.transpose(0, 2, 1)], axis=1))
+        # An empty child becomes a far point: the shader sorts each slab's ends, so an inverted box would be endless.
+        shown_low = np.where(children_low > children_high, EMPTY, children_low)
+        shown_high = np.where(children_low > children_high, EMPTY, children_high)
+        nodes.append(np.concatenate([shown_low.transpose(0, 2, 1), shown_high.transpose(0, 2, 1)], axis=1))
         box_low, box_high = children_low.min(axis=1), children_high.max(axis=1)
     rows = np.concatenate(nodes[::-1]).reshape(-1, 4)  # root first
     return Hierarchy(images.upload_list(rows), images.upload_list(packed.reshape(-1, 4)), levels, count)

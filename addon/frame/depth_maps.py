@@ -104,6 +104,8 @@ def point_views(
     tangents = np.where(ahead[..., None], lateral / np.where(ahead, depth, 1.0)[..., None], np.inf)
     if cone_tangent <= WIDEST_TANGENT:
         tangents = np.clip(tangents, -cone_tangent, cone_tangent)
+        crossing = ~ahead.all(axis=1)  # reaches behind the light: lit as far as the cone on all sides
+        tangents[crossing, 0], tangents[crossing, 1] = -cone_tangent, cone_tangent
     wide = ~np.isfinite(tangents).all(axis=(1, 2)) | (np.abs(tangents) > WIDEST_TANGENT).any(axis=(1, 2))
     if not wide.any():
         groups = [g for g in (np.flatnonzero(np.isin(index, group)) for group in receivers.groups()) if len(g)]
@@ -204,11 +206,13 @@ class Atlas:
         self.target: images.Target | None = None
 
     def prepare(self, views: list[MapView], resolution: int) -> tuple[list[tuple[int, int, int]], np.ndarray]:
-        """Cells (x, y, size) for the views, and what shaders must know of them, (V, VIEW_TEXELS, 4)."""
-        columns = max(1, int(np.ceil(np.sqrt(len(views)))))
-        rows = max(1, -(-len(views) // columns))
-        size = (columns * resolution, rows * resolution)
-        if self.target is None or self.target.size != size:
+        """Cells (x, y, size) for the views, and what shaders must know of them, (V, VIEW_TEXELS, 4).
+
+        The image only grows: the number of views varies from sample to sample, and a new size costs an allocation.
+        """
+        columns = max(1, min(4, 4096 // resolution))
+        size = (columns * resolution, -(-len(views) // columns) * resolution)
+        if self.target is None or self.target.size[0] != size[0] or self.target.size[1] < size[1]:
             self.release()
             self.target = images.Target(
                 (images.pool.take(*size, "RGBA32F"),), images.pool.take(*size, "DEPTH_COMPONENT32F")

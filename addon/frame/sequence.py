@@ -1,10 +1,10 @@
 """The one low-discrepancy sequence that all techniques draw from, indexed by sample number.
 
-Sobol' points, Owen-scrambled by hashing. The film takes dimensions 1 and 2, every other use dimensions 3 and 4 with a
-scramble of its own. So the film and any one use form a four-dimensional net together: at an edge, where only some of
+Sobol' points, Owen-scrambled by hashing. The film takes dimensions 3 and 4, every other use dimensions 1 and 2 (the
+perfect pair: every prefix of 2^k points has one in each cell) with a scramble of its own. So the film and any one use form a four-dimensional net together: at an edge, where only some of
 the samples see a surface, those still cover the light evenly. (Pairs shuffled independently leave a random subset
-there, and the error at edges falls only like 1 / sqrt(n).) Shaders get dimensions 3 to 6 unscrambled and scramble
-them per pixel.
+there, and the error at edges falls only like 1 / sqrt(n).) Shaders get dimensions 1, 2, 5 and 6 unscrambled and
+scramble them per pixel.
 
 Sources: Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; Joe & Kuo, "Constructing Sobol sequences
 with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (direction numbers).
@@ -76,7 +76,7 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     """Points `first` ... `first + count - 1` of the sequence for `use`, (count, 2) float64 in [0, 1)."""
     salt = zlib.crc32(f"{use}/{seed}".encode())
     index = np.arange(first, first + count, dtype=np.uint64)
-    pair = 0 if use == FILM else 2
+    pair = 2 if use == FILM else 0
     x = _owen(bits(index, pair), salt * 2654435761 + 1)
     y = _owen(bits(index, pair + 1), salt * 2246822519 + 2)
     return np.stack([x, y], axis=-1).astype(np.float64) / 4294967296.0
@@ -90,6 +90,6 @@ def point(index: int, use: str, seed: int = 0) -> tuple[float, float]:
 
 
 def pixel_bits(index: int) -> tuple[int, int, int, int]:
-    """Dimensions 3 to 6 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
-    values = [int(bits(np.uint64(index), dimension)) for dimension in range(2, 6)]
+    """Dimensions 1, 2, 5, 6 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
+    values = [int(bits(np.uint64(index), dimension)) for dimension in (0, 1, 4, 5)]
     return tuple(value - 2**32 if value >= 2**31 else value for value in values)

@@ -33,6 +33,9 @@ from ..snapshot.scene import Snapshot
 from .accumulated_maps import DepthMapService, rounds
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
+CANDIDATES = 8  # directions that traced_glossy draws from a lobe per sample, of which it traces one
+TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
+
 LIGHTING = passes.fullscreen_program(
     "direct light",
     "light/direct.frag.glsl",
@@ -40,7 +43,8 @@ LIGHTING = passes.fullscreen_program(
         *SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"),
     ),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
+    constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "world_samples")),
+    defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
 DIRECT_WRITES = (
@@ -58,8 +62,11 @@ def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: l
         blend="ADDITIVE_PREMULT",
         textures={**surface_bindings(frame), "depth_maps": atlas, "energy_table": frame.materials.energy_table},
         blocks={"film_view": frame.view_block, "sources": sources.set(rows, views)},
-        constants={"light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", 0.0)},
-    )
+        constants={
+            "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", 0.0),
+            "world_samples": frame.services.get("world_samples", 0.0),
+        },
+    )  # fmt: skip
     frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
 

@@ -29,12 +29,21 @@ from .direct_light import DIRECT_WRITES, shade
 from .surfaces import SURFACES
 
 
+def directions_per_sample(frame: Frame) -> int:
+    """How many directions of the world each sample draws. Auto shares a budget of six maps with the lights."""
+    asked = frame.settings.values.get((EnvironmentLight.name, "directions"), 0)
+    return asked or max(2, 6 - len(frame.snapshot.lights))
+
+
 class EnvironmentLight(Technique):
     name = "environment_light"
     label = "Environment light"
     slot = "environment"
     params = (
-        Param("directions", "Directions", 2, "Directions of the world that are drawn per sample", 1, 64),
+        Param(
+            "directions", "Directions", 0,
+            "Directions of the world that are drawn per sample; 0: more where fewer lights need the time", 0, 64,
+        ),
         RESOLUTION,
     )
     reads = SURFACES
@@ -60,7 +69,7 @@ class EnvironmentLight(Technique):
         seen = frame.snapshot.world.visibility
         flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.DIFFUSE_FLAG * seen.diffuse + lights.GLOSSY_FLAG * seen.glossy
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
-        count = frame.settings.get(self, "directions")
+        count = directions_per_sample(frame)
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
         stride = 1 << max(frame.settings.samples - 1, 0).bit_length()
         items = []

@@ -1,10 +1,12 @@
 """Traced glossy light: what narrow lobes and mirrors see of lights and world, by one ray per pixel and sample.
 
 Light samples shared by all pixels (direct_light, environment_light) cannot serve a narrow lobe: it would show them as
-dots, and a mirror would show nothing. Below `roughness` a ray is drawn from the lobe's visible normals instead, and
-both estimators are weighted by the power heuristic (Veach 1997), so that rough lobes keep the noise-free one:
+dots, and a mirror would show nothing. Below `roughness` eight directions are drawn from the lobe's visible normals
+instead, and one of them, chosen by what it would bring unblocked, is traced (resampled importance sampling, Talbot et
+al. 2005): where nothing blocks, that is as good as eight rays. Both estimators, lobe and light samples, are weighted
+by the power heuristic (Veach 1997), so that rough lobes keep the noise-free one:
 
-    sum over lights and world of  F G2/G1 * Le(w) * V(x, w) * p_lobe^2 / (p_lobe^2 + p_light^2)
+    sum over lights and world of  F G2/G1 * Le(w) * V(x, w) * (8 p_lobe)^2 / ((8 p_lobe)^2 + (n p_light)^2)
 
 V comes from a bounding volume hierarchy (addon/frame/acceleration.py): no depth map has a view per pixel's direction.
 
@@ -35,7 +37,8 @@ from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import passes
 from ..snapshot.scene import Snapshot
-from .direct_light import DIRECT_WRITES
+from .direct_light import DIRECT_WRITES, TRACED_DEFINES
+from .environment_light import directions_per_sample
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 TRACED = passes.fullscreen_program(
@@ -48,8 +51,9 @@ TRACED = passes.fullscreen_program(
     blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"), ("INT", "trace_levels"),
-        ("INT", "world_glossy"), ("INT", "world_sampled"),
+        ("INT", "world_glossy"), ("FLOAT", "world_samples"),
     ),
+    defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
 
@@ -110,6 +114,8 @@ class TracedGlossy(Technique):
             self._light_count = len(shown)
         world = frame.snapshot.world
         sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
+        samples = directions_per_sample(frame) if sampled and world.visibility.glossy else 0
+        frame.services["world_samples"] = float(samples)
         passes.fullscreen(
             TRACED,
             frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
@@ -126,7 +132,7 @@ class TracedGlossy(Technique):
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size, "trace_levels": self._hierarchy.levels,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
-                "world_sampled": int(sampled and world.visibility.glossy),
+                "world_samples": float(samples),
             },
         )  # fmt: skip
         frame.count(self, "passes")

@@ -43,7 +43,8 @@ void main()
       float lobe_density;
       from_glossy = lobe_reflection(lobe, direction, lobe_density);
       if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
-        float ratio = lobe_density / density;
+        float own = (light.kind == LIGHT_DIRECTION) ? world_samples : 1.0;
+        float ratio = float(CANDIDATES) * lobe_density / (own * density);
         from_glossy /= 1.0 + ratio * ratio;
       }
     }

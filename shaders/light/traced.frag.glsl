@@ -7,10 +7,40 @@
 #include "light/sources.glsl"
 #include "trace/hierarchy.glsl"
 
-float power_share(float own, float other)
+// Share of the lobe's samples against `light_samples` of density `light_density` (power heuristic, beta = 2).
+float lobe_share(float lobe_density, float light_density, float light_samples)
 {
-  float ratio = other / max(own, 1e-30);
+  float ratio = light_samples * light_density / max(float(CANDIDATES) * lobe_density, 1e-30);
   return 1.0 / (1.0 + ratio * ratio);
+}
+
+// Light that arrives along `direction` if nothing nearer than `limit` blocks it, with the shares applied.
+vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, float limit, out float farthest)
+{
+  vec3 sum = vec3(0.0);
+  farthest = 0.0;
+  if (limit >= 1e29 && world_glossy != 0) {
+    vec3 radiance = environment_radiance(direction);
+    if (world_samples > 0.0 && !mirror) {
+      radiance *= lobe_share(lobe_density, environment_density(direction), world_samples);
+    }
+    sum += radiance;
+    farthest = (max_component(abs(radiance)) > 0.0) ? 1e29 : 0.0;
+  }
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    if ((light.flags & LIGHT_GLOSSY) == 0) {
+      continue;
+    }
+    float hit_distance;
+    float density;
+    vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
+    if (hit_distance <= limit && max_component(abs(radiance)) > 0.0) {
+      sum += radiance * (mirror ? 1.0 : lobe_share(lobe_density, density, 1.0));
+      farthest = max(farthest, min(hit_distance, 1e29));
+    }
+  }
+  return sum;
 }
 
 void main()
@@ -28,40 +58,58 @@ void main()
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   Lobe lobe = lobe_begin(s.glossy_normal, s.tangent_angle, lobe_alpha(s.glossy_roughness, s.glossy_anisotropy),
                          s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
+  bool mirror = lobe_is_mirror(lobe);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
-  vec3 weight;
-  vec3 direction = lobe_sample(lobe, u, weight);
-  if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
-    return;
+  float choice = scrambled(film_view.bits_w, salt.z);
+
+  // Resampled importance sampling (Talbot et al. 2005): candidates of the lobe, one of which is kept in proportion to
+  // what it would bring if nothing blocked it. The mean over the candidates is exact; only visibility is sampled.
+  int count = mirror ? 1 : CANDIDATES;
+  float total = 0.0;
+  float kept_importance = 0.0;
+  float reach = 0.0;
+  vec3 kept_direction = vec3(0.0);
+  vec3 kept_weight = vec3(0.0);
+  float kept_density = 0.0;
+  for (int k = 0; k < count; k++) {
+    vec3 weight;
+    vec3 direction = lobe_sample(lobe, vec2((u.x + float(k)) / float(count), u.y), weight);
+    if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
+      continue;
+    }
+    float density = 0.0;
+    if (!mirror) {
+      lobe_reflection(lobe, direction, density);
+    }
+    float farthest;
+    vec3 light = arriving(s.position, direction, density, mirror, 1e29, farthest);
+    float importance = dot(abs(weight * light), vec3(1.0));
+    if (!(importance > 0.0)) {
+      continue;
+    }
+    total += importance;
+    float p = importance / total;
+    if (choice < p) {
+      choice /= p;
+      kept_importance = importance;
+      kept_direction = direction;
+      kept_weight = weight;
+      kept_density = density;
+      reach = farthest;
+    }
+    else {
+      choice = (choice - p) / max(1.0 - p, 1e-7);
+    }
   }
-  float lobe_density = 0.0;
-  bool mirror = lobe_is_mirror(lobe);
-  if (!mirror) {
-    lobe_reflection(lobe, direction, lobe_density);
+  if (kept_importance <= 0.0) {
+    return;
   }
   // Away from the surface by what float32 positions of this size cannot tell apart.
   vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
-  float blocked = trace_nearest(origin, direction, 1e29, salt.z + uint(film_view.sample_index));
-  vec3 sum = vec3(0.0);
-  if (blocked >= 1e29 && world_glossy != 0) {
-    float share = 1.0;
-    if (world_sampled != 0 && !mirror) {
-      share = power_share(lobe_density, environment_density(direction));
-    }
-    sum += environment_radiance(direction) * share;
-  }
-  for (int i = 0; i < light_count; i++) {
-    Light light = light_read(i);
-    if ((light.flags & LIGHT_GLOSSY) == 0) {
-      continue;
-    }
-    float hit_distance;
-    float density;
-    vec3 radiance = light_hit(light, s.position, direction, hit_distance, density);
-    if (hit_distance <= blocked) {
-      sum += radiance * (mirror ? 1.0 : power_share(lobe_density, density));
-    }
-  }
-  out_glossy = vec4(weight * sum, 0.0);
+  float blocked = trace_nearest(origin, kept_direction, reach, salt.z + uint(film_view.sample_index));
+  float ignored;
+  float limit = (blocked < reach) ? blocked : 1e29;
+  vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
+  out_glossy = vec4(kept_weight * light * (total / (kept_importance * float(count))), 0.0);
 }
