@@ -9,7 +9,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo samples test test-fast check package test-window bench-quick clean
+.PHONY: help environment demo pictures samples test test-fast check package test-window bench-quick clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
@@ -20,10 +20,13 @@ environment: ## the virtual environment, with Blender as a Python module
 
 demo: environment ## a sample scene by Candela and by Cycles, and a page that compares them
 	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --output out/demo
-	@echo "The page: $(CURDIR)/out/demo/index.html"
 
-samples: environment ## write the sample scenes anew
-	$(PYTHON) sample_blends/make.py
+pictures: demo ## the README's picture, from the demo
+	$(PYTHON) tools/pictures.py out/demo docs/images/demo.png
+
+samples: ## write the sample scenes anew, with Blender 4.5, so that every supported Blender opens them
+	@$(PYTHON3) tools/environment.py --blender 4.5
+	.venv-4.5/bin/python sample_blends/make.py
 
 test: environment ## every test that needs no window
 	$(PYTHON) -m pytest -m "not window"
