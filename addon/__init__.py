@@ -3,24 +3,21 @@
 
 def register():
     """Called by Blender when the extension is enabled."""
-    import bpy
-
     from . import cli, engine
-    from .ui import properties
+    from .ui import panels, properties
 
     properties.register()
-    bpy.utils.register_class(engine.CandelaEngine)
+    engine.register()
+    panels.register()
     cli.register()
 
 
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
-    import bpy
-
     from . import cli, engine
-    from .ui import properties
+    from .ui import panels, properties
 
     cli.unregister()
-    bpy.utils.unregister_class(engine.CandelaEngine)
-    engine.free_sessions()
+    panels.unregister()
+    engine.unregister()
     properties.unregister()

@@ -13,23 +13,22 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from . import techniques, viewport
+from . import viewport
 from .frame import ledger as ledgers
 from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
 from .snapshot.scene import Snapshot
-from .ui import notes
+from .ui import ENGINE, notes
+from .ui.passes import RenderPass, wanted_passes
 from .ui.properties import settings_of
-
-ENGINE = "CANDELA"
 
 
 @dataclass
 class Session:
     """What one scene's renders share: the renderer on the GPU, and what the sync may reuse."""
 
-    renderer: Renderer = field(default_factory=lambda: Renderer(techniques.make_registry))
+    renderer: Renderer = field(default_factory=viewport.spare_renderer)
     cache: SnapshotCache = field(default_factory=SnapshotCache)
 
 
@@ -42,9 +41,28 @@ def session(scene: bpy.types.Scene, use: str) -> Session:
 
 
 def free_sessions() -> None:
-    """Free all GPU resources and cached scene data."""
-    _sessions.clear()
+    """Free what renders of scenes hold; compiled programs stay."""
     viewport.free_all()
+    for shared in _sessions.values():
+        viewport.set_aside(shared.renderer)
+    _sessions.clear()
+    images.pool.trim()
+
+
+@bpy.app.handlers.persistent
+def _another_file(*_) -> None:
+    free_sessions()
+
+
+def register() -> None:
+    bpy.utils.register_class(CandelaEngine)
+    bpy.app.handlers.load_post.append(_another_file)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_another_file)
+    bpy.utils.unregister_class(CandelaEngine)
+    free_sessions()
     context.release_all()
 
 
@@ -66,9 +84,8 @@ class CandelaEngine(bpy.types.RenderEngine):
     def update_render_passes(self, scene=None, renderlayer=None):
         """Tell Blender (and the compositor) which passes will come."""
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
-        for render_pass in _wanted_passes(renderlayer):
-            name, channels, kind, _ = render_pass
-            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+        for asked in wanted_passes(renderlayer):
+            self.register_pass(scene, renderlayer, asked.name, len(asked.channels), asked.channels, asked.kind)
 
     def update(self, data, depsgraph):
         """Read the scene while Blender keeps it locked."""
@@ -113,7 +130,7 @@ class CandelaEngine(bpy.types.RenderEngine):
                     shared.renderer.advance(frame)
                 self.update_stats("Candela", f"Sample {frame.samples_done} of {settings.samples}")
                 self.update_progress(frame.samples_done / settings.samples)
-            wanted = _wanted_passes(layer)
+            wanted = wanted_passes(layer)
             with viewport.turn:
                 pixels = _finished(shared.renderer, frame, wanted)
             for name, array in pixels.items():
@@ -156,48 +173,26 @@ class CandelaEngine(bpy.types.RenderEngine):
 
 # ------------------------------------------------------------------------------------------------------------- passes
 
-# Switch of the view layer, Blender's name since 5.0 and before, channels, type, how it is made from the frame's images.
-_PASSES = (
-    ("use_pass_z", "Depth", "Depth", "Z", "VALUE", "film.depth"),
-    ("use_pass_normal", "Normal", "Normal", "XYZ", "VECTOR", "surface.normal_sum"),
-    ("use_pass_diffuse_direct", "Diffuse Direct", "DiffDir", "RGB", "COLOR", "radiance.diffuse_direct / color.diffuse"),
-    ("use_pass_diffuse_color", "Diffuse Color", "DiffCol", "RGB", "COLOR", "color.diffuse"),
-    ("use_pass_glossy_direct", "Glossy Direct", "GlossDir", "RGB", "COLOR", "radiance.glossy_direct / color.glossy"),
-    ("use_pass_glossy_color", "Glossy Color", "GlossCol", "RGB", "COLOR", "color.glossy"),
-    ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
-    ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),
-)  # fmt: skip
 
-
-def _wanted_passes(layer) -> list[tuple[str, str, str, str]]:
-    """(Blender's name, channels, type, source) of the passes that the view layer asks for."""
-    since_5 = bpy.app.version >= (5, 0)
-    return [
-        (name if since_5 else old, channels, kind, source)
-        for switch, name, old, channels, kind, source in _PASSES
-        if getattr(layer, switch)
-    ]
-
-
-def _finished(renderer: Renderer, frame: Frame, wanted) -> dict[str, np.ndarray]:
+def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     from .techniques.film import resolve
 
     resolve(frame)
     names = {"film.combined"}
-    for _, _, _, source in wanted:
-        names.update(source.split(" / "))
+    for asked in wanted:
+        names.update(asked.source.split(" / "))
     arrays = renderer.finish(frame, sorted(names))
     out = {"Combined": arrays["film.combined"]}
     exposure = frame.snapshot.film.exposure
-    for name, channels, _, source in wanted:
-        image, _, color = source.partition(" / ")
-        pixels = arrays[image][..., : len(channels)]
+    for asked in wanted:
+        image, _, color = asked.source.partition(" / ")
+        pixels = arrays[image][..., : len(asked.channels)]
         if color:
             pixels = divide_by_color(pixels, arrays[color][..., :3])
         if image.startswith("radiance."):
             pixels = pixels * exposure
-        out[name] = pixels
+        out[asked.name] = pixels
     return out
 
 

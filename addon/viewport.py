@@ -45,6 +45,20 @@ turn = threading.Lock()
 TURN_WAIT_S = 0.02
 
 
+_spare: list[Renderer] = []
+
+
+def spare_renderer() -> Renderer:
+    """A renderer that holds nothing. Old ones first: they stay listed for release until Candela ends."""
+    return _spare.pop() if _spare else Renderer(techniques.make_registry)
+
+
+def set_aside(renderer: Renderer) -> None:
+    """Free what a renderer holds, and keep it for the next one who needs one."""
+    renderer.release()
+    _spare.append(renderer)
+
+
 @dataclass
 class Pace:
     """Which scale keeps a step below STEP_S, learned from what steps took."""
@@ -72,8 +86,8 @@ class Pace:
 class Viewport:
     """What one region shows of one scene: its own samples, and the scene's content as it was read last."""
 
-    def __init__(self, renderer: Renderer | None = None):
-        self.renderer = renderer or Renderer(techniques.make_registry)
+    def __init__(self):
+        self.renderer = spare_renderer()
         self.cache = SnapshotCache()
         self.pace = Pace()
         self.dirty = True  # the scene may have changed since the snapshot
@@ -89,6 +103,7 @@ class Viewport:
         self._finished = False
         self._compiled = -1  # programs made so far, at the end of the last sample
         self.local_view = False
+        self.news = False  # a ledger that the panels do not show yet
         self.reported = ""  # the error that was reported last
 
     @property
@@ -145,6 +160,8 @@ class Viewport:
         if self.scale == 1 and frame.samples_done >= settings.samples and not self._finished:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
+            frame.ledger.times["total"] = self.seconds
+            self.news = True
         return self.picture
 
     def _prepare(self, source, camera: Camera, size: tuple[int, int], settings: Settings, clock) -> None:
@@ -180,11 +197,10 @@ class Viewport:
         return frame
 
     def release(self) -> None:
-        """Free everything on the GPU and all that was read of the scene."""
-        self.renderer.release()
+        """Free everything on the GPU and all that was read of the scene; this viewport is not used again."""
+        set_aside(self.renderer)
         self.cache.clear()
-        self.frame = self.picture = self._snapshot = self._asked = None
-        self.dirty = True
+        self.frame = self.picture = self._snapshot = None
 
 
 def _view_key(camera: Camera) -> tuple:
@@ -194,14 +210,13 @@ def _view_key(camera: Camera) -> tuple:
 # -------------------------------------------------------------------------------------------------- Blender's callbacks
 
 _viewports: dict[tuple[int, int], Viewport] = {}  # by address of the region and session_uid of the scene
-_spare: list[Renderer] = []  # released ones, for the next viewports
 
 
 def _viewport_of(engine, context, depsgraph) -> Viewport:
     key = (context.region.as_pointer(), depsgraph.scene.original.session_uid)
     viewport = _viewports.get(key)
     if viewport is None:
-        viewport = _viewports[key] = Viewport(_spare.pop() if _spare else None)
+        viewport = _viewports[key] = Viewport()
     if viewport.owner() is not engine:
         viewport.attach(engine)
     return viewport
@@ -234,6 +249,11 @@ def draw(engine, context, depsgraph) -> None:
     engine.update_stats("Candela", viewport.status())
     if not viewport.done:
         engine.tag_redraw()
+    elif viewport.news:
+        viewport.news = False
+        for area in context.screen.areas:
+            if area.type == "PROPERTIES":
+                area.tag_redraw()  # the Frame panel shows this picture's ledger
 
 
 def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int]) -> None:
@@ -304,9 +324,7 @@ def _free_orphans() -> float | None:
         return FREE_AFTER_S  # later
     try:
         for key in orphans:
-            viewport = _viewports.pop(key)
-            viewport.release()
-            _spare.append(viewport.renderer)
+            _viewports.pop(key).release()
         images.pool.trim()
     finally:
         turn.release()
@@ -317,7 +335,6 @@ def free_all() -> None:
     """Free every viewport; those that are still open begin anew with their next redraw."""
     for viewport in _viewports.values():
         viewport.release()
-        _spare.append(viewport.renderer)
     _viewports.clear()
     if bpy.app.timers.is_registered(_free_orphans):
         bpy.app.timers.unregister(_free_orphans)

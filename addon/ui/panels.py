@@ -1,0 +1,291 @@
+"""Candela's panels in the Properties editor, and what the last frame did.
+
+The panels of the techniques are made from the parameters that they declare.
+"""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from ..frame import ledger as ledgers
+from ..techniques import REGISTRY
+from . import ENGINE, blender_panels, notes
+from .passes import PASSES
+from .properties import identifier, slots
+
+MOST_NOTES = 12  # more than these are counted only
+_STATE_ICONS = {ledgers.RAN: "CHECKMARK", ledgers.REUSED: "LOOP_BACK", ledgers.SKIPPED: "REMOVE"}
+
+
+class _CandelaPanel:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    bl_order = -1  # before Blender's own, which are registered first
+    COMPAT_ENGINES = {ENGINE}
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine in cls.COMPAT_ENGINES
+
+
+def _columns(panel, animatable: bool = True):
+    """The panel's layout as Blender's own: names left, values right."""
+    panel.layout.use_property_split = True
+    panel.layout.use_property_decorate = animatable
+    return panel.layout.column()
+
+
+class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Sampling"
+
+    def draw(self, context):
+        settings = context.scene.candela
+        column = _columns(self)
+        column.prop(settings, "samples", text="Render Samples")
+        column.prop(settings, "viewport_samples", text="Viewport Samples")
+        column.prop(settings, "seed")
+
+
+class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Techniques"
+
+    def draw(self, context):
+        column = _columns(self)
+        for slot in slots():
+            column.prop(context.scene.candela, f"slot_{slot}")
+
+
+def _technique_panel(technique) -> type:
+    """The sub-panel with a technique's parameters."""
+
+    def draw(self, context):
+        column = _columns(self)
+        for param in technique.params:
+            column.prop(context.scene.candela, identifier(technique.name, param.name))
+
+    body = {
+        "__doc__": f"Parameters of {technique.label}",
+        "__module__": __name__,
+        "bl_label": technique.label,
+        "bl_parent_id": "CANDELA_RENDER_PT_techniques",
+        "bl_options": {"DEFAULT_CLOSED"},
+        "draw": draw,
+    }
+    return type(f"CANDELA_RENDER_PT_{technique.name}", (_CandelaPanel, bpy.types.Panel), body)
+
+
+class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Film"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = _columns(self)
+        column.prop(context.scene.render, "filter_size", text="Filter Size")
+        column.prop(context.scene.render, "film_transparent", text="Transparent")
+
+
+class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
+    """What ran for the last picture, what was reused or skipped, and why"""
+
+    bl_label = "Frame"
+
+    def draw(self, context):
+        ledger = ledgers.latest()
+        if ledger is None:
+            self.layout.label(text="Nothing was rendered yet.")
+            return
+        column = self.layout.column(align=True)
+        times = ", ".join(f"{name} {_seconds(seconds)}" for name, seconds in ledger.times.items() if seconds >= 0.0005)
+        _text(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
+        column.separator()
+        for row in ledger.rows:
+            line = column.row()
+            line.active = row.state == ledgers.RAN
+            line.label(text=row.label, icon=_STATE_ICONS[row.state])
+            value = line.row()
+            value.alignment = "RIGHT"
+            value.label(text=_seconds(row.milliseconds / 1000) if row.state == ledgers.RAN else row.state)
+            if row.reason:
+                _text(column, context, row.reason, dim=True, indent=True)
+
+
+class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
+    """What is drawn otherwise than it is set up, with a click to the culprit"""
+
+    bl_label = "Warnings"
+    bl_parent_id = "CANDELA_RENDER_PT_frame"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and (bool(notes.latest()) or _bad_pixels() > 0)
+
+    def draw(self, context):
+        if _bad_pixels():
+            _text(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
+        for note in notes.latest()[:MOST_NOTES]:
+            row = self.layout.row()
+            _text(row.column(align=True), context, str(note), icon="ERROR", room=2)
+            kind, name = notes.target(note)
+            if kind:
+                button = row.operator("candela.select_culprit", text="", icon="RESTRICT_SELECT_OFF")
+                button.kind, button.name = kind, name
+        left = len(notes.latest()) - MOST_NOTES
+        if left > 0:
+            self.layout.label(text=f"and {left} more")
+
+
+class CANDELA_VIEWLAYER_PT_passes(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context):
+        column = _columns(self, animatable=False)
+        for number, render_pass in enumerate(PASSES):
+            part = column.column(align=True, heading="Include" if number == 0 else "")
+            part.prop(context.view_layer, render_pass.switch, text=render_pass.name)
+
+
+class CANDELA_LIGHT_PT_beam_shape(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Beam Shape"
+    bl_context = "data"
+    bl_parent_id = "DATA_PT_EEVEE_light"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light and context.light.type == "AREA"
+
+    def draw(self, context):
+        _columns(self).prop(context.light, "spread")
+
+
+class CANDELA_LIGHT_PT_shadow(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Shadow"
+    bl_context = "data"
+    bl_parent_id = "DATA_PT_EEVEE_light"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light
+
+    def draw(self, context):
+        _columns(self).prop(context.light, "use_shadow", text="Cast Shadow")
+
+
+class CANDELA_OBJECT_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_context = "object"
+    bl_parent_id = "OBJECT_PT_visibility"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.object
+
+    def draw(self, context):
+        column = _columns(self)
+        for name in ("camera", "diffuse", "glossy", "shadow"):
+            column.prop(context.object, f"visible_{name}", text=name.title())
+
+
+class CANDELA_OT_select_culprit(bpy.types.Operator):
+    """Select what the warning is about, and show it in the Properties editor"""
+
+    bl_idname = "candela.select_culprit"
+    bl_label = "Select"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    kind: bpy.props.StringProperty(options={"SKIP_SAVE"})
+    name: bpy.props.StringProperty(options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        if self.kind == "WORLD":
+            _show_tab(context, "WORLD")
+            return {"FINISHED"}
+        shown = None
+        if self.kind == "OBJECT":
+            shown = context.view_layer.objects.get(self.name)
+        elif self.kind == "MATERIAL":
+            shown = _show_material(context.view_layer, self.name)
+        if shown is None:
+            self.report({"WARNING"}, f"No object of this view layer is or uses '{self.name}'.")
+            return {"CANCELLED"}
+        if context.mode != "OBJECT" and bpy.ops.object.mode_set.poll():
+            bpy.ops.object.mode_set(mode="OBJECT")
+        for other in context.view_layer.objects.selected:
+            other.select_set(False)
+        shown.select_set(True)
+        context.view_layer.objects.active = shown
+        _show_tab(context, "MATERIAL" if self.kind == "MATERIAL" else "OBJECT")
+        return {"FINISHED"}
+
+
+def _show_material(layer, name: str):
+    """The first object that uses a material of this name, with that slot made active; None if there is none."""
+    for candidate in layer.objects:
+        for index, slot in enumerate(candidate.material_slots):
+            if slot.material is not None and slot.material.name == name:
+                candidate.active_material_index = index
+                return candidate
+    return None
+
+
+def _show_tab(context, tab: str) -> None:
+    space = context.space_data
+    if space is None or space.type != "PROPERTIES":
+        return
+    try:
+        space.context = tab
+    except TypeError:
+        pass  # the tab is hidden, or does not exist for this kind of object
+
+
+def _bad_pixels() -> int:
+    ledger = ledgers.latest()
+    return ledger.bad_pixels if ledger is not None else 0
+
+
+def _seconds(seconds: float) -> str:
+    if seconds >= 1:
+        return f"{seconds:.1f} s"
+    return f"{seconds * 1000:.1f} ms" if seconds < 0.1 else f"{seconds * 1000:.0f} ms"
+
+
+def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room: int = 0) -> None:
+    """A sentence over as many lines as the panel's width asks for; `room` widgets of a line's height are left free."""
+    widget = 20 * context.preferences.system.ui_scale
+    letters = (context.region.width - (3 + room + (icon != "NONE") + indent) * widget) / (0.29 * widget)
+    blank = "BLANK1" if indent or icon != "NONE" else "NONE"
+    for number, line in enumerate(textwrap.wrap(text, max(int(letters), 16))):
+        row = layout.row()
+        row.active = not dim
+        row.scale_y = 0.8
+        row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
+
+
+_CLASSES = (
+    CANDELA_OT_select_culprit,
+    CANDELA_RENDER_PT_sampling,
+    CANDELA_RENDER_PT_techniques,
+    *(_technique_panel(technique) for technique in REGISTRY if technique.params),
+    CANDELA_RENDER_PT_film,
+    CANDELA_RENDER_PT_frame,
+    CANDELA_RENDER_PT_frame_notes,
+    CANDELA_VIEWLAYER_PT_passes,
+    CANDELA_LIGHT_PT_beam_shape,
+    CANDELA_LIGHT_PT_shadow,
+    CANDELA_OBJECT_PT_ray_visibility,
+)
+
+
+def register() -> None:
+    for made in _CLASSES:
+        bpy.utils.register_class(made)
+    blender_panels.show(ENGINE)
+
+
+def unregister() -> None:
+    blender_panels.withdraw(ENGINE)
+    for made in reversed(_CLASSES):
+        bpy.utils.unregister_class(made)

@@ -1,0 +1,200 @@
+"""The panels: made from the declarations, shown among Blender's own, and gone without a trace."""
+
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+from addon.frame import ledger
+from addon.snapshot.scene import Note
+from addon.techniques import REGISTRY
+from addon.ui import ENGINE, blender_panels, notes, panels
+from addon.ui.passes import PASSES, wanted_passes
+from addon.ui.properties import identifier, slots
+
+
+class Layout:
+    """Stands in for a UILayout: takes every call and lists what is shown."""
+
+    def __init__(self, shown=None):
+        self.shown = [] if shown is None else shown
+
+    def prop(self, data, name, **_):
+        assert name in data.bl_rna.properties, f"{data.bl_rna.identifier} has no property {name}"
+        self.shown.append(name)
+
+    def label(self, text="", **_):
+        self.shown.append(text)
+
+    def operator(self, name, **_):
+        self.shown.append(name)
+        return SimpleNamespace()
+
+    def separator(self, **_):
+        pass
+
+    def row(self, **_):
+        return Layout(self.shown)
+
+    column = row
+
+
+class Context:
+    """What the panels ask of a context."""
+
+    def __init__(self, **more):
+        self.scene = bpy.context.scene
+        self.view_layer = bpy.context.view_layer
+        self.engine = ENGINE
+        self.preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))  # 0 in background mode
+        self.region = SimpleNamespace(width=400)
+        for name, value in more.items():
+            setattr(self, name, value)
+
+
+def drawn(panel, **more):
+    """Everything that a panel shows."""
+    layout = Layout()
+    panel.draw(SimpleNamespace(layout=layout), Context(**more))
+    return layout.shown
+
+
+@pytest.fixture
+def scene(registered, empty_scene):
+    empty_scene.render.engine = ENGINE
+    return empty_scene
+
+
+@pytest.fixture
+def published():
+    """Sets the last frame's ledger and notes, and takes them back."""
+    before = ledger.latest(), notes.latest()
+
+    def publish(made_ledger, *made_notes):
+        ledger.publish(made_ledger)
+        notes.publish(made_notes)
+
+    yield publish
+    ledger.publish(before[0])
+    notes.publish(before[1])
+
+
+def test_every_slot_and_parameter_has_a_place(scene):
+    shown = drawn(panels.CANDELA_RENDER_PT_techniques)
+    for technique in REGISTRY:
+        if technique.params:
+            shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_{technique.name}"))
+    assert sorted(shown) == sorted(
+        [f"slot_{slot}" for slot in slots()] + [identifier(t.name, p.name) for t in REGISTRY for p in t.params]
+    )
+
+
+def test_all_passes_can_be_chosen_and_are_wanted_then(scene):
+    layer = bpy.context.view_layer
+    assert drawn(panels.CANDELA_VIEWLAYER_PT_passes) == [render_pass.switch for render_pass in PASSES]
+    for render_pass in PASSES:
+        setattr(layer, render_pass.switch, True)
+    assert wanted_passes(layer) == list(PASSES)
+
+
+def test_frame_panel_shows_states_times_and_reasons(scene, published):
+    rows = [
+        ledger.Row("surfaces", "Surfaces", ledger.RAN, milliseconds=12.34),
+        ledger.Row("direct", "Direct light", ledger.RAN, milliseconds=2500.0),
+        ledger.Row("glossy", "Traced glossy", ledger.SKIPPED, "no material is glossy"),
+    ]
+    published(ledger.Ledger(rows, {"sync": 0.02, "passes": 2.6}, samples=16))
+    text = " ".join(drawn(panels.CANDELA_RENDER_PT_frame))
+    for part in ("16 samples", "sync 20.0 ms", "12.3 ms", "2.5 s", "skipped", "no material is glossy"):
+        assert part in text
+
+
+def test_frame_panel_before_the_first_render(scene, published):
+    published(None)
+    assert drawn(panels.CANDELA_RENDER_PT_frame) == ["Nothing was rendered yet."]
+    assert not panels.CANDELA_RENDER_PT_frame_notes.poll(Context())
+
+
+def test_warnings_stand_with_a_button_for_what_can_be_selected(scene, published):
+    about_material = Note("Material 'Glass'", "node 'Glass BSDF' is not supported.", "Glass", "Glass BSDF")
+    about_scene = Note("Image 'gone.png'", "its file is missing.")
+    published(ledger.Ledger(bad_pixels=3), about_material, about_scene)
+    assert panels.CANDELA_RENDER_PT_frame_notes.poll(Context())
+    shown = drawn(panels.CANDELA_RENDER_PT_frame_notes)
+    assert shown.count("candela.select_culprit") == 1
+    assert "3 values were not finite" in " ".join(shown)
+
+
+def test_many_warnings_are_counted(scene, published):
+    published(ledger.Ledger(), *(Note(f"Object '{k}'", "is strange.") for k in range(30)))
+    shown = drawn(panels.CANDELA_RENDER_PT_frame_notes)
+    assert shown.count("candela.select_culprit") == panels.MOST_NOTES
+    assert shown[-1] == f"and {30 - panels.MOST_NOTES} more"
+
+
+@pytest.mark.parametrize(
+    ("note", "target"),
+    [
+        (Note("Material 'A'", "…", material="A"), ("MATERIAL", "A")),
+        (Note("Object 'it's'", "…"), ("OBJECT", "it's")),
+        (Note("Light 'Key'", "…"), ("OBJECT", "Key")),
+        (Note("Camera 'Camera'", "…"), ("OBJECT", "Camera")),
+        (Note("World 'Sky'", "…"), ("WORLD", "Sky")),
+        (Note("Image 'a.png'", "…"), ("", "")),
+    ],
+)
+def test_note_says_what_it_is_about(note, target):
+    assert notes.target(note) == target
+
+
+def test_culprit_is_selected(scene):
+    mesh = bpy.data.meshes.new("mesh")
+    first, second = (bpy.data.objects.new(name, mesh if name == "second" else None) for name in ("first", "second"))
+    for made in (first, second):
+        scene.collection.objects.link(made)
+    for name in ("Plain", "Glass"):
+        mesh.materials.append(bpy.data.materials.new(name))
+    assert bpy.ops.candela.select_culprit(kind="OBJECT", name="first") == {"FINISHED"}
+    assert bpy.context.view_layer.objects.active == first
+    assert bpy.ops.candela.select_culprit(kind="MATERIAL", name="Glass") == {"FINISHED"}
+    assert bpy.context.view_layer.objects.active == second
+    assert second.select_get() and not first.select_get()
+    assert second.active_material.name == "Glass"
+    assert bpy.ops.candela.select_culprit(kind="OBJECT", name="nobody") == {"CANCELLED"}
+
+
+def test_light_panels_show_what_the_snapshot_reads(scene):
+    area, point = bpy.data.lights.new("area", "AREA"), bpy.data.lights.new("point", "POINT")
+    assert panels.CANDELA_LIGHT_PT_beam_shape.poll(Context(light=area))
+    assert not panels.CANDELA_LIGHT_PT_beam_shape.poll(Context(light=point))
+    assert drawn(panels.CANDELA_LIGHT_PT_beam_shape, light=area) == ["spread"]
+    assert drawn(panels.CANDELA_LIGHT_PT_shadow, light=point) == ["use_shadow"]
+
+
+def test_panels_are_for_candela_only(scene):
+    assert panels.CANDELA_RENDER_PT_sampling.poll(Context())
+    assert not panels.CANDELA_RENDER_PT_sampling.poll(Context(engine="CYCLES"))
+
+
+def compatible():
+    return {
+        panel.__name__: frozenset(panel.COMPAT_ENGINES)
+        for panel in bpy.types.Panel.__subclasses__()
+        if hasattr(panel, "COMPAT_ENGINES") and not panel.__name__.startswith("CANDELA_")
+    }
+
+
+def test_blenders_panels_are_shown_and_left_as_they_were(registered):
+    shown = compatible()
+    with_candela = {name for name, engines in shown.items() if ENGINE in engines}
+    assert {
+        "RENDER_PT_color_management", "RENDER_PT_format", "DATA_PT_lens", "EEVEE_MATERIAL_PT_surface",
+        "EEVEE_WORLD_PT_surface", "DATA_PT_EEVEE_light", "MATERIAL_PT_preview",
+    } <= with_candela  # fmt: skip
+    assert not {name for name in with_candela if "freestyle" in name or "lightprobe" in name or name == "DATA_PT_light"}
+    blender_panels.withdraw(ENGINE)
+    try:
+        assert compatible() == {name: engines - {ENGINE} for name, engines in shown.items()}
+    finally:
+        blender_panels.show(ENGINE)
+    assert compatible() == shown
