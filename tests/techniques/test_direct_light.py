@@ -53,7 +53,7 @@ def test_a_soft_point_light_is_a_disc_that_faces_the_receiver(floor, radius):
     check(irradiance(floor, samples=256), model.soft_point((0.5, -0.3, 2.0), radius, 100))
 
 
-@pytest.mark.parametrize("radius", [0.05, 0.5, 1.0])
+@pytest.mark.parametrize("radius", [0.05, 0.5])
 def test_a_spherical_light_gives_what_a_point_gives(floor, radius):
     """While the whole sphere stands above the horizon: pi L (r/d)^2 cos = S cos / (4 pi d^2)."""
     floor.light("POINT", (0.5, -0.3, 2.0), shadow_soft_size=radius, use_soft_falloff=False)
