@@ -1,0 +1,236 @@
+"""Shadows against geometry: penumbrae as clipped areas, blockers that add up, alpha, no acne, no leaks."""
+
+import numpy as np
+import pytest
+
+from tests.techniques import light_model as model
+from tests.techniques.conftest import places
+
+SPAN = 4.0
+EVERYWHERE = 9.0
+
+
+@pytest.fixture
+def floor(stage):
+    stage.floor()
+    stage.camera_above(SPAN)
+    return stage
+
+
+def irradiance(stage, samples, size):
+    return stage.render(samples, size)["diffuse_direct"][..., 0].astype(float) * np.pi
+
+
+def receivers(size):
+    x, y = (a.ravel() for a in places(size, SPAN))
+    return np.column_stack([x, y, np.zeros_like(x)])
+
+
+HEIGHT = 2.0
+LIGHTS = {  # kind, settings, the same for light_model
+    "square": ("AREA", {"size": 1.0}, model.area((0, 0, HEIGHT), (1, 0, 0), (0, 1, 0), 100)),
+    "rectangle": (
+        "AREA", {"shape": "RECTANGLE", "size": 1.6, "size_y": 0.3},
+        model.area((0, 0, HEIGHT), (1.6, 0, 0), (0, 0.3, 0), 100),
+    ),
+    "disc": ("AREA", {"shape": "DISK", "size": 1.2}, model.area((0, 0, HEIGHT), (1.2, 0, 0), (0, 1.2, 0), 100, True)),
+    "sphere": (
+        "POINT", {"shadow_soft_size": 0.5, "use_soft_falloff": False}, model.sphere((0, 0, HEIGHT), 0.5, 100),
+    ),
+    "soft point": ("POINT", {"shadow_soft_size": 0.4}, model.soft_point((0, 0, HEIGHT), 0.4, 100)),
+    "sun": ("SUN", {"angle": 0.6}, model.sun((0, 0, 1), 0.6, 1.0)),
+}  # fmt: skip
+
+# Soft points are drawn from a ball, see accumulated_maps.py: their penumbra is exact to (radius / distance)^2 only.
+PENUMBRA_RMS = {"soft point": 0.015}
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_the_penumbra_of_an_edge_is_the_clipped_area_of_the_light(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    edge = ((-EVERYWHERE, -EVERYWHERE), (0.0, EVERYWHERE), 1.0)
+    floor.blocker(*edge)
+    size = (64, 4)
+    points = receivers(size)
+    whole = model.irradiance(source, points)
+    expected = model.irradiance(source, points, [edge]) / whole
+    found = irradiance(floor, 256, size).ravel() / whole
+    assert ((expected > 0.05) & (expected < 0.95)).sum() > 10  # there is a penumbra
+    assert np.sqrt(((found - expected) ** 2).mean()) < PENUMBRA_RMS.get(name, 0.01)
+    assert (found[expected == 0] == 0).all()
+
+
+def test_the_width_of_a_penumbra_follows_from_similar_triangles(floor):
+    """A light of width w at height H over an edge at height h: w h / (H - h)."""
+    floor.light("AREA", (0, 0, HEIGHT), size=0.8)
+    source = model.area((0, 0, HEIGHT), (0.8, 0, 0), (0, 0.8, 0), 100)
+    for edge_height in (0.25, 0.5, 1.0):
+        blocker = floor.blocker((-EVERYWHERE, -EVERYWHERE), (0, EVERYWHERE), edge_height)
+        size = (128, 4)
+        share = irradiance(floor, 256, size)[0] / model.irradiance(source, receivers(size)[:128])
+        width = ((share > 0.01) & (share < 0.99)).sum() * SPAN / 128
+        expected = 0.8 * edge_height / (HEIGHT - edge_height)
+        assert width == pytest.approx(expected, rel=0.05, abs=2 * SPAN / 128)
+        blocker.hide_render = True
+
+
+@pytest.mark.parametrize("name", ["square", "sphere", "sun"])
+def test_blockers_at_two_heights_block_together_what_either_blocks(floor, name):
+    """Two edges that leave a slit: shadows are united per point of the light, not multiplied."""
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    edges = [
+        ((-EVERYWHERE, -EVERYWHERE), (-0.1, EVERYWHERE), 1.2),
+        ((0.15, -EVERYWHERE), (EVERYWHERE, EVERYWHERE), 0.5),
+    ]
+    for edge in edges:
+        floor.blocker(*edge)
+    size = (64, 4)
+    points = receivers(size)
+    whole = model.irradiance(source, points)
+    expected = model.irradiance(source, points, edges) / whole
+    separate = np.prod([model.irradiance(source, points, [edge]) / whole for edge in edges], axis=0)
+    found = irradiance(floor, 256, size).ravel() / whole
+    error = np.sqrt(((found - expected) ** 2).mean())
+    assert error < 0.015
+    assert error < 0.5 * np.sqrt(((separate - expected) ** 2).mean())
+
+
+def test_a_grid_of_bars_at_two_heights_blocks_as_the_union_of_its_bars(floor):
+    floor.light("AREA", (0, 0, HEIGHT), size=0.6)
+    bars = [((x, -EVERYWHERE), (x + 0.2, EVERYWHERE), 0.8) for x in np.arange(-1.4, 1.4, 0.4)]
+    bars += [((-EVERYWHERE, y), (EVERYWHERE, y + 0.2), 0.6) for y in np.arange(-1.4, 1.4, 0.4)]
+    for bar in bars:
+        floor.blocker(*bar)
+    source, size = model.area((0, 0, HEIGHT), (0.6, 0, 0), (0, 0.6, 0), 100), (32, 32)
+    points = receivers(size).reshape(*size[::-1], 3)[1::3, 1::3].reshape(-1, 3)
+    expected = model.irradiance(source, points, bars) / model.irradiance(source, points)
+    found = irradiance(floor, 256, size)[1::3, 1::3].ravel() / model.irradiance(source, points)
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.02  # a dozen edges, each of 0.005 at 256 samples
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.01)
+
+
+# Transparent casters -------------------------------------------------------------------------------------------------
+
+POINT = ("POINT", {"shadow_soft_size": 0.0}, model.point((0, 0, HEIGHT), 100))
+
+
+@pytest.mark.parametrize(
+    ("light", "opacities"),
+    [
+        (POINT, (0.0,)),
+        (POINT, (0.5,)),
+        (POINT, (1.0, 0.5)),
+        (POINT, (0.2, 0.7, 0.4)),
+        (LIGHTS["square"], (0.5,)),
+        (LIGHTS["sun"], (0.5, 0.5)),
+    ],
+    ids=["clear", "half", "opaque", "three layers", "half of a square", "two layers of a sun"],
+)
+def test_layers_with_alpha_let_the_product_of_their_transparencies_pass(floor, light, opacities):
+    kind, settings, source = light
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    for k, opacity in enumerate(opacities):
+        corner = (EVERYWHERE, EVERYWHERE)
+        floor.blocker((-EVERYWHERE, -EVERYWHERE), corner, 0.4 + 0.3 * k, material=floor.see_through(opacity))
+    size, samples = (24, 24), 128
+    through = np.prod([1 - opacity for opacity in opacities])
+    found = irradiance(floor, samples, size).ravel() / model.irradiance(source, receivers(size))
+    # Each texel and sample lets light pass or not: independent coins, 576 x 128 of them.
+    spread = np.sqrt(through * (1 - through) / samples)
+    assert found.mean() == pytest.approx(through, abs=0.004 + 4 * spread / 24)
+    assert found.std() <= 1.3 * spread + 0.004
+
+
+def test_an_object_without_shadow_visibility_casts_none(floor):
+    floor.light("POINT", shadow_soft_size=0)
+    free = floor.render(1)["combined"]
+    blocker = floor.blocker((-1, -1), (1, 1), 1.0)
+    blocked = floor.render(1)["combined"]
+    blocker.visible_shadow = False
+    np.testing.assert_allclose(floor.render(1)["combined"], free, rtol=1e-6)
+    assert blocked[..., :3].mean() < 0.5 * free[..., :3].mean()
+
+
+def test_a_light_without_shadow_passes_through_everything(floor):
+    light = floor.light("POINT", shadow_soft_size=0.2)
+    free = floor.render(16)["combined"]
+    floor.blocker((-9, -9), (9, 9), 1.0)
+    assert not floor.render(16)["combined"][..., :3].any()
+    light.data.use_shadow = False
+    np.testing.assert_allclose(floor.render(16)["combined"], free, rtol=1e-5)
+
+
+# Contact, acne, leaks ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_shadow_starts_where_its_caster_touches_the_floor(stage, scale):
+    """At any size of the scene: no gap of light at the foot of a wall, no dark rim before it."""
+    stage.floor(20 * scale)
+    stage.camera_above(SPAN * scale, height=10 * scale)
+    stage.scene.camera.data.clip_end = 100 * scale
+    stage.scene.camera.data.clip_start = 0.1 * scale
+    corners = np.array([(0, -9, 0), (0, 9, 0), (0, 9, 1), (0, -9, 1)]) * scale
+    stage.mesh([tuple(c) for c in corners], [(0, 1, 2, 3)]).visible_camera = False
+    place = np.array((2.0, 0.0, 2.0)) * scale
+    stage.light("POINT", place, shadow_soft_size=0, energy=100 * scale**2)
+    size = (64, 8)
+    x, y = (a * scale for a in places(size, SPAN))
+    found = irradiance(stage, 1, size)
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    expected = model.irradiance(model.point(place, 100 * scale**2), points).reshape(x.shape)
+    assert (found[(x < 0) & (x > -1.9 * scale)] == 0).all()  # at -2 the shadow ends
+    np.testing.assert_allclose(found[x > 0], expected[x > 0], rtol=2e-3)
+
+
+@pytest.mark.parametrize("tilt", [45.0, 80.0, 89.0, 89.9])
+def test_a_plane_under_a_grazing_sun_does_not_shadow_itself(floor, tilt):
+    floor.light("SUN", turn=(np.radians(tilt), 0.1, 0), angle=0.0)
+    cosine = np.cos(np.radians(tilt)) * np.cos(0.1)
+    np.testing.assert_allclose(irradiance(floor, 4, (32, 32)), cosine, rtol=5e-3)
+
+
+@pytest.mark.parametrize("position", [(0, 0, 1.0), (1.9, 0, 0.1), (0.0, 0.0, 0.02)])
+def test_a_plane_under_a_point_close_to_it_does_not_shadow_itself(floor, position):
+    floor.light("POINT", position, shadow_soft_size=0)
+    expected = model.irradiance(model.point(position, 100), receivers((32, 32)))
+    np.testing.assert_allclose(irradiance(floor, 1, (32, 32)).ravel(), expected, rtol=5e-3)
+
+
+def test_a_smooth_sphere_is_lit_up_to_its_terminator(stage):
+    """The light side of a finely divided sphere: radiance S cos / pi, without stripes or missing triangles."""
+    import bmesh
+    import bpy
+
+    data, shape = bpy.data.meshes.new("Sphere"), bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=5, radius=1.5)
+    for face in shape.faces:
+        face.smooth = True
+    shape.to_mesh(data)
+    shape.free()
+    data.materials.append(stage.diffuse())
+    stage.link("Sphere", data)
+    stage.camera_above(SPAN)
+    stage.light("SUN", turn=(0.7, 0, 0), angle=0.0)
+    images = stage.render(4, (48, 48))
+    towards = np.array([0.0, -np.sin(0.7), np.cos(0.7)])
+    normal = images["normal"].astype(float)
+    inside = np.linalg.norm(normal, axis=-1) > 0.999
+    cosine = normal @ towards
+    found = images["diffuse_direct"][..., 0] * np.pi
+    np.testing.assert_allclose(found[inside & (cosine > 0.1)], cosine[inside & (cosine > 0.1)], atol=0.01)
+    assert (found[inside & (cosine < -0.05)] == 0).all()
+
+
+def test_no_light_leaks_under_a_closed_box(stage):
+    """A lamp inside of a box lights the box from inside and nothing else."""
+    stage.floor()
+    stage.camera_above(SPAN)
+    low, high = -0.5, 0.5
+    corners = [(x, y, z) for z in (0.3, 1.3) for y in (low, high) for x in (low, high)]
+    faces = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    stage.mesh(corners, faces).visible_camera = False
+    stage.light("POINT", (0.1, 0.2, 0.8), shadow_soft_size=0.05)
+    assert not stage.render(16)["combined"][..., :3].any()
