@@ -116,3 +116,36 @@ def _morton(points: np.ndarray) -> np.ndarray:
     return code
 
 
+
+
+class HierarchyCache:
+    """The hierarchy of a renderer's scene: built when first asked for, kept until geometry or alpha changes."""
+
+    def __init__(self):
+        self._key: object = None
+        self._hierarchy: Hierarchy | None = None
+
+    def get(self, snapshot, materials: list[CompiledMaterial], origin: np.ndarray) -> Hierarchy | None:
+        """The hierarchy; None where the scene is empty or has too many triangles (see `too_many`)."""
+        if too_many(snapshot):
+            return None
+        key = (
+            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.glossy)
+                  for i in snapshot.instances),
+            tuple(m.opacity if m.transparent else 1.0 for m in materials), tuple(origin),
+        )  # fmt: skip
+        if key != self._key:
+            self._key = key
+            self._hierarchy = build(*world_triangles(list(snapshot.instances), snapshot.meshes, materials, origin))
+        return self._hierarchy
+
+    def release(self) -> None:
+        self._key = self._hierarchy = None
+
+
+def too_many(snapshot) -> str | None:
+    """Why this scene has no hierarchy, as a sentence; None if it has."""
+    count = sum(snapshot.meshes[instance.mesh].triangle_count for instance in snapshot.instances)
+    if count > LARGEST:
+        return f"{count} triangles with all instances are more than the {LARGEST} that can be traced"
+    return None

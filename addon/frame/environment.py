@@ -1,7 +1,8 @@
 """The world as a light: its radiance as an image, and directions drawn in proportion to it.
 
 Directions are drawn from a grid over the equirectangular image, with a density per steradian that follows the mean
-luminance of each cell; a twentieth is spread evenly, so that no direction with light has zero density.
+luminance of each cell; a twentieth is spread evenly, so that no direction with light has zero density. The technique
+may guide the density further, to directions from which light reaches what the camera sees (a window, the open sky).
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ WORLD = Struct(
     ("vec4", "map_options"),  # x = 1 for a transparent film
 )
 LARGEST_GRID = (256, 512)
+SMALLEST_GRID = (32, 64)  # for guiding, even where the image is smaller
+GUIDE_ROWS, GUIDE_COLUMNS = 16, 32
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -35,17 +38,54 @@ class Environment:
         luminance = np.maximum(pixels @ np.abs(LUMINANCE * np.sign(self.color)), 0.0)
         self.power = float(np.abs(self.color).max() * luminance.max())
         density = _density(luminance)
-        self.density = density  # per steradian, rows from the bottom
+        self._by_radiance = density  # per steradian, rows from the bottom
         self.map = images.upload(np.dstack([pixels, np.ones(pixels.shape[:2])]).astype(np.float32))
-        self.density_map = images.upload(density.astype(np.float32), "R32F")
         rows = np.concatenate([mapping, np.zeros((3, 4 - mapping.shape[1]))], axis=1)
         self.block = Block(
             WORLD, color=(*self.color, float(world.visibility.camera)), map_x=rows[0], map_y=rows[1], map_z=rows[2],
             map_options=(float(transparent_film), 0, 0, 0),
         )  # fmt: skip
+        self._set_density(density)
+
+    def guide(self, usefulness: np.ndarray | None) -> None:
+        """Prefer directions from which light reaches what the camera sees.
+
+        `usefulness`, (GUIDE_ROWS, GUIDE_COLUMNS), is the mean of visibility x cosine over probes, for cells of equal
+        solid angle in the world's own frame. A tenth of the directions ignores it, so that what the probes missed is
+        still drawn. None: back to radiance alone.
+        """
+        if usefulness is None:
+            if self.density is not self._by_radiance:
+                self._set_density(self._by_radiance)
+            return
+        height, width = self._by_radiance.shape
+        z = np.sin(((np.arange(height) + 0.5) / height - 0.5) * np.pi)
+        azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2 * np.pi
+        ring = np.sqrt(1 - z * z)[:, None]
+        in_map = np.stack(
+            [ring * np.cos(azimuth), ring * np.sin(azimuth), np.repeat(z[:, None], width, axis=1)], axis=-1
+        )
+        world = in_map @ np.linalg.inv(self.rotation).T
+        row = np.clip((world[..., 2] + 1) / 2 * GUIDE_ROWS, 0, GUIDE_ROWS - 1).astype(int)
+        turn = np.arctan2(world[..., 1], world[..., 0]) / (2 * np.pi) + 0.5
+        column = np.clip(turn * GUIDE_COLUMNS, 0, GUIDE_COLUMNS - 1).astype(int)
+        guided = self._by_radiance * usefulness[row, column]
+        solid_angle = self._cell_solid_angle(height, width)
+        total = float((guided * solid_angle).sum())
+        self._set_density(
+            0.9 * guided / total + 0.1 * self._by_radiance if total > 0 else self._by_radiance
+        )
+
+    @staticmethod
+    def _cell_solid_angle(height: int, width: int) -> np.ndarray:
+        return np.diff(np.sin((np.arange(height + 1) / height - 0.5) * np.pi))[:, None] * (2 * np.pi / width)
+
+    def _set_density(self, density: np.ndarray) -> None:
+        self.density = density
+        self.density_map = images.upload(density.astype(np.float32), "R32F")
         height, width = density.shape
         edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
-        mass = density * np.diff(edges)[:, None] * (2 * np.pi / width)
+        mass = density * self._cell_solid_angle(height, width)
         self._edges = edges
         self._rows = np.concatenate([[0.0], np.cumsum(mass.sum(axis=1))])
         self._columns = np.concatenate([np.zeros((height, 1)), np.cumsum(mass, axis=1)], axis=1)
@@ -109,6 +149,9 @@ def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
 
 def _density(luminance: np.ndarray) -> np.ndarray:
     """Density per steradian on a grid of at most LARGEST_GRID cells."""
+    height, width = luminance.shape
+    repeat_rows, repeat_columns = -(-SMALLEST_GRID[0] // height), -(-SMALLEST_GRID[1] // width)
+    luminance = np.repeat(np.repeat(luminance, repeat_rows, axis=0), repeat_columns, axis=1)
     height, width = luminance.shape
     rows, columns = min(height, LARGEST_GRID[0]), min(width, LARGEST_GRID[1])
     row_of, column_of = np.arange(height) * rows // height, np.arange(width) * columns // width

@@ -13,6 +13,7 @@ from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..snapshot.scene import Snapshot
 from . import ledger as ledger_module
+from .acceleration import Hierarchy, HierarchyCache
 from .depth_maps import Receivers
 from .environment import Environment
 from .geometry import SceneGeometry
@@ -40,6 +41,7 @@ class Frame:
     profiler: Profiler
     ledger: Ledger
     view_block: Block
+    hierarchies: HierarchyCache
     sample: int = 0  # the sample that is running
     samples_done: int = 0
     receivers: Receivers | None = None
@@ -53,6 +55,10 @@ class Frame:
     def random(self, use: str) -> tuple[float, float]:
         """This sample's point of the sequence for `use`."""
         return point(self.sample, use, self.settings.seed)
+
+    def hierarchy(self) -> Hierarchy | None:
+        """Triangles for tracing rays; None where there are too many. Built on the first call."""
+        return self.hierarchies.get(self.snapshot, self.materials.compiled, self.geometry.origin)
 
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
@@ -78,6 +84,7 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
+        self._hierarchies = HierarchyCache()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._frame_key: object = None
@@ -119,7 +126,7 @@ class Renderer:
             self._view_block = Block(VIEW, **values)
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
-            {}, Profiler(settings.profile), ledger, self._view_block,
+            {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
         )  # fmt: skip
         self.frame = frame
         for technique in plan.techniques:
@@ -189,6 +196,7 @@ class Renderer:
             technique.release()
         self.geometry.release()
         self.materials.release()
+        self._hierarchies.release()
         self._environment = self._view_block = self._frame_key = None
         self._keys.clear()
 

@@ -25,8 +25,6 @@ the material's mean opacity instead of its texture.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-
 import numpy as np
 
 from ..frame import acceleration, lights
@@ -72,7 +70,6 @@ class TracedGlossy(Technique):
     writes = DIRECT_WRITES
 
     def __init__(self):
-        self._hierarchy: acceleration.Hierarchy | None = None
         self._sources = lights.Sources()
         self._lights = None
 
@@ -84,25 +81,7 @@ class TracedGlossy(Technique):
         lit = np.any(snapshot.world.color) and snapshot.world.visibility.glossy
         if not lit and not any(_has_extent(light) for light in snapshot.lights):
             return "no light has a size and the world is black: nothing that a ray could hit"
-        count = sum(snapshot.meshes[instance.mesh].triangle_count for instance in snapshot.instances)
-        if count > acceleration.LARGEST:
-            return f"{count} triangles with all instances are more than the {acceleration.LARGEST} that can be traced"
-        return None
-
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return (
-            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.glossy)
-                  for i in snapshot.instances),
-            tuple(material.graph for material in snapshot.materials if _may_pass_light(material)),
-            snapshot.camera.matrix.tobytes() if snapshot.camera else b"",
-        )  # fmt: skip
-
-    def prepare(self, frame: Frame) -> None:
-        corners, opacity = acceleration.world_triangles(
-            list(frame.snapshot.instances), frame.snapshot.meshes, frame.materials.compiled, frame.geometry.origin
-        )
-        self._hierarchy = acceleration.build(corners, opacity)
-        frame.count(self, "triangles sorted", self._hierarchy.triangles)
+        return acceleration.too_many(snapshot)
 
     def run(self, frame: Frame) -> None:
         roughness = frame.settings.get(self, "roughness")
@@ -116,6 +95,8 @@ class TracedGlossy(Technique):
         sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
         samples = directions_per_sample(frame) if sampled and world.visibility.glossy else 0
         frame.services["world_samples"] = float(samples)
+        hierarchy = frame.hierarchy()
+        frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
         passes.fullscreen(
             TRACED,
             frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
@@ -123,14 +104,14 @@ class TracedGlossy(Technique):
             textures={
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
-                "trace_nodes": self._hierarchy.nodes, "trace_leaves": self._hierarchy.leaves,
+                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
             },
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
             constants={
                 "light_count": self._light_count, "traced_roughness": roughness,
-                "offset_size": 1e-6 * frame.geometry.size, "trace_levels": self._hierarchy.levels,
+                "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": float(samples),
             },
@@ -138,7 +119,7 @@ class TracedGlossy(Technique):
         frame.count(self, "passes")
 
     def release(self) -> None:
-        self._hierarchy = self._lights = None
+        self._lights = None
         self._sources.release()
 
 
@@ -147,10 +128,6 @@ def _may_be_glossy(material) -> bool:
 
 
 _NEVER_GLOSSY = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfTranslucent"}
-
-
-def _may_pass_light(material) -> bool:
-    return any(node.type in ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfPrincipled") for node in material.graph.nodes.values())
 
 
 def _has_extent(light) -> bool:

@@ -1,0 +1,34 @@
+// Guiding: does light from a cell of directions (column) arrive at a probe (row), a pixel of a coarse grid?
+// Each probe shifts its directions within the cells, so that the mean over the probes covers them.
+#include "lib/gbuffer.glsl"
+#include "trace/hierarchy.glsl"
+
+void main()
+{
+  out_useful = 0.0;
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  ivec2 probe = ivec2(place.y % probes.x, place.y / probes.x);
+  uvec3 bits = hash3(uvec3(uint(place.x), uint(place.y), 41u));
+  vec2 shift = vec2(to_unit(bits.x), to_unit(bits.y));
+  vec2 size = vec2(textureSize(surface_position, 0));
+  uvec3 pixel_bits = hash3(uvec3(uint(place.y), 7u, 5u));
+  vec2 within = vec2(to_unit(pixel_bits.x), to_unit(pixel_bits.y));
+  ivec2 pixel = ivec2((vec2(probe) + within) / vec2(probes) * size);
+  Surface s = SURFACE_READ(pixel);
+  if (!s.hit) {
+    return;
+  }
+  vec2 cell = vec2(float(place.x % columns), float(place.x / columns)) + shift;
+  float z = 2.0 * cell.y / float(rows) - 1.0;
+  float azimuth = (cell.x / float(columns) - 0.5) * 2.0 * PI;
+  float ring = sqrt(max(1.0 - z * z, 0.0));
+  vec3 direction = vec3(ring * cos(azimuth), ring * sin(azimuth), z);
+  float cosine = dot(direction, s.normal);
+  if (cosine <= 0.0) {
+    return;
+  }
+  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+  if (trace_nearest(origin, direction, 1e29, bits.z) >= 1e29) {
+    out_useful = cosine;
+  }
+}
