@@ -99,6 +99,7 @@ class Viewport:
         self.owner: Callable = lambda: None  # weak reference to the engine instance that draws it
         self._snapshot: Snapshot | None = None
         self._asked: tuple | None = None
+        self._size = (0, 0)  # of the region when the frame was begun
         self._changed_at = 0.0
         self._finished = False
         self._compiled = -1  # programs made so far, at the end of the last sample
@@ -182,14 +183,15 @@ class Viewport:
             self._begin(camera, size, settings, self.pace.scale())
         elif self.scale > 1 and clock() - self._changed_at > REST_S:
             self._begin(camera, size, settings, 1)
-            images.pool.trim()  # sizes that the region had while it was being resized
 
     def _begin(self, camera: Camera, size: tuple[int, int], settings: Settings, scale: int) -> Frame:
         width, height = (max(-(-extent // scale), 1) for extent in size)
         film = replace(self._snapshot.film, width=width, height=height, border=(0, 0, width, height))
         frame = self.renderer.begin(replace(self._snapshot, camera=camera, film=film), settings)
         if frame is not self.frame:
-            self.frame, self.scale = frame, scale
+            if size != self._size:
+                images.pool.trim()  # nobody will ask for the images of the old size again
+            self.frame, self.scale, self._size = frame, scale, size
             self.seconds, self._finished = 0.0, False
         elif frame.samples_done < settings.samples:
             self._finished = False
