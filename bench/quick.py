@@ -70,7 +70,9 @@ class Result:
     entrant: Entrant
     cold: float = float("nan")
     times: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)  # processor seconds of all threads: steadier on a busy machine
     relmse: list[float] = field(default_factory=list)  # of each run; empty where it is not comparable
+    trimmed: list[float] = field(default_factory=list)  # the same without the worst 0.1 % of the pixels
     stages: list[dict[str, float]] = field(default_factory=list)  # of each run; Candela alone
 
     @property
@@ -84,6 +86,10 @@ class Result:
     @property
     def error(self) -> float | None:
         return float(np.mean(self.relmse)) if self.relmse else None
+
+    @property
+    def trimmed_error(self) -> float | None:
+        return float(np.mean(self.trimmed)) if self.trimmed else None
 
 
 # -------------------------------------------------------------------------------------------------------------- figures
@@ -116,7 +122,7 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 def report(found: dict[str, list[Result]]) -> str:
     """All tables, for the terminal."""
-    rows = [("scene", "engine", "samples", "median s", "p95 s", "cold s", "relMSE", "× Candela")]
+    rows = [("scene", "engine", "samples", "median s", "p95 s", "CPU s", "cold s", "relMSE", "trimmed", "× Candela")]
     for scene, results in found.items():
         own = next(result.median for result in results if result.entrant == CANDELA)
         rows += [
@@ -126,8 +132,9 @@ def report(found: dict[str, list[Result]]) -> str:
                 str(result.entrant.samples),
                 f"{result.median:.3f}",
                 f"{result.p95:.3f}",
+                f"{np.median(result.cpu):.2f}",
                 "–" if np.isnan(result.cold) else f"{result.cold:.2f}",
-                "–" if result.error is None else f"{result.error:.1e}",
+                *("–" if error is None else f"{error:.1e}" for error in (result.error, result.trimmed_error)),
                 f"{result.median / own:.1f}",
             )
             for result in results
@@ -157,7 +164,9 @@ def as_json(found: dict[str, list[Result]], about: dict) -> str:
                     "p95_s": result.p95,
                     "cold_s": None if np.isnan(result.cold) else result.cold,
                     "times_s": result.times,
+                    "cpu_s": result.cpu,
                     "relmse": result.error,
+                    "relmse_trimmed": result.trimmed_error,
                     "stages_s": result.stages,
                 }
                 for result in results
@@ -231,8 +240,18 @@ def settings_for(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int
     return settings
 
 
-def render(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int]) -> tuple[float, dict, np.ndarray]:
-    """One whole render: seconds, the ledger's stages (Candela alone), Combined as (H, W, 4), bottom row first."""
+@dataclass(frozen=True)
+class Render:
+    """One whole render: times in seconds, Combined as (H, W, 4), bottom row first."""
+
+    seconds: float
+    cpu: float
+    stages: dict[str, float]  # of Candela's ledger
+    pixels: np.ndarray
+
+
+def render(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int]) -> Render:
+    """Render the view layer with an entrant's settings."""
     import bpy
 
     from addon.compare import reference
@@ -240,9 +259,9 @@ def render(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int]) -> 
     from addon.frame import ledger
 
     with reference.overridden(settings_for(scene, layer, entrant, seed, size)):
-        start = time.perf_counter()
+        start, cpu_start = time.perf_counter(), time.process_time()
         bpy.ops.render.render(scene=scene.name, layer=layer.name)
-        seconds = time.perf_counter() - start
+        seconds, cpu = time.perf_counter() - start, time.process_time() - cpu_start
         result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "picture.exr"
@@ -252,7 +271,7 @@ def render(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int]) -> 
     if entrant.engine == "CANDELA":
         times = ledger.latest().times
         stages = {name: times[name] for name in STAGES if name in times}
-    return seconds, stages, pixels
+    return Render(seconds, cpu, stages, pixels)
 
 
 def measure(path: Path, size: tuple[int, int], runs: int, reference_samples: int, tick) -> list[Result]:
@@ -270,18 +289,19 @@ def measure(path: Path, size: tuple[int, int], runs: int, reference_samples: int
     for result in results:
         if result.entrant.engine != "CYCLES":  # Cycles compiles nothing here
             tick(f"{result.entrant.label}, cold")
-            result.cold, _, _ = render(scene, layer, result.entrant, 1000, size)
+            result.cold = render(scene, layer, result.entrant, 1000, size).seconds
     for run in range(runs):
         for result in results:
             tick(f"{result.entrant.label}, {result.entrant.samples}")
-            seconds, stages, pixels = render(scene, layer, result.entrant, run + 1, size)
-            result.times.append(seconds)
-            if stages:
-                result.stages.append(stages)
+            made = render(scene, layer, result.entrant, run + 1, size)
+            result.times.append(made.seconds)
+            result.cpu.append(made.cpu)
+            if made.stages:
+                result.stages.append(made.stages)
             if result.entrant.comparable:
-                half = truth.half["combined"]
-                error = metrics.compare_radiance("Combined", pixels, truth.images["combined"], half)
+                error = metrics.compare_radiance("Combined", made.pixels, truth.images["combined"])
                 result.relmse.append(error.relmse)
+                result.trimmed.append(error.relmse_trimmed)
     return results
 
 
@@ -297,6 +317,7 @@ def about_run(size: tuple[int, int], runs: int, reference_samples: int) -> dict:
         "python": platform.python_version(),
         "device": context.describe(),
         "cpu": f"{cpu_name()}, {os.cpu_count()} threads",
+        "load_before": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,  # processes that wanted a core
         "size": list(size),
         "runs": runs,
         "reference": f"Cycles without bounces, 2 × {reference_samples} samples",
@@ -342,26 +363,28 @@ def main(arguments: list[str]) -> int:
     from addon.gfx import context
 
     addon.register()
-    found = {}
-    cold = sum(entrant.engine != "CYCLES" for entrant in ENTRANTS)
-    steps = len(options.scenes) * (1 + cold + options.runs * len(ENTRANTS))
-    with quiet() as terminal:
+    found: dict[str, list[Result]] = {}
+    with quiet():
         context.ensure()
         about = about_run(options.size, options.runs, options.reference_samples)
-        with tqdm(total=steps, file=terminal, leave=False, disable=not terminal.isatty(), unit="render") as bar:
-            for name in options.scenes:
+    print(f"Blender {about['blender']}, {about['device']}, {about['cpu']}, load {about['load_before']}")
+    print(f"{about['size'][0]} × {about['size'][1]} pixels, {options.runs} runs; relMSE against {about['reference']}")
+    renders = 1 + sum(entrant.engine != "CYCLES" for entrant in ENTRANTS) + options.runs * len(ENTRANTS)
+    for name in options.scenes:
+        with quiet() as terminal:
+            hidden = not terminal.isatty()
+            with tqdm(total=renders, desc=name, file=terminal, leave=False, disable=hidden, unit="render") as bar:
 
-                def tick(what: str, name=name) -> None:
-                    bar.set_postfix_str(f"{name}: {what}")
+                def tick(what: str, bar=bar) -> None:
+                    bar.set_postfix_str(what)
                     bar.update()
 
                 path = SCENES / f"{name}.blend"
                 found[name] = measure(path, options.size, options.runs, options.reference_samples, tick)
-    print(f"Blender {about['blender']}, {about['device']}, {about['cpu']}")
-    print(f"{about['size'][0]} × {about['size'][1]} pixels, {options.runs} runs; relMSE against {about['reference']}")
-    print(report(found))
-    options.json.parent.mkdir(parents=True, exist_ok=True)
-    options.json.write_text(as_json(found, about), encoding="utf-8")
+        print(f"{name}: EEVEE / Candela {ratio(found[name]):.1f}", flush=True)
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(as_json(found, about), encoding="utf-8")
+    print(f"\n{report(found)}")
     draw(found, about, options.picture)
     print(f"\n{options.json}\n{options.picture}")
     return 0
