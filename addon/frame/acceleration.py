@@ -17,6 +17,7 @@ import numpy as np
 from ..gfx import images
 from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
+from .geometry import morton_codes
 
 LARGEST = 4_000_000  # triangles
 LEAF = 4
@@ -61,7 +62,7 @@ def build(corners: np.ndarray, opacity: np.ndarray) -> Hierarchy:
     finite = np.isfinite(corners).all(axis=(1, 2))
     corners, opacity = corners[finite], opacity[finite]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    order = np.argsort(_morton((low + high) * 0.5), kind="stable")
+    order = np.argsort(morton_codes((low + high) * 0.5), kind="stable")
     count = len(corners)
     levels = 1
     while LEAF * 4**levels < count:
@@ -95,27 +96,6 @@ def build(corners: np.ndarray, opacity: np.ndarray) -> Hierarchy:
         box_low, box_high = children_low.min(axis=1), children_high.max(axis=1)
     rows = np.concatenate(nodes[::-1]).reshape(-1, 4)  # root first
     return Hierarchy(images.upload_list(rows), images.upload_list(packed.reshape(-1, 4)), levels, count)
-
-
-def _morton(points: np.ndarray) -> np.ndarray:
-    """63-bit Morton codes of (N, 3) points within their own bounds."""
-    if not len(points):
-        return np.zeros(0, np.uint64)
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
-    grid = np.clip((points - low) / extent * (2**21 - 1), 0, 2**21 - 1).astype(np.uint64)
-    code = np.zeros(len(points), np.uint64)
-    for axis in range(3):
-        x = grid[:, axis]
-        for shift, mask in (
-            (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
-            (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
-        ):  # fmt: skip
-            x = (x | (x << np.uint64(shift))) & np.uint64(mask)
-        code |= x << np.uint64(axis)
-    return code
-
-
 
 
 class HierarchyCache:

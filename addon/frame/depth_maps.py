@@ -242,7 +242,9 @@ def draw_views(atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometr
     sent = 0
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     shader = passes.get(OPAQUE)
-    for view, cell in zip(views, cells):
+    opaque_seen = _seen(views, geometry.opaque_casters)
+    alpha_seen = _seen(views, [draw for draw, _, _ in alpha_casters])
+    for k, (view, cell) in enumerate(zip(views, cells)):
         constants = {
             "row_x": view.rows[0], "row_y": view.rows[1], "row_w": view.rows[2], "row_q": view.rows[3],
             "near": view.near,
@@ -250,11 +252,13 @@ def draw_views(atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometr
         with passes.drawing(atlas.target, viewport=(cell[0], cell[1], cell[2], cell[2])):
             if geometry.opaque_casters:
                 shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
-                for draw in geometry.opaque_casters:
+                for index in opaque_seen[k]:
+                    draw = geometry.opaque_casters[index]
                     shader.set_constant("first_instance", draw.first)
                     passes.draw(shader, draw.batch, draw.count)
                     sent += draw.triangles
-            for draw, alpha_shader, bindings in alpha_casters:
+            for index in alpha_seen[k]:
+                draw, alpha_shader, bindings = alpha_casters[index]
                 alpha_shader.bind(
                     **bindings,
                     constants={
@@ -265,3 +269,18 @@ def draw_views(atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometr
                 passes.draw(alpha_shader, draw.batch, draw.count)
                 sent += draw.triangles
     return sent
+
+
+def _seen(views: list[MapView], draws: list) -> list[np.ndarray]:
+    """Per view, the numbers of the draws whose bounds it may see."""
+    if not views or not draws:
+        return [np.zeros(0, int)] * len(views)
+    low, high = np.stack([draw.low for draw in draws]), np.stack([draw.high for draw in draws])
+    corners = low[:, None] + CORNERS[None] * (high - low)[:, None]  # (D, 8, 3)
+    corners = np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=-1)
+    rows = np.stack([view.rows for view in views])  # (V, 4, 4)
+    x, y, w, _ = np.moveaxis(np.einsum("vrk,dck->vdcr", rows, corners), -1, 0)
+    outside = (
+        (w <= 0).all(-1) | (x > w).all(-1) | (x < -w).all(-1) | (y > w).all(-1) | (y < -w).all(-1)
+    )  # fmt: skip
+    return [np.flatnonzero(~hidden) for hidden in outside]

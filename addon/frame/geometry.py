@@ -1,8 +1,9 @@
 """The snapshot's geometry on the GPU: vertex buffers by mesh, transforms in one image, draws by material.
 
 Meshes that are shown many times are drawn as instances. Meshes shown once would cost one draw call each in every
-pass, so they are joined: one vertex buffer, one draw per material, and each vertex knows its instance. Transforms
-always come from the instance image, so moving an object uploads a few numbers.
+pass, so neighbours are joined: one vertex buffer, one draw per material, and each vertex knows its instance.
+Instances, too, are drawn in groups of neighbours, so that a depth map leaves out the groups that it does not see.
+Transforms always come from the instance image, so moving an object uploads a few numbers.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from ..snapshot.scene import Instance, Mesh, Snapshot
 
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
 TEXELS_PER_INSTANCE = 4
+JOINED_TRIANGLES = 2000  # about so many triangles of joined meshes make one draw: enough to fill a GPU, few to cull
+GROUP_TRIANGLES = 600  # the same for groups of instances
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,8 @@ class Draw:
     batch: gfx_geometry.Batch
     first: int
     count: int
+    low: np.ndarray  # (3,) bounds relative to the render origin
+    high: np.ndarray
 
     @property
     def triangles(self) -> int:
@@ -72,7 +77,8 @@ class SceneGeometry:
     def update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""
         instances = [i for i in snapshot.instances if snapshot.meshes[i.mesh].triangle_count]
-        order = sorted(range(len(instances)), key=lambda k: (instances[k].mesh, instances[k].materials))
+        place = _neighbourhood(instances)
+        order = sorted(range(len(instances)), key=lambda k: (instances[k].mesh, instances[k].materials, place[k]))
         instances = [instances[k] for k in order]
         changed = self._update_transforms(instances, snapshot)
         key = (
@@ -80,6 +86,8 @@ class SceneGeometry:
             tuple((m.attributes, m.transparent) for m in materials),
         )
         if key == self._draw_key:
+            if changed:
+                self._set_bounds()
             return changed
         self._draw_key = key
         self._make_draws(instances, snapshot.meshes, materials)
@@ -98,7 +106,8 @@ class SceneGeometry:
             centre, half = (low + high) / 2, (high - low) / 2
             world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centre) + matrices[:, :3, 3]
             reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
-            self.bounds_min, self.bounds_max = (world - reach).min(axis=0), (world + reach).max(axis=0)
+            self._low, self._high = world - reach, world + reach  # per instance
+            self.bounds_min, self.bounds_max = self._low.min(axis=0), self._high.max(axis=0)
         camera = snapshot.camera.matrix[:3, 3] if snapshot.camera else (self.bounds_min + self.bounds_max) / 2
         # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
         grid = 2.0 ** np.ceil(np.log2(self.size)) if instances else 1.0
@@ -134,33 +143,90 @@ class SceneGeometry:
                 runs[-1] = (runs[-1][0], runs[-1][1] + 1)
             else:
                 runs.append((k, 1))
-        joined = tuple(first for first, count in runs if count == 1)
-        made: dict = {}
-        if joined:
-            parts = [(k, meshes[instances[k].mesh], instances[k].materials) for k in joined]
+        joined = [first for first, count in runs if count == 1]
+        made: dict = {}  # key -> (parts for the buffers, [(first, count, instances covered)])
+        for group in _by_size(joined, instances, meshes):
+            parts = [(k, meshes[instances[k].mesh], instances[k].materials) for k in group]
             key = ("joined", tuple((k, mesh.key, mesh.version, slots) for k, mesh, slots in parts))
-            made[key] = (parts, 0, 1)
+            made[key] = (parts, [(0, 1, group)])
         for first, count in runs:
             if count > 1:
                 mesh, slots = meshes[instances[first].mesh], instances[first].materials
-                made[(mesh.key, mesh.version, slots)] = ([(0, mesh, slots)], first, count)
+                step = max(1, GROUP_TRIANGLES // mesh.triangle_count)
+                starts = range(first, first + count, step)
+                spans = [(k, min(step, first + count - k)) for k in starts]
+                made[(mesh.key, mesh.version, slots)] = (
+                    [(0, mesh, slots)],
+                    [(k, length, list(range(k, k + length))) for k, length in spans],
+                )
         attributes = tuple((m.attributes, m.transparent) for m in materials)
-        self.draws, self.opaque_casters = [], []
+        self._plan: list[tuple[list[int], int, object, int, int, bool]] = []
         kept = {}
-        for key, (parts, first, count) in made.items():
+        for key, (parts, spans) in made.items():
             cached = self._mesh_draws.get((key, attributes))
             if cached is None:
                 self.uploads += len(parts)
                 cached = _draws_of(parts, materials)
             kept[(key, attributes)] = cached
             surfaces, casters = cached
-            self.draws += [Draw(material, batch, first, count) for material, batch in surfaces]
-            self.opaque_casters += [Draw(-1, batch, first, count) for batch in casters]
-        self.draws.sort(key=lambda draw: draw.material)
+            for first, count, covered in spans:
+                self._plan += [(covered, material, batch, first, count, False) for material, batch in surfaces]
+                self._plan += [(covered, -1, batch, first, count, True) for batch in casters]
+        self._plan.sort(key=lambda entry: entry[1])
         self._mesh_draws = kept
+        self._set_bounds()
+
+    def _set_bounds(self) -> None:
+        """Make the draws with the bounds of the instances that each covers."""
+        self.draws, self.opaque_casters = [], []
+        for covered, material, batch, first, count, caster in self._plan:
+            low = self._low[covered].min(axis=0) - self.origin
+            high = self._high[covered].max(axis=0) - self.origin
+            (self.opaque_casters if caster else self.draws).append(Draw(material, batch, first, count, low, high))
 
     def release(self) -> None:
         self.__init__()
+
+
+def _neighbourhood(instances: list[Instance]) -> np.ndarray:
+    """(N,) numbers that are close for instances that are close: Morton codes of their places."""
+    if not instances:
+        return np.zeros(0)
+    places = np.stack([instance.matrix[:3, 3] for instance in instances])
+    return morton_codes(np.nan_to_num(places, posinf=0.0, neginf=0.0))
+
+
+def _by_size(indices: list[int], instances: list[Instance], meshes: dict[str, Mesh]) -> list[list[int]]:
+    """Groups of neighbours among `indices` of about JOINED_TRIANGLES triangles each."""
+    place = _neighbourhood([instances[k] for k in indices])
+    groups, size = [], JOINED_TRIANGLES
+    for position in np.argsort(place, kind="stable"):
+        k = indices[position]
+        if size >= JOINED_TRIANGLES:
+            groups.append([])
+            size = 0
+        groups[-1].append(k)
+        size += meshes[instances[k].mesh].triangle_count
+    return groups
+
+
+def morton_codes(points: np.ndarray) -> np.ndarray:
+    """63-bit Morton codes of (N, 3) points within their own bounds."""
+    if not len(points):
+        return np.zeros(0, np.uint64)
+    low = points.min(axis=0)
+    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
+    grid = np.clip((points - low) / extent * (2**21 - 1), 0, 2**21 - 1).astype(np.uint64)
+    code = np.zeros(len(points), np.uint64)
+    for axis in range(3):
+        x = grid[:, axis]
+        for shift, mask in (
+            (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
+            (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
+        ):  # fmt: skip
+            x = (x | (x << np.uint64(shift))) & np.uint64(mask)
+        code |= x << np.uint64(axis)
+    return code
 
 
 def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[CompiledMaterial]):

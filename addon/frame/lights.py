@@ -38,14 +38,19 @@ class Emitter:
     w: np.ndarray
 
     @property
+    def has_span(self) -> bool:
+        """Whether `u` and `v` are the half axes of an area light; for spots they hold the cone's matrix."""
+        return self.kind in (RECTANGLE, ELLIPSE)
+
+    @property
     def power(self) -> float:
         """For choosing among many lights: total strength, W (suns: W/m2)."""
         return float(np.abs(self.light.strength).sum())
 
-    def sample(self, x: float, y: float) -> np.ndarray:
-        """This sample's point from two uniform numbers: position, offset from the centre, or direction."""
+    def sample(self, x: float, y: float, z: float) -> np.ndarray:
+        """This sample's point from three uniform numbers: position, offset from the centre, or direction."""
         if self.kind in (POINT, SPHERE):
-            return _ball_offset(x, y) * self.radius
+            return _ball_offset(x, y, z) * self.radius
         if self.kind == SUN:
             return _cone_direction(self.centre, self.radius, x, y)
         if self.kind == RECTANGLE:
@@ -173,13 +178,12 @@ _RADII = np.sin(np.linspace(0.0, np.pi / 2, 4097))
 _RADIAL_CDF = (np.arcsin(_RADII) - _RADII * np.sqrt(1 - _RADII**2)) / (np.pi / 2)
 
 
-def _ball_offset(x: float, y: float) -> np.ndarray:
-    """Offset in the unit ball. Two numbers make three: the radius uses the bits that the direction's turn leaves."""
-    z = 1.0 - 2.0 * x
+def _ball_offset(x: float, y: float, z: float) -> np.ndarray:
+    """Offset in the unit ball: direction from x and y, radius from z."""
+    height = 1.0 - 2.0 * x
     turn = 2.0 * np.pi * y
-    ring = np.sqrt(max(1.0 - z * z, 0.0))
-    radius = np.interp((y * 977.0 + x * 379.0) % 1.0, _RADIAL_CDF, _RADII)
-    return radius * np.array([ring * np.cos(turn), ring * np.sin(turn), z])
+    ring = np.sqrt(max(1.0 - height * height, 0.0))
+    return np.interp(z, _RADIAL_CDF, _RADII) * np.array([ring * np.cos(turn), ring * np.sin(turn), height])
 
 
 def _cone_direction(axis: np.ndarray, half_angle: float, x: float, y: float) -> np.ndarray:

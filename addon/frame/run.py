@@ -20,7 +20,7 @@ from .geometry import SceneGeometry
 from .ledger import RAN, REUSED, Ledger, Row
 from .materials import MaterialSet, compile_programs
 from .plan import Plan, make_plan
-from .sequence import point
+from .sequence import point, third
 from .settings import Settings
 from .technique import Technique
 from .view import VIEW, View, blackman_harris_offset
@@ -55,6 +55,10 @@ class Frame:
     def random(self, use: str) -> tuple[float, float]:
         """This sample's point of the sequence for `use`."""
         return point(self.sample, use, self.settings.seed)
+
+    def random_volume(self, use: str) -> tuple[float, float, float]:
+        """The same with a third number."""
+        return *self.random(use), third(self.sample, use, self.settings.seed)
 
     def hierarchy(self) -> Hierarchy | None:
         """Triangles for tracing rays; None where there are too many. Built on the first call."""
@@ -117,6 +121,8 @@ class Renderer:
             ledger.rows = [Row(t.name, t.label, REUSED, "nothing changed", slot=t.slot) for t in plan.techniques]
             ledger.rows += plan.skipped
             self.frame.ledger = ledger
+            self.frame.profiler = Profiler(settings.profile)
+            self.frame.counters = {}
             self.frame.settings = settings
             return self.frame
         self._frame_key = key
@@ -155,6 +161,7 @@ class Renderer:
             with frame.profiler.step(technique.name):
                 technique.run(frame)
         frame.samples_done += 1
+        frame.ledger.rows = []  # what was reused up to here is being added to
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -176,7 +183,7 @@ class Renderer:
                 pixels /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
-        if not any(row.state == REUSED for row in ledger.rows):
+        if not ledger.rows:
             seconds = frame.profiler.seconds
             ledger.rows = [
                 Row(t.name, t.label, RAN, "", 1000 * seconds.get(t.name, 0.0), t.slot, frame.counters.get(t.name, {}))

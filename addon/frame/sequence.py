@@ -1,7 +1,8 @@
 """The one low-discrepancy sequence that all techniques draw from, indexed by sample number.
 
-Sobol' points, Owen-scrambled by hashing. The film takes dimensions 3 and 4, every other use dimensions 1 and 2 (the
-perfect pair: every prefix of 2^k points has one in each cell) with a scramble of its own. So the film and any one use form a four-dimensional net together: at an edge, where only some of
+Sobol' points, Owen-scrambled by hashing. The film takes dimensions 4 and 5, every other use dimensions 1 to 3 (the
+first two are the perfect pair: every prefix of 2^k points has one in each cell) with a scramble of its own. So the film
+and any one use form a net together: at an edge, where only some of
 the samples see a surface, those still cover the light evenly. (Pairs shuffled independently leave a random subset
 there, and the error at edges falls only like 1 / sqrt(n).) Shaders get dimensions 1, 2, 5 and 6 unscrambled and
 scramble them per pixel.
@@ -40,8 +41,9 @@ def _owen(x: np.ndarray, seed: int) -> np.ndarray:
     return _reverse_bits(_laine_karras(_reverse_bits(x), seed))
 
 
-# Primitive polynomials and initial numbers of dimensions 2 to 6 (Joe & Kuo 2008, new-joe-kuo-6): degree, a, m.
-_JOE_KUO = ((1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)), (3, 2, (1, 1, 1)), (4, 1, (1, 1, 3, 3)))
+# Primitive polynomials and initial numbers of dimensions 2 to 7 (Joe & Kuo 2008, new-joe-kuo-6): degree, a, m.
+_JOE_KUO = ((1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)), (3, 2, (1, 1, 1)), (4, 1, (1, 1, 3, 3)),
+            (4, 4, (1, 3, 5, 13)))  # fmt: skip
 DIMENSIONS = 1 + len(_JOE_KUO)
 
 
@@ -76,7 +78,7 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     """Points `first` ... `first + count - 1` of the sequence for `use`, (count, 2) float64 in [0, 1)."""
     salt = zlib.crc32(f"{use}/{seed}".encode())
     index = np.arange(first, first + count, dtype=np.uint64)
-    pair = 2 if use == FILM else 0
+    pair = 3 if use == FILM else 0
     x = _owen(bits(index, pair), salt * 2654435761 + 1)
     y = _owen(bits(index, pair + 1), salt * 2246822519 + 2)
     return np.stack([x, y], axis=-1).astype(np.float64) / 4294967296.0
@@ -89,7 +91,14 @@ def point(index: int, use: str, seed: int = 0) -> tuple[float, float]:
     return float(x), float(y)
 
 
+@lru_cache(maxsize=4096)
+def third(index: int, use: str, seed: int = 0) -> float:
+    """A third number that goes with `point`, for uses that fill a volume."""
+    salt = zlib.crc32(f"{use}/{seed}".encode())
+    return float(_owen(bits(np.array([index]), 2), salt * 3266489917 + 3)[0]) / 4294967296.0
+
+
 def pixel_bits(index: int) -> tuple[int, int, int, int]:
-    """Dimensions 1, 2, 5, 6 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
-    values = [int(bits(np.uint64(index), dimension)) for dimension in (0, 1, 4, 5)]
+    """Dimensions 1, 2, 6, 7 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
+    values = [int(bits(np.uint64(index), dimension)) for dimension in (0, 1, 5, 6)]
     return tuple(value - 2**32 if value >= 2**31 else value for value in values)

@@ -19,7 +19,8 @@ is right); a receiver that no fitted view contains counts as lit.
 
 Bias: none for the diffuse path. On soft-edged point and spot lights the depth map is drawn from a point in the ball
 while light arrives from its projection onto the disc that faces the receiver (as in Cycles): the difference is of
-the order of (radius / distance)^2.
+the order of (radius / distance)^2. Where a light brings less than `cutoff` of the picture's median light, it is left
+unshadowed: at most that share of light too much, for views and casters that a picture with many lights need not draw.
 """
 
 from __future__ import annotations
@@ -40,6 +41,11 @@ RESOLUTION = Param(
     "Texels of a depth map per pixel of the picture's longer side; rounded up to a power of two", 0.125, 16.0,
 )  # fmt: skip
 MOST_RESOLUTION = 2048  # six maps of one point light take 500 MB then; with 4096, 2 GB, which no software GPU gives
+CUTOFF = Param(
+    "cutoff", "Shadow cutoff", 0.001,
+    "Where a light can bring less than this share of the picture's median light, its shadows are left out", 0.0, 0.1,
+    "FACTOR",
+)  # fmt: skip
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
 
 
@@ -101,10 +107,11 @@ class AccumulatedMaps(Technique):
     name = "accumulated_maps"
     label = "Accumulated shadow maps"
     slot = "shadow"
-    params = (RESOLUTION,)
+    params = (RESOLUTION, CUTOFF)
 
     def __init__(self):
         self.service = DepthMapService()
+        self._reached: dict[str, depth_maps.Receivers] = {}
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not any(light.cast_shadow and np.any(light.strength) for light in snapshot.lights):
@@ -115,16 +122,50 @@ class AccumulatedMaps(Technique):
 
     def run(self, frame: Frame) -> None:
         frame.services["shadow"] = self
+        if frame.sample == 0:
+            self._find_reached(frame)
+
+    def _find_reached(self, frame: Frame) -> None:
+        """For each light the receivers where its shadows can be seen (see CUTOFF)."""
+        self._reached = {}
+        receivers = frame.receivers
+        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+        emitters = [emitter for emitter in found if emitter is not None]
+        if receivers is None or not len(receivers.distance) or not emitters:
+            return
+        centre = (receivers.low + receivers.high) / 2
+        typical = np.zeros(len(centre))  # irradiance at the tiles' centres if nothing is blocked
+        largest = []
+        for emitter in emitters:
+            strength = float(np.abs(emitter.radiance).max())
+            if emitter.kind == lights.SUN:
+                typical += strength * emitter.area
+                largest.append(np.full(len(centre), np.inf))
+                continue
+            strength *= emitter.area if emitter.area > 0 else 1.0
+            nearest = np.clip(emitter.centre, receivers.low, receivers.high)
+            reach = float(np.linalg.norm(emitter.u[:3]) + np.linalg.norm(emitter.v[:3])) if emitter.has_span else 0
+            gap = np.maximum(np.linalg.norm(nearest - emitter.centre, axis=1) - reach, 1e-6 * frame.geometry.size)
+            largest.append(strength / gap**2)
+            middle = np.linalg.norm(centre - emitter.centre, axis=1)
+            typical += strength / np.maximum(middle, max(reach, emitter.radius, 1e-6 * frame.geometry.size)) ** 2
+        # The median, not the mean: the tile next to a lamp must not decide for the room.
+        least = frame.settings.get(self, "cutoff") * float(np.median(typical))
+        for emitter, most in zip(emitters, largest):
+            keep = most >= least
+            self._reached[emitter.light.key] = depth_maps.Receivers(
+                receivers.low[keep], receivers.high[keep], receivers.distance[keep]
+            )
 
     def resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray) -> list:
         """Views that cover this sample of the light for all receivers."""
-        if not emitter.light.cast_shadow or frame.receivers is None:
+        receivers = self._reached.get(emitter.light.key)
+        if not emitter.light.cast_shadow or receivers is None or not len(receivers.distance):
             return []
-        use = f"map/{emitter.light.key}"
-        jitter = (*frame.random(use), *frame.random(use + "/turn"))
+        jitter = (*frame.random("map"), *frame.random("map/turn"))
         if emitter.kind == lights.SUN:
             return depth_maps.directional_views(sample, frame.receivers, frame.geometry, jitter, self.resolution(frame))
         axis, cone = None, np.inf
@@ -135,7 +176,7 @@ class AccumulatedMaps(Technique):
             if half < np.pi / 2 - 0.01:
                 axis, cone = emitter.axis, _spot_tangent(emitter, half)
         return depth_maps.point_views(
-            emitter.position(sample), axis, cone, frame.receivers, frame.geometry, jitter, self.resolution(frame)
+            emitter.position(sample), axis, cone, receivers, frame.geometry, jitter, self.resolution(frame)
         )
 
     def draw(self, frame: Frame, views: list) -> tuple[images.Image, np.ndarray]:

@@ -63,7 +63,7 @@ def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: l
         textures={**surface_bindings(frame), "depth_maps": atlas, "energy_table": frame.materials.energy_table},
         blocks={"film_view": frame.view_block, "sources": sources.set(rows, views)},
         constants={
-            "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", 0.0),
+            "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
             "world_samples": frame.services.get("world_samples", 0.0),
         },
     )  # fmt: skip
@@ -105,7 +105,8 @@ class DirectLight(Technique):
         shadow = frame.services.get("shadow")
         items = []
         for emitter, weight in self._chosen(frame):
-            sample = emitter.sample(*frame.random(f"light/{emitter.light.key}"))
+            # The same numbers for all lights: then two half lights are one, and names and order change nothing.
+            sample = emitter.sample(*frame.random_volume("light"))
             views = shadow.views(frame, emitter, sample) if shadow else []
             row = emitter.row(sample, 0, len(views), weight)
             row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)

@@ -25,7 +25,6 @@ import numpy as np
 
 from ..frame import depth_maps, environment, lights
 from ..frame.run import Frame
-from ..frame.sequence import point
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
@@ -94,13 +93,10 @@ class EnvironmentLight(Technique):
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         count = directions_per_sample(frame)
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
-        stride = 1 << max(frame.settings.samples - 1, 0).bit_length()
         items = []
         for k in range(count):
-            # Further directions of a sample continue the sequence beyond the last sample, so that all directions
-            # are spread together and each set of them with the film.
 
-            x, y = point(frame.sample + k * stride, "environment", frame.settings.seed)
+            x, y = frame.random(f"environment{k}")
             direction, radiance, density = frame.environment.draw(x, y)
             views = []
             if shadows:

@@ -1,7 +1,7 @@
 """Traced glossy light: what narrow lobes and mirrors see of lights and world, by one ray per pixel and sample.
 
 Light samples shared by all pixels (direct_light, environment_light) cannot serve a narrow lobe: it would show them as
-dots, and a mirror would show nothing. Below `roughness` eight directions are drawn from the lobe's visible normals
+dots, and a mirror would show nothing. Up to `roughness` eight directions are drawn from the lobe's visible normals
 instead, and one of them, chosen by what it would bring unblocked, is traced (resampled importance sampling, Talbot et
 al. 2005): where nothing blocks, that is as good as eight rays. Both estimators, lobe and light samples, are weighted
 by the power heuristic (Veach 1997), so that rough lobes keep the noise-free one:
@@ -12,7 +12,7 @@ V comes from a bounding volume hierarchy (addon/frame/acceleration.py): no depth
 
 | cost | per sample |
 |---|---|
-| rays | 1 per pixel whose lobe is below `roughness` |
+| rays | 1 per pixel with a lobe up to `roughness` |
 | fetches per ray | about 6 per node and 10 per leaf visited |
 | build | one sort of all triangles, when geometry changed |
 
@@ -62,8 +62,8 @@ class TracedGlossy(Technique):
     slot = "reflection"
     params = (
         Param(
-            "roughness", "Roughness", 0.5,
-            "Lobes below this roughness trace a ray per sample; rougher ones are lit by light samples alone", 0.0, 1.0,
+            "roughness", "Roughness", 1.0,
+            "Lobes up to this roughness trace a ray per sample; rougher ones are lit by light samples alone", 0.0, 1.0,
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -26,7 +26,7 @@ void main()
                       s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
     has_glossy = !lobe_is_mirror(lobe);
   }
-  bool traced = s.glossy_roughness < traced_roughness;
+  bool traced = s.glossy_roughness <= traced_roughness;
   vec3 diffuse = vec3(0.0);
   vec3 glossy = vec3(0.0);
   for (int i = 0; i < light_count; i++) {

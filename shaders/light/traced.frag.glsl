@@ -52,7 +52,7 @@ void main()
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  if (s.glossy_roughness >= traced_roughness) {
+  if (s.glossy_roughness > traced_roughness) {
     return;
   }
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
