@@ -22,7 +22,7 @@ from .geometry import morton_codes
 LARGEST = 4_000_000  # triangles
 LEAF = 4
 NODE_TEXELS = 6  # min x, y, z, max x, y, z of the four children
-LEAF_TEXELS = 10  # corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; their opacities
+LEAF_TEXELS = 13  # corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity; emission r, g, b
 EMPTY = 1e30
 
 
@@ -39,9 +39,12 @@ class Hierarchy:
 def world_triangles(
     instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial], origin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (T, 3, 3) float32 relative to `origin`, and opacity (T,) of all triangles that reflections can show."""
-    corners, opacities = [], []
-    opacity = np.array([material.opacity if material.transparent else 1.0 for material in materials])
+    """All triangles that reflections can show: corners (T, 3, 3) float32 relative to `origin`, and (T, 4) opacity and
+    mean emitted radiance."""
+    corners, looks = [], []
+    look = np.array([
+        (m.opacity if m.transparent else 1.0, *(m.emission if m.emissive else (0.0, 0.0, 0.0))) for m in materials
+    ])  # fmt: skip
     for instance in instances:
         mesh = meshes[instance.mesh]
         if not instance.visibility.glossy or not mesh.triangle_count:
@@ -51,16 +54,16 @@ def world_triangles(
         world = mesh.positions @ matrix[:3, :3].T.astype(np.float32) + matrix[:3, 3].astype(np.float32)
         corners.append(world[mesh.corner_vertices[mesh.triangle_corners]])
         slots = np.asarray(instance.materials)
-        opacities.append(opacity[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]])
+        looks.append(look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]])
     if not corners:
-        return np.zeros((0, 3, 3), np.float32), np.zeros(0)
-    return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(opacities)
+        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 4))
+    return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
 
 
-def build(corners: np.ndarray, opacity: np.ndarray) -> Hierarchy:
-    """The hierarchy of `corners` (T, 3, 3)."""
+def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
+    """The hierarchy of `corners` (T, 3, 3) with opacity and emission `look` (T, 4)."""
     finite = np.isfinite(corners).all(axis=(1, 2))
-    corners, opacity = corners[finite], opacity[finite]
+    corners, look = corners[finite], look[finite]
     low, high = corners.min(axis=1), corners.max(axis=1)
     order = np.argsort(morton_codes((low + high) * 0.5), kind="stable")
     count = len(corners)
@@ -78,9 +81,9 @@ def build(corners: np.ndarray, opacity: np.ndarray) -> Hierarchy:
         packed[:, axis] = first[:, axis].reshape(used, LEAF)
         packed[:, 3 + axis] = edges[:, 0, axis].reshape(used, LEAF)
         packed[:, 6 + axis] = edges[:, 1, axis].reshape(used, LEAF)
-    weights = np.zeros(used * LEAF, np.float32)
-    weights[:count] = opacity[order]
-    packed[:, 9] = weights.reshape(used, LEAF)
+    looks = np.zeros((used * LEAF, 4), np.float32)
+    looks[:count] = look[order]
+    packed[:, 9:13] = looks.reshape(used, LEAF, 4).transpose(0, 2, 1)
 
     box_low = np.full((slots, 3), EMPTY, np.float32)
     box_high = np.full((slots, 3), -EMPTY, np.float32)
@@ -112,7 +115,7 @@ class HierarchyCache:
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.glossy)
                   for i in snapshot.instances),
-            tuple(m.opacity if m.transparent else 1.0 for m in materials), tuple(origin),
+            tuple((m.opacity if m.transparent else 1.0, m.emissive and m.emission) for m in materials), tuple(origin),
         )  # fmt: skip
         if key != self._key:
             self._key = key

@@ -12,6 +12,7 @@ import numpy as np
 from ..gfx import images
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import World
+from .lights import LUMINANCE
 
 WORLD = Struct(
     "World",
@@ -24,7 +25,6 @@ WORLD = Struct(
 LARGEST_GRID = (256, 512)
 SMALLEST_GRID = (32, 64)  # for guiding, even where the image is smaller
 GUIDE_ROWS, GUIDE_COLUMNS = 16, 32
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class Environment:

@@ -16,7 +16,8 @@ TEXELS = 8
 VIEW_TEXELS = 5
 MOST_LIGHTS, MOST_VIEWS = 64, 96  # together just below the 16 KiB that every GPU grants a uniform block
 SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4", f"view[{MOST_VIEWS * VIEW_TEXELS}]"))
-POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION = range(6)
+POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = range(7)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG = 1, 2, 4, 8, 16, 32
 
 
@@ -164,6 +165,16 @@ def direction_row(direction, radiance_over_density, density, flags, first_view: 
     rows[0] = DIRECTION, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
     rows[1, :3] = direction
     rows[3] = *radiance_over_density, density
+    return rows
+
+
+def surface_row(point, normal, radiance, density, flags, first_view: int, view_count: int) -> np.ndarray:
+    """A row for a point on an emissive surface, drawn with `density` per m2; it shines to both sides."""
+    rows = np.zeros((TEXELS, 4))
+    rows[0] = SURFACE, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
+    rows[1, :3] = rows[2, :3] = point
+    rows[3] = *radiance, 1.0 / density
+    rows[4, :3] = normal
     return rows
 
 

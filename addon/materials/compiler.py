@@ -165,3 +165,23 @@ class _Compilation:
         """A colour or number where a shader belongs."""
         emitter = Node(node.key, node.label, "", {"Color": Input("COLOR", 0.0, link)})
         return self._leaf(emitter, IMPLICIT_EMISSION, weight)
+
+
+EMITTERS = {"ShaderNodeEmission": ("Strength", "Color"), "ShaderNodeBsdfPrincipled": ("Emission Strength", "Emission Color")}
+
+
+def may_emit(graph: Graph) -> bool:
+    """Whether some node of the graph can emit: cheap, by its sockets alone. A black constant cannot."""
+    for node in graph.nodes.values():
+        if node.type in ("ShaderNodeBackground", "ShaderNodeEeveeSpecular"):
+            return True
+        if node.type in EMITTERS and all(_not_black(node.inputs.get(name)) for name in EMITTERS[node.type]):
+            return True
+    return False
+
+
+def _not_black(socket) -> bool:
+    if socket is None or socket.link is not None:
+        return socket is not None
+    value = socket.value
+    return any(value[:3]) if isinstance(value, tuple) else bool(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
 from .direct_light import DirectLight
+from .emissive_light import EmissiveLight
 from .environment_light import EnvironmentLight
 from .film import Film
 from .surfaces import Surfaces
@@ -15,6 +16,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     AccumulatedMaps,
     TracedGlossy,
     DirectLight,
+    EmissiveLight,
     EnvironmentLight,
     Film,
 )

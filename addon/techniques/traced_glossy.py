@@ -34,6 +34,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import passes
+from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES, TRACED_DEFINES
 from .environment_light import directions_per_sample
@@ -49,7 +50,7 @@ TRACED = passes.fullscreen_program(
     blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"), ("INT", "trace_levels"),
-        ("INT", "world_glossy"), ("FLOAT", "world_samples"),
+        ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
     ),
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
@@ -79,7 +80,8 @@ class TracedGlossy(Technique):
         if not any(_may_be_glossy(material) for material in snapshot.materials[1:]):
             return "no material has a glossy closure"
         lit = np.any(snapshot.world.color) and snapshot.world.visibility.glossy
-        if not lit and not any(_has_extent(light) for light in snapshot.lights):
+        emits = any(may_emit(material.graph) for material in snapshot.materials)
+        if not lit and not emits and not any(_has_extent(light) for light in snapshot.lights):
             return "no light has a size and the world is black: nothing that a ray could hit"
         return acceleration.too_many(snapshot)
 
@@ -96,6 +98,7 @@ class TracedGlossy(Technique):
         samples = directions_per_sample(frame) if sampled and world.visibility.glossy else 0
         frame.services["world_samples"] = float(samples)
         hierarchy = frame.hierarchy()
+        emissive_power, emissive_points = frame.services.get("emissive", (0.0, 1.0))
         frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
         passes.fullscreen(
             TRACED,
@@ -113,7 +116,7 @@ class TracedGlossy(Technique):
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
-                "world_samples": float(samples),
+                "world_samples": float(samples), "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
         )  # fmt: skip
         frame.count(self, "passes")

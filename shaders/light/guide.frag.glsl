@@ -28,7 +28,8 @@ void main()
     return;
   }
   vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
-  if (trace_nearest(origin, direction, 1e29, bits.z) >= 1e29) {
+  ivec2 hit;
+  if (trace_nearest(origin, direction, 1e29, bits.z, hit) >= 1e29) {
     out_useful = cosine;
   }
 }

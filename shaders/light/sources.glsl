@@ -4,7 +4,8 @@
 //   0: kind, flags, first depth-map view, number of views
 //   1: centre, radius                 (sun, direction: unit vector towards the light, half angle)
 //   2: this sample's point            (point, spot: offset from the centre; area: position; sun: direction)
-//   3: radiance, area                 (radius 0: radiant intensity; direction: radiance / density, density)
+//   3: radiance, area                 (radius 0: radiant intensity; direction: radiance / density, density;
+//                                      point of an emissive surface: radiance, 1 / density)
 //   4: emission axis (unit)           w: tan of the half spread, 0 = Lambertian
 //   5: half width vector (area), or row 0 of the inverse spot matrix; w: cosine of the half cone
 //   6: half height vector, or row 1;  w: 1 / ((1 - cosine) blend), 0 = hard edge
@@ -18,6 +19,7 @@
 #define LIGHT_RECTANGLE 3
 #define LIGHT_ELLIPSE 4
 #define LIGHT_DIRECTION 5
+#define LIGHT_SURFACE 6
 
 #define LIGHT_DIFFUSE 1
 #define LIGHT_GLOSSY 2
@@ -113,11 +115,14 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     density = 1.0 / light.area;
     return light.radiance * light.area;
   }
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
     vec3 to_light = light.point - position;
     float squared = max(dot(to_light, to_light), 1e-30);
     direction = to_light * inversesqrt(squared);
     float cos_light = -dot(direction, light.axis);
+    if (light.kind == LIGHT_SURFACE) {
+      cos_light = abs(cos_light);  // meshes emit to both sides
+    }
     if (cos_light <= 0.0) {
       return vec3(0.0);
     }
@@ -202,7 +207,7 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     density = t * t / max(light.area * cos_light, 1e-30);
     return light.radiance * spread_attenuation(light.spread, cos_light);
   }
-  if (light.kind == LIGHT_DIRECTION || light.radius <= 0.0) {
+  if (light.kind == LIGHT_DIRECTION || light.kind == LIGHT_SURFACE || light.radius <= 0.0) {
     return vec3(0.0);
   }
   vec3 to_centre = light.centre - origin;

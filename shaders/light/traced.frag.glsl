@@ -102,14 +102,38 @@ void main()
       choice = (choice - p) / max(1.0 - p, 1e-7);
     }
   }
-  if (kept_importance <= 0.0) {
-    return;
-  }
   // Away from the surface by what float32 positions of this size cannot tell apart.
   vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
-  float blocked = trace_nearest(origin, kept_direction, reach, salt.z + uint(film_view.sample_index));
-  float ignored;
-  float limit = (blocked < reach) ? blocked : 1e29;
-  vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
-  out_glossy = vec4(kept_weight * light * (total / (kept_importance * float(count))), 0.0);
+  uint layers = salt.z + uint(film_view.sample_index);
+  ivec2 hit;
+  if (kept_importance > 0.0) {
+    float blocked = trace_nearest(origin, kept_direction, reach, layers, hit);
+    float ignored;
+    float limit = (blocked < reach) ? blocked : 1e29;
+    vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
+    out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
+  }
+  if (emissive_power > 0.0) {
+    // Emissive triangles are only known once a ray meets them, so they cannot be weighed beforehand: a ray of their own.
+    vec3 weight;
+    vec3 direction = lobe_sample(lobe, u, weight);
+    if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
+      return;
+    }
+    float t = trace_nearest(origin, direction, 1e29, layers, hit);
+    if (t < 1e29) {
+      vec3 normal;
+      vec3 emission = triangle_emission(hit, normal);
+      float share = 1.0;
+      if (!mirror && max_component(abs(emission)) > 0.0) {
+        float lobe_density;
+        lobe_reflection(lobe, direction, lobe_density);
+        // Points are drawn with density luminance / power per area (addon/techniques/emissive_light.py).
+        float light_density = luminance(abs(emission)) / emissive_power * t * t / max(abs(dot(normal, direction)), 1e-6);
+        float ratio = emissive_points * light_density / max(lobe_density, 1e-30);
+        share = 1.0 / (1.0 + ratio * ratio);
+      }
+      out_glossy.rgb += weight * emission * share;
+    }
+  }
 }

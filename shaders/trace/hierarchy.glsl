@@ -6,7 +6,7 @@
 #include "lib/random.glsl"
 
 #define NODE_TEXELS 6
-#define LEAF_TEXELS 10
+#define LEAF_TEXELS 13
 
 vec4 node_texel(int index)
 {
@@ -47,10 +47,11 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction)
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
 }
 
-// Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`. Triangles with an opacity
-// below one are passed at random, the same way for the same `salt`.
-float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt)
+// Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
+// number there. Triangles with an opacity below one are passed at random, the same way for the same `salt`.
+float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ivec2 hit)
 {
+  hit = ivec2(-1);
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
   float nearest = limit;
   int level = 0;
@@ -69,8 +70,8 @@ float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt)
       vec4 z1 = (node_texel(base + 5) - origin.z) * inverse.z;
       vec4 enter = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), vec4(0.0)));
       vec4 leave = min(min(max(x0, x1), max(y0, y1)), min(max(z0, z1), vec4(nearest)));
-      bvec4 hit = lessThanEqual(enter, leave * 1.0000004);
-      uint mask = (hit.x ? 1u : 0u) | (hit.y ? 2u : 0u) | (hit.z ? 4u : 0u) | (hit.w ? 8u : 0u);
+      bvec4 met = lessThanEqual(enter, leave * 1.0000004);
+      uint mask = (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
       if (level < 8) {
         pending.x |= mask << uint(4 * level);
       }
@@ -107,7 +108,11 @@ float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt)
         vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                            to_unit(roll * 277803737u + 7u));
         t = mix(vec4(1e30), t, lessThan(chance, opacity));
-        nearest = min(nearest, min(min(t.x, t.y), min(t.z, t.w)));
+        best = min(min(t.x, t.y), min(t.z, t.w));
+        if (best < nearest) {
+          nearest = best;
+          hit = ivec2(next, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
+        }
       }
     }
     else {
@@ -118,4 +123,15 @@ float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt)
     }
   }
   return nearest;
+}
+
+// Radiance that a triangle emits (mean over its material), and its unit normal.
+vec3 triangle_emission(ivec2 hit, out vec3 normal)
+{
+  int base = hit.x * LEAF_TEXELS;
+  int k = hit.y;
+  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
+  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  normal = safe_normalize(cross(e1, e2));
+  return vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
 }

@@ -1,0 +1,117 @@
+"""Emissive light: meshes whose material emits, as light sources of other surfaces.
+
+Points on emissive triangles are drawn in proportion to area times luminance, a few per sample, each with depth maps:
+
+    L(x, v) = mean over samples of  f(x, v, w) cos(w) Le |cos_y| V(x, y) / (|x - y|^2 p(y)),   p(y) = lum(Le) / power
+
+As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissive triangles by their own rays
+(traced_glossy), weighted against these points.
+
+| cost | per sample |
+|---|---|
+| maps | `points` x (1 view, or up to 6 cube faces) |
+| passes | 1 over the screen |
+
+Fails: emission from a texture is taken at its mean over the material; very many small emitters need many samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame import depth_maps, lights
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique
+from ..materials.compiler import may_emit
+from ..snapshot.scene import Snapshot
+from .accumulated_maps import RESOLUTION, DepthMapService, map_resolution, rounds
+from .direct_light import DIRECT_WRITES, shade
+from .surfaces import SURFACES
+
+
+class EmissiveTriangles:
+    """World-space triangles that emit, ready to draw points from."""
+
+    def __init__(self, frame: Frame):
+        corners, radiance = [], []
+        materials = frame.materials.compiled
+        for instance in frame.snapshot.instances:
+            mesh = frame.snapshot.meshes[instance.mesh]
+            slots = np.array([materials[m].emission if materials[m].emissive else (0, 0, 0) for m in instance.materials])
+            if not np.any(slots) or not mesh.triangle_count:
+                continue
+            emission = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]
+            shining = np.abs(emission).max(axis=1) > 0
+            matrix = instance.matrix.copy()
+            matrix[:3, 3] -= frame.geometry.origin
+            world = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[shining]]] @ matrix[:3, :3].T
+            corners.append(world + matrix[:3, 3])
+            radiance.append(emission[shining])
+        self.corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
+        self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
+        normal = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        double_area = np.linalg.norm(normal, axis=1)
+        self.normal = normal / np.maximum(double_area, 1e-30)[:, None]
+        weight = np.abs(self.radiance) @ lights.LUMINANCE * double_area / 2
+        weight = np.where(np.isfinite(weight), weight, 0.0)
+        self.power = float(weight.sum())
+        self._edges = np.concatenate([[0.0], np.cumsum(weight)])
+
+    def draw(self, x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """From three uniform numbers: point, normal, radiance, density per m2."""
+        k = int(np.clip(np.searchsorted(self._edges, x * self.power, side="right") - 1, 0, len(self.radiance) - 1))
+        root = np.sqrt(y)
+        a, b, c = self.corners[k]
+        point = (1 - root) * a + root * (1 - z) * b + root * z * c
+        density = float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
+        return point, self.normal[k], self.radiance[k], density
+
+
+class EmissiveLight(Technique):
+    name = "emissive_light"
+    label = "Emissive surfaces"
+    params = (
+        Param("points", "Points", 2, "Points on emissive surfaces that are drawn per sample", 1, 64),
+        RESOLUTION,
+    )
+    reads = SURFACES
+    writes = DIRECT_WRITES
+
+    def __init__(self):
+        self.service = DepthMapService()
+        self._sources = lights.Sources()
+        self._triangles: EmissiveTriangles | None = None
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        if not any(may_emit(snapshot.materials[slot].graph) for slot in used):
+            return "no material emits light"
+        return None
+
+    def run(self, frame: Frame) -> None:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        if frame.sample == 0:
+            self._triangles = EmissiveTriangles(frame)
+        count = frame.settings.get(self, "points")
+        frame.services["emissive"] = (self._triangles.power, float(count))
+        if not self._triangles.power > 0:
+            return
+        resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.GLOSSY_FLAG + lights.TRACED_FLAG
+        items = []
+        for k in range(count):
+            point, normal, radiance, density = self._triangles.draw(*frame.random_volume(f"emissive{k}"))
+            jitter = (*frame.random(f"map/emissive{k}"), *frame.random(f"map/emissive{k}/turn"))
+            views = depth_maps.point_views(
+                point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution
+            )  # fmt: skip
+            items.append((lights.surface_row(point, normal, radiance, density * count, flags, 0, len(views)), views))
+        for rows, views in rounds(items, resolution):
+            shade(frame, self, rows, self._sources, self.service.draw(frame, self, views, resolution))
+
+    def release(self) -> None:
+        self.service.release()
+        self._sources.release()
+        self._triangles = None
