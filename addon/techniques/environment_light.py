@@ -13,7 +13,7 @@ orthographic depth map along w over what the camera sees, so it converges to the
 |---|---|
 | maps | `directions` orthographic views (more where the picture reaches from near to far) |
 | passes | 1 over the screen |
-| first sample | 192 x 512 rays |
+| first sample | 48 x 512 rays |
 
 Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (see traced_glossy).
 Few samples under an even sky show faint overlapping hard shadows.
@@ -35,7 +35,7 @@ from .direct_light import DIRECT_WRITES, shade
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 
-PROBES = (16, 12)
+PROBES = (8, 6)
 GUIDE = passes.fullscreen_program(
     "environment guide",
     "light/guide.frag.glsl",
