@@ -55,6 +55,11 @@ class Stage:
         corners = [(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]
         return self.mesh(corners, [(0, 1, 2, 3)], material=material, **placement)
 
+    def remove(self, placed):
+        """Take an object out of the file, with its mesh and materials."""
+        data = placed.data
+        bpy.data.batch_remove([placed, *(material for material in data.materials if material), data])
+
     def floor(self, half=20.0, **options):
         """A white Lambertian plane at z = 0 that reaches beyond the picture."""
         options.setdefault("material", self.diffuse())

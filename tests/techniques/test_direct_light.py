@@ -285,10 +285,6 @@ def test_another_seed_gives_other_noise_with_the_same_mean(stage):
     assert a.mean() == pytest.approx(b.mean(), rel=2e-3)
 
 
-FOLLOWS_UID = pytest.mark.xfail(strict=True, reason="the numbers of a light follow its object's session uid")
-
-
-@FOLLOWS_UID
 def test_the_same_file_opened_twice_gives_the_same_picture(stage, tmp_path):
     furnished(stage)
     stage.light("AREA", (0.5, 0.7, 2), size=1.5)
@@ -302,7 +298,6 @@ def test_the_same_file_opened_twice_gives_the_same_picture(stage, tmp_path):
     np.testing.assert_array_equal(pictures[0], pictures[1])
 
 
-@FOLLOWS_UID
 def test_objects_in_another_order_give_the_same_picture(stage):
     pictures = []
     for order in (1, -1):

@@ -99,6 +99,7 @@ def test_blockers_at_two_heights_block_together_what_either_blocks(floor, name):
 
 def test_a_grid_of_bars_at_two_heights_blocks_as_the_union_of_its_bars(floor):
     floor.light("AREA", (0, 0, HEIGHT), size=0.6)
+    floor.scene.candela.accumulated_maps_texels_per_pixel = 8.0  # narrow bars: texels blur what lies within them
     bars = [((x, -EVERYWHERE), (x + 0.2, EVERYWHERE), 0.8) for x in np.arange(-1.4, 1.4, 0.4)]
     bars += [((-EVERYWHERE, y), (EVERYWHERE, y + 0.2), 0.6) for y in np.arange(-1.4, 1.4, 0.4)]
     for bar in bars:
@@ -107,7 +108,7 @@ def test_a_grid_of_bars_at_two_heights_blocks_as_the_union_of_its_bars(floor):
     points = receivers(size).reshape(*size[::-1], 3)[1::3, 1::3].reshape(-1, 3)
     expected = model.irradiance(source, points, bars) / model.irradiance(source, points)
     found = irradiance(floor, 256, size)[1::3, 1::3].ravel() / model.irradiance(source, points)
-    assert np.sqrt(((found - expected) ** 2).mean()) < 0.02  # a dozen edges, each of 0.005 at 256 samples
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.015  # a dozen edges, each of 0.005 at 256 samples
     assert found.mean() == pytest.approx(expected.mean(), rel=0.01)
 
 

@@ -1,0 +1,136 @@
+"""The world as a light: irradiance and occlusion of the sky in closed form, images, visibility."""
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.techniques.conftest import places
+
+SPAN = 4.0
+
+
+@pytest.fixture
+def floor(stage):
+    stage.floor(200.0)
+    stage.camera_above(SPAN)
+    stage.scene.camera.data.clip_end = 1000
+    return stage
+
+
+def diffuse(stage, samples, size=(32, 32)):
+    """Radiance of a white floor; under an open sky of radiance 1 it is 1."""
+    return stage.render(samples, size)["diffuse_direct"].astype(float)
+
+
+def sky(stage, pixels):
+    """A world with an equirectangular image, (H, W, 3) linear radiance, bottom row first."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new("Sky", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))]).astype(np.float32).ravel())
+    image.update()
+    tree = stage.world().node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+
+
+def directions(height, width):
+    """Unit vectors of an equirectangular image's texel centres, and their solid angles."""
+    v, u = (np.mgrid[0:height, 0:width] + 0.5) / np.array([height, width])[:, None, None]
+    latitude, azimuth = (v - 0.5) * np.pi, (0.5 - u) * 2 * np.pi
+    ring = np.cos(latitude)
+    direction = np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), np.sin(latitude)], axis=-1)
+    return direction, ring * np.pi / height * 2 * np.pi / width
+
+
+def test_an_open_floor_under_an_even_sky_has_the_skys_colour(floor):
+    floor.world((0.2, 0.5, 1.0), strength=3.0)
+    np.testing.assert_allclose(diffuse(floor, 64), np.broadcast_to([0.6, 1.5, 3.0], (32, 32, 3)), rtol=0.005)
+
+
+def test_a_long_wall_hides_its_form_factor_of_the_sky(floor):
+    """Height h at distance d: the wall fills (1 - cos a) / 2 of the sky, tan a = h / d."""
+    floor.world()
+    wall = floor.mesh([(0, -300, 0), (0, 300, 0), (0, 300, 1), (0, -300, 1)], [(0, 1, 2, 3)])
+    wall.visible_camera = False
+    x, _ = places((64, 4), SPAN)
+    expected = 0.5 + 0.5 * np.abs(x) / np.hypot(1.0, x)
+    found = diffuse(floor, 256, (64, 4))[..., 0]
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.01
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
+
+
+def test_a_roof_over_everything_leaves_darkness(floor):
+    floor.world()
+    floor.blocker((-300, -300), (300, 300), 0.5)
+    assert diffuse(floor, 16).max() < 0.01
+
+
+def test_half_a_sky_from_an_image_gives_half_the_light(floor):
+    """Radiance 2 where x > 0: irradiance pi, whatever the seam between the halves does."""
+    direction, _ = directions(32, 64)
+    floor_light = np.where(direction[..., :1] > 0, 2.0, 0.0) * np.ones(3)
+    sky(floor, floor_light)
+    assert diffuse(floor, 128).mean() == pytest.approx(1.0, rel=0.005)
+
+
+def test_the_light_of_an_image_is_the_integral_over_its_texels(floor):
+    direction, solid_angle = directions(16, 32)
+    pixels = np.random.default_rng(4).uniform(0, 1, (16, 32, 3)) ** 4
+    pixels[12, 5] = 40.0  # a lamp of one texel
+    sky(floor, pixels)
+    # Bilinear filtering moves light between rows of different cosine; 16 x finer texels of the filtered image do not.
+    fine = filtered(pixels, 16)
+    direction, solid_angle = directions(*fine.shape[:2])
+    weight = (np.maximum(direction[..., 2], 0) * solid_angle)[..., None]
+    np.testing.assert_allclose(
+        diffuse(floor, 256).mean(axis=(0, 1)), (fine * weight).sum(axis=(0, 1)) / np.pi, rtol=0.01
+    )
+
+
+def filtered(pixels, times):
+    """The image between its texel centres, as a bilinear lookup sees it."""
+    height, width = pixels.shape[:2]
+    y, x = (np.arange(height * times) + 0.5) / times - 0.5, (np.arange(width * times) + 0.5) / times - 0.5
+    y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
+    ty, tx = (y - y0)[:, None, None], (x - x0)[None, :, None]
+    rows, columns = np.clip([y0, y0 + 1], 0, height - 1), np.array([x0, x0 + 1]) % width
+    a, b = pixels[rows[0]], pixels[rows[1]]
+    lower = a[:, columns[0]] * (1 - tx) + a[:, columns[1]] * tx
+    upper = b[:, columns[0]] * (1 - tx) + b[:, columns[1]] * tx
+    return lower * (1 - ty) + upper * ty
+
+
+def test_k_times_the_worlds_strength_is_k_times_the_picture(floor):
+    floor.blocker((-0.5, -0.5), (0.5, 0.5), 0.5)
+    world = floor.world((0.2, 0.5, 1.0))
+    one = floor.render(4)["combined"][..., :3]
+    next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Strength"].default_value = 4.0
+    np.testing.assert_allclose(floor.render(4)["combined"][..., :3], one * 4, rtol=1e-5)
+
+
+def test_a_world_hidden_from_the_camera_still_gives_light(stage):
+    stage.rectangle((-1, -2), (1, 2), material=stage.diffuse())
+    stage.camera_above(SPAN)
+    world = stage.world()
+    shown = stage.render(16)
+    world.cycles_visibility.camera = False
+    hidden = stage.render(16)
+    x, _ = places((32, 32), SPAN)
+    assert (shown["combined"][np.abs(x) > 1.1, :3] == 1).all()
+    assert (hidden["combined"][np.abs(x) > 1.1, :3] == 0).all()
+    np.testing.assert_allclose(hidden["diffuse_direct"], shown["diffuse_direct"], rtol=1e-5)
+
+
+def test_a_transparent_film_shows_the_world_as_alpha_and_in_its_own_pass(stage):
+    stage.rectangle((-1, -2), (1, 2), material=stage.diffuse())
+    stage.camera_above(SPAN)
+    stage.world((0.25, 0.5, 1.0))
+    stage.scene.render.film_transparent = True
+    images = stage.render(16)
+    outside = np.abs(places((32, 32), SPAN)[0]) > 1.1
+    assert (images["combined"][outside] == 0).all()
+    assert (images["environment"][outside] == [0.25, 0.5, 1.0]).all()
+    assert (images["combined"][~outside & (np.abs(places((32, 32), SPAN)[0]) < 0.9), 3] == 1).all()

@@ -1,0 +1,182 @@
+"""Skip, reuse, then compute: the ledger says what ran and why the rest did not, and unchanged work is not redone."""
+
+import resource
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon import engine
+from addon.frame.ledger import RAN, REUSED, SKIPPED
+from addon.gfx import images, library
+
+
+@pytest.fixture
+def room(stage):
+    """A floor, two boxes and a lamp."""
+    stage.floor(material=stage.principled())
+    stage.boxes = [stage.rectangle((x, -0.3), (x + 0.6, 0.3), 0.5, material=stage.diffuse(0.5)) for x in (-1, 0.5)]
+    stage.lamp = stage.light("AREA", (0.5, 0.7, 2), size=1.0)
+    stage.camera_above(4.0)
+    return stage
+
+
+def states(stage):
+    return {row.name: row.state for row in stage.ledger.rows}
+
+
+def reason(stage, name):
+    return stage.ledger.row(name).reason
+
+
+def test_a_scene_without_lights_draws_no_light_and_no_shadow(room):
+    room.lamp.hide_render = True
+    images = room.render(2)
+    assert states(room)["direct_light"] == states(room)["accumulated_maps"] == SKIPPED
+    assert reason(room, "direct_light") == "the scene has no light with power"
+    assert reason(room, "environment_light") == "the world is black"
+    assert not images["combined"][..., :3].any()
+
+
+def test_a_scene_without_surfaces_draws_no_light(stage):
+    stage.light("POINT")
+    stage.world()
+    stage.camera_above(4.0)
+    images = stage.render(2)
+    assert {name for name, state in states(stage).items() if state == RAN} == {"surfaces", "film"}
+    assert (images["combined"] == 1).all()
+
+
+def test_lights_without_shadow_need_no_depth_maps(room):
+    room.lamp.data.use_shadow = False
+    room.render(2)
+    assert states(room)["accumulated_maps"] == SKIPPED
+    assert reason(room, "accumulated_maps") == "no light casts a shadow"
+
+
+def test_what_ran_is_timed_and_counted(room):
+    room.render(4)
+    assert room.ledger.samples == 4
+    row = room.ledger.row("direct_light")
+    assert row.state == RAN
+    assert row.milliseconds > 0
+    assert row.counters["passes"] == 4
+    assert room.ledger.row("surfaces").counters["passes"] == 4
+    assert room.ledger.row("accumulated_maps").counters["maps"] >= 4
+    assert {"sync", "upload", "compile", "passes", "readback", "total"} <= room.ledger.times.keys()
+
+
+def test_a_second_render_of_an_unchanged_scene_draws_nothing(room):
+    first = room.render(4)
+    second = room.render(4)
+    assert all(row.state in (REUSED, SKIPPED) for row in room.ledger.rows)
+    for name, pixels in first.items():
+        np.testing.assert_array_equal(second[name], pixels)
+
+
+CHANGES = {
+    "light moved": lambda s: s.lamp.location.__setitem__(0, -1.0),
+    "light power": lambda s: setattr(s.lamp.data, "energy", 50.0),
+    "light colour": lambda s: setattr(s.lamp.data, "color", (1, 0, 0)),
+    "light size": lambda s: setattr(s.lamp.data, "size", 0.2),
+    "object moved": lambda s: s.boxes[0].location.__setitem__(2, 0.3),
+    "object hidden": lambda s: setattr(s.boxes[0], "hide_render", True),
+    "shadow switched off": lambda s: setattr(s.boxes[0], "visible_shadow", False),
+    "vertex moved": lambda s: move_vertex(s),
+    "camera moved": lambda s: s.scene.camera.location.__setitem__(0, 0.5),
+    "lens": lambda s: setattr(s.scene.camera.data, "ortho_scale", 3.0),
+    "material": lambda s: set_color(s),
+}
+
+
+def move_vertex(stage):
+    mesh = stage.boxes[1].data
+    mesh.vertices[0].co.x += 0.4
+    mesh.update()
+
+
+def set_color(stage):
+    stage.boxes[0].data.materials[0].node_tree.nodes[0].inputs["Color"].default_value = (1, 0, 0, 1)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_whatever_changes_the_picture_is_drawn_anew_and_as_if_it_were_the_first(room, change):
+    before = room.render(4)["combined"]
+    CHANGES[change](room)
+    after = room.render(4)["combined"]
+    assert states(room)["surfaces"] == RAN
+    assert (after != before).any()
+    engine.free_sessions()
+    np.testing.assert_array_equal(room.render(4)["combined"], after)
+
+
+def test_moving_an_object_uploads_no_mesh(room):
+    room.render(1)
+    uploads = room.renderer.geometry.uploads
+    assert uploads > 0
+    room.boxes[0].location.x += 0.3
+    room.render(1)
+    room.lamp.location.x += 0.3
+    room.render(1)
+    assert room.renderer.geometry.uploads == uploads
+
+
+def test_sliders_of_a_material_compile_nothing(room):
+    room.render(1)
+    compiled = library.compile_count
+    shader = room.scene.objects["Mesh"].active_material.node_tree.nodes[0]
+    for value in (0.1, 0.9):
+        shader.inputs["Roughness"].default_value = value
+        shader.inputs["Base Color"].default_value = (value, 0.5, 0.5, 1)
+        room.render(1)
+        assert states(room)["surfaces"] == RAN
+    assert library.compile_count == compiled
+
+
+def test_changing_lights_world_and_size_compiles_nothing(room):
+    room.world((0.1, 0.1, 0.1))
+    room.render(1)
+    compiled = library.compile_count
+    room.lamp.data.type = "SUN"
+    room.render(1)
+    room.render(1, (24, 40))
+    room.scene.candela.seed = 3
+    room.render(1, seed=3)
+    assert library.compile_count == compiled
+
+
+def test_a_technique_that_was_skipped_leaves_no_light_behind(room):
+    """Images are kept from frame to frame: what an earlier frame wrote must not show in a later one."""
+    room.world((1, 1, 1))
+    assert room.render(2)["combined"][..., :3].max() > 0
+    room.scene.world = None
+    room.lamp.hide_render = True
+    assert not room.render(2)["combined"][..., :3].any()
+
+
+STATISTICS = Path("/proc/self/statm")  # sizes in pages: program, resident, …
+
+
+def resident_bytes():
+    return int(STATISTICS.read_text().split()[1]) * resource.getpagesize()
+
+
+@pytest.mark.skipif(not STATISTICS.exists(), reason="only Linux tells a process its size in a file")
+def test_fifty_renders_with_changes_leave_memory_flat(room):
+    """Sessions freed, sizes and settings changed, objects added and removed: neither pool nor process grows."""
+    room.world((0.2, 0.3, 0.4))
+    sizes, used = [(32, 32), (48, 16), (20, 36)], []
+    for k in range(50):
+        room.lamp.data.energy = 50 + k
+        room.lamp.data.type = ("AREA", "SUN", "POINT")[k % 3]
+        extra = room.rectangle((-0.2, -0.2), (0.2, 0.2), 0.3 + 0.01 * k, material=room.diffuse(0.5))
+        room.render(1, sizes[k % 3])
+        room.remove(extra)
+        if k % 2:
+            engine.free_sessions()
+        used.append((resident_bytes(), images.pool.allocated_bytes))
+    (early, _), (late, pool) = np.median(used[10:20], axis=0), np.median(used[40:], axis=0)
+    assert late < 1.05 * early
+    engine.free_sessions()
+    assert images.pool.allocated_bytes == 0
+    assert pool <= max(bytes_ for _, bytes_ in used[:10])
