@@ -31,6 +31,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_blends"
+SLOW = 30.0  # seconds of a cold render; what is slower is timed once instead of several times
 STAGES = ("sync", "upload", "compile", "passes", "readback")  # of Candela's ledger; what is left is "other"
 
 
@@ -122,7 +123,9 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 def report(found: dict[str, list[Result]]) -> str:
     """All tables, for the terminal."""
-    rows = [("scene", "engine", "samples", "median s", "p95 s", "CPU s", "cold s", "relMSE", "trimmed", "× Candela")]
+    rows = [
+        ("scene", "engine", "samples", "runs", "median s", "p95 s", "CPU s", "cold s", "relMSE", "trimmed", "× Candela")
+    ]
     for scene, results in found.items():
         own = next(result.median for result in results if result.entrant == CANDELA)
         rows += [
@@ -130,6 +133,7 @@ def report(found: dict[str, list[Result]]) -> str:
                 scene,
                 result.entrant.label,
                 str(result.entrant.samples),
+                str(len(result.times)),
                 f"{result.median:.3f}",
                 f"{result.p95:.3f}",
                 f"{np.median(result.cpu):.2f}",
@@ -293,6 +297,8 @@ def measure(path: Path, size: tuple[int, int], runs: int, reference_samples: int
     for run in range(runs):
         for result in results:
             tick(f"{result.entrant.label}, {result.entrant.samples}")
+            if run > 0 and result.cold > SLOW:
+                continue
             made = render(scene, layer, result.entrant, run + 1, size)
             result.times.append(made.seconds)
             result.cpu.append(made.cpu)
@@ -384,8 +390,8 @@ def main(arguments: list[str]) -> int:
         print(f"{name}: EEVEE / Candela {ratio(found[name]):.1f}", flush=True)
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(as_json(found, about), encoding="utf-8")
+        draw(found, about, options.picture)
     print(f"\n{report(found)}")
-    draw(found, about, options.picture)
     print(f"\n{options.json}\n{options.picture}")
     return 0
 
