@@ -162,6 +162,7 @@ class Viewport:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
             frame.ledger.times["total"] = self.seconds
+            images.pool.trim()  # what only moving views needed
             self.news = True
         return self.picture
 

@@ -72,9 +72,7 @@ class Environment:
         guided = self._by_radiance * usefulness[row, column]
         solid_angle = self._cell_solid_angle(height, width)
         total = float((guided * solid_angle).sum())
-        self._set_density(
-            0.9 * guided / total + 0.1 * self._by_radiance if total > 0 else self._by_radiance
-        )
+        self._set_density(0.9 * guided / total + 0.1 * self._by_radiance if total > 0 else self._by_radiance)
 
     @staticmethod
     def _cell_solid_angle(height: int, width: int) -> np.ndarray:

@@ -46,7 +46,9 @@ class MaterialSet:
             cache[material.key] = cached
             compiled = cached[1]
             self.compiled.append(compiled)
-            notes += [Note(f"Material '{material.name}'", text, material.name, node) for node, text in compiled.fallbacks]
+            notes += [
+                Note(f"Material '{material.name}'", text, material.name, node) for node, text in compiled.fallbacks
+            ]
         self._cache = cache
         self.notes = tuple(notes)
         needed = {key for compiled in self.compiled for key in compiled.images}
@@ -54,7 +56,7 @@ class MaterialSet:
             key: self._images.get(key) or _upload(snapshot.images[key[0]])
             for key in ((name, _version(snapshot, name)) for name in needed)
         }
-        self._versions = {name: version for name, version in self._images}
+        self._versions = dict(self._images)
         self._blocks = {key: block for key, block in self._blocks.items() if key in cache}
         self._keys = [material.key for material in snapshot.materials]
         for key, compiled in zip(self._keys, self.compiled):
@@ -115,7 +117,8 @@ def _shared(compiled: CompiledMaterial) -> dict:
             *(("VEC4", f"attribute{k}") for k in range(count)),
         ),
         "varyings": (
-            ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"), ("flat", "IVEC2", "instance_flat"),
+            ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"),
+            ("flat", "IVEC2", "instance_flat"),
             *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
         ),
         "textures": (

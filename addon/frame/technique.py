@@ -48,7 +48,16 @@ class Param:
 
 def _as_bool(value) -> bool:
     if isinstance(value, str):
-        words = {"1": True, "true": True, "on": True, "yes": True, "0": False, "false": False, "off": False, "no": False}
+        words = {
+            "1": True,
+            "true": True,
+            "on": True,
+            "yes": True,
+            "0": False,
+            "false": False,
+            "off": False,
+            "no": False,
+        }
         return words[value.lower()] if value.lower() in words else _refuse(value)
     return bool(value)
 

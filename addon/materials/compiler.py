@@ -167,7 +167,10 @@ class _Compilation:
         return self._leaf(emitter, IMPLICIT_EMISSION, weight)
 
 
-EMITTERS = {"ShaderNodeEmission": ("Strength", "Color"), "ShaderNodeBsdfPrincipled": ("Emission Strength", "Emission Color")}
+EMITTERS = {
+    "ShaderNodeEmission": ("Strength", "Color"),
+    "ShaderNodeBsdfPrincipled": ("Emission Strength", "Emission Color"),
+}
 
 
 def may_emit(graph: Graph) -> bool:

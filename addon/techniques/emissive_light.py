@@ -38,7 +38,9 @@ class EmissiveTriangles:
         materials = frame.materials.compiled
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
-            slots = np.array([materials[m].emission if materials[m].emissive else (0, 0, 0) for m in instance.materials])
+            slots = np.array(
+                [materials[m].emission if materials[m].emissive else (0, 0, 0) for m in instance.materials]
+            )
             if not np.any(slots) or not mesh.triangle_count:
                 continue
             emission = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]

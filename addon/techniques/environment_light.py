@@ -34,7 +34,6 @@ from .accumulated_maps import RESOLUTION, DepthMapService, map_resolution, round
 from .direct_light import DIRECT_WRITES, shade
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
-
 PROBES = (8, 6)
 GUIDE = passes.fullscreen_program(
     "environment guide",
@@ -60,8 +59,12 @@ class EnvironmentLight(Technique):
     slot = "environment"
     params = (
         Param(
-            "directions", "Directions", 0,
-            "Directions of the world that are drawn per sample; 0: more where fewer lights need the time", 0, 64,
+            "directions",
+            "Directions",
+            0,
+            "Directions of the world that are drawn per sample; 0: more where fewer lights need the time",
+            0,
+            64,
         ),
         RESOLUTION,
         Param("guiding", "Guiding", True, "Draw more directions from where light reaches what the camera sees"),
@@ -89,13 +92,17 @@ class EnvironmentLight(Technique):
         if frame.sample == 0:
             self._guide(frame)
         seen = frame.snapshot.world.visibility
-        flags = lights.SHADOW_FLAG + lights.TRACED_FLAG + lights.DIFFUSE_FLAG * seen.diffuse + lights.GLOSSY_FLAG * seen.glossy
+        flags = (
+            lights.SHADOW_FLAG
+            + lights.TRACED_FLAG
+            + lights.DIFFUSE_FLAG * seen.diffuse
+            + lights.GLOSSY_FLAG * seen.glossy
+        )
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         count = directions_per_sample(frame)
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
         items = []
         for k in range(count):
-
             x, y = frame.random(f"environment{k}")
             direction, radiance, density = frame.environment.draw(x, y)
             views = []

@@ -109,8 +109,7 @@ class Surfaces(Technique):
             images.pool.give(image)
         low, high = low.reshape(-1, 4).astype(np.float64), high.reshape(-1, 4).astype(np.float64)
         seen = (np.isfinite(low) & np.isfinite(high)).all(axis=1) & (low <= high).all(axis=1)
-        seen &= (low[:, 3] < 1e29)
+        seen &= low[:, 3] < 1e29
         order = np.argsort(low[seen, 3], kind="stable")
         low, high = low[seen][order], high[seen][order]
         return Receivers(low[:, :3], high[:, :3], low[:, 3])
-
