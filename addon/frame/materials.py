@@ -56,7 +56,7 @@ class MaterialSet:
             key: self._images.get(key) or _upload(snapshot.images[key[0]])
             for key in ((name, _version(snapshot, name)) for name in needed)
         }
-        self._versions = dict(self._images)
+        self._versions = dict(self._images.keys())  # the keys are pairs of name and version
         self._blocks = {key: block for key, block in self._blocks.items() if key in cache}
         self._keys = [material.key for material in snapshot.materials]
         for key, compiled in zip(self._keys, self.compiled):

@@ -1,6 +1,7 @@
 // Closures: what a surface point does with light, collected while the material graph is walked.
 // Diffuse weights add up. Of several glossy lobes one is kept per sample with probability proportional to its
 // weight (reservoir sampling) and carries all of their weight, so the lobes stay apart and the mean is exact.
+#include "lib/math.glsl"
 
 struct SurfacePoint {
   vec3 position;          // world space, metres, relative to the render origin
@@ -118,7 +119,15 @@ void closure_transparent(inout Closures c, vec3 weight)
   c.transparency += weight;
 }
 
+// 0 for a colour that is no number: node math may overflow or divide by zero. Cycles drops such light, too.
+vec3 finite_or_black(vec3 color)
+{
+  return (is_finite(color.x) && is_finite(color.y) && is_finite(color.z)) ? color : vec3(0.0);
+}
+
 void closures_end(inout Closures c)
 {
-  c.glossy_weight *= c.glossy_sum;
+  c.glossy_weight = finite_or_black(c.glossy_weight * c.glossy_sum);
+  c.diffuse = finite_or_black(c.diffuse);
+  c.emission = finite_or_black(c.emission);
 }

@@ -1,0 +1,106 @@
+"""Meshes that emit light: the same irradiance as an area light of their radiance, from both sides, with shadows."""
+
+import numpy as np
+import pytest
+
+from tests.techniques import light_model as model
+from tests.techniques.conftest import places
+
+SIZE, SPAN = (32, 32), 4.0
+RADIANCE = 5.0
+
+
+@pytest.fixture
+def floor(stage):
+    stage.floor()
+    stage.camera_above(SPAN)
+    stage.glow = stage.material("ShaderNodeEmission", Strength=RADIANCE, Color=(1, 1, 1, 1))
+    return stage
+
+
+def receivers(stride):
+    x, y = (a[::stride, ::stride].ravel() for a in places(SIZE, SPAN))
+    return np.column_stack([x, y, np.zeros_like(x)])
+
+
+def panel(stage, z=2.0, half=0.5, cuts=1, **placement):
+    """A square emitter of cuts x cuts faces, which the camera does not see."""
+    edges = np.linspace(-half, half, cuts + 1)
+    corners = [(x, y, z) for y in edges for x in edges]
+    faces = [
+        (j * (cuts + 1) + i, j * (cuts + 1) + i + 1, (j + 1) * (cuts + 1) + i + 1, (j + 1) * (cuts + 1) + i)
+        for j in range(cuts)
+        for i in range(cuts)
+    ]
+    made = stage.mesh(corners, faces, material=stage.glow, **placement)
+    made.visible_camera = False
+    return made
+
+
+def irradiance(stage, samples=128):
+    return stage.render(samples, SIZE)["diffuse_direct"][..., 0].astype(float) * np.pi
+
+
+@pytest.mark.parametrize("cuts", [1, 7])
+def test_an_emissive_square_gives_its_form_factor_however_it_is_cut(floor, cuts):
+    panel(floor, cuts=cuts)
+    source = model.area((0, 0, 2), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    expected = model.irradiance(source, receivers(4))
+    found = irradiance(floor)[::4, ::4].ravel()
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
+
+
+def test_emission_leaves_both_sides(floor):
+    panel(floor, turn=(0, np.pi, 0), location=(0, 0, 4))
+    source = model.area((0, 0, 2), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    assert irradiance(floor).mean() == pytest.approx(model.irradiance(source, receivers(1)).mean(), rel=0.01)
+
+
+def test_the_scale_of_an_emitter_scales_its_light_with_its_area(floor):
+    """Radiance stays what it is: a quarter of the area gives a quarter of the light, from far away."""
+    far = panel(floor, z=0.0, half=0.2, location=(0, 0, 8))
+    whole = irradiance(floor, 64).mean()
+    far.scale = (0.5, 0.5, 1)
+    assert irradiance(floor, 64).mean() == pytest.approx(whole / 4, rel=0.01)
+
+
+def test_a_blocker_before_an_emitter_casts_its_penumbra(floor):
+    panel(floor)
+    edge = ((-9.0, -9.0), (0.0, 9.0), 1.0)
+    floor.blocker(*edge)
+    source = model.area((0, 0, 2), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
+    points = receivers(2)
+    whole = model.irradiance(source, points)
+    expected = model.irradiance(source, points, [edge]) / whole
+    found = irradiance(floor, 256)[::2, ::2].ravel() / whole
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.015
+
+
+def test_an_emitter_in_the_plane_of_a_ceiling_is_not_shadowed_by_it(floor):
+    """The lamp of a Cornell box that was not moved down."""
+    panel(floor)
+    alone = irradiance(floor)
+    for low, high in [((-9, -9), (-0.5, 9)), ((0.5, -9), (9, 9)), ((-0.5, 0.5), (0.5, 9)), ((-0.5, -9), (0.5, -0.5))]:
+        floor.blocker(low, high, 2.0)
+    np.testing.assert_allclose(irradiance(floor), alone, rtol=0.02)
+
+
+@pytest.mark.xfail(strict=True, reason="rays of the first sample do not know the emitters yet")
+def test_a_mirror_shows_an_emitter_as_bright_as_it_is(stage):
+    stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.0))
+    stage.camera_above(SPAN)
+    stage.glow = stage.material("ShaderNodeEmission", Strength=RADIANCE, Color=(1, 1, 1, 1))
+    panel(stage)
+    found = stage.render(4, SIZE)["glossy_direct"][..., 0]
+    x, y = places(SIZE, SPAN)
+    reach = np.maximum(np.abs(x), np.abs(y))
+    np.testing.assert_allclose(found[reach < 0.45], RADIANCE, rtol=1e-4)
+    assert (found[reach > 0.55] == 0).all()
+
+
+def test_without_emission_the_technique_says_so(stage):
+    stage.floor()
+    stage.camera_above(SPAN)
+    stage.render(1)
+    assert stage.ledger.row("emissive_light").reason == "no material emits light"
