@@ -23,7 +23,6 @@ class _CandelaPanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
-    bl_order = -1  # before Blender's own, which are registered first
     COMPAT_ENGINES = {ENGINE}
 
     @classmethod

@@ -1,111 +1,168 @@
-"""Runs inside a windowed Blender: render as F12 does, show the viewport rendered, take pictures, quit.
+"""Runs inside a windowed Blender: renders as F12 does, shows the viewport moving and at rest, and the panels."""
 
-    blender FILE.blend --python drive.py -- FOLDER ENGINE
-
-FOLDER receives render.png, viewport_first.png, viewport_early.png, viewport_late.png and result.json, which is written
-last and holds what Blender said on the way. Everything happens in a timer, between the events of the window's own
-loop, as it does for a person.
-"""
-
-import json
-import shutil
-import subprocess
 import sys
 import time
-import traceback
 from pathlib import Path
 
 import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Quaternion
 
-FOLDER, ENGINE = Path(sys.argv[-2]), sys.argv[-1]
+sys.path.insert(0, str(Path(__file__).parent))
+
+from stage import (
+    ENGINE,
+    FOLDER,
+    candela,
+    main_region,
+    picture,
+    render,
+    result,
+    run,
+    there,
+    viewport_area,
+    viewports,
+    wait_for_rest,
+    window,
+)
+
 RENDER_SIZE = (320, 180)
-RENDER_TIMEOUT_S = 240
-# When the pictures of the resting viewport are taken, in seconds after its first one. Three, because "refines" means
-# that the second is nearer to the third than the first is.
-EARLY_S, LATE_S = 3, 25
-
-result = {"render": "not finished"}
+SAMPLES = 8
+ORBIT_S = 5.0
 
 
 def steps():
-    """What is done, with the seconds to wait yielded in between."""
-    yield 2.0  # the window opens and is drawn
-    window = bpy.context.window_manager.windows[0]
-    scene = window.scene
+    scene = window().scene
     scene.render.engine = ENGINE
     result["engine"] = scene.render.engine
-    yield from render_as_f12(window, scene)
-    yield from show_viewport(window)
+    scene.candela.samples = scene.candela.viewport_samples = SAMPLES
+    yield from final_renders(scene)
+    yield from resting_camera_view()
+    yield from orbit()
+    yield from panels()
 
 
-def render_as_f12(window, scene):
-    """The render job as the key starts it, in the background of the window; the picture is saved afterwards."""
+def final_renders(scene):
+    """Three times: anew, unchanged, and changed, since each render has a thread and a GPU context of its own."""
     scene.render.resolution_x, scene.render.resolution_y = RENDER_SIZE
     scene.render.resolution_percentage = 100
-    scene.render.image_settings.file_format = "PNG"
-    scene.render.image_settings.color_mode = "RGB"
-    bpy.context.preferences.view.render_display_type = "NONE"
-    bpy.app.handlers.render_complete.append(lambda *_: result.update(render="complete"))
-    bpy.app.handlers.render_cancel.append(lambda *_: result.update(render="cancelled"))
-    with bpy.context.temp_override(window=window):
-        bpy.ops.render.render("INVOKE_DEFAULT")
+    for switch in ("z", "normal", "diffuse_direct", "diffuse_color", "glossy_color", "emit", "environment"):
+        setattr(window().view_layer, f"use_pass_{switch}", True)
     started = time.monotonic()
-    while result["render"] == "not finished" and time.monotonic() - started < RENDER_TIMEOUT_S:
-        yield 0.25
+    result["render"] = yield from render()
     result["render_s"] = time.monotonic() - started
-    yield 1.0
-    bpy.data.images["Render Result"].save_render(str(FOLDER / "render.png"), scene=scene)
+    save(scene, "render.exr", "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER")
+    save(scene, "render.png", "IMAGE", "PNG")
+    result["render_again"] = yield from render()
+    save(scene, "render_again.png", "IMAGE", "PNG")
+    scene.candela.seed = 1
+    result["render_changed"] = yield from render()
+    save(scene, "render_changed.png", "IMAGE", "PNG")
+    scene.candela.seed = 0
 
 
-def show_viewport(window):
-    """The camera's view in "Rendered" shading, at rest; the whole window is pictured three times."""
-    area = max((area for area in window.screen.areas if area.type == "VIEW_3D"), key=lambda a: a.width * a.height)
-    for other in window.screen.areas:
-        if other.type == "PROPERTIES":
-            other.spaces.active.context = "RENDER"
-    space = area.spaces.active
+def save(scene, name, media, file_format):
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # since Blender 5.0
+        settings.media_type = media
+    settings.file_format = file_format
+    if media == "IMAGE":
+        settings.color_mode = "RGB"
+    else:
+        settings.color_depth = "32"
+    bpy.data.images["Render Result"].save_render(str(FOLDER / name), scene=scene)
+
+
+def resting_camera_view():
+    """What the camera sees: coarse at once, then refined. Where its frame lies is told for the comparison."""
+    area = viewport_area()
+    space, region = area.spaces.active, main_region(area)
     space.overlay.show_overlays = False
+    space.show_gizmo = False
     space.region_3d.view_perspective = "CAMERA"
     space.shading.type = "RENDERED"
-    region = next(region for region in area.regions if region.type == "WINDOW")
+    started = time.monotonic()
+    yield 0.1
+    while not viewports() or viewports()[0].picture is None:
+        yield 0.05
+    result["first_picture_s"] = time.monotonic() - started
+    picture("viewport_first.png")
+    yield from wait_for_rest()
+    result["rest_s"] = time.monotonic() - started
+    picture("viewport_rest.png")
+    result["status"] = viewports()[0].status()
+    camera = window().scene.camera
+    corners = [
+        location_3d_to_region_2d(region, space.region_3d, camera.matrix_world @ corner)
+        for corner in camera.data.view_frame(scene=window().scene)
+    ]
+    left, right = min(x for x, _ in corners), max(x for x, _ in corners)
+    low, high = min(y for _, y in corners), max(y for _, y in corners)
     # The y axis of regions points upwards, that of pictures downwards.
-    result["viewport"] = [region.x, window.height - region.y - region.height, region.width, region.height]
+    result["viewport"] = [region.x, window().height - region.y - region.height, region.width, region.height]
+    result["camera"] = [region.x + left, window().height - region.y - high, right - left, high - low]
+
+
+def orbit():
+    """The view turns for a while; how long each redraw took is noted."""
+    space = viewport_area().spaces.active
+    space.region_3d.view_perspective = "PERSP"
+    yield from wait_for_rest()
+    took, scales, draw = [], [], candela().draw
+
+    def timed(*arguments):
+        started = time.perf_counter()
+        draw(*arguments)
+        took.append(time.perf_counter() - started)
+        scales.append(viewports()[0].scale)
+
+    candela().draw = timed
+    started = time.monotonic()
+    while time.monotonic() - started < ORBIT_S:
+        space.region_3d.view_rotation = Quaternion((0, 0, 1), 0.02) @ space.region_3d.view_rotation
+        yield 0.01
+    picture("viewport_moving.png")
+    candela().draw = draw
+    result["moving"] = {
+        "steps_per_s": len(took) / ORBIT_S,
+        "median_step_s": sorted(took)[len(took) // 2] if took else 0.0,
+        "scales": sorted(set(scales)),
+    }
+    started = time.monotonic()
+    yield from wait_for_rest()
+    result["rest_after_moving_s"] = time.monotonic() - started
+    picture("viewport_moved.png")
+
+
+def panels():
+    """The panels beside the viewport, one picture for each tab."""
+    area = viewport_area()
+    area.spaces.active.overlay.show_overlays = True
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    with there(area):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.6)
     yield 0.5
-    picture(window, "viewport_first.png")
-    yield EARLY_S
-    picture(window, "viewport_early.png")
-    yield LATE_S - EARLY_S
-    picture(window, "viewport_late.png")
+    left, right = sorted((a for a in window().screen.areas if a.type == "VIEW_3D"), key=lambda a: a.x)
+    left.spaces.active.shading.type = "RENDERED"
+    right.type = "PROPERTIES"
+    yield from wait_for_rest()
+    scene = window().scene
+    light = next(one for one in scene.objects if one.type == "LIGHT" and one.data.type == "AREA")
+    mesh = next(one for one in scene.objects if one.type == "MESH" and one.active_material)
+    for tab, active in (
+        ("RENDER", None), ("VIEW_LAYER", None), ("WORLD", None), ("DATA", light), ("MATERIAL", mesh),
+    ):  # fmt: skip
+        if active is not None:
+            window().view_layer.objects.active = active
+            yield 0.3
+        right.spaces.active.context = tab
+        yield 1.5
+        picture(f"panel_{tab.lower()}.png")
+    material = mesh.active_material
+    material.asset_generate_preview()
+    yield 4.0
+    preview = material.preview.image_pixels_float[:]
+    result["preview"] = [min(preview, default=0.0), max(preview, default=0.0)]
 
 
-def picture(window, name):
-    """The window as a picture. Where the driver cannot read what it has shown (black), the X server is asked for it."""
-    path = FOLDER / name
-    with bpy.context.temp_override(window=window):
-        bpy.ops.screen.screenshot(filepath=str(path))
-    image = bpy.data.images.load(str(path))
-    black = not any(image.pixels[:][::388])  # red of every 97th pixel
-    bpy.data.images.remove(image)
-    if black and shutil.which("import"):  # ImageMagick's
-        subprocess.run(["import", "-window", "root", str(path)], check=True)
-
-
-def finish():
-    (FOLDER / "result.json").write_text(json.dumps(result), encoding="utf-8")
-    bpy.ops.wm.quit_blender()
-
-
-def tick(walk=None):
-    walk = walk or tick.walk
-    try:
-        return next(walk)
-    except StopIteration:
-        finish()
-    except Exception:
-        result["error"] = traceback.format_exc()
-        finish()
-    return None
-
-
-tick.walk = steps()
-bpy.app.timers.register(tick, first_interval=0.5)
+run(steps)

@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from addon.compare.exr import read_exr
+
 pytestmark = pytest.mark.window
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,37 +55,54 @@ def installed():
     blender(*install, log=OUTPUT / "install.log", timeout_s=120)
 
 
+def run_script(backend, script, _done={}):  # noqa: B006 - a cache: each script runs once on each backend
+    """The folder with what the script left there, and its result."""
+    if (backend, script) not in _done:
+        folder = OUTPUT / f"{script}-{backend}"
+        folder.mkdir()
+        display = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800")
+        path = Path(__file__).with_name(f"{script}.py")
+        blender(*display, SAMPLE, "--python", path, "--", folder, log=folder / "blender.log", timeout_s=900)
+        _done[backend, script] = folder, json.loads((folder / "result.json").read_text())
+    return _done[backend, script]
+
+
 @pytest.fixture(scope="module", params=BACKENDS)
 def driven(request, installed):
-    """The folder of pictures of one backend, and what the script inside Blender recorded."""
-    return drive(request.param)
+    """The pictures of one backend, and what the script inside Blender recorded."""
+    return run_script(request.param, "drive")
 
 
-def drive(backend, _done={}):  # noqa: B006 - a cache: each backend is driven once
-    if backend not in _done:
-        folder = OUTPUT / backend
-        folder.mkdir()
-        window = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800")
-        script = ("--python", Path(__file__).with_name("drive.py"), "--", folder, "CANDELA")
-        blender(*window, SAMPLE, *script, log=folder / "blender.log", timeout_s=400)
-        _done[backend] = folder, json.loads((folder / "result.json").read_text())
-    return _done[backend]
+@pytest.fixture(scope="module", params=BACKENDS)
+def walked(request, installed):
+    return run_script(request.param, "walk")
 
 
-def pixels(path, box=None):
-    """The picture as (height, width, 3) in 0…255; `box` is (x, y, width, height) from the upper left corner."""
+def pixels(path, box=None, size=None):
+    """The picture as (height, width, 3) in 0…255; `box` is (x, y, width, height) from the upper left corner.
+
+    With a `size` (width, height) it is reduced to it.
+    """
     picture = Image.open(path).convert("RGB")
     if box:
         x, y, width, height = box
-        picture = picture.crop((x, y, x + width, y + height))
+        picture = picture.resize(
+            size or (round(width), round(height)), Image.Resampling.BOX, box=(x, y, x + width, y + height)
+        )
     return np.asarray(picture, np.float32)
+
+
+def complaints(folder):
+    """Lines of Blender's console that tell of an error."""
+    lines = (folder / "blender.log").read_text(errors="replace").splitlines()
+    return [line for line in lines if "Traceback" in line or "Error" in line or "ERROR" in line]
 
 
 def test_engine_is_there_and_nothing_failed(driven):
     folder, result = driven
     assert result.get("error") is None
     assert result["engine"] == "CANDELA"
-    assert "Traceback" not in (folder / "blender.log").read_text(errors="replace")
+    assert not complaints(folder)
 
 
 def test_f12_completes_with_a_picture(driven):
@@ -94,18 +113,94 @@ def test_f12_completes_with_a_picture(driven):
     assert picture.std() > 8
 
 
-def test_viewport_shows_the_scene_and_refines_at_rest(driven):
+def test_f12_again_gives_the_same_picture_and_another_seed_another(driven):
     folder, result = driven
-    first, early, late = (
-        pixels(folder / f"viewport_{when}.png", result["viewport"]) for when in ("first", "early", "late")
+    assert result["render_again"] == result["render_changed"] == "complete"
+    first, again, changed = (pixels(folder / f"render{what}.png") for what in ("", "_again", "_changed"))
+    assert np.array_equal(first, again)
+    assert 0 < np.abs(first - changed).mean() < 4
+
+
+def test_viewport_shows_the_scene_and_refines_at_rest(driven):
+    """The picture at rest is nearer to the final render of the camera's view than the first one.
+
+    The camera's frame has more pixels in the viewport: reduced to the render's size its edges are sharper and its few
+    samples others, so what is compared is the middle of the differences.
+    """
+    folder, result = driven
+    final = pixels(folder / "render.png")
+    first, rest = (
+        np.abs(pixels(folder / f"viewport_{when}.png", result["camera"], (320, 180)) - final)
+        for when in ("first", "rest")
     )
-    assert late.std() > 8
-    assert np.abs(early - late).mean() <= np.abs(first - late).mean()
+    assert result["status"].startswith("Sample 8 of 8")
+    assert rest.mean() < 0.7 * first.mean()
+    assert np.median(rest) <= 2
+
+
+def test_viewport_follows_a_turning_view(driven):
+    folder, result = driven
+    moving, moved = (pixels(folder / f"viewport_{when}.png", result["viewport"]) for when in ("moving", "moved"))
+    assert result["moving"]["steps_per_s"] > 0
+    assert min(moving.std(), moved.std()) > 8
+    assert np.abs(moving - moved).mean() < 40  # the same view, coarse and fine
+
+
+def test_material_icon_is_drawn(driven):
+    _, result = driven
+    low, high = result["preview"]
+    assert high > low
+
+
+def test_nothing_fails_while_the_viewport_runs(walked):
+    folder, result = walked
+    assert result.get("error") is None
+    assert not complaints(folder)
+    assert result["done"] == [
+        "move and undo", "light", "edit mode", "views", "frames", "engines", "shading", "render", "window", "files",
+    ]  # fmt: skip
+    assert result["render_meanwhile"] == "complete"
+
+
+def test_viewports_come_and_go_with_their_regions(walked):
+    _, result = walked
+    assert result["viewports_while_solid"] == 0
+    assert result["freed_mib"] > 0
+    assert result["viewports_after_split"] == 2
+    assert result["viewports_after_load"] == 1
+    assert result["viewports_at_home"] == 0
+
+
+def test_undo_takes_the_picture_back(walked):
+    folder, _ = walked
+    moved, undone = pixels(folder / "moved.png"), pixels(folder / "undone.png")
+    assert np.abs(moved - undone).max() > 30
 
 
 def test_opengl_and_vulkan_render_the_same_picture(installed):
-    """Within 1/255; one pixel in a thousand may differ more, where two rasterisers decide otherwise about an edge."""
-    opengl, vulkan = (pixels(drive(backend)[0] / "render.png") for backend in BACKENDS)
+    """Within 1/255 wherever both saw the same surfaces.
+
+    The two rasterisers decide otherwise about a sample that falls exactly on a triangle's edge, and then see another
+    surface. The passes that hold no light tell these pixels apart: normal, colours, emission and world differ. The same
+    happens in depth maps, at the edges of shadows: there, direct light varies among the neighbours.
+    """
+    folders = [run_script(backend, "drive")[0] for backend in BACKENDS]
+    opengl, vulkan = (pixels(folder / "render.png") for folder in folders)
+    passes = [
+        {name.split(".")[-1]: values[::-1] for name, values in read_exr(folder / "render.exr").items()}
+        for folder in folders
+    ]
+    other_surface = np.zeros(opengl.shape[:2], bool)
+    for name in ("Normal", "Diffuse Color", "Glossy Color", "Emission", "Environment"):
+        first, second = (one[name] for one in passes)
+        other_surface |= (np.abs(first - second) > 1e-4 * np.maximum(np.abs(first), 1e-3)).any(axis=2)
+    light = passes[0]["Diffuse Direct"].max(axis=2)
+    around = np.stack([np.roll(light, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)])
+    shadow_edge = np.ptp(around, axis=0) > 0.02 * around.max(axis=0)
+
     difference = np.abs(opengl - vulkan).max(axis=2)
-    assert (difference > 1).mean() <= 0.001
-    assert difference.mean() <= 0.05
+    wrong = difference > 1
+    assert not (wrong & ~other_surface & ~shadow_edge).any()
+    assert (wrong & ~other_surface).mean() <= 1e-4
+    assert other_surface.mean() <= 0.005
+    assert difference.mean() <= 0.02
