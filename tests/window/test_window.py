@@ -118,7 +118,8 @@ def test_f12_again_gives_the_same_picture_and_another_seed_another(driven):
     assert result["render_again"] == result["render_changed"] == "complete"
     first, again, changed = (pixels(folder / f"render{what}.png") for what in ("", "_again", "_changed"))
     assert np.array_equal(first, again)
-    assert 0 < np.abs(first - changed).mean() < 4
+    assert 0 < np.abs(first - changed).mean() < 8  # the noise of few samples
+    assert abs(first.mean() - changed.mean()) < 2
 
 
 def test_viewport_shows_the_scene_and_refines_at_rest(driven):
