@@ -210,21 +210,27 @@ class Atlas:
 
         The image only grows: the number of views varies from sample to sample, and a new size costs an allocation.
         """
-        columns = max(1, min(4, 4096 // resolution))
-        size = (columns * resolution, -(-len(views) // columns) * resolution)
+        columns = max(1, min(4, 8192 // resolution))
+        quarters = sorted(range(len(views)), key=lambda k: views[k].scale)  # four half-size views share a cell
+        cells, taken, quarter = [(0, 0, 0)] * len(views), 0, 0
+        for k in quarters:
+            side = resolution // views[k].scale
+            if views[k].scale == 1 or quarter % 4 == 0:
+                corner = (taken % columns * resolution, taken // columns * resolution)
+                taken += 1
+            place = (0, 0) if views[k].scale == 1 else (quarter % 2 * side, quarter // 2 % 2 * side)
+            quarter += views[k].scale > 1
+            cells[k] = (corner[0] + place[0], corner[1] + place[1], side)
+        size = (columns * resolution, -(-taken // columns) * resolution)
         if self.target is None or self.target.size[0] != size[0] or self.target.size[1] < size[1]:
             self.release()
             self.target = images.Target(
                 (images.pool.take(*size, "RGBA32F"),), images.pool.take(*size, "DEPTH_COMPONENT32F")
             )
-        cells = []
         texels = np.zeros((len(views), VIEW_TEXELS, 4))
         for k, view in enumerate(views):
-            side = resolution // view.scale
-            cell = ((k % columns) * resolution, (k // columns) * resolution, side)
-            cells.append(cell)
             texels[k, :4] = view.rows
-            texels[k, 4] = *cell, 0.0
+            texels[k, 4] = *cells[k], 0.0
         return cells, texels
 
     def release(self) -> None:

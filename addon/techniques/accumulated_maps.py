@@ -38,9 +38,9 @@ from ..snapshot.scene import Snapshot
 
 RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
-    "Texels of a depth map per pixel of the picture's longer side; rounded up to a power of two", 0.125, 16.0,
+    "Texels of a depth map per pixel of the picture's longer side", 0.125, 16.0,
 )  # fmt: skip
-MOST_RESOLUTION = 2048  # six maps of one point light take 500 MB then; with 4096, 2 GB, which no software GPU gives
+MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
 CUTOFF = Param(
     "cutoff", "Shadow cutoff", 0.001,
     "Where a light can bring less than this share of the picture's median light, its shadows are left out", 0.0, 0.1,
@@ -52,7 +52,7 @@ ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in sever
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     """Side of a depth map in texels."""
     wished = max(frame.size) * texels_per_pixel
-    return int(np.clip(2 ** np.ceil(np.log2(max(wished, 1.0))), 16, MOST_RESOLUTION))
+    return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
 
 
 class DepthMapService:
@@ -90,12 +90,14 @@ _NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
 
 def rounds(items: list[tuple[np.ndarray, list]], resolution: int) -> Iterator[tuple[list[np.ndarray], list]]:
     """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers."""
-    most = min(max(ATLAS_TEXELS // resolution**2, 6), lights.MOST_VIEWS)
-    rows, views = [], []
+    rows, views, texels = [], [], 0
     for row, own in items:
-        if rows and (len(views) + len(own) > most or len(rows) == lights.MOST_LIGHTS):
+        size = sum((resolution // view.scale) ** 2 for view in own)
+        full = texels + size > ATLAS_TEXELS or len(views) + len(own) > lights.MOST_VIEWS
+        if rows and (full or len(rows) == lights.MOST_LIGHTS):
             yield rows, views
-            rows, views = [], []
+            rows, views, texels = [], [], 0
+        texels += size
         row[0, 2:4] = len(views), len(own)
         rows.append(row)
         views += own
