@@ -51,6 +51,7 @@ def test_an_emissive_square_gives_its_form_factor_however_it_is_cut(floor, cuts)
     assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
 
 
+@pytest.mark.slow
 def test_emission_leaves_both_sides(floor):
     panel(floor, turn=(0, np.pi, 0), location=(0, 0, 4))
     source = model.area((0, 0, 2), (1, 0, 0), (0, 1, 0), RADIANCE * np.pi)
@@ -65,6 +66,7 @@ def test_the_scale_of_an_emitter_scales_its_light_with_its_area(floor):
     assert irradiance(floor, 64).mean() == pytest.approx(whole / 4, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_blocker_before_an_emitter_casts_its_penumbra(floor):
     panel(floor)
     edge = ((-9.0, -9.0), (0.0, 9.0), 1.0)
@@ -77,6 +79,7 @@ def test_a_blocker_before_an_emitter_casts_its_penumbra(floor):
     assert np.sqrt(((found - expected) ** 2).mean()) < 0.015
 
 
+@pytest.mark.slow
 def test_an_emitter_in_the_plane_of_a_ceiling_is_not_shadowed_by_it(floor):
     """The lamp of a Cornell box that was not moved down."""
     panel(floor)
@@ -86,7 +89,6 @@ def test_an_emitter_in_the_plane_of_a_ceiling_is_not_shadowed_by_it(floor):
     np.testing.assert_allclose(irradiance(floor), alone, rtol=0.02)
 
 
-@pytest.mark.xfail(strict=True, reason="rays of the first sample do not know the emitters yet")
 def test_a_mirror_shows_an_emitter_as_bright_as_it_is(stage):
     stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.0))
     stage.camera_above(SPAN)

@@ -50,6 +50,7 @@ def test_an_open_floor_under_an_even_sky_has_the_skys_colour(floor):
     np.testing.assert_allclose(diffuse(floor, 64), np.broadcast_to([0.6, 1.5, 3.0], (32, 32, 3)), rtol=0.005)
 
 
+@pytest.mark.slow
 def test_a_long_wall_hides_its_form_factor_of_the_sky(floor):
     """Height h at distance d: the wall fills (1 - cos a) / 2 of the sky, tan a = h / d."""
     floor.world()
@@ -68,6 +69,7 @@ def test_a_roof_over_everything_leaves_darkness(floor):
     assert diffuse(floor, 16).max() < 0.01
 
 
+@pytest.mark.slow
 def test_half_a_sky_from_an_image_gives_half_the_light(floor):
     """Radiance 2 where x > 0: irradiance pi, whatever the seam between the halves does."""
     direction, _ = directions(32, 64)
@@ -76,6 +78,7 @@ def test_half_a_sky_from_an_image_gives_half_the_light(floor):
     assert diffuse(floor, 128).mean() == pytest.approx(1.0, rel=0.005)
 
 
+@pytest.mark.slow
 def test_the_light_of_an_image_is_the_integral_over_its_texels(floor):
     direction, solid_angle = directions(16, 32)
     pixels = np.random.default_rng(4).uniform(0, 1, (16, 32, 3)) ** 4

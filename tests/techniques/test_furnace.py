@@ -54,7 +54,12 @@ NAMES = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=[0, 60, 80], ids="{}_degrees".format)
+SLOW = pytest.mark.slow
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(0, marks=SLOW), pytest.param(60, marks=SLOW), 80], ids="{}_degrees".format
+)
 def pictures(request, kept_stage):
     """Strips of all materials in one plane, seen under one angle from the normal: by Candela and by Cycles."""
     stage = kept_stage

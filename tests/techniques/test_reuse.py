@@ -161,6 +161,7 @@ def resident_bytes():
     return int(STATISTICS.read_text().split()[1]) * resource.getpagesize()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not STATISTICS.exists(), reason="only Linux tells a process its size in a file")
 def test_fifty_renders_with_changes_leave_memory_flat(room):
     """Sessions freed, sizes and settings changed, objects added and removed: neither pool nor process grows."""

@@ -45,7 +45,7 @@ LIGHTS = {  # kind, settings, the same for light_model
 PENUMBRA_RMS = {"soft point": 0.015}
 
 
-@pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "disc" else pytest.mark.slow) for n in LIGHTS])
 def test_the_penumbra_of_an_edge_is_the_clipped_area_of_the_light(floor, name):
     kind, settings, source = LIGHTS[name]
     floor.light(kind, (0, 0, HEIGHT), **settings)
@@ -61,6 +61,7 @@ def test_the_penumbra_of_an_edge_is_the_clipped_area_of_the_light(floor, name):
     assert (found[expected == 0] == 0).all()
 
 
+@pytest.mark.slow
 def test_the_width_of_a_penumbra_follows_from_similar_triangles(floor):
     """A light of width w at height H over an edge at height h: w h / (H - h)."""
     floor.light("AREA", (0, 0, HEIGHT), size=0.8)
@@ -75,6 +76,7 @@ def test_the_width_of_a_penumbra_follows_from_similar_triangles(floor):
         blocker.hide_render = True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["square", "sphere", "sun"])
 def test_blockers_at_two_heights_block_together_what_either_blocks(floor, name):
     """Two edges that leave a slit: shadows are united per point of the light, not multiplied."""
@@ -97,6 +99,7 @@ def test_blockers_at_two_heights_block_together_what_either_blocks(floor, name):
     assert error < 0.5 * np.sqrt(((separate - expected) ** 2).mean())
 
 
+@pytest.mark.slow
 def test_a_grid_of_bars_at_two_heights_blocks_as_the_union_of_its_bars(floor):
     floor.light("AREA", (0, 0, HEIGHT), size=0.6)
     floor.scene.candela.accumulated_maps_texels_per_pixel = 8.0  # narrow bars: texels blur what lies within them
@@ -117,6 +120,7 @@ def test_a_grid_of_bars_at_two_heights_blocks_as_the_union_of_its_bars(floor):
 POINT = ("POINT", {"shadow_soft_size": 0.0}, model.point((0, 0, HEIGHT), 100))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("light", "opacities"),
     [

@@ -322,7 +322,6 @@ def test_a_scene_without_camera_is_refused_with_a_sentence(room):
         room.stage.render(1, SIZE)
 
 
-@pytest.mark.xfail(strict=True, reason="rays of the first sample are weighted by the world's former guide")
 def test_settings_toggled_objects_deleted_and_sizes_changed_in_a_row_give_what_each_gives_alone(room):
     """As an artist works: nothing of an earlier state may stay in the picture."""
 
