@@ -14,10 +14,10 @@ from .traced_glossy import TracedGlossy
 REGISTRY: tuple[type[Technique], ...] = (
     Surfaces,
     AccumulatedMaps,
-    TracedGlossy,
     DirectLight,
     EmissiveLight,
     EnvironmentLight,
+    TracedGlossy,
     Film,
 )
 

@@ -25,6 +25,8 @@ the material's mean opacity instead of its texture.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 
 from ..frame import acceleration, lights
@@ -85,18 +87,25 @@ class TracedGlossy(Technique):
             return "no light has a size and the world is black: nothing that a ray could hit"
         return acceleration.too_many(snapshot)
 
+    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
+        return object()  # what `prepare` leaves with the frame is needed anew in every frame
+
+    def prepare(self, frame: Frame) -> None:
+        """Tell the techniques that draw light samples, which run before this one, what share the rays take over."""
+        frame.services["traced_roughness"] = frame.settings.get(self, "roughness")
+        seen = frame.snapshot.world.visibility.glossy
+        sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
+        frame.services["world_samples"] = float(directions_per_sample(frame)) if sampled and seen else 0.0
+
     def run(self, frame: Frame) -> None:
-        roughness = frame.settings.get(self, "roughness")
-        frame.services["traced_roughness"] = roughness
+        roughness = frame.services["traced_roughness"]
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             shown = lights.traceable([emitter for emitter in found if emitter is not None])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in shown])
             self._light_count = len(shown)
         world = frame.snapshot.world
-        sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
-        samples = directions_per_sample(frame) if sampled and world.visibility.glossy else 0
-        frame.services["world_samples"] = float(samples)
+        samples = frame.services["world_samples"]
         hierarchy = frame.hierarchy()
         emissive_power, emissive_points = frame.services.get("emissive", (0.0, 1.0))
         frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
@@ -116,7 +125,7 @@ class TracedGlossy(Technique):
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
-                "world_samples": float(samples), "emissive_power": emissive_power, "emissive_points": emissive_points,
+                "world_samples": samples, "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
         )  # fmt: skip
         frame.count(self, "passes")

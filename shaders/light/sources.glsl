@@ -176,11 +176,11 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
   return result;
 }
 
-// What a ray sees of a light: radiance, distance (1e30 for suns) and the density that light_sample has for the
+// What a ray sees of a light: radiance, distance (1e28 for suns, before the end of all rays) and the density that light_sample has for the
 // direction. Zero radiance = missed.
 vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance, out float density)
 {
-  hit_distance = 1e30;
+  hit_distance = 1e28;
   density = 0.0;
   if (light.kind == LIGHT_SUN) {
     if (light.radius <= 0.0 || dot(direction, light.centre) < cos(light.radius)) {
