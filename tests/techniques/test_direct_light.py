@@ -10,6 +10,7 @@ from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
 SIZE, SPAN = (32, 32), 4.0
+SLOW = pytest.mark.slow
 TOLERANCE = 0.005  # of the formula, as issue and docs promise
 
 
@@ -47,13 +48,13 @@ def test_a_point_light_gives_intensity_over_distance_squared(floor):
     check(irradiance(floor, samples=1), model.point((0.5, -0.3, 2.0), 100), stride=1)
 
 
-@pytest.mark.parametrize("radius", [0.05, 0.5])
+@pytest.mark.parametrize("radius", [pytest.param(0.05, marks=SLOW), 0.5])
 def test_a_soft_point_light_is_a_disc_that_faces_the_receiver(floor, radius):
     floor.light("POINT", (0.5, -0.3, 2.0), shadow_soft_size=radius)
     check(irradiance(floor, samples=256), model.soft_point((0.5, -0.3, 2.0), radius, 100))
 
 
-@pytest.mark.parametrize("radius", [0.05, 0.5])
+@pytest.mark.parametrize("radius", [pytest.param(0.05, marks=SLOW), 0.5])
 def test_a_spherical_light_gives_what_a_point_gives(floor, radius):
     """While the whole sphere stands above the horizon: pi L (r/d)^2 cos = S cos / (4 pi d^2)."""
     floor.light("POINT", (0.5, -0.3, 2.0), shadow_soft_size=radius, use_soft_falloff=False)
@@ -79,6 +80,7 @@ def test_a_spot_light_is_a_point_light_within_its_cone(floor, cone):
     check(irradiance(floor, samples=1), source, floor=0.05, stride=1)
 
 
+@SLOW
 def test_the_cone_of_a_soft_spot_light_applies_to_each_ray(floor):
     floor.light("SPOT", (0, 0, 2), shadow_soft_size=0.4, spot_size=np.radians(60), spot_blend=0.6)
     source = model.spot(model.soft_point((0, 0, 2), 0.4, 100), np.eye(3), np.radians(60), 0.6)
@@ -117,7 +119,7 @@ AREAS = {
 }
 
 
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0.6, -0.3, 0.8)], ids=["level", "turned"])
+@pytest.mark.parametrize("turn", [pytest.param((0, 0, 0), marks=SLOW), (0.6, -0.3, 0.8)], ids=["level", "turned"])
 @pytest.mark.parametrize("shape", AREAS.values(), ids=AREAS)
 def test_an_area_light_gives_the_form_factor_of_its_shape(floor, shape, turn):
     settings, (width, height) = shape
@@ -135,7 +137,7 @@ def test_the_scale_of_an_area_light_scales_its_shape_and_not_its_power(floor):
     check(irradiance(floor), model.area((0, 0, 2), (2, 0, 0), (0, 0.5, 0), 100))
 
 
-@pytest.mark.parametrize("spread", [np.radians(170), np.radians(100), np.radians(40)])
+@pytest.mark.parametrize("spread", [pytest.param(np.radians(170), marks=SLOW), np.radians(40)])
 def test_a_spread_narrows_an_area_light_and_keeps_its_flux(floor, spread):
     floor.light("AREA", (0, 0, 2), shape="SQUARE", size=0.8, spread=spread)
     check(
@@ -220,6 +222,7 @@ def test_k_times_the_power_is_k_times_the_picture(stage, kind):
     np.testing.assert_array_equal(stage.render(4)["combined"][..., :3], before * 8.0)
 
 
+@SLOW
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_two_lights_of_half_the_power_are_one(stage, kind):
     light = furnished(stage).light(kind[0], (0.5, 0.7, 2), **kind[1])
@@ -246,6 +249,7 @@ def test_nothing_leaks_through_a_wall_with_another_behind_it(floor, kind):
     assert not floor.render(16)["combined"][..., :3].any()
 
 
+@SLOW
 @pytest.mark.parametrize("move", ["far away", "a quarter turn"])
 def test_a_scene_that_is_moved_with_its_camera_gives_the_same_picture(stage, move):
     furnished(stage)
@@ -277,6 +281,7 @@ def test_the_same_scene_gives_the_same_picture_after_everything_was_freed(stage)
         np.testing.assert_array_equal(second[name], pixels, err_msg=name)
 
 
+@SLOW
 def test_another_seed_gives_other_noise_with_the_same_mean(stage):
     furnished(stage)
     stage.light("AREA", (0.5, 0.7, 2), size=1.5)
@@ -311,6 +316,7 @@ def test_objects_in_another_order_give_the_same_picture(stage):
     np.testing.assert_array_equal(pictures[0], pictures[1])
 
 
+@SLOW
 def test_of_many_lights_a_few_per_sample_give_the_sum_of_all(floor):
     """Drawn by lot, each weighted by the inverse of its chance."""
     places_of_lights = [(x, y, 1.5) for x in np.linspace(-2, 2, 8) for y in np.linspace(-2, 2, 8)]
