@@ -21,7 +21,7 @@ from .geometry import morton_codes
 
 LARGEST = 4_000_000  # triangles
 LEAF = 4
-NODE_TEXELS = 6  # min x, y, z, max x, y, z of the four children
+NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children on it
 LEAF_TEXELS = 13  # corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity; emission r, g, b
 EMPTY = 1e30
 
@@ -90,15 +90,38 @@ def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
     box_low[:count], box_high[:count] = low[order], high[order]
     box_low, box_high = box_low.reshape(-1, LEAF, 3).min(axis=1), box_high.reshape(-1, LEAF, 3).max(axis=1)
     nodes = []
+    reach = max(np.abs(box_low[:used]).max(initial=0.0), np.abs(box_high[:used]).max(initial=0.0))
+    least = max(1e-6 * float(reach), 1e-30)
     for _ in range(levels):
         children_low, children_high = box_low.reshape(-1, 4, 3), box_high.reshape(-1, 4, 3)
-        # An empty child becomes a far point: the shader sorts each slab's ends, so an inverted box would be endless.
-        shown_low = np.where(children_low > children_high, EMPTY, children_low)
-        shown_high = np.where(children_low > children_high, EMPTY, children_high)
-        nodes.append(np.concatenate([shown_low.transpose(0, 2, 1), shown_high.transpose(0, 2, 1)], axis=1))
+        nodes.append(_packed_boxes(children_low, children_high, least))
         box_low, box_high = children_low.min(axis=1), children_high.max(axis=1)
     rows = np.concatenate(nodes[::-1]).reshape(-1, 4)  # root first
     return Hierarchy(images.upload_list(rows), images.upload_list(packed.reshape(-1, 4)), levels, count)
+
+
+def _packed_boxes(low: np.ndarray, high: np.ndarray, least: float) -> np.ndarray:
+    """Boxes of four children per node, (N, 4, 3), as (N, NODE_TEXELS, 4); see node_meets in shaders/trace.
+
+    A step of the grid is a power of two, so that the shader's arithmetic is exact but for the last addition; the grid
+    starts a little below the node's corner and boxes are rounded outwards. Extents below `least` metres count as that.
+    """
+    empty = (low > high).any(axis=2)
+    corner = np.where(empty.all(axis=1)[:, None], 0.0, low.min(axis=1)).astype(np.float64)
+    extent = np.where(empty.all(axis=1)[:, None], 0.0, high.max(axis=1) - corner)
+    exponent = np.clip(np.ceil(np.log2(np.maximum(extent, least) / 250.0)), -126, 127)
+    step = np.exp2(exponent)
+    corner = (corner - 0.5 * step).astype(np.float32)
+    start = corner.astype(np.float64)[:, None]
+    first = np.clip(np.floor((low - start) / step[:, None] - 0.01), 0, 255)
+    last = np.clip(np.ceil((high - start) / step[:, None] + 0.01), 0, 255)
+    first[empty], last[empty] = 255, 0
+    byte = np.array([1.0, 256.0, 65536.0])
+    packed = np.zeros((len(low), NODE_TEXELS, 4), np.float32)
+    packed[:, 0, :3] = corner
+    packed[:, 0, 3] = (exponent + 127) @ byte
+    packed[:, 1], packed[:, 2] = first @ byte, last @ byte
+    return packed
 
 
 class HierarchyCache:

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gfx import images, passes
-from ..gfx.library import Program
-from .geometry import SHADOW_FLAG, SceneGeometry
+from ..gfx.library import Program, Shader
+from .culling import CORNERS, Boxes, calls
+from .geometry import SHADOW_FLAG, Draw, SceneGeometry
 from .lights import VIEW_TEXELS
 
 WIDEST_TANGENT = 2.5  # a single view up to 68 degrees half angle; beyond it, cube faces
-CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class MapView:
     near: float
     light_point: tuple[float, float, float, float]  # xyz, w: position (1) or direction (0)
     scale: int = 1  # resolution is divided by this
+    least_q: float = -np.inf  # of the receivers: what lies farther from the light casts no shadow on any of them
 
 
 def directional_views(direction, receivers: Receivers, geometry: SceneGeometry, jitter, resolution) -> list[MapView]:
@@ -68,12 +69,14 @@ def directional_views(direction, receivers: Receivers, geometry: SceneGeometry, 
     bottom, top = bottom - margin, top + margin
     one = np.array([0.0, 0.0, 0.0, 1.0])
     row_q = np.append(direction, -bottom) / (top - bottom)
+    q = (corners @ direction - bottom) / (top - bottom)
     views = []
-    for low, high in _merged_rectangles(place, receivers.groups(), 1e-6 * geometry.size):
+    for low, high, members in _merged_rectangles(place, receivers.groups(), 1e-6 * geometry.size):
         low, high = _padded(low, high, jitter, resolution)
         row_x = np.append(2 * u, -(low[0] + high[0])) / (high[0] - low[0])
         row_y = np.append(2 * v, -(low[1] + high[1])) / (high[1] - low[1])
-        views.append(MapView(np.stack([row_x, row_y, one, row_q]), 1.0, (*direction, 0.0)))
+        rows = np.stack([row_x, row_y, one, row_q])
+        views.append(MapView(rows, 1.0, (*direction, 0.0), least_q=float(q[members].min())))
     return views
 
 
@@ -110,8 +113,8 @@ def point_views(
     if not wide.any():
         groups = [g for g in (np.flatnonzero(np.isin(index, group)) for group in receivers.groups()) if len(g)]
         return [
-            _perspective(position, u, v, forward, *_padded(low, high, jitter, resolution), near)
-            for low, high in _merged_rectangles(tangents, groups, 1e-6)
+            _perspective(position, u, v, forward, *_padded(low, high, jitter, resolution), near, depth[members].max())
+            for low, high, members in _merged_rectangles(tangents, groups, 1e-6)
         ]
     views = []
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
@@ -129,32 +132,33 @@ def point_views(
             slack = 2.0 / size  # faces overlap by more than their jitter
             low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
             shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
-            views.append(_perspective(position, face_u, face_v, face_forward, low + shift, high + shift, near, 2))
+            far = (offsets[inside] @ face_forward).max()
+            views.append(_perspective(position, face_u, face_v, face_forward, low + shift, high + shift, near, far, 2))
     return views
 
 
-def _perspective(position, u, v, forward, low, high, near, scale=1) -> MapView:
+def _perspective(position, u, v, forward, low, high, near, far, scale=1) -> MapView:
     row_w = np.append(forward, -forward @ position)
     x, y = np.append(u, -u @ position), np.append(v, -v @ position)
     row_x = (2 * x - (low[0] + high[0]) * row_w) / (high[0] - low[0])
     row_y = (2 * y - (low[1] + high[1]) * row_w) / (high[1] - low[1])
     one = np.array([0.0, 0.0, 0.0, 1.0])
-    return MapView(np.stack([row_x, row_y, row_w, one]), near, (*position, 1.0), scale)
+    return MapView(np.stack([row_x, row_y, row_w, one]), near, (*position, 1.0), scale, 1.0 / max(float(far), near))
 
 
 def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float):
-    """Rectangles (low, high) for groups from near to far. A group joins the one before if that stays affordable."""
+    """Rectangles (low, high, members) for groups from near to far; a group joins the one before if that is affordable."""
     rectangles = []
     for group in groups:
         low, high = place[group].min(axis=(0, 1)), place[group].max(axis=(0, 1))
         high = np.maximum(high, low + floor)
         if rectangles:
-            last_low, last_high = rectangles[-1]
+            last_low, last_high, members = rectangles[-1]
             both_low, both_high = np.minimum(last_low, low), np.maximum(last_high, high)
             if (both_high - both_low).max() <= 3.0 * (last_high - last_low).max():
-                rectangles[-1] = (both_low, both_high)
+                rectangles[-1] = (both_low, both_high, np.concatenate([members, group]))
                 continue
-        rectangles.append((low, high))
+        rectangles.append((low, high, group))
     return rectangles
 
 
@@ -240,53 +244,51 @@ class Atlas:
         self.target = None
 
 
-def draw_views(atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometry, alpha_casters, sample: int) -> int:
-    """Draw all casters into every view. `alpha_casters` is frame.materials' list of (Draw, shader, bindings).
+@dataclass(frozen=True)
+class AlphaCasters:
+    """Casters whose material lets some light pass, and the shader and bindings of each material."""
 
-    Returns how many triangles were sent.
-    """
+    draws: list[Draw]
+    programs: dict[int, tuple[Shader, dict]]
+
+
+def draw_views(
+    atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometry, alpha: AlphaCasters, sample: int
+) -> int:
+    """Draw all casters into every view. Returns how many triangles were sent."""
     sent = 0
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     shader = passes.get(OPAQUE)
-    opaque_seen = _seen(views, geometry.opaque_casters)
-    alpha_seen = _seen(views, [draw for draw, _, _ in alpha_casters])
-    for k, (view, cell) in enumerate(zip(views, cells)):
+    opaque_boxes, alpha_boxes = Boxes.of(geometry.opaque_casters), Boxes.of(alpha.draws)
+    shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
+    for view, (x, y, side) in zip(views, cells):
         constants = {
             "row_x": view.rows[0], "row_y": view.rows[1], "row_w": view.rows[2], "row_q": view.rows[3],
             "near": view.near,
         }  # fmt: skip
-        with passes.drawing(atlas.target, viewport=(cell[0], cell[1], cell[2], cell[2])):
-            if geometry.opaque_casters:
+        seen = opaque_boxes.seen(view.rows, view.least_q)
+        one_sided = seen & shells
+        if view.light_point[3]:
+            one_sided &= opaque_boxes.without(np.array(view.light_point[:3]))
+        for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
+            if not drawn.any():
+                continue
+            with passes.drawing(atlas.target, viewport=(x, y, side, side), cull=cull):
                 shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
-                for index in opaque_seen[k]:
-                    draw = geometry.opaque_casters[index]
-                    shader.set_constant("first_instance", draw.first)
-                    passes.draw(shader, draw.batch, draw.count)
-                    sent += draw.triangles
-            for index in alpha_seen[k]:
-                draw, alpha_shader, bindings = alpha_casters[index]
+                for call in calls(geometry.opaque_casters, np.flatnonzero(drawn)):
+                    shader.set_constant("first_instance", call.first)
+                    passes.draw(shader, call.draw.batch, call.count)
+                    sent += call.triangles
+        with passes.drawing(atlas.target, viewport=(x, y, side, side)):
+            for call in calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q))):
+                alpha_shader, bindings = alpha.programs[call.draw.material]
                 alpha_shader.bind(
                     **bindings,
                     constants={
-                        **constants, "first_instance": draw.first, "sample_index": sample,
+                        **constants, "first_instance": call.first, "sample_index": sample,
                         "light_point": view.light_point,
                     },
                 )  # fmt: skip
-                passes.draw(alpha_shader, draw.batch, draw.count)
-                sent += draw.triangles
+                passes.draw(alpha_shader, call.draw.batch, call.count)
+                sent += call.triangles
     return sent
-
-
-def _seen(views: list[MapView], draws: list) -> list[np.ndarray]:
-    """Per view, the numbers of the draws whose bounds it may see."""
-    if not views or not draws:
-        return [np.zeros(0, int)] * len(views)
-    low, high = np.stack([draw.low for draw in draws]), np.stack([draw.high for draw in draws])
-    corners = low[:, None] + CORNERS[None] * (high - low)[:, None]  # (D, 8, 3)
-    corners = np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=-1)
-    rows = np.stack([view.rows for view in views])  # (V, 4, 4)
-    x, y, w, _ = np.moveaxis(np.einsum("vrk,dck->vdcr", rows, corners), -1, 0)
-    outside = (
-        (w <= 0).all(-1) | (x > w).all(-1) | (x < -w).all(-1) | (y > w).all(-1) | (y < -w).all(-1)
-    )  # fmt: skip
-    return [np.flatnonzero(~hidden) for hidden in outside]

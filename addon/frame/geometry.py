@@ -16,6 +16,7 @@ from ..gfx import geometry as gfx_geometry
 from ..gfx import images
 from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
+from .culling import closed
 
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
 TEXELS_PER_INSTANCE = 4
@@ -33,6 +34,7 @@ class Draw:
     count: int
     low: np.ndarray  # (3,) bounds relative to the render origin
     high: np.ndarray
+    closed: bool = False  # casters only: every mesh in it bounds a volume and faces outwards
 
     @property
     def triangles(self) -> int:
@@ -63,6 +65,7 @@ class SceneGeometry:
         self._draw_key = None
         self._instance_key = None
         self._mesh_draws: dict = {}
+        self._closed: dict[tuple[str, int], bool] = {}
 
     @property
     def size(self) -> float:
@@ -97,6 +100,7 @@ class SceneGeometry:
         if not instances:
             self.bounds_min = self.bounds_max = np.zeros(3)
             matrices = np.zeros((0, 4, 4))
+            self._mirrored = np.zeros(0, bool)
         else:
             matrices = np.stack([i.matrix for i in instances]).astype(np.float64)
             finite = np.isfinite(matrices).all(axis=(1, 2))
@@ -124,7 +128,8 @@ class SceneGeometry:
             relative = matrices[:, :3, :].copy()
             relative[:, :, 3] -= self.origin
             rows[:, :3] = relative
-            rows[:, 3, 3] = np.where(np.linalg.det(matrices[:, :3, :3]) < 0.0, -1.0, 1.0)
+            self._mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
+            rows[:, 3, 3] = np.where(self._mirrored, -1.0, 1.0)
         key = rows.tobytes()
         if key == self._instance_key:
             return False
@@ -143,9 +148,11 @@ class SceneGeometry:
                 runs[-1] = (runs[-1][0], runs[-1][1] + 1)
             else:
                 runs.append((k, 1))
+        shell = self._shells(instances, meshes, materials)
         joined = [first for first, count in runs if count == 1]
         made: dict = {}  # key -> (parts for the buffers, [(first, count, instances covered)])
-        for group in _by_size(joined, instances, meshes):
+        closed_groups = _by_size([k for k in joined if shell[k]], instances, meshes)
+        for group in closed_groups + _by_size([k for k in joined if not shell[k]], instances, meshes):
             parts = [(k, meshes[instances[k].mesh], instances[k].materials) for k in group]
             key = ("joined", tuple((k, mesh.key, mesh.version, slots) for k, mesh, slots in parts))
             made[key] = (parts, [(0, 1, group)])
@@ -160,6 +167,7 @@ class SceneGeometry:
                     [(k, length, list(range(k, k + length))) for k, length in spans],
                 )
         attributes = tuple((m.attributes, m.transparent) for m in materials)
+        self._shell = shell
         self._plan: list[tuple[list[int], int, object, int, int, bool]] = []
         kept = {}
         for key, (parts, spans) in made.items():
@@ -182,7 +190,24 @@ class SceneGeometry:
         for covered, material, batch, first, count, caster in self._plan:
             low = self._low[covered].min(axis=0) - self.origin
             high = self._high[covered].max(axis=0) - self.origin
-            (self.opaque_casters if caster else self.draws).append(Draw(material, batch, first, count, low, high))
+            if caster:
+                one_sided = bool(self._shell[covered].all() and not self._mirrored[covered].any())
+                self.opaque_casters.append(Draw(material, batch, first, count, low, high, one_sided))
+            else:
+                self.draws.append(Draw(material, batch, first, count, low, high))
+
+    def _shells(self, instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]):
+        """(N,) whether an instance is opaque all over and its mesh bounds a volume."""
+        kept = {}
+        shell = np.zeros(len(instances), bool)
+        for k, instance in enumerate(instances):
+            mesh = meshes[instance.mesh]
+            key = (mesh.key, mesh.version)
+            if key not in kept:
+                kept[key] = self._closed[key] if key in self._closed else closed(mesh)
+            shell[k] = kept[key] and not any(materials[slot].transparent for slot in instance.materials)
+        self._closed = kept
+        return shell
 
     def release(self) -> None:
         self.__init__()

@@ -42,6 +42,7 @@ class Frame:
     ledger: Ledger
     view_block: Block
     hierarchies: HierarchyCache
+    view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
     receivers: Receivers | None = None
@@ -154,7 +155,9 @@ class Renderer:
         x, y = frame.random("film")
         # As in Cycles, the first sample stands at the pixel's centre: depth is taken from it.
         jitter = (0.0, 0.0) if frame.sample == 0 else tuple(blackman_harris_offset(u, width) for u in (x, y))
-        frame.view_block.update(**frame.view.values(frame.sample, frame.settings.seed, jitter, frame.geometry.size))
+        values = frame.view.values(frame.sample, frame.settings.seed, jitter, frame.geometry.size)
+        frame.view_block.update(**values)
+        frame.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
         if frame.sample == 0:
             self._clear_sums(frame)
         for technique in frame.plan.techniques:
@@ -223,11 +226,12 @@ class Renderer:
         return self._environment[1]
 
     def _programs(self, plan: Plan) -> list:
-        wanted = [self.materials.surface_program(draw.material) for draw in self.geometry.draws]
+        shown = sorted({draw.material for draw in self.geometry.draws})
+        wanted = [self.materials.surface_program(material) for material in shown]
         wanted += [
-            self.materials.caster_program(draw.material)
-            for draw in self.geometry.draws
-            if self.materials.compiled[draw.material].transparent
+            self.materials.caster_program(material)
+            for material in shown
+            if self.materials.compiled[material].transparent
         ]
         return list(dict.fromkeys(wanted))
 

@@ -61,14 +61,15 @@ class DepthMapService:
     def __init__(self):
         self._atlas = depth_maps.Atlas()
 
-    def alpha_casters(self, frame: Frame) -> list:
-        """Draws, shaders and bindings of casters whose material lets some light pass."""
-        casters = []
-        for draw in frame.geometry.draws:
-            if frame.materials.compiled[draw.material].transparent:
-                shader = passes.get(frame.materials.caster_program(draw.material))
-                casters.append((draw, shader, frame.materials.bindings(draw.material, frame.geometry.instances)))
-        return casters
+    def alpha_casters(self, frame: Frame) -> depth_maps.AlphaCasters:
+        """What lets some light pass, and how to draw it."""
+        materials = frame.materials
+        draws = [draw for draw in frame.geometry.draws if materials.compiled[draw.material].transparent]
+        programs = {
+            index: (passes.get(materials.caster_program(index)), materials.bindings(index, frame.geometry.instances))
+            for index in {draw.material for draw in draws}
+        }
+        return depth_maps.AlphaCasters(draws, programs)
 
     def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> tuple[images.Image, np.ndarray]:
         """Draw the views; returns the atlas and the views' part of the uniform block `sources`."""

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..frame.culling import Boxes, calls
 from ..frame.depth_maps import Receivers
 from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
@@ -78,14 +79,19 @@ class Surfaces(Technique):
     def _draw(self, frame: Frame, mode: int) -> None:
         target = frame.target(*SURFACES, depth="surface.depth_buffer")
         target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+        seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
         with passes.drawing(target):
-            for draw in frame.geometry.draws:
-                shader = passes.get(frame.materials.surface_program(draw.material))
-                bindings = frame.materials.bindings(draw.material, frame.geometry.instances)
-                bindings["blocks"]["film_view"] = frame.view_block
-                shader.bind(**bindings, constants={"first_instance": draw.first, "transparent_mode": mode})
-                passes.draw(shader, draw.batch, draw.count)
-                frame.count(self, "triangles", draw.triangles)
+            material = None
+            for call in calls(frame.geometry.draws, seen):
+                if call.draw.material != material:
+                    material = call.draw.material
+                    shader = passes.get(frame.materials.surface_program(material))
+                    bindings = frame.materials.bindings(material, frame.geometry.instances)
+                    bindings["blocks"]["film_view"] = frame.view_block
+                    shader.bind(**bindings, constants={"first_instance": call.first, "transparent_mode": mode})
+                shader.set_constant("first_instance", call.first)
+                passes.draw(shader, call.draw.batch, call.count)
+                frame.count(self, "triangles", call.triangles)
         frame.count(self, "passes")
 
     def _receivers(self, frame: Frame, modes: tuple[int, ...]) -> Receivers:

@@ -29,7 +29,7 @@ void main()
   }
   vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
   ivec2 hit;
-  if (trace_nearest(origin, direction, 1e29, bits.z, hit) >= 1e29) {
+  if (trace_until(origin, direction, 1e29, 1e29, bits.z, hit) >= 1e29) {
     out_useful = cosine;
   }
 }

@@ -14,18 +14,19 @@ float lobe_share(float lobe_density, float light_density, float light_samples)
   return 1.0 / (1.0 + ratio * ratio);
 }
 
-// Light that arrives along `direction` if nothing nearer than `limit` blocks it, with the shares applied.
-vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, float limit, out float farthest)
+// Light that arrives along `direction` if nothing nearer than `limit` blocks it, with the shares applied. `span` is how
+// far the nearest and the farthest of its sources are.
+vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, float limit, out vec2 span)
 {
   vec3 sum = vec3(0.0);
-  farthest = 0.0;
+  span = vec2(1e29, 0.0);
   if (limit >= 1e29 && world_glossy != 0) {
     vec3 radiance = environment_radiance(direction);
     if (world_samples > 0.0 && !mirror) {
       radiance *= lobe_share(lobe_density, environment_density(direction), world_samples);
     }
     sum += radiance;
-    farthest = (max_component(abs(radiance)) > 0.0) ? 1e29 : 0.0;
+    span.y = (max_component(abs(radiance)) > 0.0) ? 1e29 : 0.0;
   }
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
@@ -37,7 +38,7 @@ vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, floa
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && max_component(abs(radiance)) > 0.0) {
       sum += radiance * (mirror ? 1.0 : lobe_share(lobe_density, density, 1.0));
-      farthest = max(farthest, min(hit_distance, 1e29));
+      span = vec2(min(span.x, hit_distance), max(span.y, min(hit_distance, 1e29)));
     }
   }
   return sum;
@@ -68,7 +69,7 @@ void main()
   int count = mirror ? 1 : CANDIDATES;
   float total = 0.0;
   float kept_importance = 0.0;
-  float reach = 0.0;
+  vec2 kept_span = vec2(0.0);
   vec3 kept_direction = vec3(0.0);
   vec3 kept_weight = vec3(0.0);
   float kept_density = 0.0;
@@ -82,8 +83,8 @@ void main()
     if (!mirror) {
       lobe_reflection(lobe, direction, density);
     }
-    float farthest;
-    vec3 light = arriving(s.position, direction, density, mirror, 1e29, farthest);
+    vec2 span;
+    vec3 light = arriving(s.position, direction, density, mirror, 1e29, span);
     float importance = dot(abs(weight * light), vec3(1.0));
     if (!(importance > 0.0)) {
       continue;
@@ -96,7 +97,7 @@ void main()
       kept_direction = direction;
       kept_weight = weight;
       kept_density = density;
-      reach = farthest;
+      kept_span = span;
     }
     else {
       choice = (choice - p) / max(1.0 - p, 1e-7);
@@ -107,11 +108,14 @@ void main()
   uint layers = salt.z + uint(film_view.sample_index);
   ivec2 hit;
   if (kept_importance > 0.0) {
-    float blocked = trace_nearest(origin, kept_direction, reach, layers, hit);
-    float ignored;
-    float limit = (blocked < reach) ? blocked : 1e29;
-    vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
-    out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
+    // Whatever stands before the nearest source blocks all of them.
+    float blocked = trace_until(origin, kept_direction, kept_span.y, kept_span.x, layers, hit);
+    if (blocked >= kept_span.x) {
+      vec2 ignored;
+      float limit = (blocked < kept_span.y) ? blocked : 1e29;
+      vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
+      out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
+    }
   }
   if (emissive_power > 0.0) {
     // Emissive triangles are only known once a ray meets them, so they cannot be weighed beforehand: a ray of their own.

@@ -5,7 +5,7 @@
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 
-#define NODE_TEXELS 6
+#define NODE_TEXELS 3
 #define LEAF_TEXELS 13
 
 vec4 node_texel(int index)
@@ -47,82 +47,118 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction)
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
 }
 
+// On to the deepest child that is still to visit; false if there is none.
+bool trace_next(inout uvec2 pending, inout int level, inout int node)
+{
+  bool deep = pending.y != 0u;
+  uint word = deep ? pending.y : pending.x;
+  if (word == 0u) {
+    return false;
+  }
+  int bit = findMSB(word);
+  if (deep) {
+    pending.y ^= 1u << uint(bit);
+  }
+  else {
+    pending.x ^= 1u << uint(bit);
+  }
+  int parent_level = (bit >> 2) + (deep ? 8 : 0);
+  node = (node >> (2 * (level - parent_level))) * 4 + (bit & 3);
+  level = parent_level + 1;
+  return true;
+}
+
+// Boxes of a node's four children against the ray: which it meets before `farthest`, as four bits, and where it enters.
+// Boxes stand on a grid of 256 steps over the node: texel 0 holds the grid's corner and the exponents of its three steps,
+// texels 1 and 2 the lower and upper corners of the children, three bytes (x, y, z) in each float.
+uint node_meets(int node, vec3 origin, vec3 inverse, float farthest, out vec4 enter)
+{
+  vec4 frame = node_texel(node);
+  uvec4 low = uvec4(node_texel(node + 1));
+  uvec4 high = uvec4(node_texel(node + 2));
+  uint exponents = uint(frame.w);
+  vec3 step_size = vec3(uintBitsToFloat((exponents & 255u) << 23u), uintBitsToFloat((exponents & 65280u) << 15u),
+                        uintBitsToFloat((exponents & 16711680u) << 7u));
+  vec3 slope = step_size * inverse;
+  vec3 start = (frame.xyz - origin) * inverse;
+  vec4 x0 = vec4(low & 255u) * slope.x + start.x;
+  vec4 y0 = vec4((low >> 8u) & 255u) * slope.y + start.y;
+  vec4 z0 = vec4(low >> 16u) * slope.z + start.z;
+  vec4 x1 = vec4(high & 255u) * slope.x + start.x;
+  vec4 y1 = vec4((high >> 8u) & 255u) * slope.y + start.y;
+  vec4 z1 = vec4(high >> 16u) * slope.z + start.z;
+  // By the ray's sign, not by min and max: the inverted box of an empty child is then never met.
+  enter = max(max(inverse.x > 0.0 ? x0 : x1, inverse.y > 0.0 ? y0 : y1), max(inverse.z > 0.0 ? z0 : z1, vec4(0.0)));
+  vec4 leave = min(min(inverse.x > 0.0 ? x1 : x0, inverse.y > 0.0 ? y1 : y0),
+                   min(inverse.z > 0.0 ? z1 : z0, vec4(farthest)));
+  bvec4 met = lessThanEqual(enter, leave * 1.000001);
+  return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
+}
+
 // Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
-// number there. Triangles with an opacity below one are passed at random, the same way for the same `salt`.
-float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ivec2 hit)
+// number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
+// Triangles with an opacity below one are passed at random, the same way for the same `salt`.
+float trace_until(vec3 origin, vec3 direction, float limit, float enough, uint salt, out ivec2 hit)
 {
   hit = ivec2(-1);
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
   float nearest = limit;
   int level = 0;
   int node = 0;
-  int level_start = 0;  // number of nodes on all levels above
-  uvec2 pending = uvec2(0u);
-  bool arrived = true;
-  for (int step = 0; step < 4096; step++) {
-    if (arrived) {
-      int base = (level_start + node) * NODE_TEXELS;
-      vec4 x0 = (node_texel(base) - origin.x) * inverse.x;
-      vec4 y0 = (node_texel(base + 1) - origin.y) * inverse.y;
-      vec4 z0 = (node_texel(base + 2) - origin.z) * inverse.z;
-      vec4 x1 = (node_texel(base + 3) - origin.x) * inverse.x;
-      vec4 y1 = (node_texel(base + 4) - origin.y) * inverse.y;
-      vec4 z1 = (node_texel(base + 5) - origin.z) * inverse.z;
-      vec4 enter = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), vec4(0.0)));
-      vec4 leave = min(min(max(x0, x1), max(y0, y1)), min(max(z0, z1), vec4(nearest)));
-      bvec4 met = lessThanEqual(enter, leave * 1.0000004);
-      uint mask = (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
-      if (level < 8) {
-        pending.x |= mask << uint(4 * level);
+  uvec2 pending = uvec2(0u);  // four bits per level: children still to visit
+  for (int round = 0; round < 4096; round++) {
+    // Down to a leaf, nearest child first; then all rays of a group test triangles together.
+    bool more = true;
+    while (more && level < trace_levels) {
+      int level_start = (level == 0) ? 0 : int(0x55555555u >> uint(32 - 2 * level));
+      vec4 enter;
+      uint met = node_meets((level_start + node) * NODE_TEXELS, origin, inverse, nearest, enter);
+      if (met != 0u) {
+        enter = mix(vec4(1e38), enter, notEqual(uvec4(met) & uvec4(1u, 2u, 4u, 8u), uvec4(0u)));
+        vec2 pair = min(enter.xy, enter.zw);
+        float first = min(pair.x, pair.y);
+        int child = (enter.x == first) ? 0 : (enter.y == first) ? 1 : (enter.z == first) ? 2 : 3;
+        met &= ~(1u << uint(child));
+        if (level < 8) {
+          pending.x |= met << uint(4 * level);
+        }
+        else {
+          pending.y |= met << uint(4 * (level - 8));
+        }
+        node = node * 4 + child;
+        level++;
       }
       else {
-        pending.y |= mask << uint(4 * (level - 8));
+        more = trace_next(pending, level, node);
       }
-      arrived = false;
     }
-    uint here = ((level < 8) ? pending.x >> uint(4 * level) : pending.y >> uint(4 * (level - 8))) & 15u;
-    if (here == 0u) {
-      if (level == 0) {
-        break;
-      }
-      level--;
-      node >>= 2;
-      level_start = (level_start - 1) >> 2;
-      continue;
+    if (!more) {
+      break;
     }
-    int child = ((here & 1u) != 0u) ? 0 : ((here & 2u) != 0u) ? 1 : ((here & 4u) != 0u) ? 2 : 3;
-    uint bit = 1u << uint(child + 4 * (level & 7));
-    if (level < 8) {
-      pending.x &= ~bit;
-    }
-    else {
-      pending.y &= ~bit;
-    }
-    int next = node * 4 + child;
-    if (level + 1 == trace_levels) {
-      vec4 t = intersect_four(next, origin, direction);
-      float best = min(min(t.x, t.y), min(t.z, t.w));
+    vec4 t = intersect_four(node, origin, direction);
+    float best = min(min(t.x, t.y), min(t.z, t.w));
+    if (best < nearest) {
+      vec4 opacity = leaf_texel(node * LEAF_TEXELS + 9);
+      uint roll = hash3(uvec3(uint(node), salt, 77u)).x;
+      vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
+                         to_unit(roll * 277803737u + 7u));
+      t = mix(vec4(1e30), t, lessThan(chance, opacity));
+      best = min(min(t.x, t.y), min(t.z, t.w));
       if (best < nearest) {
-        vec4 opacity = leaf_texel(next * LEAF_TEXELS + 9);
-        uint roll = hash3(uvec3(uint(next), salt, 77u)).x;
-        vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
-                           to_unit(roll * 277803737u + 7u));
-        t = mix(vec4(1e30), t, lessThan(chance, opacity));
-        best = min(min(t.x, t.y), min(t.z, t.w));
-        if (best < nearest) {
-          nearest = best;
-          hit = ivec2(next, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
-        }
+        nearest = best;
+        hit = ivec2(node, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
       }
     }
-    else {
-      node = next;
-      level_start = level_start * 4 + 1;
-      level++;
-      arrived = true;
+    if (nearest < enough || !trace_next(pending, level, node)) {
+      break;
     }
   }
   return nearest;
+}
+
+float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ivec2 hit)
+{
+  return trace_until(origin, direction, limit, 0.0, salt, hit);
 }
 
 // Radiance that a triangle emits (mean over its material), and its unit normal.
