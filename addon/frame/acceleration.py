@@ -17,7 +17,7 @@ import numpy as np
 from ..gfx import images
 from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
-from .geometry import morton_codes
+from .morton import morton_codes
 
 LARGEST = 4_000_000  # triangles
 LEAF = 4

@@ -24,33 +24,41 @@ CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], 
 
 @dataclass(frozen=True)
 class Boxes:
-    """Bounds of a list of draws, for testing many views against them."""
+    """Bounds of draws, for testing views against all of them at once."""
 
-    low: np.ndarray  # (D, 3)
-    high: np.ndarray
-    corners: np.ndarray  # (D, 8, 4) homogeneous
+    centre: np.ndarray  # (D, 3)
+    half: np.ndarray
+
+    @classmethod
+    def between(cls, low: np.ndarray, high: np.ndarray) -> Boxes:
+        """Boxes from corners (D, 3); an empty list may have any shape."""
+        low, high = np.asarray(low, np.float64).reshape(-1, 3), np.asarray(high, np.float64).reshape(-1, 3)
+        return cls((low + high) / 2, (high - low) / 2)
 
     @classmethod
     def of(cls, draws: list[Draw]) -> Boxes:
-        low = np.array([draw.low for draw in draws]).reshape(-1, 3)
-        high = np.array([draw.high for draw in draws]).reshape(-1, 3)
-        corners = low[:, None] + CORNERS[None] * (high - low)[:, None]
-        return cls(low, high, np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=-1))
+        return cls.between([draw.low for draw in draws], [draw.high for draw in draws])
 
     def seen(self, rows: np.ndarray, least_q: float = -np.inf) -> np.ndarray:
-        """(D,) whether a projection with `rows` x, y, w, q may see the box before the depth measure `least_q`."""
-        x, y, w, q = np.moveaxis(self.corners @ rows.T, -1, 0)
-        outside = (
-            (w <= 0).all(-1) | (x > w).all(-1) | (x < -w).all(-1) | (y > w).all(-1) | (y < -w).all(-1)
-        )  # fmt: skip
+        """(D,) whether a projection with `rows` x, y, w, q may see the box before the depth measure `least_q`.
+
+        Each condition is a linear form, whose extremes over a box are its value at the centre and its reach over the
+        half axes: nothing is lost against testing all corners.
+        """
+        x, y, w, q = rows
         # By more than what float32 and the slack of the comparison could mistake.
-        outside |= ((w > 0) & (q < least_q * w * (1.0 - 1e-3))).all(-1)
-        return ~outside
+        before = q - least_q * (1.0 - 1e-3) * w if np.isfinite(least_q) else np.array([0.0, 0.0, 0.0, 1.0])
+        forms = np.stack([w, w - x, w + x, w - y, w + y, before])
+        middle = self.centre @ forms[:, :3].T + forms[:, 3]
+        reach = self.half @ np.abs(forms[:, :3]).T
+        most = middle + reach
+        behind = (most[:, 5] < 0) & (middle[:, 0] > reach[:, 0])
+        return (most[:, 0] > 0) & (most[:, 1:5] >= 0).all(axis=1) & ~behind
 
     def without(self, point: np.ndarray) -> np.ndarray:
         """(D,) whether `point` lies outside of the box, by more than rounding."""
-        margin = 1e-3 * np.linalg.norm(self.high - self.low, axis=1)[:, None]
-        return ((point < self.low - margin) | (point > self.high + margin)).any(axis=1)
+        margin = 2e-3 * np.linalg.norm(self.half, axis=1)[:, None]
+        return (np.abs(point - self.centre) > self.half + margin).any(axis=1)
 
 
 @dataclass(frozen=True)

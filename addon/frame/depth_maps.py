@@ -14,6 +14,7 @@ import numpy as np
 
 from ..gfx import images, passes
 from ..gfx.library import Program, Shader
+from .casters import Clusters
 from .culling import CORNERS, Boxes, calls
 from .geometry import SHADOW_FLAG, Draw, SceneGeometry
 from .lights import VIEW_TEXELS
@@ -147,7 +148,7 @@ def _perspective(position, u, v, forward, low, high, near, far, scale=1) -> MapV
 
 
 def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float):
-    """Rectangles (low, high, members) for groups from near to far; a group joins the one before if that is affordable."""
+    """Rectangles (low, high, members) for groups from near to far; a group joins the last one if that is affordable."""
     rectangles = []
     for group in groups:
         low, high = place[group].min(axis=(0, 1)), place[group].max(axis=(0, 1))
@@ -184,10 +185,8 @@ def _unit(v):
 
 # ------------------------------------------------------------------------------------------------ atlas and drawing
 
-PROJECTION_CONSTANTS = (
-    ("VEC4", "row_x"), ("VEC4", "row_y"), ("VEC4", "row_w"), ("VEC4", "row_q"), ("FLOAT", "near"),
-    ("INT", "first_instance"),
-)  # fmt: skip
+ROWS = (("VEC4", "row_x"), ("VEC4", "row_y"), ("VEC4", "row_w"), ("VEC4", "row_q"), ("FLOAT", "near"))
+PROJECTION_CONSTANTS = (*ROWS, ("INT", "first_instance"))
 PROJECTION_DEFINES = (("PROJECTION", "row_x, row_y, row_w, row_q, near"), ("VISIBILITY_FLAG", str(SHADOW_FLAG)))
 
 OPAQUE = Program(
@@ -200,6 +199,16 @@ OPAQUE = Program(
     textures=(("FLOAT_2D", "instances"),),
     constants=PROJECTION_CONSTANTS,
     defines=PROJECTION_DEFINES,
+)
+RESTING = Program(
+    name="depth map of resting casters",
+    vertex="depth_map/resting.vert.glsl",
+    fragment="depth_map/opaque.frag.glsl",
+    inputs=(("VEC3", "position"),),
+    varyings=(("smooth", "VEC2", "depth_terms"),),
+    outputs=(("VEC4", "out_depth"),),
+    constants=ROWS,
+    defines=(("PROJECTION", "row_x, row_y, row_w, row_q, near"),),
 )
 
 
@@ -255,40 +264,55 @@ class AlphaCasters:
 def draw_views(
     atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometry, alpha: AlphaCasters, sample: int
 ) -> int:
-    """Draw all casters into every view. Returns how many triangles were sent."""
-    sent = 0
+    """Draw all casters into every view of sample number `sample`. Returns how many triangles were sent."""
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-    shader = passes.get(OPAQUE)
-    opaque_boxes, alpha_boxes = Boxes.of(geometry.opaque_casters), Boxes.of(alpha.draws)
+    # What has not moved since the first sample is worth being written out.
+    resting = geometry.resting_casters() if sample > 0 else None
+    boxes, alpha_boxes = Boxes.of(geometry.opaque_casters), Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
+    sent = 0
     for view, (x, y, side) in zip(views, cells):
-        constants = {
-            "row_x": view.rows[0], "row_y": view.rows[1], "row_w": view.rows[2], "row_q": view.rows[3],
-            "near": view.near,
-        }  # fmt: skip
-        seen = opaque_boxes.seen(view.rows, view.least_q)
-        one_sided = seen & shells
-        if view.light_point[3]:
-            one_sided &= opaque_boxes.without(np.array(view.light_point[:3]))
-        for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
-            if not drawn.any():
-                continue
-            with passes.drawing(atlas.target, viewport=(x, y, side, side), cull=cull):
-                shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
-                for call in calls(geometry.opaque_casters, np.flatnonzero(drawn)):
-                    shader.set_constant("first_instance", call.first)
-                    passes.draw(shader, call.draw.batch, call.count)
-                    sent += call.triangles
-        with passes.drawing(atlas.target, viewport=(x, y, side, side)):
+        viewport = (x, y, side, side)
+        rows = {"row_x": view.rows[0], "row_y": view.rows[1], "row_w": view.rows[2], "row_q": view.rows[3]}
+        constants = {**rows, "near": view.near}
+        light_point = np.array(view.light_point[:3]) if view.light_point[3] else None
+        if resting is not None:
+            for clusters in resting:
+                sent += _draw_resting(atlas, viewport, constants, clusters, view, light_point)
+        else:
+            seen = boxes.seen(view.rows, view.least_q)
+            one_sided = seen & shells & (True if light_point is None else boxes.without(light_point))
+            for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
+                sent += _draw_instanced(atlas, viewport, constants, geometry, np.flatnonzero(drawn), cull)
+        with passes.drawing(atlas.target, viewport=viewport):
             for call in calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q))):
-                alpha_shader, bindings = alpha.programs[call.draw.material]
-                alpha_shader.bind(
-                    **bindings,
-                    constants={
-                        **constants, "first_instance": call.first, "sample_index": sample,
-                        "light_point": view.light_point,
-                    },
-                )  # fmt: skip
-                passes.draw(alpha_shader, call.draw.batch, call.count)
+                shader, bindings = alpha.programs[call.draw.material]
+                own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point}
+                shader.bind(**bindings, constants={**constants, **own})
+                passes.draw(shader, call.draw.batch, call.count)
                 sent += call.triangles
+    return sent
+
+
+def _draw_resting(atlas: Atlas, viewport, constants: dict, clusters: Clusters, view: MapView, light_point) -> int:
+    cull = "BACK" if clusters.one_sided(light_point) else "NONE"
+    shader = passes.get(RESTING)
+    sent = 0
+    with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+        shader.bind(constants=constants)
+        for first, count in clusters.runs(clusters.boxes.seen(view.rows, view.least_q)):
+            passes.draw_range(shader, clusters.batch, first, count)
+            sent += count
+    return sent
+
+
+def _draw_instanced(atlas: Atlas, viewport, constants: dict, geometry: SceneGeometry, seen: np.ndarray, cull) -> int:
+    shader = passes.get(OPAQUE)
+    sent = 0
+    with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+        shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
+        for call in calls(geometry.opaque_casters, seen):
+            shader.set_constant("first_instance", call.first)
+            passes.draw(shader, call.draw.batch, call.count)
+            sent += call.triangles
     return sent

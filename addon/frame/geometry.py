@@ -16,7 +16,9 @@ from ..gfx import geometry as gfx_geometry
 from ..gfx import images
 from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
+from . import casters
 from .culling import closed
+from .morton import morton_codes
 
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
 TEXELS_PER_INSTANCE = 4
@@ -66,6 +68,7 @@ class SceneGeometry:
         self._instance_key = None
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
+        self._clusters: tuple[object, list[casters.Clusters] | None] = (None, None)
 
     @property
     def size(self) -> float:
@@ -88,6 +91,7 @@ class SceneGeometry:
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
             tuple((m.attributes, m.transparent) for m in materials),
         )
+        self._placed = (instances, snapshot.meshes, materials)
         if key == self._draw_key:
             if changed:
                 self._set_bounds()
@@ -95,6 +99,13 @@ class SceneGeometry:
         self._draw_key = key
         self._make_draws(instances, snapshot.meshes, materials)
         return True
+
+    def resting_casters(self) -> list[casters.Clusters] | None:
+        """Opaque casters in world space, made when first asked for; None where there are too many."""
+        key = (self._draw_key, self._instance_key)
+        if self._clusters[0] != key:
+            self._clusters = (key, casters.clusters(*self._placed, self.origin))
+        return self._clusters[1]
 
     def _update_transforms(self, instances: list[Instance], snapshot: Snapshot) -> bool:
         if not instances:
@@ -233,25 +244,6 @@ def _by_size(indices: list[int], instances: list[Instance], meshes: dict[str, Me
         groups[-1].append(k)
         size += meshes[instances[k].mesh].triangle_count
     return groups
-
-
-def morton_codes(points: np.ndarray) -> np.ndarray:
-    """63-bit Morton codes of (N, 3) points within their own bounds."""
-    if not len(points):
-        return np.zeros(0, np.uint64)
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
-    grid = np.clip((points - low) / extent * (2**21 - 1), 0, 2**21 - 1).astype(np.uint64)
-    code = np.zeros(len(points), np.uint64)
-    for axis in range(3):
-        x = grid[:, axis]
-        for shift, mask in (
-            (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
-            (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
-        ):  # fmt: skip
-            x = (x | (x << np.uint64(shift))) & np.uint64(mask)
-        code |= x << np.uint64(axis)
-    return code
 
 
 def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[CompiledMaterial]):

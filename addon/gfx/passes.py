@@ -49,6 +49,11 @@ def draw(shader: Shader, batch: Batch, instances: int = 1) -> None:
     batch.handle.draw_instanced(shader.handle, instance_start=0, instance_count=instances)
 
 
+def draw_range(shader: Shader, batch: Batch, first: int, count: int) -> None:
+    """Draw `count` triangles of a batch from the `first` on. Only inside `drawing`."""
+    batch.handle.draw_range(shader.handle, elem_start=3 * first, elem_count=3 * count)
+
+
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
     shader = get(program)

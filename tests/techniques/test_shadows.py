@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon import engine
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -239,3 +240,26 @@ def test_no_light_leaks_under_a_closed_box(stage):
     stage.mesh(corners, faces).visible_camera = False
     stage.light("POINT", (0.1, 0.2, 0.8), shadow_soft_size=0.05)
     assert not stage.render(16)["combined"][..., :3].any()
+
+
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "AREA"])
+def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, kind):
+    """Closed, mirrored and open casters: written out in world space or drawn as instances, the picture is the same."""
+    import bpy
+
+    from addon.frame import casters
+
+    stage.floor()
+    stage.camera_above(SPAN)
+    bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.5, 0.4, 0.5))
+    cube = bpy.context.object
+    stage.link("Mirrored", cube.data, (-0.7, 0.3, 0.6), (0.3, 0.4, 0.5), (-1, 1, 0.5))
+    stage.link("Turned", cube.data, (-0.5, -0.8, 0.5), (0.8, 0.1, 0.5))
+    stage.rectangle((0.2, -1.2), (0.9, -0.5), 0.7)
+    stage.light(kind, (0.4, -0.2, 2.5), turn=(0.2, 0.1, 0))
+    written_out = stage.render(4, (48, 48))["diffuse_direct"]
+    monkeypatch.setattr(casters, "LARGEST", 0)
+    engine.free_sessions()
+    as_instances = stage.render(4, (48, 48))["diffuse_direct"]
+    assert (written_out < 0.5 * written_out.max()).any()
+    np.testing.assert_allclose(written_out, as_instances, atol=1e-4 * float(written_out.max()))
