@@ -63,14 +63,17 @@ class Emitter:
         """World position (relative to the origin) of a sample; not for suns."""
         return self.centre + sample if self.kind in (POINT, SPHERE) else sample
 
-    def row(self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0) -> np.ndarray:
-        """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen."""
+    def row(
+        self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0, rate: float = 1.0
+    ) -> np.ndarray:
+        """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen, `rate` how many
+        points of this light a sample of the picture has on average."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
         rows = np.zeros((TEXELS, 4))
         rows[0] = self.kind, flags, first_view, view_count
         rows[1] = *self.centre, self.radius
-        rows[2, :3] = sample
-        rows[3] = *(self.radiance * weight), self.area
+        rows[2] = *sample, rate
+        rows[3] = *(self.radiance * weight / rate), self.area
         rows[4] = *self.axis, self.spread
         for k, row in enumerate((self.u, self.v, self.w)):
             rows[5 + k, : len(row)] = row
@@ -159,12 +162,15 @@ class Sources:
         self._block = None
 
 
-def direction_row(direction, radiance_over_density, density, flags, first_view: int, view_count: int) -> np.ndarray:
-    """A row for light from one direction at infinity, as the environment draws them."""
+def direction_row(
+    direction, radiance_over_density, density, flags, first_view: int, view_count: int, rate: float = 1.0
+) -> np.ndarray:
+    """A row for light from one direction at infinity, as the environment draws them, `rate` in a sample."""
     rows = np.zeros((TEXELS, 4))
     rows[0] = DIRECTION, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
     rows[1, :3] = direction
-    rows[3] = *radiance_over_density, density
+    rows[2, 3] = rate
+    rows[3] = *(np.asarray(radiance_over_density) / rate), density
     return rows
 
 
@@ -172,7 +178,8 @@ def surface_row(point, normal, radiance, density, flags, first_view: int, view_c
     """A row for a point on an emissive surface, drawn with `density` per m2; it shines to both sides."""
     rows = np.zeros((TEXELS, 4))
     rows[0] = SURFACE, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
-    rows[1, :3] = rows[2, :3] = point
+    rows[1, :3] = point
+    rows[2] = *point, 1.0
     rows[3] = *radiance, 1.0 / density
     rows[4, :3] = normal
     return rows

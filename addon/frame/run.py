@@ -20,6 +20,7 @@ from .geometry import SceneGeometry
 from .ledger import RAN, REUSED, Ledger, Row
 from .materials import MaterialSet, compile_programs
 from .plan import Plan, make_plan
+from .rates import Rate
 from .sequence import point, third
 from .settings import Settings
 from .technique import Technique
@@ -48,6 +49,7 @@ class Frame:
     receivers: Receivers | None = None
     services: dict[str, object] = field(default_factory=dict)  # what one technique offers to others, by slot
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
+    rates: dict[str, Rate] = field(default_factory=dict)  # of lights by key, where not one point per sample
 
     @property
     def size(self) -> tuple[int, int]:
@@ -56,6 +58,14 @@ class Frame:
     def random(self, use: str) -> tuple[float, float]:
         """This sample's point of the sequence for `use`."""
         return point(self.sample, use, self.settings.seed)
+
+    def random_at(self, index: int, use: str) -> tuple[float, float]:
+        """Point `index` of the sequence for `use`, for uses that take more or fewer points than samples."""
+        return point(index, use, self.settings.seed)
+
+    def random_volume_at(self, index: int, use: str) -> tuple[float, float, float]:
+        """The same with a third number."""
+        return *self.random_at(index, use), third(index, use, self.settings.seed)
 
     def random_volume(self, use: str) -> tuple[float, float, float]:
         """The same with a third number."""
@@ -136,6 +146,7 @@ class Renderer:
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
         )  # fmt: skip
         self.frame = frame
+        environment.guide(None)
         for technique in plan.techniques:
             for write in technique.writes:
                 if write.name not in frame.images:
@@ -246,7 +257,8 @@ class Renderer:
         return (
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-            settings.seed, tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
+            settings.seed, settings.whole and settings.samples,
+            tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
             tuple(t.name for t in plan.techniques),
         )  # fmt: skip
 

@@ -20,6 +20,7 @@ class Settings:
     seed: int = SEED.default
     slots: dict[str, str] = field(default_factory=dict)
     values: dict[tuple[str, str], object] = field(default_factory=dict)
+    whole: bool = False  # only the mean of all samples is shown, so that a sample may leave out what others bring
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):

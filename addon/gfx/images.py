@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -161,3 +162,13 @@ class Pool:
 
 pool = Pool()
 on_release(pool.trim)
+
+
+@contextmanager
+def borrowed(width: int, height: int, image_format: str) -> Iterator[Target]:
+    """A target over one image of the pool, which gets it back at the end."""
+    image = pool.take(width, height, image_format)
+    try:
+        yield Target((image,))
+    finally:
+        pool.give(image)

@@ -8,11 +8,13 @@ from .direct_light import DirectLight
 from .emissive_light import EmissiveLight
 from .environment_light import EnvironmentLight
 from .film import Film
+from .light_probes import LightProbes
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
 
 REGISTRY: tuple[type[Technique], ...] = (
     Surfaces,
+    LightProbes,
     AccumulatedMaps,
     DirectLight,
     EmissiveLight,

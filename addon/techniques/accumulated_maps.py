@@ -163,12 +163,12 @@ class AccumulatedMaps(Technique):
     def resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
 
-    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray) -> list:
-        """Views that cover this sample of the light for all receivers."""
+    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int) -> list:
+        """Views that cover point `number` of the light, at `sample`, for all receivers."""
         receivers = self._reached.get(emitter.light.key)
         if not emitter.light.cast_shadow or receivers is None or not len(receivers.distance):
             return []
-        jitter = (*frame.random("map"), *frame.random("map/turn"))
+        jitter = (*frame.random_at(number, "map"), *frame.random_at(number, "map/turn"))
         if emitter.kind == lights.SUN:
             return depth_maps.directional_views(sample, frame.receivers, frame.geometry, jitter, self.resolution(frame))
         axis, cone = None, np.inf

@@ -8,6 +8,7 @@ with Cycles' light shapes and units (addon/frame/lights.py) and Cycles' closures
 the technique in the shadow slot. All pixels share y, so there is no noise, only the quadrature error of a
 low-discrepancy set; where a narrow lobe would see dots, traced rays take over part of the light (see traced_glossy).
 
+Where the picture is only shown whole, light_probes shares out points among the lights by the error that each leaves.
 More lights than `lights_per_sample` are drawn by lot, in proportion to power, each weighted by the inverse of its
 chance (systematic sampling); every light keeps a minimum chance.
 
@@ -31,6 +32,7 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..snapshot.scene import Snapshot
 from .accumulated_maps import DepthMapService, rounds
+from .light_probes import rate_of
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 CANDIDATES = 8  # directions that traced_glossy draws from a lobe per sample, of which it traces one
@@ -43,7 +45,7 @@ LIGHTING = passes.fullscreen_program(
         *SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"),
     ),
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "world_samples")),
+    constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
@@ -64,7 +66,6 @@ def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: l
         blocks={"film_view": frame.view_block, "sources": sources.set(rows, views)},
         constants={
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
-            "world_samples": frame.services.get("world_samples", 0.0),
         },
     )  # fmt: skip
     frame.count(technique, "passes")
@@ -105,12 +106,14 @@ class DirectLight(Technique):
         shadow = frame.services.get("shadow")
         items = []
         for emitter, weight in self._chosen(frame):
-            # The same numbers for all lights: then two half lights are one, and names and order change nothing.
-            sample = emitter.sample(*frame.random_volume("light"))
-            views = shadow.views(frame, emitter, sample) if shadow else []
-            row = emitter.row(sample, 0, len(views), weight)
-            row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-            items.append((row, views))
+            rate = rate_of(frame, emitter.light.key)
+            for number in rate.points(frame.sample):
+                # The same numbers for all lights: then two half lights are one, and names and order change nothing.
+                sample = emitter.sample(*frame.random_volume_at(number, "light"))
+                views = shadow.views(frame, emitter, sample, number) if shadow else []
+                row = emitter.row(sample, 0, len(views), weight, rate.per_sample)
+                row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
+                items.append((row, views))
         resolution = shadow.resolution(frame) if shadow else 16
         for rows, views in rounds(items, resolution):
             maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)

@@ -1,8 +1,7 @@
 """Environment light: the world as directional lights, drawn in proportion to its radiance, each with a depth map.
 
-Before the first sample, probes spread over the picture trace one ray into each cell of a grid of directions; how often
-light from there arrives guides the drawing (addon/frame/environment.py: guide). A room lit through a window then
-spends its directions on the window, and no scene spends them on the ground below it.
+The light probes guide the drawing (light_probes.py): a room lit through a window spends its directions on the window,
+and no scene spends them on the ground below it.
 
     L(x, v) = mean over samples of  f(x, v, w) cos(w) L_world(w) V(x, w) / p(w)
 
@@ -13,7 +12,6 @@ orthographic depth map along w over what the camera sees, so it converges to the
 |---|---|
 | maps | `directions` orthographic views (more where the picture reaches from near to far) |
 | passes | 1 over the screen |
-| first sample | 48 x 512 rays |
 
 Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (see traced_glossy).
 Few samples under an even sky show faint overlapping hard shadows.
@@ -23,34 +21,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame import depth_maps, environment, lights
+from ..frame import depth_maps, lights
+from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..frame.view import VIEW
-from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .accumulated_maps import RESOLUTION, DepthMapService, map_resolution, rounds
 from .direct_light import DIRECT_WRITES, shade
-from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
-
-PROBES = (8, 6)
-GUIDE = passes.fullscreen_program(
-    "environment guide",
-    "light/guide.frag.glsl",
-    textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves")),
-    blocks=((VIEW, "film_view"),),
-    constants=(
-        ("INT", "trace_levels"), ("INT", "columns"), ("INT", "rows"), ("IVEC2", "probes"), ("FLOAT", "offset_size"),
-    ),
-    outputs=(("FLOAT", "out_useful"),),
-)  # fmt: skip
+from .light_probes import WORLD
+from .surfaces import SURFACES
 
 
-def directions_per_sample(frame: Frame) -> int:
-    """How many directions of the world each sample draws. Auto shares a budget of six maps with the lights."""
+def directions_rate(frame: Frame) -> Rate:
+    """How many directions of the world a sample draws. Auto asks the probes, or shares six maps with the lights."""
     asked = frame.settings.values.get((EnvironmentLight.name, "directions"), 0)
-    return asked or max(2, 6 - len(frame.snapshot.lights))
+    if not asked and WORLD in frame.rates:
+        return frame.rates[WORLD]
+    return Rate(int(np.log2(asked or max(2, 6 - len(frame.snapshot.lights)))))
 
 
 class EnvironmentLight(Technique):
@@ -62,12 +50,11 @@ class EnvironmentLight(Technique):
             "directions",
             "Directions",
             0,
-            "Directions of the world that are drawn per sample; 0: more where fewer lights need the time",
+            "Directions of the world that are drawn per sample, as a power of two; 0: by the error they leave",
             0,
             64,
         ),
         RESOLUTION,
-        Param("guiding", "Guiding", True, "Draw more directions from where light reaches what the camera sees"),
     )
     reads = SURFACES
     writes = DIRECT_WRITES
@@ -89,8 +76,6 @@ class EnvironmentLight(Technique):
     def run(self, frame: Frame) -> None:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
-        if frame.sample == 0:
-            self._guide(frame)
         seen = frame.snapshot.world.visibility
         flags = (
             lights.SHADOW_FLAG
@@ -99,42 +84,21 @@ class EnvironmentLight(Technique):
             + lights.GLOSSY_FLAG * seen.glossy
         )
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
-        count = directions_per_sample(frame)
+        rate = directions_rate(frame)
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
         items = []
-        for k in range(count):
-            x, y = frame.random(f"environment{k}")
-            direction, radiance, density = frame.environment.draw(x, y)
+        for number in rate.points(frame.sample):
+            direction, radiance, density = frame.environment.draw(*frame.random_at(number, "environment"))
             views = []
             if shadows:
-                jitter = (*frame.random(f"map/environment{k}"), *frame.random(f"map/environment{k}/turn"))
+                jitter = (
+                    *frame.random_at(number, "map/environment"), *frame.random_at(number, "map/environment/turn")
+                )  # fmt: skip
                 views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, jitter, resolution)
-            row = lights.direction_row(direction, radiance / (density * count), density, flags, 0, len(views))
+            row = lights.direction_row(direction, radiance / density, density, flags, 0, len(views), rate.per_sample)
             items.append((row, views))
         for rows, views in rounds(items, resolution):
             shade(frame, self, rows, self._sources, self.service.draw(frame, self, views, resolution))
-
-    def _guide(self, frame: Frame) -> None:
-        hierarchy = frame.hierarchy() if frame.settings.get(self, "guiding") else None
-        if hierarchy is None:
-            frame.environment.guide(None)
-            return
-        cells = environment.GUIDE_ROWS * environment.GUIDE_COLUMNS
-        target = images.Target((images.pool.take(cells, PROBES[0] * PROBES[1], "R32F"),))
-        passes.fullscreen(
-            GUIDE,
-            target,
-            textures={**surface_bindings(frame), "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves},
-            blocks={"film_view": frame.view_block},
-            constants={
-                "trace_levels": hierarchy.levels, "columns": environment.GUIDE_COLUMNS, "rows": environment.GUIDE_ROWS,
-                "probes": PROBES, "offset_size": 1e-6 * frame.geometry.size,
-            },
-        )  # fmt: skip
-        useful = images.read(target.colors[0]).mean(axis=(0, 2))
-        images.pool.give(target.colors[0])
-        frame.environment.guide(useful.reshape(environment.GUIDE_ROWS, environment.GUIDE_COLUMNS))
-        frame.count(self, "guiding rays", cells * PROBES[0] * PROBES[1])
 
     def release(self) -> None:
         self.service.release()

@@ -39,7 +39,8 @@ from ..gfx import passes
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES, TRACED_DEFINES
-from .environment_light import directions_per_sample
+from .environment_light import directions_rate
+from .light_probes import rate_of
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 TRACED = passes.fullscreen_program(
@@ -93,19 +94,19 @@ class TracedGlossy(Technique):
     def prepare(self, frame: Frame) -> None:
         """Tell the techniques that draw light samples, which run before this one, what share the rays take over."""
         frame.services["traced_roughness"] = frame.settings.get(self, "roughness")
-        seen = frame.snapshot.world.visibility.glossy
-        sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
-        frame.services["world_samples"] = float(directions_per_sample(frame)) if sampled and seen else 0.0
 
     def run(self, frame: Frame) -> None:
         roughness = frame.services["traced_roughness"]
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             shown = lights.traceable([emitter for emitter in found if emitter is not None])
-            self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in shown])
+            rates = [rate_of(frame, emitter.light.key).per_sample for emitter in shown]
+            rows = [emitter.row(emitter.centre, 0, 0, rate, rate) for emitter, rate in zip(shown, rates)]
+            self._lights = self._sources.set(rows)
+            sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
+            self._world_samples = directions_rate(frame).per_sample if sampled else 0.0
             self._light_count = len(shown)
         world = frame.snapshot.world
-        samples = frame.services["world_samples"]
         hierarchy = frame.hierarchy()
         emissive_power, emissive_points = frame.services.get("emissive", (0.0, 1.0))
         frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
@@ -125,7 +126,8 @@ class TracedGlossy(Technique):
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
-                "world_samples": samples, "emissive_power": emissive_power, "emissive_points": emissive_points,
+                "world_samples": self._world_samples,
+                "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
         )  # fmt: skip
         frame.count(self, "passes")

@@ -75,6 +75,7 @@ def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
     samples = 8 if preview else (group.viewport_samples if viewport else group.samples)
     return Settings(
         samples=samples,
+        whole=not viewport,
         seed=group.seed,
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
         values={

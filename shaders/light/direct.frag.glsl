@@ -43,9 +43,8 @@ void main()
       float lobe_density;
       from_glossy = lobe_reflection(lobe, direction, lobe_density);
       if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
-        float own = (light.kind == LIGHT_DIRECTION) ? world_samples : 1.0;
         float rays = (light.kind == LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
-        float ratio = rays * lobe_density / (own * density);
+        float ratio = rays * lobe_density / (light.rate * density);
         from_glossy /= 1.0 + ratio * ratio;
       }
     }

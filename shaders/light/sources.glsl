@@ -4,6 +4,7 @@
 //   0: kind, flags, first depth-map view, number of views
 //   1: centre, radius                 (sun, direction: unit vector towards the light, half angle)
 //   2: this sample's point            (point, spot: offset from the centre; area: position; sun: direction)
+//      w: how many points of the light a sample of the picture has on average (addon/frame/rates.py)
 //   3: radiance, area                 (radius 0: radiant intensity; direction: radiance / density, density;
 //                                      point of an emissive surface: radiance, 1 / density)
 //   4: emission axis (unit)           w: tan of the half spread, 0 = Lambertian
@@ -36,6 +37,7 @@ struct Light {
   vec3 centre;
   float radius;
   vec3 point;
+  float rate;
   vec3 radiance;
   float area;
   vec3 axis;
@@ -57,7 +59,9 @@ Light light_read(int index)
   light.view_count = int(a.w);
   light.centre = b.xyz;
   light.radius = b.w;
-  light.point = sources.light[light.base + 2].xyz;
+  vec4 c = sources.light[light.base + 2];
+  light.point = c.xyz;
+  light.rate = c.w;
   light.radiance = d.xyz;
   light.area = d.w;
   light.axis = e.xyz;

@@ -37,7 +37,7 @@ vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, floa
     float density;
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && max_component(abs(radiance)) > 0.0) {
-      sum += radiance * (mirror ? 1.0 : lobe_share(lobe_density, density, 1.0));
+      sum += radiance * (mirror ? 1.0 : lobe_share(lobe_density, density, light.rate));
       span = vec2(min(span.x, hit_distance), max(span.y, min(hit_distance, 1e29)));
     }
   }

@@ -1,0 +1,56 @@
+"""How often each light is sampled: points go where the error is, not evenly over the lights.
+
+With points from a low-discrepancy set the squared error that light k leaves in a picture falls like V_k / n_k^1.5;
+V_k is the variance of one point's contribution, relative to the light in the picture. A budget of points is spent best
+if it goes, doubling by doubling, to the light whose error per added point falls most. A lamp without size or one whose
+shadows nobody sees then costs a map every few samples; the window that lights the room gets several maps in each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+FEWEST_POINTS = 8  # of a light in a whole picture, whatever its variance: it was estimated from few probes
+MOST_EXPONENT = 3
+
+
+@dataclass(frozen=True)
+class Rate:
+    """2^exponent points per sample of the picture."""
+
+    exponent: int = 0
+
+    @property
+    def per_sample(self) -> float:
+        return 2.0**self.exponent
+
+    def points(self, sample: int) -> range:
+        """Numbers of the points that belong to a sample: several, one, or in some samples none."""
+        if self.exponent >= 0:
+            count = 1 << self.exponent
+            return range(sample * count, (sample + 1) * count)
+        every = 1 << -self.exponent
+        return range(sample // every, sample // every + (sample % every == 0))
+
+
+def allocate(variance: Sequence[float], samples: int, budget: float) -> list[Rate]:
+    """Rates for lights of these variances that sum to about `budget` points per sample.
+
+    No light gets fewer than FEWEST_POINTS points in all, nor a rate that does not come out even over `samples`.
+    """
+    least = 0
+    while least > -3 and samples % (1 << (1 - least)) == 0 and samples >> (1 - least) >= FEWEST_POINTS:
+        least -= 1
+    exponents = [least] * len(variance)
+    variance = np.nan_to_num(np.asarray(variance, np.float64), nan=0.0, posinf=1e30)
+    gain = 1.0 - 2.0**-1.5
+    while True:
+        rates = np.exp2(exponents)
+        benefit = variance * rates**-1.5 * gain / rates
+        affordable = (rates.sum() + rates <= budget) & (np.asarray(exponents) < MOST_EXPONENT) & (benefit > 0)
+        if not affordable.any():
+            return [Rate(int(exponent)) for exponent in exponents]
+        exponents[int(np.argmax(np.where(affordable, benefit, -1.0)))] += 1

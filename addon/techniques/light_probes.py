@@ -1,0 +1,191 @@
+"""Light probes: before the first sample, a few rays tell which light reaches the picture, and where points are needed.
+
+Two questions are asked at pixels of a coarse grid, by rays through the hierarchy of all triangles:
+
+- From which directions does the world's light arrive? (48 probes, 512 directions.) Directions of the world are then
+  drawn in proportion to radiance times usefulness: a room lit through a window spends them on the window.
+- How much do single points of a light differ in what they bring? (432 probes, 8 points per light.) Their variance, in
+  units of the light that the probe gets, is the error that one point leaves; frame/rates.py turns it into the number of
+  points per sample. Only for pictures whose samples are shown together: otherwise every sample has one point per light.
+
+| cost | once per picture |
+|---|---|
+| rays | 24,576 for the world, 3,456 per light |
+| readback | 4 bytes per probe and direction, 16 per probe and light |
+
+Bias: none; only the density of samples depends on it. Fails: where the scene has too many triangles for a hierarchy,
+every light gets one point per sample and the world is drawn by its radiance alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame import acceleration, environment, lights
+from ..frame.rates import Rate, allocate
+from ..frame.run import Frame
+from ..frame.sequence import point, third
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique
+from ..frame.view import VIEW
+from ..gfx import images, passes
+from ..snapshot.scene import Snapshot
+from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
+
+GUIDE_PROBES, SPREAD_PROBES = (8, 6), (24, 18)
+POINTS = 8  # of each light
+WORLD = "world"  # its name among the rates
+RAYS = (*SURFACE_TEXTURES, ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
+GUIDE = passes.fullscreen_program(
+    "environment guide",
+    "light/guide.frag.glsl",
+    textures=RAYS,
+    blocks=((VIEW, "film_view"),),
+    constants=(
+        ("INT", "trace_levels"), ("INT", "columns"), ("INT", "rows"), ("IVEC2", "probes"), ("FLOAT", "offset_size"),
+    ),
+    outputs=(("FLOAT", "out_useful"),),
+)  # fmt: skip
+SPREAD = passes.fullscreen_program(
+    "light spread",
+    "light/spread.frag.glsl",
+    textures=RAYS,
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+    constants=(("INT", "trace_levels"), ("IVEC2", "probes"), ("FLOAT", "offset_size"), ("INT", "points")),
+    outputs=(("VEC4", "out_moments"),),
+)
+
+
+class LightProbes(Technique):
+    name = "light_probes"
+    label = "Light probes"
+    params = (
+        Param("guiding", "Guiding", True, "Draw more directions of the world from where light reaches the picture"),
+        Param(
+            "maps", "Maps per sample", 6.0,
+            "Depth maps that a sample of a final picture shares out among lights and world, by the error of each; "
+            "0: one for every light", 0.0, 64.0,
+        ),
+    )  # fmt: skip
+    reads = SURFACES
+
+    def __init__(self):
+        self._sources = lights.Sources()
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if not snapshot.instances:
+            return "the scene has no surface"
+        if not np.any(snapshot.world.color) and not any(np.any(light.strength) for light in snapshot.lights):
+            return "the scene has no light to look for"
+        return acceleration.too_many(snapshot)
+
+    def run(self, frame: Frame) -> None:
+        if frame.sample > 0 or frame.receivers is None or not len(frame.receivers.distance):
+            return
+        lit = bool(np.any(frame.snapshot.world.color))
+        if lit:
+            self._guide(frame)
+        if frame.settings.whole and frame.settings.get(self, "maps") > 0:
+            self._share_out(frame, lit)
+
+    def _rays(self, frame: Frame) -> dict:
+        hierarchy = frame.hierarchy()
+        return {
+            "textures": {
+                **surface_bindings(frame), "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
+            },
+            "constants": {"trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size},
+        }  # fmt: skip
+
+    def _guide(self, frame: Frame) -> None:
+        if not frame.settings.get(self, "guiding"):
+            frame.environment.guide(None)
+            return
+        rays = self._rays(frame)
+        rows, columns = environment.GUIDE_ROWS, environment.GUIDE_COLUMNS
+        probes = GUIDE_PROBES[0] * GUIDE_PROBES[1]
+        with images.borrowed(rows * columns, probes, "R32F") as target:
+            passes.fullscreen(
+                GUIDE,
+                target,
+                textures=rays["textures"],
+                blocks={"film_view": frame.view_block},
+                constants={**rays["constants"], "columns": columns, "rows": rows, "probes": GUIDE_PROBES},
+            )
+            useful = images.read(target.colors[0]).mean(axis=(0, 2))
+        frame.environment.guide(useful.reshape(rows, columns))
+        frame.count(self, "guiding rays", rows * columns * probes)
+
+    def _share_out(self, frame: Frame, lit: bool) -> None:
+        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+        emitters = [emitter for emitter in found if emitter is not None]
+        if len(emitters) >= lights.MOST_LIGHTS:
+            emitters = []  # so many are drawn by lot
+        trials = [(emitter.light.key, self._points_of(frame, emitter)) for emitter in emitters]
+        if lit:
+            trials.append((WORLD, self._points_of_world(frame)))
+        if not trials:
+            return
+        moments = self._moments(frame, [rows for _, rows in trials])
+        variance = relative_variance(moments[..., 0], moments[..., 1])
+        # Lights in one place count as one, so that two half lights are sampled like the whole.
+        places = [_place(emitter) for emitter in emitters] + [WORLD] * lit
+        distinct = list(dict.fromkeys(places))
+        joint = [sum(np.sqrt(v) for v, place in zip(variance, places) if place == one) ** 2 for one in distinct]
+        rates = dict(zip(distinct, allocate(joint, frame.settings.samples, frame.settings.get(self, "maps"))))
+        frame.rates = {key: rates[place] for (key, _), place in zip(trials, places)}
+        frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * POINTS)
+
+    def _points_of(self, frame: Frame, emitter: lights.Emitter) -> list[np.ndarray]:
+        seed = frame.settings.seed
+        samples = [emitter.sample(*point(k, "light", seed), third(k, "light", seed)) for k in range(POINTS)]
+        return [emitter.row(sample, 0, int(emitter.light.cast_shadow)) for sample in samples]
+
+    def _points_of_world(self, frame: Frame) -> list[np.ndarray]:
+        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
+        drawn = [frame.environment.draw(*point(k, "environment", frame.settings.seed)) for k in range(POINTS)]
+        return [lights.direction_row(d, radiance / density, density, flags, 0, 1) for d, radiance, density in drawn]
+
+    def _moments(self, frame: Frame, trials: list[list[np.ndarray]]) -> np.ndarray:
+        """(lights, probes, 2): mean and mean square of a point's irradiance at each probe that sees a surface."""
+        rays = self._rays(frame)
+        out = []
+        step = lights.MOST_LIGHTS // POINTS
+        for first in range(0, len(trials), step):
+            part = trials[first : first + step]
+            with images.borrowed(SPREAD_PROBES[0] * SPREAD_PROBES[1], len(part), "RGBA32F") as target:
+                passes.fullscreen(
+                    SPREAD,
+                    target,
+                    textures=rays["textures"],
+                    blocks={
+                        "film_view": frame.view_block,
+                        "sources": self._sources.set([row for rows in part for row in rows]),
+                    },
+                    constants={**rays["constants"], "probes": SPREAD_PROBES, "points": POINTS},
+                )
+                out.append(images.read(target.colors[0])[..., :2].astype(np.float64))
+        return np.concatenate(out)
+
+    def release(self) -> None:
+        self._sources.release()
+
+
+def relative_variance(mean: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """(L,) variance that a single point of each light leaves, relative to the light at the probes, as relMSE counts it.
+
+    `mean`, `square`: (L, P) moments of a point's irradiance.
+    """
+    total = mean.sum(axis=0)
+    scale = total**2 + (0.1 * total.mean()) ** 2
+    return (np.maximum(square - mean**2, 0.0) / np.maximum(scale, 1e-300)).mean(axis=1)
+
+
+def _place(emitter: lights.Emitter) -> tuple:
+    shape = (emitter.centre, emitter.u, emitter.v, emitter.axis)
+    return (emitter.kind, emitter.flags, emitter.radius, *(part.tobytes() for part in shape))
+
+
+def rate_of(frame: Frame, key: str) -> Rate:
+    """How often the light `key`, or WORLD, is sampled; once per sample where nothing else was found."""
+    return frame.rates.get(key, Rate())

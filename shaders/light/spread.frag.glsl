@@ -1,0 +1,35 @@
+// How much the points of one light (row) differ in what they bring to a probe (column), a pixel of a coarse grid:
+// mean and mean square of the irradiance by single points, visibility traced.
+#include "lib/gbuffer.glsl"
+#include "light/sources.glsl"
+#include "trace/hierarchy.glsl"
+
+void main()
+{
+  out_moments = vec4(0.0);
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  vec2 probe = vec2(float(place.x % probes.x), float(place.x / probes.x));
+  uvec3 bits = hash3(uvec3(uint(place.x), 7u, 5u));
+  vec2 size = vec2(textureSize(surface_position, 0));
+  ivec2 pixel = ivec2((probe + vec2(to_unit(bits.x), to_unit(bits.y))) / vec2(probes) * size);
+  Surface s = SURFACE_READ(pixel);
+  if (!s.hit) {
+    return;
+  }
+  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+  for (int k = 0; k < points; k++) {
+    Light light = light_read(place.y * points + k);
+    vec3 direction;
+    float density;
+    vec3 arriving = light_sample(light, s.position, direction, density);
+    float irradiance = luminance(abs(arriving)) * max(dot(s.normal, direction), 0.0);
+    if (irradiance > 0.0 && (light.flags & LIGHT_SHADOW) != 0) {
+      bool far = light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION;
+      bool flat_light = light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE;
+      float reach = far ? 1e29 : length((flat_light ? light.point : light.centre) - s.position) - light.radius;
+      ivec2 hit;
+      irradiance *= (trace_until(origin, direction, reach, reach, bits.z, hit) >= reach) ? 1.0 : 0.0;
+    }
+    out_moments.xy += vec2(irradiance, irradiance * irradiance) / float(points);
+  }
+}
