@@ -69,6 +69,7 @@ class Environment:
         row = np.clip((world[..., 2] + 1) / 2 * GUIDE_ROWS, 0, GUIDE_ROWS - 1).astype(int)
         turn = np.arctan2(world[..., 1], world[..., 0]) / (2 * np.pi) + 0.5
         column = np.clip(turn * GUIDE_COLUMNS, 0, GUIDE_COLUMNS - 1).astype(int)
+        usefulness = np.maximum(usefulness, 0.5 * _largest_nearby(usefulness))
         guided = self._by_radiance * usefulness[row, column]
         solid_angle = self._cell_solid_angle(height, width)
         total = float((guided * solid_angle).sum())
@@ -117,6 +118,12 @@ class Environment:
         columns, rows = np.array([x0, x0 + 1]) % width, np.clip([y0, y0 + 1], 0, height - 1)
         block = self.pixels[np.ix_(rows, columns)]
         return np.einsum("ijk,i,j->k", block, [1 - ty, ty], [1 - tx, tx])
+
+
+def _largest_nearby(cells: np.ndarray) -> np.ndarray:
+    """Maximum over a cell and its eight neighbours: what probes saw there is likely to be seen here by others."""
+    round_about = np.pad(np.pad(cells, ((0, 0), (1, 1)), mode="wrap"), ((1, 1), (0, 0)), mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(round_about, (3, 3)).max(axis=(2, 3))
 
 
 def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:

@@ -64,10 +64,11 @@ class Emitter:
         return self.centre + sample if self.kind in (POINT, SPHERE) else sample
 
     def row(
-        self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0, rate: float = 1.0
-    ) -> np.ndarray:
+        self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0, rate: float = 1.0,
+        points: float = np.inf,
+    ) -> np.ndarray:  # fmt: skip
         """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen, `rate` how many
-        points of this light a sample of the picture has on average."""
+        points of this light a sample of the picture has on average, and `points` how many the whole picture has."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
         rows = np.zeros((TEXELS, 4))
         rows[0] = self.kind, flags, first_view, view_count
@@ -77,6 +78,7 @@ class Emitter:
         rows[4] = *self.axis, self.spread
         for k, row in enumerate((self.u, self.v, self.w)):
             rows[5 + k, : len(row)] = row
+        rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
         return rows
 
 
@@ -132,6 +134,14 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
     return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
 
 
+def footprint(area: float, points: float) -> float:
+    """Least squared distance, m2, at which a point stands for its share of `area`.
+
+    A point that is nearer than the radius of the disc it stands for would be brighter than all of the light.
+    """
+    return area / (np.pi * points)
+
+
 def traceable(emitters: list[Emitter]) -> list[Emitter]:
     """The lights that rays of narrow lobes look for: those with extent, the strongest where a block cannot hold all."""
     extended = [e for e in emitters if e.kind in (RECTANGLE, ELLIPSE) or e.radius > 0]
@@ -174,14 +184,18 @@ def direction_row(
     return rows
 
 
-def surface_row(point, normal, radiance, density, flags, first_view: int, view_count: int) -> np.ndarray:
-    """A row for a point on an emissive surface, drawn with `density` per m2; it shines to both sides."""
+def surface_row(
+    point, normal, radiance, density, flags, first_view: int, view_count: int, samples: float = np.inf
+) -> np.ndarray:
+    """A row for a point on an emissive surface, drawn with `density` per m2 in each of `samples` samples; it shines to
+    both sides."""
     rows = np.zeros((TEXELS, 4))
     rows[0] = SURFACE, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
     rows[1, :3] = point
     rows[2] = *point, 1.0
     rows[3] = *radiance, 1.0 / density
     rows[4, :3] = normal
+    rows[7, 3] = footprint(1.0 / density, samples)
     return rows
 
 

@@ -17,7 +17,8 @@ chance (systematic sampling); every light keeps a minimum chance.
 | passes | 1 over the screen per round of lights (a round fills the depth-map atlas) |
 | fetches per pixel | 6 surface + per light: 5 to 8 list, 4 to 6 shadow |
 
-Bias: none that remains as samples grow. The clamp on 1 / distance^2 is 1e-30, far below any scene.
+Bias: none that remains as samples grow. A point that stands for an area a of its light gives a receiver nearer than
+sqrt(a / pi) no more than at that distance: otherwise single points beside a surface would outshine the whole light.
 """
 
 from __future__ import annotations
@@ -111,7 +112,8 @@ class DirectLight(Technique):
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = emitter.sample(*frame.random_volume_at(number, "light"))
                 views = shadow.views(frame, emitter, sample, number) if shadow else []
-                row = emitter.row(sample, 0, len(views), weight, rate.per_sample)
+                points = rate.per_sample * frame.settings.samples / weight
+                row = emitter.row(sample, 0, len(views), weight, rate.per_sample, points)
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
                 items.append((row, views))
         resolution = shadow.resolution(frame) if shadow else 16

@@ -109,7 +109,10 @@ class EmissiveLight(Technique):
             views = depth_maps.point_views(
                 point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution
             )  # fmt: skip
-            items.append((lights.surface_row(point, normal, radiance, density * count, flags, 0, len(views)), views))
+            row = lights.surface_row(
+                point, normal, radiance, density * count, flags, 0, len(views), frame.settings.samples
+            )
+            items.append((row, views))
         for rows, views in rounds(items, resolution):
             shade(frame, self, rows, self._sources, self.service.draw(frame, self, views, resolution))
 

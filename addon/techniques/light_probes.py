@@ -2,7 +2,7 @@
 
 Two questions are asked at pixels of a coarse grid, by rays through the hierarchy of all triangles:
 
-- From which directions does the world's light arrive? (48 probes, 512 directions.) Directions of the world are then
+- From which directions does the world's light arrive? (108 probes, 512 directions.) Directions of the world are then
   drawn in proportion to radiance times usefulness: a room lit through a window spends them on the window.
 - How much do single points of a light differ in what they bring? (432 probes, 8 points per light.) Their variance, in
   units of the light that the probe gets, is the error that one point leaves; frame/rates.py turns it into the number of
@@ -10,7 +10,7 @@ Two questions are asked at pixels of a coarse grid, by rays through the hierarch
 
 | cost | once per picture |
 |---|---|
-| rays | 24,576 for the world, 3,456 per light |
+| rays | 55,296 for the world, 3,456 per light |
 | readback | 4 bytes per probe and direction, 16 per probe and light |
 
 Bias: none; only the density of samples depends on it. Fails: where the scene has too many triangles for a hierarchy,
@@ -29,11 +29,12 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import Snapshot, World
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
-GUIDE_PROBES, SPREAD_PROBES = (8, 6), (24, 18)
+GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
 POINTS = 8  # of each light
+MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
 WORLD = "world"  # its name among the rates
 RAYS = (*SURFACE_TEXTURES, ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
 GUIDE = passes.fullscreen_program(
@@ -75,14 +76,17 @@ class LightProbes(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
             return "the scene has no surface"
-        if not np.any(snapshot.world.color) and not any(np.any(light.strength) for light in snapshot.lights):
-            return "the scene has no light to look for"
+        if not _lit(snapshot.world):
+            if not any(np.any(light.strength) for light in snapshot.lights):
+                return "the scene has no light to look for"
+            if not settings.whole:
+                return "every sample is shown, so each has one point per light"
         return acceleration.too_many(snapshot)
 
     def run(self, frame: Frame) -> None:
         if frame.sample > 0 or frame.receivers is None or not len(frame.receivers.distance):
             return
-        lit = bool(np.any(frame.snapshot.world.color))
+        lit = _lit(frame.snapshot.world)
         if lit:
             self._guide(frame)
         if frame.settings.whole and frame.settings.get(self, "maps") > 0:
@@ -119,8 +123,8 @@ class LightProbes(Technique):
     def _share_out(self, frame: Frame, lit: bool) -> None:
         found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
         emitters = [emitter for emitter in found if emitter is not None]
-        if len(emitters) >= lights.MOST_LIGHTS:
-            emitters = []  # so many are drawn by lot
+        if len(emitters) > MOST_LIGHTS:
+            emitters = []
         trials = [(emitter.light.key, self._points_of(frame, emitter)) for emitter in emitters]
         if lit:
             trials.append((WORLD, self._points_of_world(frame)))
@@ -139,7 +143,8 @@ class LightProbes(Technique):
     def _points_of(self, frame: Frame, emitter: lights.Emitter) -> list[np.ndarray]:
         seed = frame.settings.seed
         samples = [emitter.sample(*point(k, "light", seed), third(k, "light", seed)) for k in range(POINTS)]
-        return [emitter.row(sample, 0, int(emitter.light.cast_shadow)) for sample in samples]
+        shadowed, total = int(emitter.light.cast_shadow), frame.settings.samples
+        return [emitter.row(sample, 0, shadowed, points=total) for sample in samples]
 
     def _points_of_world(self, frame: Frame) -> list[np.ndarray]:
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
@@ -150,7 +155,7 @@ class LightProbes(Technique):
         """(lights, probes, 2): mean and mean square of a point's irradiance at each probe that sees a surface."""
         rays = self._rays(frame)
         out = []
-        step = lights.MOST_LIGHTS // POINTS
+        step = lights.MOST_LIGHTS // POINTS  # of one uniform block
         for first in range(0, len(trials), step):
             part = trials[first : first + step]
             with images.borrowed(SPREAD_PROBES[0] * SPREAD_PROBES[1], len(part), "RGBA32F") as target:
@@ -179,6 +184,10 @@ def relative_variance(mean: np.ndarray, square: np.ndarray) -> np.ndarray:
     total = mean.sum(axis=0)
     scale = total**2 + (0.1 * total.mean()) ** 2
     return (np.maximum(square - mean**2, 0.0) / np.maximum(scale, 1e-300)).mean(axis=1)
+
+
+def _lit(world: World) -> bool:
+    return bool(np.any(world.color)) and (world.visibility.diffuse or world.visibility.glossy)
 
 
 def _place(emitter: lights.Emitter) -> tuple:

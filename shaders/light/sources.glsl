@@ -10,7 +10,7 @@
 //   4: emission axis (unit)           w: tan of the half spread, 0 = Lambertian
 //   5: half width vector (area), or row 0 of the inverse spot matrix; w: cosine of the half cone
 //   6: half height vector, or row 1;  w: 1 / ((1 - cosine) blend), 0 = hard edge
-//   7: row 2
+//   7: row 2;                         w: least squared distance at which the point stands for its part of the light
 #include "lib/math.glsl"
 
 #define LIGHT_TEXELS 8
@@ -123,6 +123,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     vec3 to_light = light.point - position;
     float squared = max(dot(to_light, to_light), 1e-30);
     direction = to_light * inversesqrt(squared);
+    squared = max(squared, sources.light[light.base + 7].w);
     float cos_light = -dot(direction, light.axis);
     if (light.kind == LIGHT_SURFACE) {
       cos_light = abs(cos_light);  // meshes emit to both sides
@@ -168,6 +169,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       vec3 to_point = to_centre + across;
       float squared = max(dot(to_point, to_point), 1e-30);
       direction = to_point * inversesqrt(squared);
+      squared = max(squared, sources.light[light.base + 7].w);
       float solid_angle = light.area * max(dot(direction, axis), 0.0) / squared;
       density = 1.0 / max(solid_angle, 1e-30);
       result = light.radiance * solid_angle;

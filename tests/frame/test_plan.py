@@ -131,8 +131,8 @@ ALWAYS = {"surfaces", "film"}
         ({"lights": ()}, set()),
         ({"lights": (lamp(strength=np.zeros(3)),)}, set()),
         ({"lights": (lamp(cast_shadow=False),)}, {"direct_light"}),
-        ({"world": World(np.ones(3))}, {"accumulated_maps", "direct_light", "environment_light"}),
-        ({"world": World(np.ones(3)), "lights": ()}, {"environment_light"}),
+        ({"world": World(np.ones(3))}, {"light_probes", "accumulated_maps", "direct_light", "environment_light"}),
+        ({"world": World(np.ones(3)), "lights": ()}, {"light_probes", "environment_light"}),
         ({"world": World(np.ones(3)), "instances": ()}, set()),
         (
             {"world": World(np.ones(3), visibility=Visibility(diffuse=False, glossy=False))},

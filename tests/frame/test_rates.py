@@ -1,0 +1,48 @@
+"""Points go to the light whose error falls most per point, within the budget, and come out even."""
+
+import numpy as np
+import pytest
+
+from addon.frame.rates import FEWEST_POINTS, Rate, allocate
+
+
+@pytest.mark.parametrize(("exponent", "numbers"), [(0, [[0], [1], [2], [3]]), (1, [[0, 1], [2, 3], [4, 5], [6, 7]])])
+def test_points_are_numbered_without_gap(exponent, numbers):
+    assert [list(Rate(exponent).points(sample)) for sample in range(4)] == numbers
+
+
+def test_a_low_rate_skips_samples_and_no_point():
+    assert [list(Rate(-1).points(sample)) for sample in range(6)] == [[0], [], [1], [], [2], []]
+
+
+def test_equal_lights_get_equal_rates():
+    assert len({rate.exponent for rate in allocate([0.3, 0.3, 0.3, 0.3], 64, 4.0)}) == 1
+
+
+def test_the_light_that_errs_most_gets_most_points():
+    rates = [rate.per_sample for rate in allocate([1.0, 0.01, 0.0], 64, 6.0)]
+    assert rates[0] > rates[1] > rates[2]
+    assert sum(rates) <= 6.0
+
+
+def test_no_other_sharing_of_the_budget_leaves_less_error():
+    """Against all rates in powers of two that cost no more."""
+    variance = np.array([0.5, 0.08, 0.003])
+    found = np.array([rate.per_sample for rate in allocate(variance, 64, 6.0)])
+    choices = 2.0 ** np.arange(-3, 4)
+    grid = np.stack(np.meshgrid(choices, choices, choices), axis=-1).reshape(-1, 3)
+    errors = (variance * grid**-1.5).sum(axis=1)
+    best = errors[grid.sum(axis=1) <= found.sum()].min()
+    assert (variance * found**-1.5).sum() <= 1.001 * best
+
+
+@pytest.mark.parametrize("samples", [1, 7, 8, 12, 16, 64, 100])
+def test_every_light_has_whole_rounds_of_points_and_enough_of_them(samples):
+    for rate in allocate([1.0, 0.0], samples, 1.0):
+        assert samples * rate.per_sample == int(samples * rate.per_sample)
+        assert samples * rate.per_sample >= min(samples, FEWEST_POINTS)
+
+
+def test_variances_that_are_no_numbers_do_no_harm():
+    assert len(allocate([np.nan, np.inf, 1.0], 16, 6.0)) == 3
+    assert allocate([], 16, 6.0) == []
