@@ -100,7 +100,7 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
         given.append(f"samples={options.samples}")
     settings = settings_of(scene, viewport=False).override(REGISTRY, given)
     group = scene.candela
-    group.samples, group.seed = settings.samples, settings.seed
+    group.samples, group.seed, group.bounces = settings.samples, settings.seed, settings.bounces
     for slot, technique in settings.slots.items():
         setattr(group, f"slot_{slot}", technique)
     for (technique, param), value in settings.values.items():

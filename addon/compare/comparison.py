@@ -118,7 +118,7 @@ def compare_scene(
     from . import reference as rendering  # bpy is needed from here on only
 
     view_layer = view_layer or rendering.active_view_layer(scene)
-    passes = rendering.render_passes(scene, engine, samples, seed, False, size, view_layer)
+    passes = rendering.render_passes(scene, engine, samples, seed, direct_only, size, view_layer)
     if ledger is None and engine == "CANDELA":
         ledger = _latest_ledger()
     truth = rendering.reference(scene, reference_samples, direct_only, size, view_layer, use_cache)

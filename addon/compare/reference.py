@@ -55,20 +55,25 @@ def render_passes(
     direct_only: bool = False,
     size: tuple[int, int] | None = None,
     view_layer: bpy.types.ViewLayer | None = None,
+    bounces: int | None = None,
 ) -> Passes:
     """Render one view layer of `scene` with `engine` and return its passes.
 
     `size` is (width, height) in pixels before any render border; without it the scene's own resolution is used. With
-    a render border the pictures hold the bordered rectangle only. `direct_only` lets Cycles stop after the first
-    surface: its direct passes stay what they are in a full render, and Combined shows direct light, emission and
-    world. Compositor and sequencer stay out of it. Blender's Render Result shows this render afterwards.
+    a render border the pictures hold the bordered rectangle only. `bounces` limits how often light is reflected on
+    its way to the surface that is seen; None leaves it to Candela's own setting, and Cycles goes on until nothing is
+    left. `direct_only` means none: the direct passes stay what they are in a full render, and Combined shows direct
+    light, emission and world. EEVEE knows no such limit. Compositor and sequencer stay out of it. Blender's Render
+    Result shows this render afterwards.
     Raises `RenderFailed`.
     """
     engine = engine_identifier(scene, engine)
     view_layer = view_layer or active_view_layer(scene)
     with tempfile.TemporaryDirectory(prefix="candela_") as folder:
         path = Path(folder) / "passes.exr"
-        with overridden(render_settings(scene, view_layer, engine, samples, seed, direct_only, size)) as notes:
+        with overridden(
+            render_settings(scene, view_layer, engine, samples, seed, 0 if direct_only else bounces, size)
+        ) as notes:
             transparent = scene.render.film_transparent
             start = time.perf_counter()
             try:
@@ -174,7 +179,7 @@ def reference_key(
     view_layer: bpy.types.ViewLayer,
 ) -> str:
     """Name of the cache entry: a hash of the scene as it will be rendered. Frame, size and samples are part of it."""
-    with overridden(render_settings(scene, view_layer, "CYCLES", samples, 0, direct_only, size)):
+    with overridden(render_settings(scene, view_layer, "CYCLES", samples, 0, 0 if direct_only else None, size)):
         view_layer.update()  # evaluation writes into the data (animated values, bounds): always hash what it left
         content = scene_hash(scene)
     about = f"{KEY_VERSION} {SEEDS} {view_layer.name!r} {content}"
@@ -225,7 +230,7 @@ def render_settings(
     engine: str,
     samples: int,
     seed: int,
-    direct_only: bool,
+    bounces: int | None,
     size: tuple[int, int] | None,
 ) -> list[Setting]:
     """All that is changed for a render, in the order in which it must be set (and put back)."""
@@ -261,19 +266,20 @@ def render_settings(
         owner, _, name = row.switch.rpartition(".")
         settings.append((getattr(view_layer, owner, None) if owner else view_layer, name, True))
     if engine == "CYCLES":
-        settings += cycles_settings(scene, samples, seed, direct_only)
+        settings += cycles_settings(scene, samples, seed, MANY_BOUNCES if bounces is None else bounces)
     elif engine in EEVEE:
         settings.append((scene.eevee, "taa_render_samples", samples))
     else:
         own = getattr(scene, engine.lower(), None)
         settings += [(own, "samples", samples), (own, "seed", seed)]
+        if bounces is not None:
+            settings.append((own, "bounces", bounces))
     return [setting for setting in settings if setting[0] is not None and hasattr(setting[0], setting[1])]
 
 
-def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, direct_only: bool) -> list[Setting]:
+def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, bounces: int) -> list[Setting]:
     """What turns Cycles into an unbiased reference. Names that one Blender version lacks are skipped by the caller."""
     cycles = scene.cycles
-    bounces = 0 if direct_only else MANY_BOUNCES
     values = {
         "device": "CPU",
         "feature_set": "SUPPORTED",

@@ -257,7 +257,7 @@ class Renderer:
         return (
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-            settings.seed, settings.whole and settings.samples,
+            settings.seed, settings.bounces, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
             tuple(t.name for t in plan.techniques),
         )  # fmt: skip

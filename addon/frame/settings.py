@@ -9,6 +9,11 @@ from .technique import Param, Technique
 
 SAMPLES = Param("samples", "Samples", 64, "Pictures that are averaged; error falls as the count grows", 1, 65536)
 SEED = Param("seed", "Seed", 0, "Another number gives other noise with the same mean", 0, 2**31 - 1)
+BOUNCES = Param(
+    "bounces", "Bounces", 16,
+    "How often light is reflected by surfaces on its way to the surface that is seen; 0: direct light only", 0, 64,
+)  # fmt: skip
+SCENE_PARAMS = (SAMPLES, SEED, BOUNCES)
 AUTO = "AUTO"
 
 
@@ -18,6 +23,7 @@ class Settings:
 
     samples: int = SAMPLES.default
     seed: int = SEED.default
+    bounces: int = BOUNCES.default
     slots: dict[str, str] = field(default_factory=dict)
     values: dict[tuple[str, str], object] = field(default_factory=dict)
     whole: bool = False  # only the mean of all samples is shown, so that a sample may leave out what others bring
@@ -37,13 +43,14 @@ class Settings:
     def override(self, techniques: Iterable[Technique], assignments: Iterable[str]) -> Settings:
         """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown."""
         settings = self
+        own = {param.name: param for param in SCENE_PARAMS}
         table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
         for text in assignments:
             name, equals, value = text.partition("=")
             if not equals:
                 raise ValueError(f"'{text}' is not of the form name=value.")
-            if name in ("samples", "seed"):
-                param = SAMPLES if name == "samples" else SEED
+            if name in own:
+                param = own[name]
                 settings = replace(settings, **{name: param.check(value)})
             elif name in table:
                 technique, param = table[name]
@@ -51,6 +58,6 @@ class Settings:
                     settings, values={**settings.values, (technique.name, param.name): param.check(value)}
                 )
             else:
-                known = ", ".join(["samples", "seed", *table])
+                known = ", ".join([*own, *table])
                 raise ValueError(f"There is no setting '{name}'. Known settings: {known}.")
         return settings

@@ -47,7 +47,8 @@ RESOLVE = passes.fullscreen_program(
     "film resolve",
     "film/resolve.frag.glsl",
     textures=(
-        ("FLOAT_2D", "diffuse"), ("FLOAT_2D", "glossy"), ("FLOAT_2D", "emission"), ("FLOAT_2D", "environment"),
+        ("FLOAT_2D", "diffuse"), ("FLOAT_2D", "glossy"), ("FLOAT_2D", "diffuse_indirect"),
+        ("FLOAT_2D", "glossy_indirect"), ("FLOAT_2D", "emission"), ("FLOAT_2D", "environment"),
     ),
     constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
     outputs=(("VEC4", "out_combined"),),
@@ -60,8 +61,10 @@ class Film(Technique):
     reads = SURFACES
     writes = (
         *SUMS,
-        Write("radiance.diffuse_direct", "RGBA32F", "Cleared here, so that a scene without lights has it", True),
-        Write("radiance.glossy_direct", "RGBA32F", "Cleared here, so that a scene without lights has it", True),
+        *(
+            Write(f"radiance.{path}", "RGBA32F", "Cleared here, so that a scene without such light has it", True)
+            for path in ("diffuse_direct", "glossy_direct", "diffuse_indirect", "glossy_indirect")
+        ),
         Write("film.depth", "RGBA32F", "Depth along the camera axis at the pixel's centre, m; 1e10 for nothing"),
         Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
     )
@@ -107,6 +110,8 @@ def resolve(frame: Frame) -> images.Image:
         frame.target("film.combined"),
         textures={
             "diffuse": frame.images["radiance.diffuse_direct"], "glossy": frame.images["radiance.glossy_direct"],
+            "diffuse_indirect": frame.images["radiance.diffuse_indirect"],
+            "glossy_indirect": frame.images["radiance.glossy_indirect"],
             "emission": frame.images["radiance.emission"], "environment": frame.images["radiance.environment"],
         },
         constants={

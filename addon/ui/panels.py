@@ -46,6 +46,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         column.prop(settings, "samples", text="Render Samples")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
+        column.prop(settings, "bounces")
 
 
 class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):

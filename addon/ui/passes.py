@@ -23,8 +23,16 @@ _TABLE = (
     ("use_pass_z", "Depth", "Depth", "Z", "VALUE", "film.depth"),
     ("use_pass_normal", "Normal", "Normal", "XYZ", "VECTOR", "surface.normal_sum"),
     ("use_pass_diffuse_direct", "Diffuse Direct", "DiffDir", "RGB", "COLOR", "radiance.diffuse_direct / color.diffuse"),
+    (
+        "use_pass_diffuse_indirect", "Diffuse Indirect", "DiffInd", "RGB", "COLOR",
+        "radiance.diffuse_indirect / color.diffuse",
+    ),
     ("use_pass_diffuse_color", "Diffuse Color", "DiffCol", "RGB", "COLOR", "color.diffuse"),
     ("use_pass_glossy_direct", "Glossy Direct", "GlossDir", "RGB", "COLOR", "radiance.glossy_direct / color.glossy"),
+    (
+        "use_pass_glossy_indirect", "Glossy Indirect", "GlossInd", "RGB", "COLOR",
+        "radiance.glossy_indirect / color.glossy",
+    ),
     ("use_pass_glossy_color", "Glossy Color", "GlossCol", "RGB", "COLOR", "color.glossy"),
     ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
     ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),

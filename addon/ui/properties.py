@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..frame.settings import AUTO, SAMPLES, SEED, Settings
+from ..frame.settings import AUTO, BOUNCES, SAMPLES, SEED, Settings
 from ..frame.technique import Param
 from ..techniques import REGISTRY
 
@@ -51,6 +51,7 @@ def _annotations() -> dict:
         "samples": _property(SAMPLES),
         "viewport_samples": _property(SAMPLES, name="Viewport Samples", default=32),
         "seed": _property(SEED),
+        "bounces": _property(BOUNCES),
     }
     for slot in slots():
         out[f"slot_{slot}"] = bpy.props.EnumProperty(
@@ -77,6 +78,7 @@ def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
         samples=samples,
         whole=not viewport,
         seed=group.seed,
+        bounces=group.bounces,
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
         values={
             (technique.name, param.name): getattr(group, identifier(technique.name, param.name))

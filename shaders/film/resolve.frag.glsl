@@ -3,7 +3,9 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 world = texelFetch(environment, pixel, 0);
-  vec3 sum = texelFetch(diffuse, pixel, 0).rgb + texelFetch(glossy, pixel, 0).rgb + texelFetch(emission, pixel, 0).rgb;
+  vec3 direct = texelFetch(diffuse, pixel, 0).rgb + texelFetch(glossy, pixel, 0).rgb;
+  vec3 indirect = texelFetch(diffuse_indirect, pixel, 0).rgb + texelFetch(glossy_indirect, pixel, 0).rgb;
+  vec3 sum = direct + indirect + texelFetch(emission, pixel, 0).rgb;
   if (transparent == 0) {
     sum += world.rgb;
   }

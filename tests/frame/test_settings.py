@@ -47,7 +47,7 @@ def test_samples_and_seed_are_settings_too():
     ("text", "sentence"),
     [
         ("rays.count", "'rays.count' is not of the form name=value"),
-        ("rays.counts=2", "There is no setting 'rays.counts'. Known settings: samples, seed, .*rays.count"),
+        ("rays.counts=2", "There is no setting 'rays.counts'. Known settings: samples, seed, bounces, .*rays.count"),
         ("rays.count=many", "'count' needs a int, not 'many'"),
         ("rays.count=0", "'count' must be at least 1, not 0"),
         ("rays.count=65", "'count' must be at most 64, not 65"),
