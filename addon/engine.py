@@ -19,7 +19,8 @@ from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
 from .snapshot.scene import Snapshot
-from .ui import ENGINE, notes
+from .techniques import make_registry
+from .ui import ENGINE
 from .ui.passes import RenderPass, wanted_passes
 from .ui.properties import settings_of
 
@@ -28,7 +29,7 @@ from .ui.properties import settings_of
 class Session:
     """What one scene's renders share: the renderer on the GPU, and what the sync may reuse."""
 
-    renderer: Renderer = field(default_factory=viewport.spare_renderer)
+    renderer: Renderer = field(default_factory=lambda: Renderer(make_registry))
     cache: SnapshotCache = field(default_factory=SnapshotCache)
 
 
@@ -44,7 +45,7 @@ def free_sessions() -> None:
     """Free what renders of scenes hold; compiled programs stay."""
     viewport.free_all()
     for shared in _sessions.values():
-        viewport.set_aside(shared.renderer)
+        shared.renderer.release()
     _sessions.clear()
     images.pool.trim()
 
@@ -144,9 +145,8 @@ class CandelaEngine(bpy.types.RenderEngine):
         ledger = ledgers.latest()
         ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
         if not self.is_preview:
-            notes.publish((*frame.snapshot.notes, *frame.materials.notes))
             for note in ledger.notes:
-                self.report({"WARNING"}, note)
+                self.report({"WARNING"}, str(note))
             if ledger.bad_pixels:
                 self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
 

@@ -1,9 +1,10 @@
 """The viewport: each 3D region's picture, coarse while it changes, refined sample by sample while it rests.
 
 Blender calls `view_update` in the middle of its dependency-graph evaluation, where nothing may be drawn: `changed`
-only records. All work is done by `draw`, which Blender calls whenever the region is drawn. One call adds samples for a
-short time, shows what there is and asks to be called again until the picture is complete, so that Blender keeps
-answering.
+only records. All work is done by `draw`, which Blender calls whenever the region is drawn. One call works for a short
+time, shows what there is and asks to be called again until the picture is complete, so that Blender keeps answering.
+While the view moves a call draws a whole sample, in pixels coarse enough for that; at rest a sample in full resolution
+may take several calls, technique by technique, and the last whole one stays in view.
 
 Engine instances come and go with the shading mode and with each frame of an animation. What they share lives in
 `_viewports`, one `Viewport` for each region and scene, and is freed a moment after the last instance has gone: not by
@@ -16,25 +17,26 @@ import threading
 import time
 import traceback
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from math import ceil, floor
 
 import bpy
 import gpu
+import numpy as np
 
 from . import techniques
 from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import context as gpu_context
 from .gfx import images, library
-from .snapshot import SnapshotCache, UnsupportedScene, camera_of_view, take
+from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, camera_of_view, take
 from .snapshot.scene import Camera, Snapshot
 from .techniques.film import resolve
-from .ui import notes
 from .ui.properties import settings_of
 
 STEP_S = 0.1  # what a sample may take while the picture changes: coarser pixels are drawn to stay below it
-BUDGET_S = 0.05  # one redraw adds samples until this is spent, and at least one
+BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 REST_S = 0.25  # without a change for so long, the picture is drawn in full resolution
 SCALES = (1, 2, 4, 8)  # screen pixels per side of a drawn pixel
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
@@ -43,20 +45,6 @@ FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well
 # its own, so whoever draws takes a turn; the longest turn is one sample.
 turn = threading.Lock()
 TURN_WAIT_S = 0.02
-
-
-_spare: list[Renderer] = []
-
-
-def spare_renderer() -> Renderer:
-    """A renderer that holds nothing. Old ones first: they stay listed for release until Candela ends."""
-    return _spare.pop() if _spare else Renderer(techniques.make_registry)
-
-
-def set_aside(renderer: Renderer) -> None:
-    """Free what a renderer holds, and keep it for the next one who needs one."""
-    renderer.release()
-    _spare.append(renderer)
 
 
 @dataclass
@@ -87,11 +75,10 @@ class Viewport:
     """What one region shows of one scene: its own samples, and the scene's content as it was read last."""
 
     def __init__(self):
-        self.renderer = spare_renderer()
+        self.renderer = Renderer(techniques.make_registry)
         self.cache = SnapshotCache()
         self.pace = Pace()
         self.dirty = True  # the scene may have changed since the snapshot
-        self.picture: images.Image | None = None
         self.frame: Frame | None = None
         self.scale = SCALES[-2]
         self.seconds = 0.0  # spent on the samples of this picture
@@ -102,10 +89,20 @@ class Viewport:
         self._size = (0, 0)  # of the region when the frame was begun
         self._changed_at = 0.0
         self._finished = False
-        self._compiled = -1  # programs made so far, at the end of the last sample
+        self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
+        self._waits = False  # what is shown is this view of this scene, only coarser
+        self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
+        self._sample: Iterator | None = None  # what is left of a sample that was begun
+        self._sample_seconds = 0.0
+        self._compiled = -1  # programs made so far, when the sample was begun
         self.local_view = False
         self.news = False  # a ledger that the panels do not show yet
         self.reported = ""  # the error that was reported last
+
+    @property
+    def picture(self) -> images.Image | None:
+        """What the region shows: the last whole sample and those before it; None before the first."""
+        return self._target.colors[0] if self._target else None
 
     @property
     def done(self) -> bool:
@@ -135,28 +132,25 @@ class Viewport:
         size: tuple[int, int],
         settings: Settings,
         clock: Callable[[], float] = time.perf_counter,
-    ) -> images.Image:
-        """Add samples to the picture of `camera` for BUDGET_S and return it: scene-linear, premultiplied.
+        border: tuple[int, int, int, int] | None = None,
+    ) -> images.Image | None:
+        """Work on the picture of `camera` for BUDGET_S and return it: scene-linear, premultiplied. None: not yet one.
 
         The picture may be coarser than `size` while the view or the scene changes. `source(camera, width, height)`
-        reads the scene and is asked only when it may have changed. Whatever the renderer raises goes through.
+        reads the scene and is asked only when it may have changed. `border`: pixels (x0, y0, x1, y1) that are drawn,
+        by default all. Whatever the renderer raises goes through.
         """
-        self._prepare(source, camera, size, settings, clock)
+        self._prepare(source, camera, size, border or (0, 0, *size), settings, clock)
         frame, started = self.frame, clock()
         drawn = False
         while frame.samples_done < settings.samples:
-            before = clock()
-            self.renderer.advance(frame)
-            frame.profiler.finish()
-            cost = clock() - before
-            if library.compile_count == self._compiled:  # the first draw of a new program takes the driver's time
-                self.pace.learn(self.scale, cost)
-            self._compiled = library.compile_count
-            drawn = True
-            if clock() - started + cost > BUDGET_S:
+            spent = self._work(frame, clock)
+            drawn |= self._sample is None
+            # Only a picture of this very view and scene may wait for its next sample.
+            if (self._waits or frame.samples_done) and clock() - started + spent > BUDGET_S:
                 break
         if drawn:
-            self.picture = resolve(frame)
+            self._resolve(frame)
         self.seconds += clock() - started
         if self.scale == 1 and frame.samples_done >= settings.samples and not self._finished:
             self._finished = True
@@ -166,44 +160,87 @@ class Viewport:
             self.news = True
         return self.picture
 
-    def _prepare(self, source, camera: Camera, size: tuple[int, int], settings: Settings, clock) -> None:
+    def _work(self, frame: Frame, clock) -> float:
+        """One part of a sample; the seconds that it took. `_sample` is None afterwards if the sample is whole."""
+        if self._sample is None:
+            self._sample, self._sample_seconds = self.renderer.steps(frame), 0.0
+            self._compiled = library.compile_count
+        before, end = clock(), object()
+        whole = next(self._sample, end) is end
+        frame.profiler.finish()
+        spent = clock() - before
+        self._sample_seconds += spent
+        if whole:
+            self._sample = None
+            if library.compile_count == self._compiled:  # the first draw of a new program takes the driver's time
+                self.pace.learn(self.scale, self._sample_seconds)
+        return spent
+
+    def _resolve(self, frame: Frame) -> None:
+        """Take the mean of the frame's samples for the picture."""
+        if self._target is None or self._target.size != frame.size:
+            self._drop_picture()
+            self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
+        resolve(frame, self._target)
+        film = frame.snapshot.film
+        x, y = self._size[0] / film.width, self._size[1] / film.height
+        x0, y0, x1, y1 = film.border
+        self.place = x0 * x, y0 * y, (x1 - x0) * x, (y1 - y0) * y
+
+    def drop(self) -> None:
+        """Forget the picture and read the scene anew when it is next drawn."""
+        self._drop_picture()
+        self._sample = None
+        self.dirty = True
+
+    def _drop_picture(self) -> None:
+        if self._target is not None:
+            images.pool.give(self._target.colors[0])
+            self._target = None
+
+    def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Bring `self.frame` to what is asked: kept if nothing changed, else begun anew at a fitting scale."""
-        asked = (_view_key(camera), size, settings)
+        asked = (_view_key(camera), size, border, settings)
         moved = asked != self._asked
         if self.dirty:
             self._snapshot = source(camera, *size)
             self.dirty = False
             if not moved:  # most updates change nothing that is drawn: selections, names, other scenes' settings
                 before = self.frame
-                if self._begin(camera, size, settings, self.scale) is before:
+                if self._begin(camera, size, border, settings, self.scale) is before:
                     return
                 moved = True
         if moved:
             self._asked = asked
             self._changed_at = clock()
-            self._begin(camera, size, settings, self.pace.scale())
+            before = self.frame
+            if self._begin(camera, size, border, settings, self.pace.scale()) is not before:
+                self._waits = False
         elif self.scale > 1 and clock() - self._changed_at > REST_S:
-            self._begin(camera, size, settings, 1)
+            self._begin(camera, size, border, settings, 1)
+            self._waits = True
 
-    def _begin(self, camera: Camera, size: tuple[int, int], settings: Settings, scale: int) -> Frame:
+    def _begin(self, camera: Camera, size, border, settings: Settings, scale: int) -> Frame:
         width, height = (max(-(-extent // scale), 1) for extent in size)
-        film = replace(self._snapshot.film, width=width, height=height, border=(0, 0, width, height))
+        x, y = width / size[0], height / size[1]
+        border = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
+        film = replace(self._snapshot.film, width=width, height=height, border=border)
         frame = self.renderer.begin(replace(self._snapshot, camera=camera, film=film), settings)
         if frame is not self.frame:
             if size != self._size:
                 images.pool.trim()  # nobody will ask for the images of the old size again
             self.frame, self.scale, self._size = frame, scale, size
-            self.seconds, self._finished = 0.0, False
+            self.seconds, self._finished, self._sample = 0.0, False, None
         elif frame.samples_done < settings.samples:
             self._finished = False
-        notes.publish((*frame.snapshot.notes, *frame.materials.notes))
         return frame
 
     def release(self) -> None:
         """Free everything on the GPU and all that was read of the scene; this viewport is not used again."""
-        set_aside(self.renderer)
+        self.renderer.release()
         self.cache.clear()
-        self.frame = self.picture = self._snapshot = None
+        self._drop_picture()
+        self.frame = self._sample = self._snapshot = None
 
 
 def _view_key(camera: Camera) -> tuple:
@@ -248,7 +285,7 @@ def draw(engine, context, depsgraph) -> None:
         else:
             engine.tag_redraw()  # a final render is drawing a sample
     if viewport.picture is not None:
-        _show(engine, scene, viewport.picture, size)
+        _show(engine, scene, viewport)
     engine.update_stats("Candela", viewport.status())
     if not viewport.done:
         engine.tag_redraw()
@@ -279,7 +316,8 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
     blend, depth_test, depth_mask = gpu.state.blend_get(), gpu.state.depth_test_get(), gpu.state.depth_mask_get()
     try:
         camera = camera_of_view(region_data, space, looks_through)
-        viewport.draw_frame(source, camera, size, settings_of(depsgraph.scene, viewport=True))
+        border = render_border(depsgraph, space, camera, looks_through, size)
+        viewport.draw_frame(source, camera, size, settings_of(depsgraph.scene, viewport=True), border=border)
     except (UnsupportedScene, ValueError, RuntimeError) as error:
         _fail(viewport, engine, str(error))
     except Exception as error:
@@ -292,22 +330,45 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         gpu.state.depth_mask_set(depth_mask)
 
 
+def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int, int]):
+    """Pixels (x0, y0, x1, y1) of the region that its render border leaves to be drawn; None without one."""
+    render = depsgraph.scene_eval.render
+    if looks_through is not None and render.use_border:
+        # Both frames lie one unit before the same eye, so they can be compared.
+        resolution = render.resolution_x, render.resolution_y
+        left, right, bottom, top = camera_of_scene(depsgraph.scene_eval, depsgraph, *resolution, looks_through).frame
+        low = left + (right - left) * render.border_min_x, bottom + (top - bottom) * render.border_min_y
+        high = left + (right - left) * render.border_max_x, bottom + (top - bottom) * render.border_max_y
+        left, right, bottom, top = view.frame
+        scale, start = np.array([right - left, top - bottom]), np.array([left, bottom])
+        shares = (*((np.array(low) - start) / scale), *((np.array(high) - start) / scale))
+    elif looks_through is None and space.use_render_border:
+        shares = (
+            space.render_border_min_x, space.render_border_min_y, space.render_border_max_x, space.render_border_max_y,
+        )  # fmt: skip
+    else:
+        return None
+    edges = np.clip(np.round(np.array(shares) * (*size, *size)), 0, (*size, *size)).astype(int)
+    x0, y0 = np.minimum(edges[:2], np.array(size) - 1)
+    return int(x0), int(y0), int(max(edges[2], x0 + 1)), int(max(edges[3], y0 + 1))
+
+
 def _fail(viewport: Viewport, engine, sentence: str) -> None:
     """Stop drawing until the scene changes; the sentence stands in the region, and once in Blender's reports."""
-    viewport.picture = None
-    viewport.dirty = True
+    viewport.drop()
     if viewport.reported != sentence:
         engine.report({"ERROR"}, sentence)
     viewport.error = viewport.reported = sentence
 
 
-def _show(engine, scene, picture: images.Image, size: tuple[int, int]) -> None:
+def _show(engine, scene, viewport: Viewport) -> None:
     """Draw the picture over the region, with the scene's colour management."""
     from gpu_extras.presets import draw_texture_2d
 
+    x, y, width, height = viewport.place
     gpu.state.blend_set("ALPHA_PREMULT")
     engine.bind_display_space_shader(scene)
-    draw_texture_2d(picture.texture, (0, 0), *size)
+    draw_texture_2d(viewport.picture.texture, (x, y), width, height)
     engine.unbind_display_space_shader()
     gpu.shader.unbind()
     gpu.state.blend_set("NONE")

@@ -183,6 +183,66 @@ def test_one_redraw_ends_when_its_time_is_spent(region):
     assert region.viewport.frame.samples_done == 4
 
 
+def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_is_whole(region):
+    """Each redraw ends after a part; while samples of full resolution are being made, the moved view stays shown."""
+    region.rest()
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    region.camera = region.moved(0.1)
+    coarse = images.read(region.draw())
+    region.clock.now += 2 * viewport.REST_S
+    region.clock.tick = viewport.BUDGET_S
+    redraws = 0
+    while region.viewport.frame.samples_done == 0 or region.viewport.scale > 1:
+        picture = region.draw()
+        redraws += 1
+        if region.viewport.frame.samples_done == 0:
+            assert np.array_equal(images.read(picture), coarse)
+    assert redraws > 3
+    assert region.viewport.picture.size == SIZE
+
+
+def test_sample_that_was_left_unfinished_is_not_continued_from(scene, region):
+    whole = region.rest()
+    region.viewport.renderer.begin(replace(region.viewport.frame.snapshot), replace(region.viewport.frame.settings))
+    frame = region.viewport.frame
+    parts = region.viewport.renderer.steps(frame)
+    next(parts), next(parts), next(parts)
+    parts.close()
+    region.viewport.dirty = True
+    assert np.array_equal(region.rest(), whole)
+    assert region.viewport.frame is not frame
+
+
+@pytest.mark.parametrize("scale", [1, 4])
+def test_only_the_border_is_drawn(region, scale):
+    whole = region.rest()
+    border = (24, 16, 72, 40)
+    settings = settings_of(bpy.context.scene, viewport=True)
+    if scale > 1:
+        region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    else:
+        region.viewport.pace.cost = {1: 0.01}
+    for _ in range(1 if scale > 1 else 20):
+        picture = region.viewport.draw_frame(region.source, region.camera, SIZE, settings, region.clock, border)
+    assert region.viewport.place == (24, 16, 48, 24)
+    assert picture.size == (48 // scale, 24 // scale)
+    if scale == 1:
+        difference = np.abs(displayed(images.read(picture)) - displayed(whole[16:40, 24:72])).max(axis=-1)
+        assert (difference <= 2).mean() >= 0.99
+
+
+def test_border_of_the_camera_lies_in_its_frame(scene, region):
+    """A region twice as wide as the camera's frame shows the frame in its middle."""
+    scene.render.resolution_x, scene.render.resolution_y = 100, 100
+    scene.render.use_border = True
+    scene.render.border_min_x, scene.render.border_max_x = 0.0, 0.5
+    scene.render.border_min_y, scene.render.border_max_y = 0.25, 1.0
+    camera = camera_of_scene(scene, region.depsgraph, 100, 100)
+    left, right, bottom, top = camera.frame
+    wide = replace(camera, frame=(2 * left, 2 * right, bottom, top))
+    assert viewport.render_border(region.depsgraph, None, wide, scene.camera, (400, 200)) == (100, 50, 200, 200)
+
+
 def test_nothing_is_done_at_rest(region):
     region.rest()
     frame, uploads = region.viewport.frame, region.viewport.renderer.geometry.uploads

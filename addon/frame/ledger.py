@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..snapshot.scene import Note
+
 RAN, REUSED, SKIPPED = "ran", "reused", "skipped"
 
 
@@ -26,7 +28,7 @@ class Ledger:
 
     rows: list[Row] = field(default_factory=list)
     times: dict[str, float] = field(default_factory=dict)  # sync, compile, passes, readback, total
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()  # what is drawn otherwise than it is set up, each with its culprit
     samples: int = 0
     bad_pixels: int = 0  # non-finite values that the sanitizer replaced
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -125,7 +125,7 @@ class Renderer:
         ledger.times["upload"] = compile_started - started
         compile_programs(self._programs(plan), progress)
         ledger.times["compile"] = time.perf_counter() - compile_started
-        ledger.notes = tuple(str(note) for note in (*snapshot.notes, *self.materials.notes))
+        ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes)))
 
         key = self._content_key(snapshot, settings, plan)
         if self.frame is not None and not geometry_changed and key == self._frame_key:
@@ -161,6 +161,21 @@ class Renderer:
 
     def advance(self, frame: Frame) -> None:
         """Render the next sample of the frame."""
+        for _ in self.steps(frame):
+            pass
+
+    def steps(self, frame: Frame) -> Iterator[None]:
+        """The same in parts: after each, other work may use the GPU before the next is asked for.
+
+        A sample that is not brought to its end leaves sums that are good for nothing: the next `begin` starts anew.
+        """
+        try:
+            yield from self._parts_of_sample(frame)
+        finally:
+            if self.frame is frame and frame.samples_done == frame.sample:
+                self._frame_key = None
+
+    def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
         frame.sample = frame.samples_done
         width = frame.snapshot.film.filter_width
         x, y = frame.random("film")
@@ -173,7 +188,9 @@ class Renderer:
             self._clear_sums(frame)
         for technique in frame.plan.techniques:
             with frame.profiler.step(technique.name):
-                technique.run(frame)
+                parts = iter(technique.run(frame) or ())
+            for _ in frame.profiler.steps(technique.name, parts):
+                yield
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -100,8 +100,11 @@ class Technique:
     def prepare(self, frame: Frame) -> None:
         """Work that does not depend on the sample. Runs when the key has changed."""
 
-    def run(self, frame: Frame) -> None:
-        """The passes of sample `frame.sample`."""
+    def run(self, frame: Frame) -> Iterator[None] | None:
+        """The passes of sample `frame.sample`.
+
+        Where that takes long, as a generator: at each `yield` a viewport may pause to answer its user.
+        """
         raise NotImplementedError
 
     def release(self) -> None:

@@ -6,12 +6,14 @@ one during a render by an engine with `bl_use_gpu_context`, and keep it afterwar
 
 from __future__ import annotations
 
+import inspect
+import weakref
 from collections.abc import Callable
 
 import bpy
 import gpu
 
-_releases: list[Callable[[], None]] = []
+_releases: list[Callable[[], Callable[[], None] | None]] = []  # each gives the function, or None once it has gone
 
 
 def available() -> bool:
@@ -48,8 +50,12 @@ def describe() -> str:
 
 
 def on_release(function: Callable[[], None]) -> Callable[[], None]:
-    """Register (as a decorator) what frees a module's GPU resources. Called in reverse order of registration."""
-    _releases.append(function)
+    """Register (as a decorator) what frees GPU resources. Called in reverse order of registration.
+
+    The method of an object does not keep the object: it is called as long as the object lives.
+    """
+    _releases[:] = [known for known in _releases if known() is not None]
+    _releases.append(weakref.WeakMethod(function) if inspect.ismethod(function) else lambda: function)
     return function
 
 
@@ -57,8 +63,10 @@ def release_all() -> None:
     """Free every GPU resource that Candela holds. The next frame makes anew what it needs."""
     if available():
         gpu.shader.unbind()
-    for function in reversed(_releases):
-        function()
+    for known in reversed(_releases):
+        function = known()
+        if function is not None:
+            function()
 
 
 class _ContextOpener(bpy.types.RenderEngine):

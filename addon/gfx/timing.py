@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from .images import Image, Target, create
@@ -30,6 +31,16 @@ class Profiler:
                 self.finish()
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
             self.calls[name] = self.calls.get(name, 0) + 1
+
+    def steps(self, name: str, parts: Iterator) -> Iterator:
+        """The parts of a step, each timed like a step; what happens between two is not."""
+        end = object()
+        while True:
+            with self.step(name):
+                part = next(parts, end)
+            yield part
+            if part is end:
+                return
 
     def finish(self) -> None:
         """Wait until the GPU has done everything submitted so far."""

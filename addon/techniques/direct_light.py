@@ -23,6 +23,8 @@ sqrt(a / pi) no more than at that distance: otherwise single points beside a sur
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..frame import lights
@@ -97,7 +99,7 @@ class DirectLight(Technique):
             return "the scene has no surface"
         return None
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             self._emitters = [emitter for emitter in found if emitter is not None]
@@ -119,7 +121,9 @@ class DirectLight(Technique):
         resolution = shadow.resolution(frame) if shadow else 16
         for rows, views in rounds(items, resolution):
             maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
+            yield
             shade(frame, self, rows, self._sources, maps)
+            yield
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
         """Lights of this sample with the inverse of their chance."""

@@ -103,11 +103,12 @@ class Film(Technique):
         self._sources.release()
 
 
-def resolve(frame: Frame) -> images.Image:
-    """The mean of all samples so far as one picture: scene-linear, premultiplied."""
+def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
+    """The mean of all samples so far as one picture, scene-linear, premultiplied: in `target`, or film.combined."""
+    target = target or frame.target("film.combined")
     passes.fullscreen(
         RESOLVE,
-        frame.target("film.combined"),
+        target,
         textures={
             "diffuse": frame.images["radiance.diffuse_direct"], "glossy": frame.images["radiance.glossy_direct"],
             "diffuse_indirect": frame.images["radiance.diffuse_indirect"],
@@ -119,4 +120,4 @@ def resolve(frame: Frame) -> images.Image:
             "transparent": int(frame.snapshot.film.transparent),
         },
     )  # fmt: skip
-    return frame.images["film.combined"]
+    return target.colors[0]

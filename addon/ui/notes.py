@@ -1,7 +1,4 @@
-"""What the last frame could not draw as the artist meant it, kept as data so that the interface can select the culprit.
-
-The ledger holds the same notes as sentences; here each still names its data-blocks.
-"""
+"""Whom a note is about, so that the interface can select the culprit."""
 
 from __future__ import annotations
 
@@ -9,19 +6,7 @@ import re
 
 from ..snapshot.scene import Note
 
-_latest: tuple[Note, ...] = ()
 _SUBJECT = re.compile(r"(Object|Material|Light|Camera|World) '(.*)'", re.DOTALL)
-
-
-def publish(notes: tuple[Note, ...]) -> None:
-    """Make these the notes that the panels show; of several alike the first is kept."""
-    global _latest
-    _latest = tuple(dict.fromkeys(notes))
-
-
-def latest() -> tuple[Note, ...]:
-    """The notes of the last frame that was begun in this process."""
-    return _latest
 
 
 def target(note: Note) -> tuple[str, str]:

@@ -120,19 +120,19 @@ class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and (bool(notes.latest()) or _bad_pixels() > 0)
+        return super().poll(context) and (bool(_notes()) or _bad_pixels() > 0)
 
     def draw(self, context):
         if _bad_pixels():
             _text(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
-        for note in notes.latest()[:MOST_NOTES]:
+        for note in _notes()[:MOST_NOTES]:
             row = self.layout.row()
             _text(row.column(align=True), context, str(note), icon="ERROR", room=2)
             kind, name = notes.target(note)
             if kind:
                 button = row.operator("candela.select_culprit", text="", icon="RESTRICT_SELECT_OFF")
                 button.kind, button.name = kind, name
-        left = len(notes.latest()) - MOST_NOTES
+        left = len(_notes()) - MOST_NOTES
         if left > 0:
             self.layout.label(text=f"and {left} more")
 
@@ -239,6 +239,11 @@ def _show_tab(context, tab: str) -> None:
         space.context = tab
     except TypeError:
         pass  # the tab is hidden, or does not exist for this kind of object
+
+
+def _notes() -> tuple:
+    ledger = ledgers.latest()
+    return ledger.notes if ledger is not None else ()
 
 
 def _bad_pixels() -> int:

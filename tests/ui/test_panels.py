@@ -67,16 +67,10 @@ def scene(registered, empty_scene):
 
 @pytest.fixture
 def published():
-    """Sets the last frame's ledger and notes, and takes them back."""
-    before = ledger.latest(), notes.latest()
-
-    def publish(made_ledger, *made_notes):
-        ledger.publish(made_ledger)
-        notes.publish(made_notes)
-
-    yield publish
-    ledger.publish(before[0])
-    notes.publish(before[1])
+    """Sets the last frame's ledger, and takes it back."""
+    before = ledger.latest()
+    yield ledger.publish
+    ledger.publish(before)
 
 
 def test_every_slot_and_parameter_has_a_place(scene):
@@ -118,7 +112,7 @@ def test_frame_panel_before_the_first_render(scene, published):
 def test_warnings_stand_with_a_button_for_what_can_be_selected(scene, published):
     about_material = Note("Material 'Glass'", "node 'Glass BSDF' is not supported.", "Glass", "Glass BSDF")
     about_scene = Note("Image 'gone.png'", "its file is missing.")
-    published(ledger.Ledger(bad_pixels=3), about_material, about_scene)
+    published(ledger.Ledger(bad_pixels=3, notes=(about_material, about_scene)))
     assert panels.CANDELA_RENDER_PT_frame_notes.poll(Context())
     shown = drawn(panels.CANDELA_RENDER_PT_frame_notes)
     assert shown.count("candela.select_culprit") == 1
@@ -126,7 +120,7 @@ def test_warnings_stand_with_a_button_for_what_can_be_selected(scene, published)
 
 
 def test_many_warnings_are_counted(scene, published):
-    published(ledger.Ledger(), *(Note(f"Object '{k}'", "is strange.") for k in range(30)))
+    published(ledger.Ledger(notes=tuple(Note(f"Object '{k}'", "is strange.") for k in range(30))))
     shown = drawn(panels.CANDELA_RENDER_PT_frame_notes)
     assert shown.count("candela.select_culprit") == panels.MOST_NOTES
     assert shown[-1] == f"and {30 - panels.MOST_NOTES} more"
