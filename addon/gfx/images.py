@@ -14,8 +14,26 @@ import numpy as np
 
 from .context import on_release
 
-_BYTES = {"RGBA32F": 16, "RGBA16F": 8, "RG32F": 8, "R32F": 4, "R16F": 2, "R32UI": 4, "DEPTH_COMPONENT32F": 4}
-_CHANNELS = {"RGBA32F": 4, "RGBA16F": 4, "RG32F": 2, "R32F": 1, "R16F": 1, "R32UI": 1, "DEPTH_COMPONENT32F": 1}
+_BYTES = {
+    "RGBA32F": 16,
+    "RGBA16F": 8,
+    "RG32F": 8,
+    "R32F": 4,
+    "R16F": 2,
+    "R32UI": 4,
+    "RGBA32UI": 16,
+    "DEPTH_COMPONENT32F": 4,
+}
+_CHANNELS = {
+    "RGBA32F": 4,
+    "RGBA16F": 4,
+    "RG32F": 2,
+    "R32F": 1,
+    "R16F": 1,
+    "R32UI": 1,
+    "RGBA32UI": 4,
+    "DEPTH_COMPONENT32F": 1,
+}
 
 
 @dataclass(eq=False)
@@ -76,7 +94,12 @@ def upload_list(rows: np.ndarray) -> Image:
 
 
 def read(image: Image) -> np.ndarray:
-    """Copy to the CPU: (H, W, channels) float32 (uint32 for R32UI). Waits for the GPU."""
+    """Copy to the CPU: (H, W, channels) float32 (uint32 for R32UI). Waits for the GPU.
+
+    Blender cannot read RGBA32UI back: ValueError.
+    """
+    if image.format == "RGBA32UI":
+        raise ValueError("An image of four integers cannot be read back: copy what is needed into floats first.")
     buffer = image.texture.read()
     count = math.prod(buffer.dimensions)
     buffer.dimensions = count  # strides of multi-dimensional buffers are wrong before Blender 5.2
