@@ -30,12 +30,18 @@ class Plan:
 
 
 def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Settings) -> Plan:
-    """Choose by slot, skip what is not needed, order by what is read and written. Raises PlanError."""
+    """Choose by slot or by pass tree, skip what is not needed, order by what is read and written. Raises PlanError."""
     chosen, skipped = [], []
     filled: dict[str, str] = {}
+    tree = settings.passes
+    if tree is not None:  # its techniques first, in its order; of those that fill a slot the first one does
+        place = {name: number for number, name in enumerate(tree)}
+        registry = sorted(registry, key=lambda technique: place.get(technique.name, len(place)))
     for technique in registry:
         reason = technique.skip(snapshot, settings)
-        wish = settings.slots.get(technique.slot, AUTO) if technique.slot else AUTO
+        if tree is not None and technique.name not in tree:
+            reason = "it is not in the pass tree"
+        wish = settings.slots.get(technique.slot, AUTO) if technique.slot and tree is None else AUTO
         if not reason and wish not in (AUTO, technique.name):
             reason = f"the {technique.slot} slot is set to {wish}"
         if not reason and technique.slot in filled:
@@ -64,6 +70,7 @@ def _ordered(techniques: list[Technique], skipped: list[Row]) -> tuple[Technique
     while left:
         for technique in left:
             needed = {w for name in technique.reads for w in writers[name] if w is not technique}
+            needed |= {other for other in techniques if set(other.offered()) & set(technique.uses)}
             if needed.issubset(done):
                 done.append(technique)
                 left.remove(technique)

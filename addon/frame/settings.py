@@ -26,6 +26,7 @@ class Settings:
     bounces: int = BOUNCES.default
     slots: dict[str, str] = field(default_factory=dict)
     values: dict[tuple[str, str], object] = field(default_factory=dict)
+    passes: tuple[str, ...] | None = None  # names of the techniques of a pass tree, in its order; None: all, by slot
     whole: bool = False  # only the mean of all samples is shown, so that a sample may leave out what others bring
     profile: bool = False  # wait for the GPU after each step, so that times are true
 

@@ -88,6 +88,13 @@ class Technique:
     params: tuple[Param, ...] = ()
     reads: tuple[str, ...] = ()
     writes: tuple[Write, ...] = ()
+    offers: tuple[str, ...] = ()  # what others may ask for in frame.services or frame.rates, apart from its slot
+    uses: tuple[str, ...] = ()  # what it asks for there, if a technique of the plan offers it
+
+    @classmethod
+    def offered(cls) -> tuple[str, ...]:
+        """All that it offers to others: a technique without images that fills a slot offers that."""
+        return (cls.slot, *cls.offers) if cls.slot and not cls.writes else cls.offers
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         """Why this scene does not need the technique, as a sentence; None if it does. Cheap, no GPU."""

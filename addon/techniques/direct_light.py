@@ -86,6 +86,7 @@ class DirectLight(Technique):
     )  # fmt: skip
     reads = SURFACES
     writes = DIRECT_WRITES
+    uses = ("shadow", "rates")
 
     def __init__(self):
         self._emitters: list[lights.Emitter] = []

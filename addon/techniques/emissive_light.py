@@ -79,6 +79,7 @@ class EmissiveLight(Technique):
     )
     reads = SURFACES
     writes = DIRECT_WRITES
+    offers = ("emissive",)
 
     def __init__(self):
         self.service = DepthMapService()

@@ -58,6 +58,7 @@ class EnvironmentLight(Technique):
     )
     reads = SURFACES
     writes = DIRECT_WRITES
+    uses = ("rates",)
 
     def __init__(self):
         self.service = DepthMapService()

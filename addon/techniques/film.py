@@ -104,7 +104,12 @@ class Film(Technique):
 
 
 def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
-    """The mean of all samples so far as one picture, scene-linear, premultiplied: in `target`, or film.combined."""
+    """The mean of all samples so far as one picture, scene-linear, premultiplied: in `target`, or film.combined.
+
+    ValueError if the plan holds no film.
+    """
+    if "film.combined" not in frame.images:
+        raise ValueError("The pass tree holds no Film, which makes the picture: add it, or use New from Auto.")
     target = target or frame.target("film.combined")
     passes.fullscreen(
         RESOLVE,

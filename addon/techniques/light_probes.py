@@ -69,6 +69,7 @@ class LightProbes(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
+    offers = ("rates",)
 
     def __init__(self):
         self._sources = lights.Sources()

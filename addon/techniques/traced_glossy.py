@@ -72,6 +72,7 @@ class TracedGlossy(Technique):
     )  # fmt: skip
     reads = SURFACES
     writes = DIRECT_WRITES
+    uses = ("emissive",)
 
     def __init__(self):
         self._sources = lights.Sources()
