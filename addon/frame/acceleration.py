@@ -22,7 +22,8 @@ from .morton import morton_codes
 LARGEST = 4_000_000  # triangles
 LEAF = 4
 NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children on it
-LEAF_TEXELS = 13  # corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity; emission r, g, b
+# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity; emission r, g, b; material.
+LEAF_TEXELS = 14
 EMPTY = 1e30
 
 
@@ -37,17 +38,22 @@ class Hierarchy:
 
 
 def world_triangles(
-    instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial], origin: np.ndarray
+    instances: list[Instance],
+    meshes: dict[str, Mesh],
+    materials: list[CompiledMaterial],
+    origin: np.ndarray,
+    path: str = "glossy",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All triangles that reflections can show: corners (T, 3, 3) float32 relative to `origin`, and (T, 4) opacity and
-    mean emitted radiance."""
+    """All triangles that rays of `path` (a name of Visibility) can meet: corners (T, 3, 3) float32 relative to
+    `origin`, and (T, 5) opacity, mean emitted radiance and number of the material."""
     corners, looks = [], []
     look = np.array([
-        (m.opacity if m.transparent else 1.0, *(m.emission if m.emissive else (0.0, 0.0, 0.0))) for m in materials
+        (m.opacity if m.transparent else 1.0, *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
+        for k, m in enumerate(materials)
     ])  # fmt: skip
     for instance in instances:
         mesh = meshes[instance.mesh]
-        if not instance.visibility.glossy or not mesh.triangle_count:
+        if not getattr(instance.visibility, path) or not mesh.triangle_count:
             continue
         matrix = instance.matrix.copy()
         matrix[:3, 3] -= origin
@@ -56,12 +62,12 @@ def world_triangles(
         slots = np.asarray(instance.materials)
         looks.append(look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]])
     if not corners:
-        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 4))
+        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 5))
     return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
 
 
 def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
-    """The hierarchy of `corners` (T, 3, 3) with opacity and emission `look` (T, 4)."""
+    """The hierarchy of `corners` (T, 3, 3) with opacity, emission and material `look` (T, 5)."""
     finite = np.isfinite(corners).all(axis=(1, 2))
     corners, look = corners[finite], look[finite]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -81,9 +87,9 @@ def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
         packed[:, axis] = first[:, axis].reshape(used, LEAF)
         packed[:, 3 + axis] = edges[:, 0, axis].reshape(used, LEAF)
         packed[:, 6 + axis] = edges[:, 1, axis].reshape(used, LEAF)
-    looks = np.zeros((used * LEAF, 4), np.float32)
+    looks = np.zeros((used * LEAF, 5), np.float32)
     looks[:count] = look[order]
-    packed[:, 9:13] = looks.reshape(used, LEAF, 4).transpose(0, 2, 1)
+    packed[:, 9:14] = looks.reshape(used, LEAF, 5).transpose(0, 2, 1)
 
     box_low = np.full((slots, 3), EMPTY, np.float32)
     box_high = np.full((slots, 3), -EMPTY, np.float32)
@@ -125,28 +131,31 @@ def _packed_boxes(low: np.ndarray, high: np.ndarray, least: float) -> np.ndarray
 
 
 class HierarchyCache:
-    """The hierarchy of a renderer's scene: built when first asked for, kept until geometry or alpha changes."""
+    """The hierarchies of a renderer's scene: built when first asked for, kept until geometry or alpha changes.
+
+    Rays of glossy and of diffuse paths meet different objects only where an artist hid some from one of them.
+    """
 
     def __init__(self):
-        self._key: object = None
-        self._hierarchy: Hierarchy | None = None
+        self._kept: dict[object, Hierarchy] = {}
 
-    def get(self, snapshot, materials: list[CompiledMaterial], origin: np.ndarray) -> Hierarchy | None:
-        """The hierarchy; None where the scene is empty or has too many triangles (see `too_many`)."""
+    def get(self, snapshot, materials: list[CompiledMaterial], origin: np.ndarray, path: str) -> Hierarchy | None:
+        """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`)."""
         if too_many(snapshot):
             return None
         key = (
-            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.glossy)
-                  for i in snapshot.instances),
+            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials) for i in snapshot.instances
+                  if getattr(i.visibility, path)),
             tuple((m.opacity if m.transparent else 1.0, m.emissive and m.emission) for m in materials), tuple(origin),
         )  # fmt: skip
-        if key != self._key:
-            self._key = key
-            self._hierarchy = build(*world_triangles(list(snapshot.instances), snapshot.meshes, materials, origin))
-        return self._hierarchy
+        if key not in self._kept:
+            triangles = world_triangles(list(snapshot.instances), snapshot.meshes, materials, origin, path)
+            # At most one for each path; the older one of another scene goes.
+            self._kept = dict([*self._kept.items()][-1:]) | {key: build(*triangles)}
+        return self._kept[key]
 
     def release(self) -> None:
-        self._key = self._hierarchy = None
+        self._kept = {}
 
 
 def too_many(snapshot) -> str | None:

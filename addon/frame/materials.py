@@ -12,7 +12,6 @@ from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..snapshot.scene import Image, Note, Snapshot
 from .depth_maps import PROJECTION_CONSTANTS, PROJECTION_DEFINES
-from .geometry import CAMERA_FLAG
 from .view import VIEW
 
 SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
@@ -145,7 +144,7 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
         constants=(("INT", "first_instance"), ("INT", "transparent_mode")),
         defines=(
             ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
-            ("VISIBILITY_FLAG", str(CAMERA_FLAG)),
+            ("VISIBILITY_FLAG", "film_view.visibility"),
         ),
         **_shared(compiled),
     )

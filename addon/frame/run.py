@@ -71,9 +71,10 @@ class Frame:
         """The same with a third number."""
         return *self.random(use), third(self.sample, use, self.settings.seed)
 
-    def hierarchy(self) -> Hierarchy | None:
-        """Triangles for tracing rays; None where there are too many. Built on the first call."""
-        return self.hierarchies.get(self.snapshot, self.materials.compiled, self.geometry.origin)
+    def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
+        """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
+        first call."""
+        return self.hierarchies.get(self.snapshot, self.materials.compiled, self.geometry.origin, path)
 
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..gfx.struct import Struct
 from ..snapshot.scene import Camera, Film
+from .geometry import CAMERA_FLAG
 from .sequence import pixel_bits
 
 # `q` is the depth measure of every projection in Candela: it is an affine function of window coordinates on any
@@ -30,6 +31,7 @@ VIEW = Struct(
     ("int", "bits_y"),
     ("int", "bits_z"),
     ("int", "bits_w"),
+    ("int", "visibility"),  # flag of the instances that this view shows (addon/frame/geometry.py)
 )
 
 
@@ -91,6 +93,7 @@ class View:
             "eye": (*eye, float(orthographic)), "right": (*right_axis, jitter[0]), "up": (*up, jitter[1]),
             "backward": (*backward, near), "frame": frame, "film": (width, height, start, end),
             "sample_index": sample, "seed": seed,
+            "visibility": CAMERA_FLAG,
             **dict(zip(("bits_x", "bits_y", "bits_z", "bits_w"), pixel_bits(sample))),
         }  # fmt: skip
 

@@ -8,6 +8,7 @@ from .direct_light import DirectLight
 from .emissive_light import EmissiveLight
 from .environment_light import EnvironmentLight
 from .film import Film
+from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
@@ -20,6 +21,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     EmissiveLight,
     EnvironmentLight,
     TracedGlossy,
+    InstantRadiosity,
     Film,
 )
 

@@ -6,7 +6,8 @@
 #include "lib/random.glsl"
 
 #define NODE_TEXELS 3
-#define LEAF_TEXELS 13
+#define LEAF_TEXELS 14
+#define MATERIAL_TEXEL 13
 
 vec4 node_texel(int index)
 {

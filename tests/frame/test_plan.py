@@ -145,10 +145,27 @@ ALWAYS = {"surfaces", "film"}
     ],
 )
 def test_only_what_the_scene_needs_is_planned(changes, planned):
-    plan = make_plan(make_registry(), room(**changes), Settings())
+    plan = make_plan(make_registry(), room(**changes), Settings(bounces=0))
     assert set(names(plan)) == planned | ALWAYS
     assert all(row.reason for row in plan.skipped)
     assert set(names(plan)) | {row.name for row in plan.skipped} == {t.name for t in make_registry()}
+
+
+@pytest.mark.parametrize(
+    ("changes", "bounces", "reason"),
+    [
+        ({}, 4, ""),
+        ({}, 0, "the scene's bounces are set to 0"),
+        ({"instances": ()}, 4, "the scene has no surface"),
+        ({"lights": ()}, 4, "no light reaches any surface"),
+        ({"lights": (), "world": World(np.ones(3))}, 4, ""),
+        ({"lights": (lamp(visibility=Visibility(diffuse=False)),)}, 4, "no light reaches any surface"),
+    ],
+)
+def test_indirect_light_runs_only_where_there_is_some(changes, bounces, reason):
+    plan = make_plan(make_registry(), room(**changes), Settings(bounces=bounces))
+    reasons = {row.name: row.reason for row in plan.skipped}
+    assert reasons.get("instant_radiosity", "") == reason
 
 
 def test_every_reason_is_part_of_a_sentence_an_artist_understands():

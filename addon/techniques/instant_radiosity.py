@@ -1,0 +1,115 @@
+"""Instant radiosity: indirect light by virtual lights and traced visibility. Converges to the truth.
+
+Indirect light at x is the integral over surfaces y of f(x) L(y) G(x, y) V(x, y), G = cos_x cos_y / d^2. Virtual lights
+(virtual_lights.py) are points of this integral, shared by all pixels; alone they leave bright blots in corners, where G
+has no bound. So the integral is split by a share s(d) = min(1, d^2 / r^2):
+
+    L_ind(x) = sum over virtual lights of  f L/n G s V   +   mean over rays of  f pi / cos * (1 - s) L(y)
+
+The first kernel is bounded by cos_x cos_y / r^2. The second needs rays of length r only (Kollig & Keller 2004: bias
+compensation), and both shares add to one at every distance: nothing is doubled, nothing is lost. L at the end of a ray
+is estimated on the spot: sources by one traced point, the virtual lights by one of them, and what is nearer than r to
+*that* point by another short ray, and so on. r is a tenth of the median distance of what is seen.
+
+Per pixel and sample, `rays` virtual lights are traced out of all, drawn in proportion to what they would bring: noise
+comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose end is shaded in the same way.
+
+| cost | per sample |
+|---|---|
+| virtual lights | see virtual_lights.py: 512 candidates, `virtual_lights` kept |
+| rays per pixel | `rays` + 1 short one, + 2 for each surface within r, + 1 to 3 for glossy surfaces |
+| arithmetic per pixel | 2 kernels per virtual light |
+
+Fails: with few samples, grain where virtual lights are partly hidden. Light that reached a diffuse surface over mirrors
+(caustics) is spread evenly from the mirror. No hierarchy for more than 4 million triangles: no indirect light then.
+
+Bias, all in the diffuse and glossy indirect paths: what virtual_lights.py names; of light that is reflected near a
+corner several times, the last bounces before the limit may be counted once more than allowed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame import acceleration
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique, Write
+from ..gfx import passes
+from ..materials.compiler import may_emit
+from ..snapshot.scene import Snapshot
+from .surfaces import SURFACES
+from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VIRTUAL_LIGHTS, VirtualLights
+
+NEAR = 0.1  # the bound r, in median distances of what is seen
+GATHER = passes.fullscreen_program(
+    "instant radiosity",
+    "indirect/gather.frag.glsl",
+    textures=PATH_TEXTURES,
+    blocks=(*PATH_BLOCKS, (VIRTUAL_LIGHTS, "virtual_lights")),
+    constants=(*PATH_CONSTANTS, ("INT", "virtual_count"), ("INT", "rays"), ("FLOAT", "near_radius")),
+    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+)
+INDIRECT_WRITES = (
+    Write("radiance.diffuse_indirect", "RGBA32F", "Light that diffuse surfaces receive from other surfaces", True),
+    Write("radiance.glossy_indirect", "RGBA32F", "Light that glossy surfaces receive from other surfaces", True),
+)
+
+
+def no_indirect_light(snapshot: Snapshot, settings: Settings) -> str | None:
+    """Why the picture has no indirect light, as a sentence; None if it has. For every technique of the slot."""
+    if settings.bounces == 0:
+        return "the scene's bounces are set to 0"
+    if not snapshot.instances:
+        return "the scene has no surface"
+    used = [snapshot.materials[m].graph for m in {m for one in snapshot.instances for m in one.materials}]
+    if not any(_may_reflect(graph) for graph in used):
+        return "no material reflects light"
+    lit = any(np.any(light.strength) and light.visibility.diffuse for light in snapshot.lights)
+    lit = lit or (np.any(snapshot.world.color) and snapshot.world.visibility.diffuse)
+    if not lit and not any(may_emit(graph) for graph in used):
+        return "no light reaches any surface"
+    return None
+
+
+def _may_reflect(graph) -> bool:
+    return any("Bsdf" in node.type and node.type != "ShaderNodeBsdfTransparent" for node in graph.nodes.values())
+
+
+class InstantRadiosity(Technique):
+    name = "instant_radiosity"
+    label = "Instant radiosity"
+    slot = "indirect"
+    params = (
+        Param("virtual_lights", "Virtual lights", 32, "Points of surfaces that light the picture in a sample", 1, 128),
+        Param("rays", "Rays", 2, "How many of the virtual lights each pixel traces in a sample", 1, 64),
+    )
+    reads = SURFACES
+    writes = INDIRECT_WRITES
+
+    def __init__(self):
+        self.virtual_lights = VirtualLights()
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
+
+    def run(self, frame: Frame) -> None:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
+        bindings = self.virtual_lights.path_bindings(frame)
+        bindings["blocks"]["virtual_lights"] = lights.block
+        bindings["constants"] |= {
+            "virtual_count": len(lights), "rays": frame.settings.get(self, "rays"),
+            "near_radius": NEAR * float(np.median(frame.receivers.distance)),
+        }  # fmt: skip
+        passes.fullscreen(
+            GATHER,
+            frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect"),
+            blend="ADDITIVE_PREMULT",
+            **bindings,
+        )
+        frame.count(self, "passes")
+
+    def release(self) -> None:
+        self.virtual_lights.release()

@@ -1,0 +1,110 @@
+"""Mean reflectance of each material: what surfaces out of the camera's sight reflect of the light that meets them.
+
+A node tree is only known as a program that runs per pixel. So each material is drawn once, all its surfaces over one
+another, from two slanted directions that between them see every face from the front or from behind at about the angle
+from which diffuse light comes (55 degrees for the faces of a box), and the pixels are averaged.
+
+| cost | once per set of materials and geometry |
+|---|---|
+| draws | 2 of each material's meshes, into 16 x 16 pixels each |
+
+Fails: where a texture that the camera does not see is lit in its dark parts only, its mean is too bright there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame.materials import SURFACE_IMAGES
+from ..frame.run import Frame
+from ..frame.view import VIEW
+from ..gfx import images, passes
+from ..gfx.struct import Block
+from .surfaces import OPAQUE, SURFACE_TEXTURES
+
+SIDE = 16  # pixels of one view
+COLUMNS = 16  # materials in a row of the result
+EVERY_FLAG = -1  # instances hidden from the camera reflect light too
+DIRECTIONS = np.array([[1.0, 0.9, 0.8], [-0.8, 1.0, 0.9]])
+VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
+REFLECTANCE = passes.fullscreen_program(
+    "reflectance",
+    "indirect/reflectance.frag.glsl",
+    textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table")),
+    constants=(("IVEC2", "cell"), ("FLOAT", "view_cosine")),
+    outputs=(("VEC4", "out_reflectance"),),
+)
+
+
+class Reflectance:
+    """The image of mean reflectances: material m stands at (m & 15, m >> 4)."""
+
+    def __init__(self):
+        self._key: object = None
+        self.image: images.Image | None = None
+
+    def update(self, frame: Frame) -> None:
+        """Draw the materials anew if they or the geometry have changed."""
+        draws = frame.geometry.draws
+        key = (frame.materials.fingerprint(), tuple((d.material, id(d.batch), d.first, d.count) for d in draws))
+        if key == self._key:
+            return
+        self._key = key
+        rows = -(-len(frame.materials.compiled) // COLUMNS)
+        if self.image is None or self.image.size != (COLUMNS, rows):
+            self.release()
+            self._key = key
+            self.image = images.pool.take(COLUMNS, rows, "RGBA32F")
+        size = (COLUMNS * SIDE, 2 * rows * SIDE)
+        seen = [images.pool.take(*size, "RGBA32F") for _ in SURFACE_IMAGES]
+        target = images.Target(tuple(seen))
+        target.clear()
+        for number, direction in enumerate(DIRECTIONS):
+            for material in sorted({draw.material for draw in draws}):
+                corner = (material % COLUMNS * SIDE, (2 * (material // COLUMNS) + number) * SIDE)
+                self._draw(frame, target, (*corner, SIDE, SIDE), material, direction / np.linalg.norm(direction))
+        passes.fullscreen(
+            REFLECTANCE,
+            images.Target((self.image,)),
+            textures={
+                **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
+                "energy_table": frame.materials.energy_table,
+            },
+            constants={"cell": (SIDE, 2 * SIDE), "view_cosine": VIEW_COSINE},
+        )
+        for image in seen:
+            images.pool.give(image)
+
+    def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
+        draws = [draw for draw in frame.geometry.draws if draw.material == material]
+        shader = passes.get(frame.materials.surface_program(material))
+        bindings = frame.materials.bindings(material, frame.geometry.instances)
+        low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
+        bindings["blocks"]["film_view"] = Block(VIEW, **_view(low, high, backward))
+        with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
+            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": OPAQUE})
+            for draw in draws:
+                shader.set_constant("first_instance", draw.first)
+                passes.draw(shader, draw.batch, draw.count)
+
+    def release(self) -> None:
+        if self.image is not None:
+            images.pool.give(self.image)
+        self.image = self._key = None
+
+
+def _view(low: np.ndarray, high: np.ndarray, backward: np.ndarray) -> dict:
+    """An orthographic view of a box from `backward`; fields of VIEW."""
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    up = np.cross(backward, right)
+    centre, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-30)
+    eye = centre + 2 * radius * backward
+    one = np.array([0.0, 0.0, 0.0, 1.0])
+    return {
+        "row_x": np.append(right, -right @ centre) / radius, "row_y": np.append(up, -up @ centre) / radius,
+        "row_w": one, "row_q": 0.5 * one, "eye": (*eye, 1.0), "right": (*right, 0.0), "up": (*up, 0.0),
+        "backward": (*backward, 1.0), "frame": (-radius, radius, -radius, radius),
+        "film": (SIDE, SIDE, 0.0, 4 * radius), "sample_index": 0, "seed": 0,
+        **dict.fromkeys(("bits_x", "bits_y", "bits_z", "bits_w"), 0), "visibility": EVERY_FLAG,
+    }  # fmt: skip

@@ -1,0 +1,239 @@
+"""Virtual lights: points of surfaces that light the picture, with the radiance that they reflect. For any gatherer.
+
+Instant radiosity (Keller 1997) starts paths at the lights; in a scene of rooms most of them end where nobody looks. So
+points are found from the picture, as in bidirectional instant radiosity (Segovia et al. 2006): at P pixels of a coarse
+grid, shifted in every sample, R cosine-distributed rays are traced, and where one meets a surface, at y, stands a
+candidate. Its radiance is what light sources send to y straight (all kinds of lights, emissive meshes and the world, as
+points shared by the sample) and what a path on from y finds in up to `bounces` reflections in all:
+
+    L(y) = rho / pi * (E(y) + sum over further bounces of their albedos x E there)
+
+No path is ended by lot; one ends where its albedos have multiplied to below 1e-4. Any probe could have found y, so the
+density of candidates there is the sum over all probes x (the balance heuristic)
+
+    n(y) = sum over x of  R cos_x cos_y V(x, y) / (pi |x - y|^2)      per m2
+
+and a candidate stands for the area 1 / n(y): it has the intensity L / n. `count` of them are kept by systematic
+resampling in proportion to L, which is what they bring to the picture (L / n times the probes that see them), each
+weighted by the inverse of its chance (Georgiev & Slusallek 2010 keep by the same measure, by lot).
+
+Colours of a path's surfaces are those of the picture where the camera sees them, else the mean of the material
+(reflectance.py); glossy reflection counts as diffuse there, so the energy is right and only its direction is blurred.
+
+| cost | per sample, with P = 64, R = 8 |
+|---|---|
+| rays | 512 x (2 per bounce + 4), then 512 x 64 for the densities |
+| readback | 24 KB of candidates, 128 KB of densities |
+
+Bias: points that only pixels see which no probe of a sample came near are missing in that sample. With 64 probes, that
+is light which reaches less than about a hundredth of the picture. Alpha is taken as the material's mean opacity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame import lights
+from ..frame.run import Frame
+from ..frame.view import VIEW
+from ..gfx import images, passes
+from ..gfx.struct import Block, Struct
+from ..materials.compiler import may_emit
+from .emissive_light import EmissiveTriangles
+from .reflectance import Reflectance
+from .surfaces import SURFACE_TEXTURES, surface_bindings
+
+PROBES = (8, 8)
+RAYS = 8  # per probe
+MOST_SOURCES = 32  # points of light sources that a sample's paths look for
+FLOOR = 0.1  # share of the mean importance that every candidate keeps
+MOST_VIRTUAL = 128
+TEXELS = 3
+VIRTUAL_LIGHTS = Struct("VirtualLights", ("vec4", f"light[{MOST_VIRTUAL * TEXELS}]"))
+
+PATH_TEXTURES = (
+    *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
+    ("FLOAT_2D", "reflectance"),
+)  # fmt: skip
+PATH_BLOCKS = ((VIEW, "film_view"), (lights.SOURCES, "sources"))
+PATH_CONSTANTS = (
+    ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "trace_levels"), ("INT", "bounces"),
+)  # fmt: skip
+PROBE_CONSTANTS = (("IVEC2", "probes"), ("INT", "rays"))
+CANDIDATES = passes.fullscreen_program(
+    "virtual light candidates",
+    "indirect/candidates.frag.glsl",
+    textures=PATH_TEXTURES,
+    blocks=PATH_BLOCKS,
+    constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
+    outputs=tuple(("VEC4", f"out_{name}") for name in ("point", "normal", "radiance", "shorter")),
+)
+DENSITY = passes.fullscreen_program(
+    "virtual light density",
+    "indirect/density.frag.glsl",
+    textures=(*PATH_TEXTURES, ("FLOAT_2D", "candidate_point"), ("FLOAT_2D", "candidate_normal")),
+    blocks=PATH_BLOCKS,
+    constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
+    outputs=(("FLOAT", "out_density"),),
+)
+
+
+@dataclass(frozen=True)
+class VirtualLightSet:
+    """The virtual lights of one sample, as arrays and as the uniform block that shaders/indirect/lights.glsl reads."""
+
+    positions: np.ndarray  # (N, 3) relative to the render origin
+    normals: np.ndarray  # (N, 3) unit; a virtual light shines to this side, Lambertian
+    intensities: np.ndarray  # (N, 3) along the normal, W/sr
+    block: Block
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+
+class VirtualLights:
+    """Finds the virtual lights of each sample. A technique owns one, calls `make` and binds `path_bindings`."""
+
+    def __init__(self):
+        self.reflectance = Reflectance()
+        self._sources = lights.Sources()
+        self._source_block: Block | None = None
+        self._source_count = 0
+        self._block: Block | None = None
+        self._emissive: EmissiveTriangles | None = None
+
+    def make(self, frame: Frame, technique, count: int) -> VirtualLightSet:
+        """At most `count` virtual lights for this sample. Counts rays in the technique's ledger row."""
+        if frame.sample == 0:
+            self.reflectance.update(frame)
+            self._begin(frame)
+        rows = self._source_rows(frame)
+        self._source_block, self._source_count = self._sources.set(rows), len(rows)
+        point, normal, radiance, shorter, density = self._candidates(frame)
+        candidates = PROBES[0] * PROBES[1] * RAYS
+        frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
+        frame.count(technique, "density rays", candidates * PROBES[0] * PROBES[1])
+        keep, weight = _resample(radiance, density, count, frame.random("virtual lights/keep")[0])
+        intensity = radiance[keep] * weight[:, None]
+        light = np.zeros((MOST_VIRTUAL * TEXELS, 4), np.float32)
+        packed = light.reshape(MOST_VIRTUAL, TEXELS, 4)[: len(keep)]
+        packed[:, 0, :3], packed[:, 1, :3], packed[:, 2, :3] = point[keep], normal[keep], intensity
+        whole = np.abs(radiance[keep]) @ lights.LUMINANCE
+        packed[:, 2, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
+        if self._block is None:
+            self._block = Block(VIRTUAL_LIGHTS, light=light)
+        else:
+            self._block.update(light=light)
+        frame.count(technique, "virtual lights", len(keep))
+        return VirtualLightSet(point[keep], normal[keep], intensity, self._block)
+
+    def path_bindings(self, frame: Frame) -> dict:
+        """What shaders/indirect/path.glsl needs: textures, blocks and constants of this sample."""
+        hierarchy = frame.hierarchy("diffuse")
+        return {
+            "textures": {
+                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
+                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves, "reflectance": self.reflectance.image,
+            },
+            "blocks": {"film_view": frame.view_block, "sources": self._source_block},
+            "constants": {
+                "light_count": self._source_count, "offset_size": 1e-6 * frame.geometry.size,
+                "trace_levels": hierarchy.levels, "bounces": frame.settings.bounces,
+            },
+        }  # fmt: skip
+
+    def _begin(self, frame: Frame) -> None:
+        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+        self._emitters = [e for e in found if e is not None and e.light.visibility.diffuse]
+        self._emissive = None
+        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
+            triangles = EmissiveTriangles(frame)
+            self._emissive = triangles if triangles.power > 0 else None
+        self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.diffuse
+
+    def _source_rows(self, frame: Frame) -> list[np.ndarray]:
+        """Points of this sample on lights, emissive surfaces and the world."""
+        kinds = bool(self._emitters) + (self._emissive is not None) + self._world
+        if not kinds:
+            return []
+        share = MOST_SOURCES // kinds
+        rows = []
+        if self._emitters:
+            rows += self._light_rows(frame, share)
+        seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
+        total = share * frame.settings.samples
+        for k in range(share):
+            index = frame.sample * share + k
+            if self._emissive is not None:
+                point, normal, radiance, density = self._emissive.draw(
+                    *frame.random_volume_at(index, "virtual lights/emissive")
+                )
+                rows.append(lights.surface_row(point, normal, radiance, density * share, seen, 0, 1, total / share))
+            if self._world:
+                drawn = frame.environment.draw(*frame.random_at(index, "virtual lights/world"))
+                direction, radiance, density = drawn
+                rows.append(lights.direction_row(direction, radiance / (density * share), density, seen, 0, 1))
+        return rows
+
+    def _light_rows(self, frame: Frame, share: int) -> list[np.ndarray]:
+        """`share` points in all; several on each light, or one on each of some, drawn in proportion to power."""
+        chosen = [(emitter, 1.0) for emitter in self._emitters]
+        if len(chosen) > share:
+            power = np.array([emitter.power for emitter in self._emitters])
+            chance = np.minimum(share * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
+            edges = np.concatenate([[0.0], np.cumsum(chance)])
+            marks = np.arange(share) + frame.random("virtual lights/choose")[0]
+            picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
+            chosen = [(self._emitters[k], 1.0 / chance[k]) for k in picked]
+        each = max(share // max(len(chosen), 1), 1)
+        rows = []
+        for emitter, weight in chosen:
+            # A light without extent is one point however often it is drawn.
+            points = each if emitter.has_span or emitter.radius > 0 else 1
+            for k in range(points):
+                sample = emitter.sample(*frame.random_volume_at(frame.sample * points + k, "virtual lights/light"))
+                total = points * frame.settings.samples / weight
+                shadowed = int(emitter.light.cast_shadow)
+                rows.append(emitter.row(sample, 0, shadowed, weight / points, points=total))
+        return rows
+
+    def _candidates(self, frame: Frame) -> tuple[np.ndarray, ...]:
+        """Points, normals, radiances, radiances of paths one bounce shorter, each (C, 3), and densities (C,) per m2."""
+        probes = PROBES[0] * PROBES[1]
+        found = images.Target(tuple(images.pool.take(RAYS, probes, "RGBA32F") for _ in range(4)))
+        bindings = self.path_bindings(frame)
+        bindings["constants"] |= {"probes": PROBES, "rays": RAYS}
+        passes.fullscreen(CANDIDATES, found, **bindings)
+        with images.borrowed(RAYS * probes, probes, "R32F") as target:
+            bindings["textures"] |= {"candidate_point": found.colors[0], "candidate_normal": found.colors[1]}
+            passes.fullscreen(DENSITY, target, **bindings)
+            density = images.read(target.colors[0])[..., 0].astype(np.float64).sum(axis=0)
+        point, normal, radiance, shorter = (
+            images.read(image).reshape(-1, 4).astype(np.float64) for image in found.colors
+        )
+        for image in found.colors:
+            images.pool.give(image)
+        there = (point[:, 3] > 0) & (density > 0) & np.isfinite(radiance).all(axis=1)
+        return *(array[there, :3] for array in (point, normal, radiance, shorter)), density[there]
+
+    def release(self) -> None:
+        self.reflectance.release()
+        self._sources.release()
+        self._source_block = self._block = self._emissive = None
+
+
+def _resample(radiance: np.ndarray, density: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
+    """Which candidates are kept, and what each stands for: m2 over the chance of being kept."""
+    importance = np.abs(radiance) @ lights.LUMINANCE
+    if not importance.sum() > 0:
+        return np.zeros(0, int), np.zeros(0)
+    importance = np.where(importance > 0, importance + FLOOR * importance.mean(), 0.0)
+    edges = np.cumsum(importance) / importance.sum() * count
+    marks = np.arange(count) + u
+    picked = np.minimum(np.searchsorted(edges, marks, side="right"), len(edges) - 1)
+    keep, times = np.unique(picked, return_counts=True)
+    expected = importance[keep] / importance.sum() * count
+    return keep, times / (expected * density[keep])

@@ -1,0 +1,50 @@
+// Candidates for virtual lights: points that light the picture, found from the picture. A pixel's cosine-distributed ray
+// meets a surface; what that reflects, after up to `bounces` reflections, is estimated by a path on from there.
+#include "indirect/path.glsl"
+#include "indirect/probe.glsl"
+
+void main()
+{
+  out_point = vec4(0.0);
+  out_normal = vec4(0.0);
+  out_radiance = vec4(0.0);
+  out_shorter = vec4(0.0);
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  Probe probe = probe_read(place.y);
+  if (!probe.receives) {
+    return;
+  }
+  uint salt = uint(place.x + place.y * 977);
+  uvec3 bits = hash3(uvec3(salt, 23u, uint(film_view.seed)));
+  // The probe's rays fill strata of the first number, and over the samples a net in both.
+  vec2 u = vec2((float(place.x) + scrambled(film_view.bits_x, bits.x)) / float(rays), scrambled(film_view.bits_y, bits.y));
+  vec3 direction = cosine_direction(probe.normal, u);
+  if (dot(direction, probe.geometric_normal) <= 0.0) {
+    return;
+  }
+  Vertex vertex;
+  float t;
+  uvec3 roll = hash3(uvec3(salt, uint(film_view.sample_index), uint(film_view.seed)));
+  if (!trace_vertex(ray_origin(probe.position, probe.geometric_normal), direction, 1e29, roll.z, vertex, t)) {
+    return;
+  }
+  out_point = vec4(vertex.position, 1.0);
+  out_normal = vec4(vertex.normal, t);
+  vec3 throughput = vertex.albedo / PI;
+  float choice = scrambled(film_view.bits_z, bits.z);
+  vec3 radiance = throughput * direct_irradiance(vertex.position, vertex.normal, 4, choice, roll.x);
+  vec3 shorter = (bounces > 1) ? radiance : vec3(0.0);
+  for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
+    roll = hash3(roll);
+    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    if (!trace_vertex(ray_origin(vertex.position, vertex.normal), direction, 1e29, roll.z, vertex, t)) {
+      break;
+    }
+    throughput *= vertex.albedo;
+    roll = hash3(roll);
+    radiance += throughput * direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y);
+    shorter = (bounce < bounces) ? radiance : shorter;
+  }
+  out_radiance = vec4(radiance, 0.0);
+  out_shorter = vec4(shorter, 0.0);
+}

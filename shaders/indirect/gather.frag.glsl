@@ -1,0 +1,73 @@
+// Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out.
+//
+// Both kernels are shares of the same light: a virtual light at distance d counts min(1, d2 / r2), a ray that meets a
+// surface at distance d counts 1 - min(1, d2 / r2).
+#include "indirect/path.glsl"
+#include "indirect/lights.glsl"
+
+// Radiance that arrives along a ray from surfaces nearer than the bound (from all surfaces, if `whole`), each with the
+// share that virtual lights leave to it, and what reaches those surfaces in the same way.
+vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
+{
+  vec3 sum = vec3(0.0);
+  vec3 throughput = vec3(1.0);
+  for (int bounce = 1; bounce <= bounces; bounce++) {
+    Vertex vertex;
+    float t;
+    float limit = (whole && bounce == 1) ? 1e29 : near_radius;
+    if (!trace_vertex(origin, direction, limit, roll.z, vertex, t)) {
+      break;
+    }
+    float share = (whole && bounce == 1) ? 1.0 : 1.0 - t * t / (near_radius * near_radius);
+    throughput *= share * vertex.albedo;
+    if (max_component(throughput) <= 1e-4) {
+      break;
+    }
+    roll = hash3(roll);
+    vec3 arriving = direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y);
+    if (bounce < bounces) {
+      arriving += virtual_irradiance(vertex.position, vertex.normal, to_unit(roll.z), roll.x);
+    }
+    sum += throughput * arriving / PI;
+    roll = hash3(roll);
+    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    origin = ray_origin(vertex.position, vertex.normal);
+  }
+  return sum;
+}
+
+void main()
+{
+  out_diffuse = vec4(0.0);
+  out_glossy = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
+  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7)));
+  vec3 origin = ray_origin(s.position, s.geometric_normal);
+  if (max_component(s.diffuse) > 0.0) {
+    out_diffuse.rgb = virtual_reflection(s, to_viewer, origin, rays, scrambled(film_view.bits_w, salt.z), salt.x + roll.x);
+    vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
+    vec3 direction = cosine_direction(s.normal, u);
+    if (dot(direction, s.geometric_normal) > 0.0) {
+      float cosine = max(dot(direction, s.normal), 1e-6);
+      vec3 weight = diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction) * (PI / cosine);
+      out_diffuse.rgb += weight * near_radiance(origin, direction, false, roll);
+    }
+  }
+  if (s.glossy_weight > 0.0) {
+    Lobe lobe = lobe_begin(s.glossy_normal, s.tangent_angle, lobe_alpha(s.glossy_roughness, s.glossy_anisotropy),
+                           s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
+    vec3 weight;
+    roll = hash3(roll);
+    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), scrambled(film_view.bits_w, salt.x));
+    vec3 direction = lobe_sample(lobe, u, weight);
+    if (max_component(weight) > 0.0 && dot(direction, s.geometric_normal) > 0.0) {
+      out_glossy.rgb = weight * near_radiance(origin, direction, true, roll);
+    }
+  }
+}

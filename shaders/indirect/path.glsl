@@ -1,0 +1,130 @@
+// Light that surfaces send on: where rays meet them, what they reflect, and what light reaches them straight from sources.
+//
+// A program that includes this binds the surface images, `film_view`, `sources`, the hierarchy and `reflectance`, and has
+// the constants `light_count`, `offset_size` and `trace_levels`.
+#include "lib/gbuffer.glsl"
+#include "lib/brdf.glsl"
+#include "light/sources.glsl"
+#include "trace/hierarchy.glsl"
+#include "indirect/albedo.glsl"
+
+struct Vertex {
+  vec3 position;
+  vec3 normal;  // of the triangle, on the side that the ray came from
+  vec3 albedo;
+};
+
+// Away from a surface by what float32 positions of this size cannot tell apart.
+vec3 ray_origin(vec3 position, vec3 normal)
+{
+  return position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
+}
+
+// Cosine-distributed around a unit normal (Malley); density cos / pi per steradian.
+vec3 cosine_direction(vec3 normal, vec2 u)
+{
+  vec3 tangent;
+  vec3 bitangent;
+  orthonormal_basis(normal, tangent, bitangent);
+  float radius = sqrt(u.x);
+  float turn = 2.0 * PI * u.y;
+  return safe_normalize(radius * cos(turn) * tangent + radius * sin(turn) * bitangent + sqrt(max(1.0 - u.x, 0.0)) * normal);
+}
+
+// What a point reflects: exactly where the camera sees it, else the mean of its material.
+vec3 albedo_at(ivec2 hit, vec3 position, vec3 normal)
+{
+  vec4 p = vec4(position, 1.0);
+  float w = dot(film_view.row_w, p);
+  if (w > 0.0) {
+    vec2 size = vec2(textureSize(surface_position, 0));
+    vec2 place = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * size;
+    if (all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size))) {
+      ivec2 pixel = ivec2(place);
+      vec4 seen = texelFetch(surface_position, pixel, 0);
+      // The pixel's own point lies within its footprint, stretched where the surface is seen from the side.
+      vec3 to_eye = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - position);
+      float slant = max(dot(normal, to_eye), 0.0);
+      float footprint = (film_view.frame.y - film_view.frame.x) / film_view.film.x * w / max(slant, 0.1);
+      if (seen.w != 0.0 && slant > 0.0 && distance(seen.xyz, position) < 1.5 * footprint) {
+        Surface s = SURFACE_READ(pixel);
+        if (dot(s.geometric_normal, normal) > 0.9) {
+          return surface_albedo(s, slant);
+        }
+      }
+    }
+  }
+  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  return texelFetch(reflectance, ivec2(material & 15, material >> 4), 0).rgb;
+}
+
+// The surface that a ray meets before `limit`; false if none.
+bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Vertex vertex, out float t)
+{
+  ivec2 hit;
+  t = trace_nearest(origin, direction, limit, salt, hit);
+  if (t >= limit) {
+    return false;
+  }
+  vertex.position = origin + t * direction;
+  triangle_emission(hit, vertex.normal);
+  if (dot(vertex.normal, direction) > 0.0) {
+    vertex.normal = -vertex.normal;
+  }
+  vertex.albedo = albedo_at(hit, vertex.position, vertex.normal);
+  return true;
+}
+
+float clear_path(vec3 origin, vec3 direction, float reach, uint salt)
+{
+  ivec2 hit;
+  return (trace_until(origin, direction, reach, reach, salt, hit) >= reach) ? 1.0 : 0.0;
+}
+
+// Irradiance by one source if nothing blocks it.
+vec3 unblocked_irradiance(Light light, vec3 position, vec3 normal, out vec3 direction)
+{
+  float density;
+  vec3 arriving = light_sample(light, position, direction, density);
+  return ((light.flags & LIGHT_DIFFUSE) != 0) ? arriving * max(dot(normal, direction), 0.0) : vec3(0.0);
+}
+
+// Irradiance straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they
+// bring unblocked (systematic resampling): only visibility is sampled.
+vec3 direct_irradiance(vec3 position, vec3 normal, int rays, float u, uint salt)
+{
+  float total = 0.0;
+  vec3 direction;
+  for (int i = 0; i < light_count; i++) {
+    total += luminance(abs(unblocked_irradiance(light_read(i), position, normal, direction)));
+  }
+  if (!(total > 0.0)) {
+    return vec3(0.0);
+  }
+  vec3 origin = ray_origin(position, normal);
+  float step_size = total / float(rays);
+  float mark = u * step_size;
+  float passed = 0.0;
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    vec3 arriving = unblocked_irradiance(light, position, normal, direction);
+    float share = luminance(abs(arriving));
+    passed += share;
+    if (share > 0.0 && mark < passed) {
+      float marks = ceil((passed - mark) / step_size);
+      mark += marks * step_size;
+      float visibility = 1.0;
+      if ((light.flags & LIGHT_SHADOW) != 0) {
+        bool far = light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION;
+        bool flat_light = light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE;
+        float reach = far ? 1e29 : length((flat_light ? light.point : light.centre) - position) - light.radius;
+        // An emissive triangle lies at the end of the ray.
+        reach *= (light.kind == LIGHT_SURFACE) ? 0.9999 : 1.0;
+        visibility = (reach > 0.0) ? clear_path(origin, direction, reach, salt + uint(i)) : 1.0;
+      }
+      sum += arriving * (visibility * marks * step_size / share);
+    }
+  }
+  return sum;
+}

@@ -1,0 +1,23 @@
+// Pixels from whose view points are found that light the picture: one in each cell of a grid, another in every sample.
+
+struct Probe {
+  bool receives;
+  vec3 position;
+  vec3 normal;
+  vec3 geometric_normal;
+};
+
+Probe probe_read(int index)
+{
+  uvec3 bits = hash3(uvec3(uint(index), 91u, uint(film_view.seed)));
+  vec2 within = vec2(scrambled(film_view.bits_z, bits.x), scrambled(film_view.bits_w, bits.y));
+  vec2 cell = vec2(float(index % probes.x), float(index / probes.x));
+  ivec2 pixel = ivec2((cell + within) / vec2(probes) * vec2(textureSize(surface_position, 0)));
+  Surface s = SURFACE_READ(pixel);
+  Probe probe;
+  probe.receives = s.hit && (max_component(s.diffuse) > 0.0 || s.glossy_weight > 0.0);
+  probe.position = s.position;
+  probe.normal = s.normal;
+  probe.geometric_normal = s.geometric_normal;
+  return probe;
+}
