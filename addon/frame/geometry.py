@@ -21,7 +21,7 @@ from .culling import closed
 from .morton import morton_codes
 
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
-TEXELS_PER_INSTANCE = 4
+TEXELS_PER_INSTANCE = 8  # layout in shaders/lib/instance.glsl
 JOINED_TRIANGLES = 2000  # about so many triangles of joined meshes make one draw: enough to fill a GPU, few to cull
 GROUP_TRIANGLES = 600  # the same for groups of instances
 
@@ -135,6 +135,8 @@ class SceneGeometry:
                 + GLOSSY_FLAG * seen.glossy + HOLDOUT_FLAG * instance.holdout
             )  # fmt: skip
             rows[k, 3] = (instance.random, instance.pass_index, flags, 0.0)
+            rows[k, 4] = instance.color
+            rows[k, 5], rows[k, 6, 0] = (*instance.generated, instance.uv[0]), instance.uv[1]
         if len(instances):
             relative = matrices[:, :3, :].copy()
             relative[:, :, 3] -= self.origin
@@ -290,6 +292,12 @@ def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
         source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
     elif attribute.kind == "COLOR":
         source = mesh.colors.get(attribute.name or mesh.active_color)
+    elif attribute.kind == "NAMED":
+        source = mesh.colors.get(attribute.name)
+        if source is None and attribute.name in mesh.uv_maps:
+            source, out[:, 3] = mesh.uv_maps[attribute.name], 1.0
+    elif attribute.kind == "GENERATED":
+        source = None if mesh.generated is None else mesh.generated[mesh.corner_vertices]
     else:
         source = mesh.tangents.get(attribute.name or mesh.active_uv)
     if source is not None:

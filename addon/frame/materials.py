@@ -12,7 +12,18 @@ from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..snapshot.scene import Image, Note, Snapshot
 from .depth_maps import PROJECTION_CONSTANTS, PROJECTION_DEFINES
-from .view import VIEW
+from .view import VIEW, View
+
+# The camera as node trees see it. Positions are relative to the render origin.
+MATERIAL_SCENE = Struct(
+    "MaterialScene",
+    ("vec4", "origin"),  # the render origin in world space; w = 1 for an orthographic camera
+    ("vec4", "camera_position"),
+    ("vec4", "camera_right"),  # w: width of a pixel one unit before the camera
+    ("vec4", "camera_up"),
+    ("vec4", "camera_backward"),
+    ("vec4", "window"),  # the picture one unit before the camera: left, bottom, width, height
+)
 
 SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
 
@@ -24,6 +35,7 @@ class MaterialSet:
         self.compiled: list[CompiledMaterial] = []
         self.notes: tuple[Note, ...] = ()
         self.energy_table: images.Image | None = None
+        self._scene: Block | None = None
         self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int], images.Image] = {}
@@ -66,6 +78,22 @@ class MaterialSet:
             else:
                 block.update(value=values)
 
+    def set_view(self, view: View) -> None:
+        """Tell the node trees from where the scene is seen."""
+        camera, (left, right, bottom, top) = view.camera, view.camera.frame
+        values = {
+            "origin": (*view.origin, float(camera.kind == "ORTHOGRAPHIC")),
+            "camera_position": (*(camera.matrix[:3, 3] - view.origin), 0.0),
+            "camera_right": (*camera.matrix[:3, 0], (right - left) / view.film.width),
+            "camera_up": (*camera.matrix[:3, 1], 0.0),
+            "camera_backward": (*camera.matrix[:3, 2], 0.0),
+            "window": (left, bottom, right - left, top - bottom),
+        }
+        if self._scene is None:
+            self._scene = Block(MATERIAL_SCENE, **values)
+        else:
+            self._scene.update(**values)
+
     def fingerprint(self) -> tuple:
         """Equal in two frames if all materials shade alike."""
         return tuple((c.program_key, c.values.tobytes(), c.images) for c in self.compiled) + tuple(self._images)
@@ -84,7 +112,10 @@ class MaterialSet:
         textures = {"instances": instances, "energy_table": self.energy_table}
         for slot, name in enumerate(compiled.images):
             textures[f"material_image{slot}"] = self._images[name, self._versions[name]]
-        return {"textures": textures, "blocks": {"material_values": self._blocks[self._keys[index]]}}
+        return {
+            "textures": textures,
+            "blocks": {"material_values": self._blocks[self._keys[index]], "material_scene": self._scene},
+        }
 
     def release(self) -> None:
         self.__init__()
@@ -109,7 +140,15 @@ def _struct(length: int) -> Struct:
 def _shared(compiled: CompiledMaterial) -> dict:
     count = len(compiled.attributes)
     copy = "".join(f"  varying_attribute{k} = attribute{k};\n" for k in range(count))
-    fill = "".join(f"  point.attributes[{k}] = varying_attribute{k};\n" for k in range(count))
+    head = "void fill_attributes(inout SurfacePoint point, vec2 steps_x, vec2 steps_y)"
+    fill = "  vec4 along_x;\n  vec4 along_y;\n" + "".join(
+        f"  point.attributes[{k}] = varying_attribute{k};\n"
+        f"  along_x = dFdx(varying_attribute{k});\n"
+        f"  along_y = dFdy(varying_attribute{k});\n"
+        f"  point.attributes_dx[{k}] = steps_x.x * along_x + steps_x.y * along_y;\n"
+        f"  point.attributes_dy[{k}] = steps_y.x * along_x + steps_y.y * along_y;\n"
+        for k in range(count)
+    )
     return {
         "inputs": (
             ("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance"),
@@ -128,7 +167,7 @@ def _shared(compiled: CompiledMaterial) -> dict:
             ("generated/attributes", f"void copy_attributes()\n{{\n{copy}}}\n"),
             (
                 "generated/material",
-                f"{compiled.glsl}\nvoid fill_attributes(inout SurfacePoint point)\n{{\n{fill}}}\n",
+                f"{compiled.glsl}\n{head}\n{{\n{fill}}}\n",
             ),
         ),
     }  # fmt: skip
@@ -140,7 +179,11 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
         vertex="surface/surface.vert.glsl",
         fragment="surface/surface.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
-        blocks=((VIEW, "film_view"), (_struct(len(compiled.values)), "material_values")),
+        blocks=(
+            (VIEW, "film_view"),
+            (_struct(len(compiled.values)), "material_values"),
+            (MATERIAL_SCENE, "material_scene"),
+        ),
         constants=(("INT", "first_instance"), ("INT", "transparent_mode")),
         defines=(
             ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
@@ -156,7 +199,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         vertex="surface/surface.vert.glsl",
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
-        blocks=((_struct(len(compiled.values)), "material_values"),),
+        blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
         constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
         defines=PROJECTION_DEFINES,
         **_shared(compiled),

@@ -120,6 +120,7 @@ class Renderer:
         self.materials.update(snapshot)
         geometry_changed = self.geometry.update(snapshot, self.materials.compiled)
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
+        self.materials.set_view(view)
         environment = self._update_environment(snapshot)
         plan = make_plan(self.techniques, snapshot, settings)
         compile_started = time.perf_counter()

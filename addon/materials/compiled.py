@@ -11,15 +11,15 @@ import numpy as np
 class Attribute:
     """A per-corner attribute that a material reads; arrives in the shader as `vec4`."""
 
-    kind: str  # UV, COLOR, TANGENT
-    name: str  # "" = the active one
+    kind: str  # UV, COLOR, TANGENT by name ("" = the active one), NAMED (colour, UV or any other), GENERATED
+    name: str
 
 
 @dataclass(frozen=True)
 class CompiledMaterial:
     """GLSL for one material topology plus the values of this material.
 
-    `glsl` defines `void evaluate_material(in SurfacePoint point, inout Closures closures)`. It reads
+    `glsl` defines `void evaluate_material(SurfacePoint point, inout Closures closures)`. It reads
     `material_values.value[k]` (a uniform block of vec4), samplers `material_image0…`, `point.attributes[k]`.
     Materials with equal `program_key` share one program; `values` alone differ.
     """

@@ -25,6 +25,9 @@ from .expressions import Expressions
 from .graph import Graph, Input, Node
 from .nodes.entry import Entry
 from .nodes.shader import IMPLICIT_EMISSION, UNKNOWN_SHADER
+from .values import glsl_number
+
+BUMP_FILTER_WIDTH = 0.1  # pixels between the heights that a displacement's normal is made of, as in Cycles
 
 
 def default_graph() -> Graph:
@@ -52,6 +55,7 @@ class _Compilation:
         self.bounds = Bounds(self.code)
 
     def result(self) -> CompiledMaterial:
+        self._displacement()
         summary = self._surface()
         self._unused_slots()
         code, glsl, values = self.code, self.code.text(), self.code.values.array()
@@ -75,12 +79,23 @@ class _Compilation:
         )
 
     def _unused_slots(self) -> None:
-        for what, link in (("volume", self.graph.volume), ("displacement", self.graph.displacement)):
-            if self.code.exists(link):
-                self.code.note(self.graph.nodes[link[0]], f"The {what} of the material is not drawn.")
+        if self.code.exists(self.graph.volume):
+            self.code.note(self.graph.nodes[self.graph.volume[0]], "The volume of the material is not drawn.")
         if self.code.values.overflow:
             sentence = "The material has more sliders than fit a uniform block; the last ones recompile it."
             self.code.fallbacks.setdefault((self.code.name, sentence))
+
+    def _displacement(self) -> None:
+        """The surface keeps its place, but every shader sees the normal that the displaced surface would have."""
+        link = self.graph.displacement
+        if not self.code.exists(link):
+            return
+        self.code.includes.setdefault("material/bump.glsl")
+        name = self.code.function(link, "VECTOR")
+        width = glsl_number(BUMP_FILTER_WIDTH, "FLOAT")
+        x = f"{name}(surface_point_moved(point, vec2({width}, 0.0)))"
+        y = f"{name}(surface_point_moved(point, vec2(0.0, {width})))"
+        self.code.lines.append(f"point.normal = displaced_normal(point, {width}, {name}(point), {x}, {y});")
 
     def _surface(self) -> Summary:
         """Emit the shaders, parents before children, so that a shared shader gets the sum of all weights at once."""
@@ -157,7 +172,7 @@ class _Compilation:
         self.code.include(entry)
         arguments = [self.code.argument(node, entry, argument) for argument in entry.arguments]
         call = ", ".join(["closures", "point", f"vec3({weight})", *arguments])
-        self.code.lines += [f"if ({weight} > 0.0) {{", f"  {entry.function}({call});", "}"]
+        self.code.lines.extend((f"if ({weight} > 0.0) {{", f"  {entry.function}({call});", "}"))
         self.code.describe(node, entry)
         return entry.summary(self.bounds.sockets(node, entry))
 

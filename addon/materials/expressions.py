@@ -1,6 +1,9 @@
 """GLSL for the value part of a tree: what the sockets of shaders read, each node computed once.
 
 Holds everything that a program collects on the way: constants, attributes, images, includes, lines of code, sentences.
+
+Bump mapping needs heights at neighbouring points. What feeds a height is written once more as a function of the point
+and called for both neighbours; at the point itself the height is an ordinary value, shared with the rest of the tree.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from .nodes.texture import IMAGE_FUNCTIONS, MISSING_COLOR
 from .values import ValueBlock, glsl_number, to_kind
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
+DEEPEST_BUMP = 3  # bump nodes within the heights of bump nodes: each level is written and evaluated three times
 MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the programs that include the material
 
 IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
@@ -30,6 +34,15 @@ def convert(expression: str, kind: str, wanted: str) -> str:
     return f"vec3({expression})"
 
 
+class _Scope:
+    """One GLSL function while it grows: its lines, and what is computed in it."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.outputs: dict[tuple[str, str], tuple[str, str]] = {}  # link -> GLSL variable, kind
+        self.done: set[str] = set()
+
+
 class Expressions:
     """The program text of one material while it grows."""
 
@@ -40,17 +53,28 @@ class Expressions:
         self.attributes: list[Attribute] = []
         self.image_keys: list[str] = []
         self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
-        self.lines: list[str] = []
-        self.outputs: dict[tuple[str, str], tuple[str, str]] = {}  # link -> GLSL variable, kind
-        self._done: set[str] = set()
+        self._scopes = [_Scope()]
+        self._functions: list[str] = []
+        self._function_names: dict[tuple[tuple[str, str], str], str] = {}
+        self._constants: dict[tuple[str, words.Argument], str] = {}
         self._read_outputs = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+
+    @property
+    def lines(self) -> list[str]:
+        return self._scopes[-1].lines
+
+    @property
+    def outputs(self) -> dict[tuple[str, str], tuple[str, str]]:
+        """What the function that grows has computed: link -> GLSL variable, kind."""
+        return self._scopes[-1].outputs
 
     def text(self) -> str:
         """The whole source: includes, the images' functions, evaluate_material."""
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
         functions = "".join("\n" + IMAGE_FUNCTIONS.format(k=k) for k in range(len(self.image_keys)))
+        functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
-        head = "void evaluate_material(in SurfacePoint point, inout Closures closures)"
+        head = "void evaluate_material(SurfacePoint point, inout Closures closures)"
         return f"{includes}{functions}\n{head}\n{{\n{body}}}\n"
 
     def note(self, node: Node, sentence: str) -> None:
@@ -75,29 +99,34 @@ class Expressions:
                 self.note(node, sentence)
 
     def require(self, node: Node, entry: Entry) -> None:
-        """Emit all value nodes that this node's sockets read, deepest first; a loop, because trees can be deep."""
-        stack = self._sources(node, entry)[::-1]
+        """Emit all value nodes that this node's sockets read."""
+        self._emit(self._sources(node, entry)[::-1])
+
+    def _emit(self, stack: list[str]) -> None:
+        """Emit nodes and what they read, deepest first; a loop, because trees can be deep."""
         while stack:
             key = stack[-1]
-            if key in self._done:
+            if key in self._scopes[-1].done:
                 stack.pop()
                 continue
             source = self.graph.nodes[key]
             found = nodes.find(source.type, source.properties)
-            missing = [] if found is None else [k for k in self._sources(source, found) if k not in self._done]
+            missing = (
+                [] if found is None else [k for k in self._sources(source, found) if k not in self._scopes[-1].done]
+            )
             # A node on the stack waits for this one already: the reader cuts cycles, hand-made graphs may not.
             missing = [k for k in missing if k not in stack]
             if missing:
                 stack += missing[::-1]
                 continue
             stack.pop()
-            self._done.add(key)
+            self._scopes[-1].done.add(key)
             self._value_node(source, found)
 
     def _sources(self, node: Node, entry: Entry) -> list[str]:
         keys = []
         for argument in entry.arguments:
-            if isinstance(argument, words.Socket):
+            if isinstance(argument, (words.Socket, words.Heights)):
                 socket = node.inputs.get(argument.identifier)
                 if socket is not None and self.exists(socket.link):
                     keys.append(socket.link[0])
@@ -108,7 +137,7 @@ class Expressions:
             if "SHADER" not in node.outputs.values():
                 self.note(node, f"'{node.label}' is not supported yet; what it feeds keeps the value set there.")
             return
-        number = len(self._done)
+        number = len(self._scopes[-1].done)
         names = {identifier: f"n{number}_{i}" for i, (identifier, _) in enumerate(entry.outputs)}
         if entry.image and not self._image_index(node):
             for identifier, kind in entry.outputs:
@@ -153,21 +182,60 @@ class Expressions:
     def argument(self, node: Node, entry: Entry, argument: words.Argument) -> str:
         if isinstance(argument, words.Socket):
             return self.socket(node, argument)
+        if isinstance(argument, words.Heights):
+            return self._heights(node, argument)
         if isinstance(argument, words.Expression):
             return argument.glsl
         if isinstance(argument, words.Choice):
             return str(argument.items.get(node.properties.get(argument.property), argument.missing))
         if isinstance(argument, words.Setting):
             value = node.properties.get(argument.property, argument.default)
-            return self.values.add(to_kind(value, "FLOAT", "FLOAT"), "FLOAT")
+            return self._constant(node, argument, to_kind(value, "FLOAT", "FLOAT"), "FLOAT")
         if isinstance(argument, words.Attribute):
+            if argument.output and (node.key, argument.output) not in self._read_outputs:
+                return "vec4(0.0)"
             return self._attribute(node, argument.kind, str(node.properties.get(argument.property, "")))
         if isinstance(argument, words.Used):
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
         if isinstance(argument, words.Rows):
-            first, count = self.values.add_rows(argument.rows(node.properties.get(argument.property)))
-            return f"{first}, {count}"
-        return self.values.add(float(self._image_flags(node.image)), "FLOAT")
+            if (node.key, argument) not in self._constants:
+                first, count = self.values.add_rows(argument.rows(node.properties.get(argument.property)))
+                self._constants[node.key, argument] = f"{first}, {count}"
+            return self._constants[node.key, argument]
+        return self._constant(node, argument, float(self._image_flags(node.image)), "FLOAT")
+
+    def _constant(self, node: Node, argument: words.Argument, value, kind: str) -> str:
+        """The node's constant in the block, the same one wherever the node is written."""
+        if (node.key, argument) not in self._constants:
+            self._constants[node.key, argument] = self.values.add(value, kind)
+        return self._constants[node.key, argument]
+
+    def _heights(self, node: Node, heights: words.Heights) -> str:
+        given = node.inputs.get(heights.identifier)
+        here = self.socket(node, words.Socket(heights.identifier, "FLOAT"))
+        if given is None or given.link not in self.outputs:
+            return f"{here}, {here}, {here}"
+        if len(self._scopes) > DEEPEST_BUMP:
+            self.note(node, "Bump within the heights of bump is left out from the fourth level on.")
+            return f"{here}, {here}, {here}"
+        name = self.function(given.link, "FLOAT")
+        width = self.socket(node, heights.width)
+        x = f"{name}(surface_point_moved(point, vec2({width}, 0.0)))"
+        y = f"{name}(surface_point_moved(point, vec2(0.0, {width})))"
+        return f"{here}, {x}, {y}"
+
+    def function(self, link: tuple[str, str], kind: str) -> str:
+        """The name of a GLSL function of the surface point that computes what `link` leads to."""
+        if (link, kind) not in self._function_names:
+            self._scopes.append(_Scope())
+            self._emit([link[0]])
+            value = convert(*self.outputs[link], kind) if link in self.outputs else glsl_number(0.0, kind)
+            name = f"tree{len(self._functions)}"
+            body = "".join(f"  {line}\n" for line in (*self.lines, f"return {value};"))
+            self._scopes.pop()
+            self._functions.append(f"\n{GLSL_TYPES[kind]} {name}(SurfacePoint point)\n{{\n{body}}}\n")
+            self._function_names[link, kind] = name
+        return self._function_names[link, kind]
 
     def socket(self, node: Node, socket: words.Socket) -> str:
         expression = self._socket_value(node, socket)
@@ -191,10 +259,13 @@ class Expressions:
                 )
         if socket.implicit == "@UV":
             return f"vec3({self._attribute(node, 'UV', '')}.xy, 0.0)"
+        if socket.implicit == "@GENERATED":
+            return f"{self._attribute(node, 'GENERATED', '')}.xyz"
         if socket.implicit:
             return socket.implicit
         value, kind = (socket.default, socket.kind) if given is None else (given.value, given.kind)
-        return self.values.add(to_kind(socket.default if value is None else value, kind, socket.kind), socket.kind)
+        constant = to_kind(socket.default if value is None else value, kind, socket.kind)
+        return self._constant(node, socket, constant, socket.kind)
 
     def _attribute(self, node: Node, kind: str, name: str) -> str:
         attribute = Attribute(kind, name)

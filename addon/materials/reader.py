@@ -29,7 +29,8 @@ KINDS = {
 }
 
 # Nodes whose value stands in their output socket; it becomes an unlinked input of the same name.
-CONSTANT_NODES = {"ShaderNodeRGB", "ShaderNodeValue", "ShaderNodeNormal"}
+# An output's constant may go by another name.
+CONSTANT_NODES = {"ShaderNodeRGB": {}, "ShaderNodeValue": {}, "ShaderNodeNormal": {"Normal": "Direction"}}
 
 CURVE_SAMPLES = 257  # points at which a curve is tabulated between the ends of its range
 
@@ -62,7 +63,7 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     output = _active_output(tree)
     if output is None:
         return Graph(), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
-    reading = _Reading(image_key)
+    reading = _Reading(image_key, getattr(owner, "pass_index", 0))
     place = _Place(tree)
     links = {}
     for name in ("Surface", "Volume", "Displacement"):
@@ -103,8 +104,8 @@ def _active_output(tree):
 class _Reading:
     """State of one reading: nodes found so far, those still to be read, and the links of each tree."""
 
-    def __init__(self, image_key: ImageKey) -> None:
-        self.image_key = image_key
+    def __init__(self, image_key: ImageKey, material_index: int) -> None:
+        self.image_key, self.material_index = image_key, material_index
         self.nodes: dict[str, Node] = {}
         self.pending: list[tuple[str, _Place, object]] = []
         self.seen: set[str] = set()
@@ -219,8 +220,10 @@ class _Reading:
             inputs[socket.identifier] = Input(wanted, _converted(value, kind, wanted), link)
         if node.bl_idname in CONSTANT_NODES:
             for socket in node.outputs:
-                if hasattr(socket, "default_value") and socket.identifier not in inputs:
-                    inputs[socket.identifier] = Input(_kind(socket), _default(socket))
+                # The Normal node has an input of the same name beside the direction in its output.
+                name = CONSTANT_NODES[node.bl_idname].get(socket.identifier, socket.identifier)
+                if hasattr(socket, "default_value") and name not in inputs:
+                    inputs[name] = Input(_kind(socket), _default(socket))
         outputs = {socket.identifier: _kind(socket) for socket in node.outputs}
         label = node.label or node.name
         image = getattr(node, "image", None)
@@ -230,9 +233,18 @@ class _Reading:
             node.bl_idname,
             inputs,
             outputs,
-            _settings(node),
+            {**_settings(node), **self._surroundings(node)},
             "" if image is None else self.image_key(image, getattr(node, "image_user", None)),
         )
+
+    def _surroundings(self, node) -> dict[str, object]:
+        """What a node says about something that is not in the tree."""
+        if node.bl_idname == "ShaderNodeObjectInfo":
+            return {"material_index": float(self.material_index)}
+        if node.bl_idname == "ShaderNodeTexCoord" and node.object is not None:
+            inverse = node.object.matrix_world.inverted_safe()
+            return {"of_another_object": True, "object_matrix": tuple(tuple(row) for row in inverse[:3])}
+        return {}
 
     def cut_cycles(self, roots: dict) -> dict[str, Node]:
         """All nodes, with every link removed that closes a circle, seen from the outputs."""

@@ -127,6 +127,9 @@ def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache
             place.random,
             facts.pass_index,
             facts.holdout,
+            facts.color,
+            place.generated,
+            place.uv,
             place.key,
         )
         groups.setdefault((mesh.key, chosen), []).append(made)

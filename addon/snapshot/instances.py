@@ -33,7 +33,8 @@ class MeshPlace:
     key: str
     random: float
     matrix: object  # mathutils.Matrix, a copy; many are converted at once
-    attributes: tuple = ()
+    generated: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where on its instancer an instance stands
+    uv: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass
@@ -61,6 +62,7 @@ class ObjectFacts:
     holdout: bool
     pass_index: int
     random: float
+    color: tuple[float, float, float, float]
 
 
 def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], list[LightPlace], tuple[Note, ...]]:
@@ -95,13 +97,15 @@ def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], lis
             continue
         key = f"{facts.uid}"
         random = facts.random
+        generated, uv = (0.0, 0.0, 0.0), (0.0, 0.0)
         if is_instance:
             ids = "-".join(str(number) for number in instance.persistent_id if number != _UNUSED_ID)
             key = f"{facts.uid}/{facts.parent_uid}/{ids}"
             random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
+            generated, uv = tuple(instance.orco), tuple(instance.uv)
         matrix = instance.matrix_world.copy()
         if kind == "MESH":
-            meshes.append(MeshPlace(facts, key, random, matrix))
+            meshes.append(MeshPlace(facts, key, random, matrix, generated, uv))
         else:
             lights.append(LightPlace(facts, key, matrix))
     return meshes, lights, tuple(notes)
@@ -125,6 +129,7 @@ def _facts(found, owner, parent, data, view_layer, shown) -> ObjectFacts:
         holdout=any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None),
         pass_index=owner.pass_index,
         random=_random_of_name(original.name),
+        color=tuple(owner.color),
     )
 
 

@@ -24,18 +24,23 @@ FARTHEST = 1e18
 class Wanted:
     """What the materials of a mesh ask for beyond the standard arrays.
 
-    `tangents`: UV map names, "" for the one that renders. `attributes`: names for attribute nodes.
+    `tangents`: UV map names, "" for the one that renders. `attributes`: names for attribute nodes. `generated`:
+    coordinates of the undeformed shape.
     """
 
     tangents: frozenset[str] = frozenset()
     attributes: frozenset[str] = frozenset()
+    generated: bool = False
 
     def __or__(self, other: Wanted) -> Wanted:
-        return Wanted(self.tangents | other.tangents, self.attributes | other.attributes)
+        return Wanted(
+            self.tangents | other.tangents, self.attributes | other.attributes, self.generated or other.generated
+        )
 
     @property
     def names(self) -> frozenset:
-        return frozenset({("tangent", name) for name in self.tangents} | {("attribute", n) for n in self.attributes})
+        names = {("tangent", name) for name in self.tangents} | {("attribute", name) for name in self.attributes}
+        return frozenset(names | ({("generated", "")} if self.generated else set()))
 
 
 @dataclass
@@ -52,6 +57,7 @@ class RawMesh:
     active_uv: str = ""
     colors: dict[str, np.ndarray] = field(default_factory=dict)
     active_color: str = ""
+    generated: np.ndarray | None = None  # (V, 3) float32
 
     def digest(self) -> bytes:
         """128 bits over everything that `build_mesh` uses; equal digests mean equal content."""
@@ -59,7 +65,7 @@ class RawMesh:
         head = (self.slots, self.active_uv, self.active_color, tuple(self.uv_maps), tuple(self.colors))
         state.update(repr((head, len(self.positions), len(self.corner_vertices), len(self.face_starts))).encode())
         arrays = [self.positions, self.corner_vertices, self.corner_normals, self.face_starts]
-        arrays += [] if self.face_slots is None else [self.face_slots]
+        arrays += [array for array in (self.face_slots, self.generated) if array is not None]
         for array in [*arrays, *self.uv_maps.values(), *self.colors.values()]:
             state.update(array.data if array.size else b"")
         return state.digest()
@@ -96,6 +102,7 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
         active_uv=next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
         colors=colors,
         active_color=active_color,
+        generated=_read_generated(mesh) if wanted.generated else None,
     )
 
 
@@ -130,6 +137,7 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
         colors=raw.colors,
         active_color=raw.active_color,
         tangents=tangents,
+        generated=raw.generated,
         bounds_min=low,
         bounds_max=high,
     )
@@ -146,6 +154,15 @@ def _attribute(mesh, name: str, field_name: str, count: int, dtype, width: int) 
     if count and name in mesh.attributes:
         mesh.attributes[name].data.foreach_get(field_name, array)
     return array.reshape(count, width) if width > 1 else array
+
+
+def _read_generated(mesh) -> np.ndarray:
+    """(V, 3) places before deformation, the mesh's texture space mapped to 0..1; an axis without extent gives 0.5."""
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("undeformed_co", places)
+    centre, size = np.array(mesh.texspace_location), np.array(mesh.texspace_size)
+    scale = np.divide(0.5, size, out=np.zeros(3), where=size != 0.0)
+    return _finite(((places.reshape(-1, 3) - centre) * scale + 0.5).astype(np.float32))
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

@@ -48,6 +48,7 @@ class Mesh:
     colors: dict[str, np.ndarray] = field(default_factory=dict)  # name -> (C, 4) float32, scene-linear
     active_color: str = ""
     tangents: dict[str, np.ndarray] = field(default_factory=dict)  # uv name -> (C, 4) float32, w = bitangent sign
+    generated: np.ndarray | None = None  # (V, 3) float32, Generated coordinates, where a material reads them
     bounds_min: np.ndarray = None  # (3,) float64, local space; finite even for an empty mesh (zeros)
     bounds_max: np.ndarray = None
 
@@ -80,6 +81,9 @@ class Instance:
     random: float = 0.0  # 0..1, Blender's per-instance random
     pass_index: int = 0
     holdout: bool = False
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)  # of the object, as in its viewport display
+    generated: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where on its instancer an instance stands
+    uv: tuple[float, float] = (0.0, 0.0)
     key: str = ""  # stable identity across frames (object and persistent id)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..materials.attributes import attributes_of
 from ..materials.graph import Graph, Input, Node
 from ..materials.reader import read_graph
 from .cache import GraphEntry, SnapshotCache
@@ -84,6 +85,8 @@ class ShadingTable:
         cache = self._cache
         if not cache.informed or (block.original or block).session_uid in cache.changed:
             return False
+        if any("object_matrix" in node.properties for node in entry.graph.nodes.values()):
+            return False  # another object's place is part of it
         if entry.images and self._images_by_uid is None:
             self._images_by_uid = {image.session_uid: image for image in bpy.data.images}
         for uid, key in entry.images:
@@ -93,25 +96,12 @@ class ShadingTable:
         return True
 
 
-# Nodes that look up a tangent, and the setting that makes them.
-_TANGENT_NODES = {
-    "ShaderNodeNormalMap": ("space", "TANGENT"),
-    "ShaderNodeTangent": ("direction_type", "UV_MAP"),
-    "ShaderNodeVectorDisplacement": ("space", "TANGENT"),
-}
-
-
 def wanted_by(graph: Graph) -> Wanted:
     """Tangents and attributes that the nodes of a graph look up in the mesh."""
-    tangents, attributes = set(), set()
-    for node in graph.nodes.values():
-        settings = node.properties
-        if node.type in _TANGENT_NODES:
-            name, value = _TANGENT_NODES[node.type]
-            if settings.get(name) == value:
-                tangents.add(settings.get("uv_map", ""))
-        elif node.type == "ShaderNodeAttribute" and settings.get("attribute_type", "GEOMETRY") == "GEOMETRY":
-            attributes.add(settings.get("attribute_name", ""))
-        elif node.type == "ShaderNodeVertexColor":
-            attributes.add(settings.get("layer_name", ""))
-    return Wanted(frozenset(tangents), frozenset(attributes - {""}))
+    attributes = attributes_of(graph)
+    named = {attribute.name for attribute in attributes if attribute.kind in ("COLOR", "NAMED")}
+    return Wanted(
+        frozenset(attribute.name for attribute in attributes if attribute.kind == "TANGENT"),
+        frozenset(named - {""}),
+        any(attribute.kind == "GENERATED" for attribute in attributes),
+    )

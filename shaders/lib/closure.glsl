@@ -2,16 +2,7 @@
 // Diffuse weights add up. Of several glossy lobes one is kept per sample with probability proportional to its
 // weight (reservoir sampling) and carries all of their weight, so the lobes stay apart and the mean is exact.
 #include "lib/math.glsl"
-
-struct SurfacePoint {
-  vec3 position;          // world space, metres, relative to the render origin
-  vec3 normal;            // shading normal, unit, on the viewer's side
-  vec3 geometric_normal;  // unit, on the viewer's side
-  vec3 incoming;          // unit, towards the viewer
-  bool backfacing;
-  float object_random;
-  vec4 attributes[8];
-};
+#include "lib/surface_point.glsl"
 
 #define FRESNEL_NONE 0        // reflectance = tint
 #define FRESNEL_DIELECTRIC 1  // reflectance runs from tint at normal incidence to 1, with the shape given by ior

@@ -1,4 +1,5 @@
-// Transforms from the instance image: three rows of the matrix, then random number, pass index, flags, orientation.
+// Instances from the instance image, eight texels each: three rows of the matrix; random number, pass index, flags,
+// orientation; the object's colour; place on the instancer (generated, first of UV), second of UV; two are free.
 
 #define FLAG_CAMERA 1
 #define FLAG_SHADOW 2
@@ -9,20 +10,27 @@ struct Instance {
   vec4 row1;
   vec4 row2;
   float random;
+  float pass_index;
   int flags;
   bool mirrored;  // negative scale turns the winding around
 };
 
+// 256 instances a row: integer division is slow on every GPU.
+ivec2 instance_place(int id)
+{
+  return ivec2((id & 255) << 3, id >> 8);
+}
+
 Instance instance_read(int id)
 {
-  // 512 instances a row: integer division is slow on every GPU.
-  ivec2 place = ivec2((id & 511) << 2, id >> 9);
+  ivec2 place = instance_place(id);
   Instance instance;
   instance.row0 = texelFetch(instances, place, 0);
   instance.row1 = texelFetch(instances, place + ivec2(1, 0), 0);
   instance.row2 = texelFetch(instances, place + ivec2(2, 0), 0);
   vec4 rest = texelFetch(instances, place + ivec2(3, 0), 0);
   instance.random = rest.x;
+  instance.pass_index = rest.y;
   instance.flags = int(rest.z);
   instance.mirrored = rest.w < 0.0;
   return instance;
@@ -42,6 +50,16 @@ vec3 instance_normal(Instance instance, vec3 local)
   vec3 c = instance.row2.xyz;
   vec3 n = vec3(dot(cross(b, c), local), dot(cross(c, a), local), dot(cross(a, b), local));
   return instance.mirrored ? -n : n;
+}
+
+// The object's colour, and where on its instancer an instance stands: generated coordinates and UV.
+void instance_extras(int id, out vec4 color, out vec3 generated, out vec2 uv)
+{
+  ivec2 place = instance_place(id);
+  color = texelFetch(instances, place + ivec2(4, 0), 0);
+  vec4 first = texelFetch(instances, place + ivec2(5, 0), 0);
+  generated = first.xyz;
+  uv = vec2(first.w, texelFetch(instances, place + ivec2(6, 0), 0).x);
 }
 
 bool instance_seen(Instance instance)

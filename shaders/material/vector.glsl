@@ -39,29 +39,98 @@ void mapping_normal(vec3 vector, vec3 location, vec3 rotation, vec3 scale, out v
   result = (length_squared > 1e-20) ? turned * inversesqrt(length_squared) : vec3(0.0);
 }
 
-// Tangent-space normal map. `tangent` is in world space with the bitangent's sign in w; the map is defined on the
-// front of the surface, so the point's normal is turned there and the result turned back.
-void normal_map_tangent(SurfacePoint point, vec4 tangent, float strength, vec3 color, out vec3 normal)
+// The colours of a normal map as a vector; DirectX runs green downwards.
+vec3 normal_map_vector(vec3 color, bool directx)
 {
-  float side = point.backfacing ? -1.0 : 1.0;
-  vec3 n = side * point.normal;
-  vec3 t = tangent.xyz;
-  vec3 bitangent = tangent.w * cross(n, t);
   vec3 mapped = 2.0 * color - vec3(1.0);
-  mapped.xy *= strength;
-  mapped.z = mix(1.0, mapped.z, clamp(strength, 0.0, 1.0));
-  vec3 turned = mapped.x * t + mapped.y * bitangent + mapped.z * n;
-  float length_squared = dot(turned, turned);
-  normal = (length_squared > 1e-20) ? side * turned * inversesqrt(length_squared) : point.normal;
+  return directx ? vec3(mapped.x, -mapped.y, mapped.z) : mapped;
 }
 
-void normal_map_world(SurfacePoint point, float strength, vec3 color, out vec3 normal)
+// Tangent-space normal map. `tangent` is in object space with the bitangent's sign in w; the map is defined on the
+// front of the surface, so the point's normal is turned there and the result turned back.
+void normal_map_tangent(SurfacePoint point, vec4 tangent, float strength, vec3 color, bool directx, out vec3 normal)
 {
   float side = point.backfacing ? -1.0 : 1.0;
-  vec3 mapped = 2.0 * color - vec3(1.0);
+  vec3 n = side * object_from_world_normal(point, point.normal);
+  vec3 bitangent = tangent.w * cross(n, tangent.xyz);
+  vec3 mapped = normal_map_vector(color, directx);
+  mapped.xy *= strength;
+  mapped.z = mix(1.0, mapped.z, clamp(strength, 0.0, 1.0));
+  vec3 turned = mapped.x * tangent.xyz + mapped.y * bitangent + mapped.z * n;
+  normal = (dot(tangent.xyz, tangent.xyz) > 0.0 && dot(turned, turned) > 1e-20)
+               ? side * world_from_object_normal(point, turned) : point.normal;
+}
+
+// Strength of maps that are not in tangent space: the straight way from the surface's normal to the map's.
+vec3 normal_map_blend(SurfacePoint point, float strength, vec3 mapped)
+{
   float map_length = length(mapped);
-  mapped = (map_length > 1e-10) ? side * mapped / map_length : point.normal;
-  vec3 turned = point.normal + (mapped - point.normal) * max(strength, 0.0);
-  float length_squared = dot(turned, turned);
-  normal = (length_squared > 1e-20) ? turned * inversesqrt(length_squared) : point.normal;
+  vec3 target = (map_length > 1e-10) ? (point.backfacing ? -mapped : mapped) / map_length : point.normal;
+  vec3 turned = point.normal + (target - point.normal) * max(strength, 0.0);
+  return (dot(turned, turned) > 1e-20) ? normalize(turned) : point.normal;
+}
+
+void normal_map_world(SurfacePoint point, float strength, vec3 color, bool directx, out vec3 normal)
+{
+  normal = normal_map_blend(point, strength, normal_map_vector(color, directx));
+}
+
+void normal_map_object(SurfacePoint point, float strength, vec3 color, bool directx, out vec3 normal)
+{
+  vec3 mapped = world_from_object_normal(point, normal_map_vector(color, directx));
+  normal = normal_map_blend(point, strength, mapped);
+}
+
+// Maps that old Blenders baked run y and z the other way.
+void normal_map_blender_world(SurfacePoint point, float strength, vec3 color, bool directx, out vec3 normal)
+{
+  normal = normal_map_blend(point, strength, normal_map_vector(color, directx) * vec3(1.0, -1.0, -1.0));
+}
+
+void normal_map_blender_object(SurfacePoint point, float strength, vec3 color, bool directx, out vec3 normal)
+{
+  vec3 mapped = world_from_object_normal(point, normal_map_vector(color, directx) * vec3(1.0, -1.0, -1.0));
+  normal = normal_map_blend(point, strength, mapped);
+}
+
+void normal_node(vec3 direction, vec3 given, out vec3 normal, out float cosine)
+{
+  normal = safe_normalize(direction);
+  cosine = dot(normal, safe_normalize(given));
+}
+
+// Rodrigues' rotation.
+vec3 rotated_about(vec3 v, vec3 axis, float angle)
+{
+  float c = cos(angle);
+  return v * c + cross(axis, v) * sin(angle) + axis * dot(axis, v) * (1.0 - c);
+}
+
+void rotate_axis_angle(vec3 vector, vec3 center, vec3 axis, float angle, bool invert, out vec3 result)
+{
+  float axis_length = length(axis);
+  result = (axis_length != 0.0)
+               ? rotated_about(vector - center, axis / axis_length, invert ? -angle : angle) + center : vector;
+}
+
+void rotate_x_axis(vec3 vector, vec3 center, float angle, bool invert, out vec3 result)
+{
+  rotate_axis_angle(vector, center, vec3(1.0, 0.0, 0.0), angle, invert, result);
+}
+
+void rotate_y_axis(vec3 vector, vec3 center, float angle, bool invert, out vec3 result)
+{
+  rotate_axis_angle(vector, center, vec3(0.0, 1.0, 0.0), angle, invert, result);
+}
+
+void rotate_z_axis(vec3 vector, vec3 center, float angle, bool invert, out vec3 result)
+{
+  rotate_axis_angle(vector, center, vec3(0.0, 0.0, 1.0), angle, invert, result);
+}
+
+void rotate_euler_xyz(vec3 vector, vec3 center, vec3 rotation, bool invert, out vec3 result)
+{
+  mat3 turn = mapping_rotation(rotation);
+  vec3 arm = vector - center;
+  result = (invert ? arm * turn : turn * arm) + center;
 }

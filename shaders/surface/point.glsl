@@ -1,3 +1,22 @@
+// Width of the camera's pixels at a place, in metres. Casters ask for the camera's, too, so that a bumped surface has
+// the same shape for light as for the viewer.
+float pixel_width(vec3 position)
+{
+  bool orthographic = material_scene.origin.w > 0.5;
+  return material_scene.camera_right.w
+         * (orthographic ? 1.0 : length(position - material_scene.camera_position.xyz));
+}
+
+// How far along the window's axes the surface point moves with `step` in its plane: the window's derivatives of an
+// attribute times this is the attribute's change.
+vec2 window_steps(vec3 step, vec3 plane_normal)
+{
+  vec3 x = dFdx(world_position);
+  vec3 y = dFdy(world_position);
+  float area = dot(cross(x, y), plane_normal);
+  return (area != 0.0) ? vec2(dot(cross(step, y), plane_normal), dot(cross(x, step), plane_normal)) / area : vec2(0.0);
+}
+
 // The point that a mesh fragment shades. Both normals are turned to the viewer's side, as Cycles does.
 
 SurfacePoint surface_point(vec3 incoming, Instance instance)
@@ -20,7 +39,17 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
     shading_normal = -shading_normal;
   }
   point.normal = shading_normal;
+  point.ray = RAY_CAMERA;
+  point.object_row0 = instance.row0;
+  point.object_row1 = instance.row1;
+  point.object_row2 = instance.row2;
   point.object_random = instance.random;
-  fill_attributes(point);
+  point.object_index = instance.pass_index;
+  instance_extras(instance_flat.x, point.object_color, point.instancer_generated, point.instancer_uv);
+  float width = pixel_width(world_position);
+  orthonormal_basis(flat_normal, point.position_dx, point.position_dy);
+  point.position_dx *= width;
+  point.position_dy *= width;
+  fill_attributes(point, window_steps(point.position_dx, flat_normal), window_steps(point.position_dy, flat_normal));
   return point;
 }

@@ -9,11 +9,21 @@ from addon.materials.energy import energy_texture
 @pytest.fixture(scope="session")
 def evaluate(gpu_context):
     """`evaluate(material, points, images)` -> dict of closure fields, (N, 3) or (N,) float32."""
+    from addon.frame.materials import MATERIAL_SCENE
     from addon.gfx import images as gpu_images
     from addon.gfx import passes
     from addon.gfx.struct import Block
     from tests.materials.probe import FIELDS, material_program, points
 
+    scene = Block(
+        MATERIAL_SCENE,
+        origin=np.zeros(4),
+        camera_position=(0.0, 0.0, 5.0, 0.0),
+        camera_right=(1.0, 0.0, 0.0, 0.01),
+        camera_up=(0.0, 1.0, 0.0, 0.0),
+        camera_backward=(0.0, 0.0, 1.0, 0.0),
+        window=(-0.5, -0.5, 1.0, 1.0),
+    )
     table = gpu_images.upload(energy_texture())
 
     def run(material, at=None, images=None):
@@ -30,7 +40,11 @@ def evaluate(gpu_context):
             textures[f"material_image{k}"] = gpu_images.upload(images[key].pixels)
         block = Block(struct, value=material.values)
         passes.compute(
-            program, (1, count), textures=textures, images={"result": result}, blocks={"material_values": block}
+            program,
+            (1, count),
+            textures=textures,
+            images={"result": result},
+            blocks={"material_values": block, "material_scene": scene},
         )
         texels = gpu_images.read(result)
         return {f: texels[:, i, :n] if n > 1 else texels[:, i, 0] for i, (f, n) in enumerate(FIELDS)}

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from addon.frame.materials import MATERIAL_SCENE
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
 
@@ -40,9 +41,20 @@ void main()
   point.geometric_normal = texelFetch(points, ivec2(1, row), 0).xyz;
   point.incoming = texelFetch(points, ivec2(2, row), 0).xyz;
   point.backfacing = texelFetch(points, ivec2(3, row), 0).x > 0.5;
+  point.ray = RAY_CAMERA;
+  point.object_row0 = vec4(1.0, 0.0, 0.0, 0.0);
+  point.object_row1 = vec4(0.0, 1.0, 0.0, 0.0);
+  point.object_row2 = vec4(0.0, 0.0, 1.0, 0.0);
+  point.object_color = vec4(1.0);
   point.object_random = 0.25;
+  point.object_index = 0.0;
+  point.instancer_generated = vec3(0.0);
+  point.instancer_uv = vec2(0.0);
+  orthonormal_basis(point.geometric_normal, point.position_dx, point.position_dy);
   for (int i = 0; i < 8; i++) {
     point.attributes[i] = texelFetch(points, ivec2(4 + i, row), 0);
+    point.attributes_dx[i] = vec4(0.0);
+    point.attributes_dy[i] = vec4(0.0);
   }
   Closures c = closures_begin(point.normal, texelFetch(points, ivec2(3, row), 0).y);
   evaluate_material(point, c);
@@ -95,7 +107,7 @@ def material_program(material, name="material probe"):
         compute="generated/probe.glsl",
         textures=(("FLOAT_2D", "points"), ("FLOAT_2D", "energy_table"), *samplers),
         images=(("result", "RGBA32F", "FLOAT_2D", "WRITE"),),
-        blocks=((values, "material_values"),),
+        blocks=((values, "material_values"), (MATERIAL_SCENE, "material_scene")),
         snippets=(
             ("generated/material.glsl", material.glsl),
             ("generated/probe.glsl", PROBE.replace("STORES", stores)),

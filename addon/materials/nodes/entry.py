@@ -27,7 +27,7 @@ class Socket:
     identifier: str
     kind: str  # FLOAT, VECTOR, COLOR
     default: Number = 0.0
-    implicit: str = ""  # GLSL expression
+    implicit: str = ""  # GLSL expression; "@UV", "@GENERATED": coordinates of that attribute
     clamp: str = ""  # name of a boolean property of the node: when true the argument is clamped to 0..1
 
 
@@ -41,20 +41,32 @@ class Setting:
 
 @dataclass(frozen=True)
 class Choice:
-    """An enum property as an int literal; changing it makes another program. A property that a Blender version lacks
-    is `missing`."""
+    """An enum or boolean property as a literal; changing it makes another program. A property that a Blender version
+    lacks is `missing`."""
 
     property: str
-    items: dict[str, int]
-    missing: int = 0
+    items: dict[object, int | str]
+    missing: int | str = 0
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """A vec4 attribute of the mesh; `property` holds its name ("" or no property: the active one)."""
+    """A vec4 attribute of the mesh; `property` holds its name ("" or no property: the active one).
 
-    kind: str  # UV, COLOR, TANGENT
+    With `output`, it is only asked for where somebody reads that output, and else is zero.
+    """
+
+    kind: str  # UV, COLOR, TANGENT, GENERATED, NAMED
     property: str = ""
+    output: str = ""
+
+
+@dataclass(frozen=True)
+class Heights:
+    """What feeds a socket, as three floats: at the point, and `width` pixels away on the surface in both directions."""
+
+    identifier: str
+    width: Socket
 
 
 @dataclass(frozen=True)
@@ -97,7 +109,7 @@ class Approximation:
     unless_linked: str = ""  # another socket that settles the matter
 
 
-Argument = Socket | Setting | Choice | Attribute | Used | ImageFlags | Rows | Expression
+Argument = Socket | Setting | Choice | Attribute | Heights | Used | ImageFlags | Rows | Expression
 
 POINT = Expression("point")
 

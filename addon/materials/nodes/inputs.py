@@ -1,10 +1,29 @@
-"""Nodes that read the surface, its attributes or a constant."""
+"""Nodes that read the surface, its object, its attributes or a constant."""
 
 from __future__ import annotations
 
-from .entry import POINT, Attribute, Entry, Socket
+from .entry import POINT, Attribute, Entry, Rows, Setting, Socket
 
 SURFACE = "material/input.glsl"
+
+GENERATED = Attribute("GENERATED", output="Generated")
+UV = Attribute("UV", output="UV")
+COORDINATES = tuple(
+    (name, "VECTOR") for name in ("Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")
+)
+NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
+
+LIGHT_PATH = (
+    *("Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray", "Is Reflection Ray"),
+    *("Is Transmission Ray", "Is Volume Scatter Ray", "Ray Length", "Ray Depth", "Diffuse Depth", "Glossy Depth"),
+    *("Transparent Depth", "Transmission Depth", "Portal Depth"),
+)
+
+
+def _matrix(rows) -> list[tuple[float, float, float, float]]:
+    """The three rows of a matrix from world to an object's space."""
+    return [tuple(row) for row in rows or ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))]
+
 
 ENTRIES = (
     Entry(
@@ -23,14 +42,32 @@ ENTRIES = (
         SURFACE,
         estimate=lambda sockets: {"Value": sockets["Value"]},
     ),
+    Entry(
+        "ShaderNodeUVMap",
+        "input_instancer_uv",
+        (POINT,),
+        (("UV", "VECTOR"),),
+        SURFACE,
+        when={"from_instancer": True},
+    ),
     Entry("ShaderNodeUVMap", "input_uv", (Attribute("UV", "uv_map"),), (("UV", "VECTOR"),), SURFACE),
     Entry(
         "ShaderNodeTexCoord",
-        "input_texture_coordinate",
-        (POINT, Attribute("UV")),
-        (("UV", "VECTOR"), ("Reflection", "VECTOR")),
+        "input_texture_coordinate_instancer",
+        (POINT,),
+        COORDINATES,
         SURFACE,
+        when={"from_instancer": True},
     ),
+    Entry(
+        "ShaderNodeTexCoord",
+        "input_texture_coordinate_object",
+        (POINT, GENERATED, UV, Rows("object_matrix", _matrix)),
+        COORDINATES,
+        SURFACE,
+        when={"of_another_object": True},
+    ),
+    Entry("ShaderNodeTexCoord", "input_texture_coordinate", (POINT, GENERATED, UV), COORDINATES, SURFACE),
     Entry(
         "ShaderNodeVertexColor",
         "input_color_attribute",
@@ -41,7 +78,7 @@ ENTRIES = (
     Entry(
         "ShaderNodeAttribute",
         "input_attribute",
-        (Attribute("COLOR", "attribute_name"),),
+        (Attribute("NAMED", "attribute_name"),),
         (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
         SURFACE,
         when={"attribute_type": "GEOMETRY"},
@@ -49,17 +86,63 @@ ENTRIES = (
     Entry(
         "ShaderNodeNewGeometry",
         "input_geometry",
-        (POINT,),
-        (("Normal", "VECTOR"), ("True Normal", "VECTOR"), ("Incoming", "VECTOR"), ("Backfacing", "FLOAT")),
+        (POINT, Attribute("GENERATED", output="Tangent")),
+        (
+            ("Position", "VECTOR"),
+            ("Normal", "VECTOR"),
+            ("Tangent", "VECTOR"),
+            ("True Normal", "VECTOR"),
+            ("Incoming", "VECTOR"),
+            ("Backfacing", "FLOAT"),
+        ),
         SURFACE,
     ),
-    Entry("ShaderNodeObjectInfo", "input_object_info", (POINT,), (("Random", "FLOAT"),), SURFACE),
+    Entry(
+        "ShaderNodeObjectInfo",
+        "input_object_info",
+        (POINT, Setting("material_index")),
+        (
+            ("Location", "VECTOR"),
+            ("Color", "COLOR"),
+            ("Alpha", "FLOAT"),
+            ("Object Index", "FLOAT"),
+            ("Material Index", "FLOAT"),
+            ("Random", "FLOAT"),
+        ),
+        SURFACE,
+    ),
+    Entry(
+        "ShaderNodeCameraData",
+        "input_camera",
+        (POINT,),
+        (("View Vector", "VECTOR"), ("View Z Depth", "FLOAT"), ("View Distance", "FLOAT")),
+        SURFACE,
+    ),
+    Entry("ShaderNodeLightPath", "input_light_path", (POINT,), tuple((name, "FLOAT") for name in LIGHT_PATH), SURFACE),
     Entry(
         "ShaderNodeTangent",
         "input_tangent",
-        (Attribute("TANGENT", "uv_map"),),
+        (POINT, Attribute("TANGENT", "uv_map")),
         (("Tangent", "VECTOR"),),
         SURFACE,
         when={"direction_type": "UV_MAP"},
+    ),
+    Entry(
+        "ShaderNodeTangent",
+        "input_tangent_{axis}",
+        (POINT, Attribute("GENERATED")),
+        (("Tangent", "VECTOR"),),
+        SURFACE,
+        choices={"axis": ("Z", "X", "Y")},
+    ),
+    Entry(
+        "ShaderNodeFresnel", "input_fresnel", (POINT, Socket("IOR", "FLOAT", 1.5), NORMAL), (("Fac", "FLOAT"),), SURFACE
+    ),
+    Entry(
+        "ShaderNodeLayerWeight",
+        "input_layer_weight",
+        (POINT, Socket("Blend", "FLOAT", 0.5), NORMAL),
+        (("Fresnel", "FLOAT"), ("Facing", "FLOAT")),
+        SURFACE,
     ),
 )
