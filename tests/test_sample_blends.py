@@ -18,6 +18,10 @@ LIGHTS = {  # how many of each kind
     "instances": {"SUN": 1, "AREA": 1, "POINT": 4},
     "window_interior": {"SUN": 1, "AREA": 1, "POINT": 1},
     "alpha_foliage": {"SUN": 1},
+    "colonnade_hall": {"SUN": 1},
+    "door_ajar": {"AREA": 1},
+    "sky_courtyard": {},
+    "emissive_lamp": {},
 }
 SHADERS = {
     "BSDF_PRINCIPLED",

@@ -1,6 +1,17 @@
 """The sample scenes: file name -> (title, builder). Each module says what its scene is there to test."""
 
-from . import alpha_foliage, cornell_box, hdri_product, instances, soft_shadow_garden, window_interior
+from . import (
+    alpha_foliage,
+    colonnade_hall,
+    cornell_box,
+    door_ajar,
+    emissive_lamp,
+    hdri_product,
+    instances,
+    sky_courtyard,
+    soft_shadow_garden,
+    window_interior,
+)
 
 SCENES = {
     "cornell_box": ("Cornell Box", cornell_box.build),
@@ -8,5 +19,9 @@ SCENES = {
     "hdri_product": ("HDRI Product", hdri_product.build),
     "instances": ("Instances", instances.build),
     "window_interior": ("Window Interior", window_interior.build),
+    "colonnade_hall": ("Colonnade Hall", colonnade_hall.build),
+    "door_ajar": ("Door Ajar", door_ajar.build),
+    "sky_courtyard": ("Sky Courtyard", sky_courtyard.build),
+    "emissive_lamp": ("Emissive Lamp", emissive_lamp.build),
     "alpha_foliage": ("Alpha Foliage", alpha_foliage.build),
 }

@@ -223,6 +223,14 @@ def glossy(name: str, color, roughness: float) -> bpy.types.Material:
     return material
 
 
+def emission(name: str, color, strength: float) -> bpy.types.Material:
+    """A material that shines with `strength` W/(sr m2) times its colour, and reflects nothing."""
+    material = bpy.data.materials.new(name)
+    tree = _cleared_tree(material)
+    _output(tree, _node(tree, "ShaderNodeEmission", (0, 0), Color=_color(color), Strength=strength))
+    return material
+
+
 def glaze(name: str, color, gloss_color, roughness: float, share: float) -> bpy.types.Material:
     """Diffuse under a constant share of gloss, joined by a Mix Shader."""
     material = bpy.data.materials.new(name)
