@@ -25,6 +25,10 @@ MATERIAL_SCENE = Struct(
     ("vec4", "window"),  # the picture one unit before the camera: left, bottom, width, height
 )
 
+CAMERA_DEFINES = (
+    ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
+    ("VISIBILITY_FLAG", "film_view.visibility"),
+)
 SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
 
 
@@ -94,6 +98,11 @@ class MaterialSet:
         else:
             self._scene.update(**values)
 
+    @property
+    def soft(self) -> bool:
+        """Some material has a lobe of shaders/lib/soft_lobe.glsl, so that programs which light surfaces need it."""
+        return any(compiled.soft for compiled in self.compiled)
+
     def fingerprint(self) -> tuple:
         """Equal in two frames if all materials shade alike."""
         return tuple((c.program_key, c.values.tobytes(), c.images) for c in self.compiled) + tuple(self._images)
@@ -101,6 +110,10 @@ class MaterialSet:
     def surface_program(self, index: int) -> Program:
         """Draws material `index` into the surface images."""
         return _surface_program(self.compiled[index])
+
+    def tint_program(self, index: int) -> Program:
+        """Multiplies what lies behind material `index`, which has coloured transparency, by its colour."""
+        return _tint_program(self.compiled[index])
 
     def caster_program(self, index: int) -> Program:
         """Draws material `index`, which has alpha, into a depth map."""
@@ -185,11 +198,26 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             (MATERIAL_SCENE, "material_scene"),
         ),
         constants=(("INT", "first_instance"), ("INT", "transparent_mode")),
-        defines=(
-            ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
-            ("VISIBILITY_FLAG", "film_view.visibility"),
-        ),
+        defines=CAMERA_DEFINES,
         **_shared(compiled),
+    )
+
+
+def _tint_program(compiled: CompiledMaterial) -> Program:
+    shared = _shared(compiled)
+    return Program(
+        name=f"tint {compiled.program_key[:8]}",
+        vertex="surface/surface.vert.glsl",
+        fragment="surface/tint.frag.glsl",
+        outputs=tuple(("VEC4", f"out_{name}") for name in ("diffuse", "tint", "emission")),
+        blocks=(
+            (VIEW, "film_view"),
+            (_struct(len(compiled.values)), "material_values"),
+            (MATERIAL_SCENE, "material_scene"),
+        ),
+        constants=(("INT", "first_instance"),),
+        defines=CAMERA_DEFINES,
+        **{**shared, "textures": (*shared["textures"], ("FLOAT_2D", "surface_position"))},
     )
 
 

@@ -263,6 +263,7 @@ class Renderer:
             for material in shown
             if self.materials.compiled[material].transparent
         ]
+        wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:

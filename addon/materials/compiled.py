@@ -36,4 +36,6 @@ class CompiledMaterial:
     opacity: float  # mean coverage 0..1, where a shader cannot be run per point
     diffuse: bool  # has a diffuse closure
     glossy: bool  # has a glossy closure
+    soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon
+    tinted: bool  # what passes straight through may be coloured
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated

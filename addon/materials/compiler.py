@@ -75,6 +75,8 @@ class _Compilation:
             opacity=float(np.clip(1.0 - passes.luminance().mean[0], 0.0, 1.0)),
             diffuse=summary.diffuse,
             glossy=summary.glossy,
+            soft=summary.soft,
+            tinted=summary.tinted,
             fallbacks=tuple(code.fallbacks),
         )
 

@@ -11,7 +11,10 @@ half vector h drawn from the distribution of visible normals (so that the expect
     energy_average(roughness)      = 2 * integral of energy(mu) mu dmu
     dielectric(mu, roughness, z)   = E_h[ s(view . h) ]              s = (F - F0) / (1 - F0), F the exact Fresnel term
     schlick(mu, roughness)         = E_h[ (1 - view . h)^5 ]
+    glass_reflection(mu, roughness, z) = E_h[ F G2 / G1 ]            what rough glass reflects at once
+    glass(mu, roughness, z)        = E_h[ F G2 / G1 + (1 - F) G2' / G1 ]   and what it reflects or lets through
 
+with G2' for the refracted direction, which must lie below the surface.
 Directions that leave below the surface count as zero in all of them. The axis z = sqrt(|ior - 1| / (ior + 1)) is
 the fourth root of F0, which spaces the usual indices of refraction evenly. These are the quantities that Cycles
 tabulates (its closures estimate albedos this way), with the same node positions, so that interpolation errors agree.
@@ -39,6 +42,8 @@ SMALLEST_Z, LARGEST_Z = 1e-4, 0.99  # z = 0 has no reflection, z = 1 an infinite
 GRID = 384  # quadrature points along each of the two dimensions of the half vector
 
 PATH = Path(__file__).with_name("energy.npz")
+SHEEN_SIZE = 32  # nodes along roughness and along mu of the sheen tables
+SHEEN_PATH = Path(__file__).with_name("sheen.npz")  # measured, see tools/measure_sheen.py
 
 
 def visible_half_vectors(mu: float, roughness: float, grid: int = GRID) -> tuple[np.ndarray, np.ndarray]:
@@ -96,9 +101,29 @@ def ggx_energy(mu: float, roughness: float, grid: int = GRID) -> float:
     return float(np.mean(np.where(lit, (1.0 + lambda_in) / (1.0 + lambda_in + lambda_out), 0.0)))
 
 
+def glass_energy(mu: float, roughness: float, ior: float, grid: int = GRID // 2) -> tuple[float, float]:
+    """Albedos of a rough dielectric that scatters once: (all, what is reflected)."""
+    alpha = max(roughness * roughness, 1e-7)
+    cos_half, cos_out = visible_half_vectors(mu, roughness, grid)
+    fresnel = fresnel_dielectric(cos_half, ior)
+    lambda_in = smith_lambda(mu, alpha)
+
+    def masking(cosine: np.ndarray) -> np.ndarray:
+        lambda_out = smith_lambda(np.maximum(cosine, 1e-8), alpha)
+        return np.where(cosine > 0.0, (1.0 + lambda_in) / (1.0 + lambda_in + lambda_out), 0.0)
+
+    # Snell: the refracted ray is -view / ior + (cos / ior - cos') half; how far it goes down is what follows.
+    half_z = np.divide(cos_out + mu, 2.0 * cos_half, out=np.ones_like(cos_half), where=cos_half > 1e-12)
+    cos_inside = np.sqrt(np.maximum(1.0 - (1.0 - cos_half * cos_half) / (ior * ior), 0.0))
+    below = mu / ior - (cos_half / ior - cos_inside) * half_z
+    reflected = fresnel * masking(cos_out)
+    return float(np.mean(reflected + (1.0 - fresnel) * masking(below))), float(np.mean(reflected))
+
+
 def make_tables() -> dict[str, np.ndarray]:
-    """All four tables: energy (32, 32) [roughness, mu], energy_average (32,), dielectric (16, 16, 16)
-    [roughness, mu, z], schlick (16, 16) [roughness, mu]; float32."""
+    """All tables: energy (32, 32) [roughness, mu], energy_average (32,), dielectric (16, 16, 16) [roughness, mu, z],
+    schlick (16, 16) [roughness, mu], glass and glass_reflection like dielectric, glass_average (16, 16) [roughness, z];
+    float32."""
     axis = np.linspace(0.0, 1.0, ENERGY_SIZE)
     energy = np.array([[ggx_energy(max(mu, SMALLEST_COSINE), r) for mu in axis] for r in axis])
     nodes, weights = np.polynomial.legendre.leggauss(24)
@@ -108,6 +133,8 @@ def make_tables() -> dict[str, np.ndarray]:
     layer_axis = np.linspace(0.0, 1.0, LAYER_SIZE)
     dielectric = np.zeros((LAYER_SIZE,) * 3)
     schlick = np.zeros((LAYER_SIZE,) * 2)
+    glass, glass_reflection = np.zeros((2, *(LAYER_SIZE,) * 3))
+    glass_average = np.zeros((LAYER_SIZE,) * 2)
     for i, roughness in enumerate(layer_axis):
         for j, mu in enumerate(layer_axis):
             cos_half, cos_out = visible_half_vectors(max(mu, SMALLEST_COSINE), roughness)
@@ -118,7 +145,16 @@ def make_tables() -> dict[str, np.ndarray]:
                 f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
                 shape = np.clip((fresnel_dielectric(cos_half, ior) - f0) / (1.0 - f0), 0.0, 1.0)
                 dielectric[i, j, k] = np.mean(np.where(lit, shape, 0.0))
-    tables = {"energy": energy, "energy_average": average, "dielectric": dielectric, "schlick": schlick}
+                cosine = max(mu, SMALLEST_COSINE)
+                glass[i, j, k], glass_reflection[i, j, k] = glass_energy(cosine, roughness, ior)
+        for k, z in enumerate(np.clip(layer_axis, SMALLEST_Z, LARGEST_Z)):
+            ior = ior_from_f0(z**4)
+            means = (2.0 * w * m * glass_energy(m, roughness, ior, 96)[0] for m, w in zip(nodes, weights))
+            glass_average[i, k] = sum(means)
+    tables = {
+        "energy": energy, "energy_average": average, "dielectric": dielectric, "schlick": schlick,
+        "glass": glass, "glass_reflection": glass_reflection, "glass_average": glass_average,
+    }  # fmt: skip
     return {name: table.astype(np.float32) for name, table in tables.items()}
 
 
@@ -129,23 +165,43 @@ def tables() -> dict[str, np.ndarray]:
         return {name: stored[name] for name in stored.files}
 
 
+@lru_cache(maxsize=1)
+def sheen_tables() -> dict[str, np.ndarray]:
+    """a, b and albedo of Cycles' microfiber sheen, each (32, 32) float32 [roughness, mu]; tools/measure_sheen.py."""
+    with np.load(SHEEN_PATH) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
 def energy_texture() -> np.ndarray:
-    """The tables packed for the GPU: (64, 64, 4) float32, row first, to be bound as `energy_table`.
+    """The tables packed for the GPU: (64, 128, 4) float32, row first, to be bound as `energy_table`.
 
     R: dielectric[i, j, k] at column i + 16 (k mod 4), row j + 16 (k div 4); G: the same for k + 1, so that one fetch
-    gives both ends of the interpolation along z. B: energy[i, j] at column i, row j; energy_average[i] at column i,
-    row 32; schlick[i, j] at column 32 + i, row j. A: unused. `shaders/lib/energy.glsl` reads exactly this.
+    gives both ends of the interpolation along z. From column 64 on the same way, R and G: glass; B and A:
+    glass_reflection. Up to column 63, B: energy[i, j] at column i, row j; energy_average[i] at column i, row 32;
+    schlick[i, j] at column 32 + i, row j; glass_average[i, k] at column 32 + i, row 32 + k. A: the sheen's a[i, j] at
+    column i, row j; its b at column 32 + i, row j; its albedo at column i, row 32 + j. `shaders/lib/energy.glsl` reads
+    exactly this.
     """
     stored = tables()
-    texture = np.zeros((TEXTURE_SIZE, TEXTURE_SIZE, 4), np.float32)
-    for k in range(LAYER_SIZE):
-        column, row = LAYER_SIZE * (k % 4), LAYER_SIZE * (k // 4)
-        tile = texture[row : row + LAYER_SIZE, column : column + LAYER_SIZE]
-        tile[..., 0] = stored["dielectric"][:, :, k].T
-        tile[..., 1] = stored["dielectric"][:, :, min(k + 1, LAYER_SIZE - 1)].T
+    texture = np.zeros((TEXTURE_SIZE, 2 * TEXTURE_SIZE, 4), np.float32)
+    for name, first, channel in (
+        ("dielectric", 0, 0), ("glass", TEXTURE_SIZE, 0), ("glass_reflection", TEXTURE_SIZE, 2),
+    ):  # fmt: skip
+        for k in range(LAYER_SIZE):
+            column, row = first + LAYER_SIZE * (k % 4), LAYER_SIZE * (k // 4)
+            tile = texture[row : row + LAYER_SIZE, column : column + LAYER_SIZE]
+            tile[..., channel] = stored[name][:, :, k].T
+            tile[..., channel + 1] = stored[name][:, :, min(k + 1, LAYER_SIZE - 1)].T
     texture[:ENERGY_SIZE, :ENERGY_SIZE, 2] = stored["energy"].T
     texture[ENERGY_SIZE, :ENERGY_SIZE, 2] = stored["energy_average"]
     texture[:LAYER_SIZE, ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, 2] = stored["schlick"].T
+    texture[ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, 2] = stored[
+        "glass_average"
+    ].T
+    sheen = sheen_tables()
+    texture[:SHEEN_SIZE, :SHEEN_SIZE, 3] = sheen["a"].T
+    texture[:SHEEN_SIZE, SHEEN_SIZE : 2 * SHEEN_SIZE, 3] = sheen["b"].T
+    texture[SHEEN_SIZE : 2 * SHEEN_SIZE, :SHEEN_SIZE, 3] = sheen["albedo"].T
     return texture
 
 

@@ -34,6 +34,11 @@ class Estimate:
     def constant(self) -> bool:
         return bool(np.all(self.low == self.high))
 
+    @property
+    def grey(self) -> bool:
+        """Known to be the same in all channels."""
+        return self.constant and bool(np.ptp(self.low) == 0.0)
+
     def map(self, function) -> Estimate:
         """The estimate of a rising function of this value."""
         return Estimate(function(self.low), function(self.mean), function(self.high))
@@ -83,10 +88,19 @@ class Summary:
     emission: Estimate = ZERO  # radiance
     diffuse: bool = False
     glossy: bool = False
+    soft: bool = False  # a lobe of shaders/lib/soft_lobe.glsl
+    tinted: bool = False  # what passes straight through may be coloured
 
     def weighted(self, weight: Estimate) -> Summary:
         seen = bool(np.any(weight.high > 0.0))
-        return Summary(self.transparency * weight, self.emission * weight, self.diffuse and seen, self.glossy and seen)
+        return Summary(
+            self.transparency * weight,
+            self.emission * weight,
+            self.diffuse and seen,
+            self.glossy and seen,
+            self.soft and seen,
+            self.tinted and seen,
+        )
 
     def __add__(self, other: Summary) -> Summary:
         return Summary(
@@ -94,6 +108,8 @@ class Summary:
             self.emission + other.emission,
             self.diffuse or other.diffuse,
             self.glossy or other.glossy,
+            self.soft or other.soft,
+            self.tinted or other.tinted,
         )
 
 

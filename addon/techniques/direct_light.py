@@ -36,21 +36,24 @@ from ..gfx import passes
 from ..snapshot.scene import Snapshot
 from .accumulated_maps import DepthMapService, rounds
 from .light_probes import rate_of
-from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
+from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
 CANDIDATES = 8  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
 
-LIGHTING = passes.fullscreen_program(
-    "direct light",
-    "light/direct.frag.glsl",
-    textures=(
-        *SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"),
-    ),
-    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
-    defines=TRACED_DEFINES,
-    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+LIGHTING = tuple(
+    passes.fullscreen_program(
+        "direct light",
+        "light/direct.frag.glsl",
+        textures=(
+            *SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"),
+        ),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
+        defines=TRACED_DEFINES + soft_defines,
+        outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+    )
+    for soft_defines in SOFT_DEFINES
 )  # fmt: skip
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
@@ -62,7 +65,7 @@ def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: l
     """Add the light of `rows` (each (TEXELS, 4)) to the radiance images. `maps` = (atlas, views) of depth maps."""
     atlas, views = maps
     passes.fullscreen(
-        LIGHTING,
+        LIGHTING[frame.materials.soft],
         frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
         blend="ADDITIVE_PREMULT",
         textures={**surface_bindings(frame), "depth_maps": atlas, "energy_table": frame.materials.energy_table},

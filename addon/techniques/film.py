@@ -13,7 +13,7 @@ from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
-from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
+from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
 SUMS = (
     Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
@@ -22,19 +22,23 @@ SUMS = (
     Write("color.glossy", "RGBA32F", "Albedo of glossy closures", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
-COLLECT = passes.fullscreen_program(
-    "film collect",
-    "film/collect.frag.glsl",
-    textures=(
-        *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
-        ("FLOAT_2D", "environment_density_map"),
-    ),
-    blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
-    constants=(("INT", "light_count"),),
-    outputs=tuple(
-        ("VEC4", name)
-        for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color", "out_normal")
-    ),
+COLLECT = tuple(
+    passes.fullscreen_program(
+        "film collect",
+        "film/collect.frag.glsl",
+        textures=(
+            *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
+            ("FLOAT_2D", "environment_density_map"),
+        ),
+        blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
+        constants=(("INT", "light_count"),),
+        defines=soft_defines,
+        outputs=tuple(
+            ("VEC4", name)
+            for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color", "out_normal")
+        ),
+    )
+    for soft_defines in SOFT_DEFINES
 )  # fmt: skip
 DEPTH = passes.fullscreen_program(
     "film depth",
@@ -85,7 +89,7 @@ class Film(Technique):
                 blocks={"film_view": frame.view_block},
             )
         passes.fullscreen(
-            COLLECT,
+            COLLECT[frame.materials.soft],
             frame.target(*(write.name for write in SUMS)),
             blend="ADDITIVE_PREMULT",
             textures={

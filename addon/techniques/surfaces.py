@@ -3,7 +3,9 @@
 Every material's graph runs once per visible pixel and leaves its closures in six images (`surface.*`); all lighting
 reads them. Transparency is stochastic: a layer is drawn with the probability of its opacity, numbers stratified over
 the samples per pixel and layer, so the mean over samples is exact alpha blending of any number of layers, at the
-price of noise that falls like 1/n. Of several glossy lobes one is kept per sample (shaders/lib/closure.glsl).
+price of noise that falls like 1/n. Where such layers are coloured, a second pass multiplies what was hit, or the
+world, by the colour of each layer before it over its mean (the order does not matter), so the mean is exact by channel.
+Of several glossy lobes one is kept per sample (shaders/lib/closure.glsl).
 
 The camera is shifted within the pixel filter (Blackman-Harris, importance-sampled), the same for all pixels.
 
@@ -14,9 +16,10 @@ which depth maps are fitted. With alpha materials both ends of the layers are dr
 |---|---|
 | draws | one per material (meshes shown once are joined) and one per instanced mesh and material |
 | bytes written per pixel | 6 x 16 + 4 |
+| coloured layers | + 1 pass of their draws, blended into three of the images |
 | first sample | + 1 or 2 surface passes and one reduction, read back at 1/256 of the pixels |
 
-Fails: coloured transparency lets its mean colour through untinted; more layers than samples look dithered.
+Fails: more layers than samples look dithered; light through coloured layers casts grey shadows.
 """
 
 from __future__ import annotations
@@ -37,12 +40,15 @@ DESCRIPTIONS = {  # the layout in full: shaders/lib/gbuffer.glsl
     "position": "Position relative to the render origin, m; whether something was hit, and held out",
     "normal": "Shading normal and the triangle's normal",
     "diffuse": "Diffuse albedo; roughness, anisotropy and tangent",
-    "tint": "Glossy reflectance at normal incidence; weight of the lobe",
-    "lobe": "Glossy normal, kind of Fresnel term, edge reflectance, index of refraction",
+    "tint": "Weight of the glossy or soft lobe; its reflectance at normal incidence",
+    "lobe": "Normal and kind of the lobe, edge reflectance, index of refraction",
     "emission": "Emitted radiance towards the viewer; glossy roughness",
 }
 SURFACES = tuple(f"surface.{name}" for name in SURFACE_IMAGES)
 SURFACE_TEXTURES = tuple(("FLOAT_2D", f"surface_{name}") for name in SURFACE_IMAGES)
+
+# Defines of the programs that light surfaces: without and with soft lobes, which few scenes have.
+SOFT_DEFINES = ((), (("SOFT_LOBES", ""),))
 
 
 def surface_bindings(frame: Frame) -> dict[str, images.Image]:
@@ -75,24 +81,43 @@ class Surfaces(Technique):
             if modes == (STOCHASTIC,):
                 return  # what was drawn for the receivers is the first sample
         self._draw(frame, STOCHASTIC)
+        if any(material.tinted for material in frame.materials.compiled):
+            self._tint(frame)
 
     def _draw(self, frame: Frame, mode: int) -> None:
         target = frame.target(*SURFACES, depth="surface.depth_buffer")
         target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-        seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
+        frame.target("surface.emission").clear((1.0, 1.0, 1.0, 0.0))  # what reaches the eye where nothing is hit
         with passes.drawing(target):
-            material = None
-            for call in calls(frame.geometry.draws, seen):
-                if call.draw.material != material:
-                    material = call.draw.material
-                    shader = passes.get(frame.materials.surface_program(material))
-                    bindings = frame.materials.bindings(material, frame.geometry.instances)
-                    bindings["blocks"]["film_view"] = frame.view_block
-                    shader.bind(**bindings, constants={"first_instance": call.first, "transparent_mode": mode})
-                shader.set_constant("first_instance", call.first)
-                passes.draw(shader, call.draw.batch, call.count)
-                frame.count(self, "triangles", call.triangles)
+            self._submit(frame, frame.materials.surface_program, None, {"transparent_mode": mode})
         frame.count(self, "passes")
+
+    def _tint(self, frame: Frame) -> None:
+        """Multiply what was hit by the colour of the layers before it that let this sample pass."""
+        tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
+        target = frame.target("surface.diffuse", "surface.tint", "surface.emission")
+        position = {"surface_position": frame.images["surface.position"]}
+        with passes.drawing(target, blend="MULTIPLY", depth_test="NONE", depth_write=False):
+            self._submit(frame, frame.materials.tint_program, tinted, {}, position)
+        frame.count(self, "passes")
+
+    def _submit(self, frame: Frame, program_of, materials: set[int] | None, constants: dict, textures=None) -> None:
+        """Draw what the camera may see of `materials` (None: of all), each with its own program."""
+        seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
+        material = None
+        for call in calls(frame.geometry.draws, seen):
+            if materials is not None and call.draw.material not in materials:
+                continue
+            if call.draw.material != material:
+                material = call.draw.material
+                shader = passes.get(program_of(material))
+                bindings = frame.materials.bindings(material, frame.geometry.instances)
+                bindings["blocks"]["film_view"] = frame.view_block
+                bindings["textures"] |= textures or {}
+                shader.bind(**bindings, constants={"first_instance": call.first, **constants})
+            shader.set_constant("first_instance", call.first)
+            passes.draw(shader, call.draw.batch, call.count)
+            frame.count(self, "triangles", call.triangles)
 
     def _receivers(self, frame: Frame, modes: tuple[int, ...]) -> Receivers:
         width, height = frame.size

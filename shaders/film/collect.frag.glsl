@@ -1,6 +1,9 @@
 // What does not depend on lights: emission, the visible world, colours and normals of this sample.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
+#ifdef SOFT_LOBES
+#include "lib/soft_lobe.glsl"
+#endif
 #include "lib/environment.glsl"
 #include "light/sources.glsl"
 
@@ -37,18 +40,27 @@ void main()
     out_emission.rgb = s.emission;
     out_diffuse_color.rgb = s.diffuse;
     out_normal = vec4(s.normal, 1.0);
-    if (s.glossy_weight > 0.0) {
+    bool microfacets = max_component(s.glossy_weight) > 0.0;
+#ifdef SOFT_LOBES
+    SoftLobe soft = soft_lobe_begin(s, -direction);
+    if (soft.exists) {
+      out_diffuse_color.rgb += soft.glossy ? vec3(0.0) : soft.weight;
+      out_glossy_color.rgb = soft.glossy ? soft.weight : vec3(0.0);
+      microfacets = false;
+    }
+#endif
+    if (microfacets) {
       vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
       float mu = max(dot(s.glossy_normal, -direction), 0.0);
-      out_glossy_color.rgb = s.glossy_weight * glossy_albedo(s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior,
+      out_glossy_color.rgb = s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior,
                                                              sqrt(sqrt(alpha.x * alpha.y)), mu);
-      if (max_component(s.diffuse) <= 0.0) {
-        out_normal.xyz = s.glossy_normal;
-      }
+    }
+    if (max_component(s.diffuse) <= 0.0 && max_component(s.glossy_weight) > 0.0) {
+      out_normal.xyz = s.glossy_normal;
     }
   }
   else {
-    out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) : vec3(0.0);
+    out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) * s.emission : vec3(0.0);
     coverage = 1.0 - world_light.map_options.x;
   }
   out_environment.a = coverage;

@@ -2,6 +2,7 @@
 // All return f * cos(normal, light); vectors are unit and point away from the surface.
 #include "lib/math.glsl"
 #include "lib/energy.glsl"
+#include "lib/gbuffer.glsl"
 
 // Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model.
 float oren_nayar_albedo_term(float c)
@@ -44,7 +45,7 @@ struct Lobe {
   vec3 normal;
   vec2 alpha;
   vec3 scale;  // weight x multiple scattering
-  int fresnel;
+  int kind;
   vec3 tint;
   vec3 edge;
   float ior;
@@ -64,25 +65,25 @@ vec3 lobe_to_world(Lobe lobe, vec3 v)
   return v.x * lobe.tangent + v.y * lobe.bitangent + v.z * lobe.normal;
 }
 
-Lobe lobe_begin(vec3 normal, float tangent_angle, vec2 alpha, float weight, int fresnel, vec3 tint, vec3 edge,
-                float ior, vec3 view)
+// The microfacet lobe of a surface, seen from `view`.
+Lobe lobe_begin(Surface s, vec3 view)
 {
   Lobe lobe;
   vec3 t;
   vec3 b;
-  orthonormal_basis(normal, t, b);
-  float angle = 2.0 * PI * tangent_angle;
+  orthonormal_basis(s.glossy_normal, t, b);
+  float angle = 2.0 * PI * s.tangent_angle;
   lobe.tangent = cos(angle) * t + sin(angle) * b;
-  lobe.bitangent = cross(normal, lobe.tangent);
-  lobe.normal = normal;
-  lobe.alpha = alpha;
-  lobe.fresnel = fresnel;
-  lobe.tint = tint;
-  lobe.edge = edge;
-  lobe.ior = ior;
+  lobe.bitangent = cross(s.glossy_normal, lobe.tangent);
+  lobe.normal = s.glossy_normal;
+  lobe.alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
+  lobe.kind = s.kind;
+  lobe.tint = s.glossy_tint;
+  lobe.edge = s.glossy_edge;
+  lobe.ior = s.glossy_ior;
   lobe.view = lobe_to_local(lobe, view);
-  float roughness = sqrt(sqrt(alpha.x * alpha.y));
-  lobe.scale = weight * multiscatter_scale(fresnel, tint, edge, ior, roughness, lobe.view.z);
+  float roughness = sqrt(sqrt(lobe.alpha.x * lobe.alpha.y));
+  lobe.scale = s.glossy_weight * multiscatter_scale(s.kind, lobe.tint, lobe.edge, lobe.ior, roughness, lobe.view.z);
   return lobe;
 }
 
@@ -119,7 +120,7 @@ vec3 lobe_reflection(Lobe lobe, vec3 light_world, out float pdf)
   float lambda_light = ggx_lambda(light, lobe.alpha);
   float facet = distribution / (4.0 * view.z);
   pdf = facet / (1.0 + lambda_view);
-  vec3 fresnel = fresnel_reflectance(lobe.fresnel, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
+  vec3 fresnel = fresnel_reflectance(lobe.kind, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
   return lobe.scale * fresnel * (facet / (1.0 + lambda_view + lambda_light));
 }
 
@@ -146,7 +147,7 @@ vec3 lobe_sample(Lobe lobe, vec2 u, out vec3 weight)
       float lambda_view = ggx_lambda(view, lobe.alpha);
       masking = (1.0 + lambda_view) / (1.0 + lambda_view + ggx_lambda(light, lobe.alpha));
     }
-    weight = lobe.scale * masking * fresnel_reflectance(lobe.fresnel, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
+    weight = lobe.scale * masking * fresnel_reflectance(lobe.kind, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
   }
   return safe_normalize(lobe_to_world(lobe, light));
 }

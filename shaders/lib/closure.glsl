@@ -1,12 +1,25 @@
 // Closures: what a surface point does with light, collected while the material graph is walked.
-// Diffuse weights add up. Of several glossy lobes one is kept per sample with probability proportional to its
-// weight (reservoir sampling) and carries all of their weight, so the lobes stay apart and the mean is exact.
+// Diffuse weights add up. Of several other lobes (glossy, sheen, translucent, toon) one is kept per sample with
+// probability proportional to its weight (reservoir sampling) and carries all of their weight, so the lobes stay apart
+// and the mean is exact.
 #include "lib/math.glsl"
 #include "lib/surface_point.glsl"
 
+// Kinds of the lobe that is kept. Microfacets differ in their Fresnel term:
 #define FRESNEL_NONE 0        // reflectance = tint
 #define FRESNEL_DIELECTRIC 1  // reflectance runs from tint at normal incidence to 1, with the shape given by ior
 #define FRESNEL_F82 2         // metal: tint at normal incidence, edge at 82 degrees
+// Lobes without microfacets, evaluated in lib/soft_lobe.glsl; all of their colour is in the weight:
+#define LOBE_SHEEN 4          // microfiber
+#define LOBE_VELVET 5         // fibres after Ashikhmin; roughness is the spread of their normals
+#define LOBE_TRANSLUCENT 6    // diffuse, lit from the other side
+#define LOBE_TOON 7           // roughness: size, anisotropy: smoothness; edge 1: around the mirror direction
+
+float dielectric_f0(float ior)
+{
+  float root = (ior - 1.0) / (ior + 1.0);
+  return root * root;
+}
 
 struct Closures {
   vec3 diffuse;           // albedo weight
@@ -15,7 +28,7 @@ struct Closures {
   vec3 emission;          // radiance
   vec3 transparency;      // fraction that passes straight through
   float holdout;
-  int fresnel;
+  int kind;               // of the lobe that is kept: FRESNEL_* or LOBE_*
   vec3 glossy_weight;     // multiplies the whole lobe
   vec3 glossy_tint;       // see FRESNEL_*
   vec3 glossy_edge;       // F82 only
@@ -37,7 +50,7 @@ Closures closures_begin(vec3 normal, float random_number)
   c.emission = vec3(0.0);
   c.transparency = vec3(0.0);
   c.holdout = 0.0;
-  c.fresnel = FRESNEL_NONE;
+  c.kind = FRESNEL_NONE;
   c.glossy_weight = vec3(0.0);
   c.glossy_tint = vec3(0.0);
   c.glossy_edge = vec3(1.0);
@@ -82,11 +95,11 @@ bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
   return false;
 }
 
-void closure_glossy(inout Closures c, vec3 weight, float importance, int fresnel, vec3 tint, vec3 edge, float ior,
+void closure_glossy(inout Closures c, vec3 weight, float importance, int kind, vec3 tint, vec3 edge, float ior,
                     float roughness, float anisotropy, vec3 tangent, vec3 normal)
 {
   if (closure_glossy_choose(c, weight, importance)) {
-    c.fresnel = fresnel;
+    c.kind = kind;
     // Kept with probability w / glossy_sum: the division by it is completed in closures_end, when the sum is final.
     float w = max(max(weight.x, weight.y), weight.z) * max(importance, 1e-4);
     c.glossy_weight = weight / w;

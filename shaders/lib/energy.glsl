@@ -1,7 +1,7 @@
 // Albedos of microfacet lobes from the table `energy_table`, and what follows from them: how much a layer leaves for
 // the layer below, and how much light a lobe must gain because it scatters more than once.
 //
-// The host binds `energy_table` (sampler2D, 64 x 64 RGBA32F, filled by addon/materials/energy.py, where the layout and
+// The host binds `energy_table` (sampler2D, 128 x 64 RGBA32F, filled by addon/materials/energy.py, where the layout and
 // the sources are described) in every program that includes this file. `mu` is the cosine between the lobe's normal
 // and the viewer, `roughness` the artist's roughness (alpha = roughness^2; for anisotropic lobes (ax ay)^(1/4), which
 // is the same value).
@@ -46,20 +46,43 @@ float ggx_energy_average(float roughness)
   return mix(texelFetch(energy_table, texel, 0).z, texelFetch(energy_table, texel + ivec2(1, 0), 0).z, cell.z);
 }
 
-float dielectric_f0(float ior)
+// Place of an index of refraction between the tables' slices: lower slice and weight of the next one.
+vec2 ior_slice(float ior)
 {
-  float root = (ior - 1.0) / (ior + 1.0);
-  return root * root;
+  float z = clamp(sqrt(abs((ior - 1.0) / (ior + 1.0))), 0.0, 1.0) * (LAYER_NODES - 1.0);
+  float slice = min(floor(z), LAYER_NODES - 2.0);
+  return vec2(slice, z - slice);
 }
 
 // Where between reflectance at normal incidence (0) and total reflection (1) the mean of a dielectric lobe lies.
 float dielectric_layer_shape(float mu, float roughness, float ior)
 {
-  float z = clamp(sqrt(abs((ior - 1.0) / (ior + 1.0))), 0.0, 1.0) * (LAYER_NODES - 1.0);
-  float slice = min(floor(z), LAYER_NODES - 2.0);
-  int k = int(slice);
+  vec2 slice = ior_slice(ior);
+  int k = int(slice.x);
   vec4 ends = energy_bilinear(ivec2(16 * (k % 4), 16 * (k / 4)), energy_cell(roughness, mu, LAYER_NODES));
-  return mix(ends.x, ends.y, z - slice);
+  return mix(ends.x, ends.y, slice.y);
+}
+
+// Albedos of a rough dielectric that scatters once: all, and what is reflected.
+vec2 glass_energy(float mu, float roughness, float ior)
+{
+  vec2 slice = ior_slice(ior);
+  int k = int(slice.x);
+  vec4 ends = energy_bilinear(ivec2(64 + 16 * (k % 4), 16 * (k / 4)), energy_cell(roughness, mu, LAYER_NODES));
+  return mix(ends.xz, ends.yw, slice.y);
+}
+
+// Cosine-weighted mean of the first over the hemisphere.
+float glass_energy_average(float roughness, float ior)
+{
+  vec2 slice = ior_slice(ior);
+  vec4 cell = energy_cell(roughness, 0.0, LAYER_NODES);
+  ivec2 texel = ivec2(32 + int(cell.x), 32 + int(slice.x));
+  vec2 low = vec2(texelFetch(energy_table, texel, 0).z, texelFetch(energy_table, texel + ivec2(1, 0), 0).z);
+  vec2 high = vec2(texelFetch(energy_table, texel + ivec2(0, 1), 0).z,
+                   texelFetch(energy_table, texel + ivec2(1, 1), 0).z);
+  vec2 ends = mix(low, high, slice.y);
+  return mix(ends.x, ends.y, cell.z);
 }
 
 // Albedo of a dielectric layer without tint.
@@ -167,4 +190,13 @@ vec3 glossy_albedo(int fresnel, vec3 tint, vec3 edge, float ior, float roughness
     return darkening * mix(tint, vec3(1.0), schlick_layer_shape(mu, roughness));
   }
   return darkening * tint;
+}
+
+// Sheen by microfibers (Zeltner, Burley & Chiang 2022): coefficients a, b of the linear map and the albedo, from the
+// tables that tools/measure_sheen.py made.
+vec3 sheen_terms(float mu, float roughness)
+{
+  vec4 cell = energy_cell(max(roughness, 1e-3), mu, ENERGY_NODES);
+  return vec3(energy_bilinear(ivec2(0, 0), cell).w, energy_bilinear(ivec2(32, 0), cell).w,
+              energy_bilinear(ivec2(0, 32), cell).w);
 }

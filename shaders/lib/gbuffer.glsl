@@ -3,9 +3,12 @@
 //   position  xyz relative to the render origin; w: 0 nothing hit, 1 surface, up to 2 held out
 //   normal    octahedral shading normal of the diffuse closure (xy) and of the triangle (zw)
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
-//   tint      glossy reflectance at normal incidence; w: weight of the lobe
-//   lobe      octahedral glossy normal (xy); z: Fresnel kind (3 bits) and edge reflectance (7 bits each); w: ior
+//   tint      weight of the lobe; w: square root of its reflectance at normal incidence, 8 bits each
+//   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each); w: ior
 //   emission  radiance; w: glossy roughness
+//
+// Colours stand alone in rgb so that transparent layers in front can tint them by blending (techniques/surfaces.py);
+// where nothing was hit, emission holds what those layers let through.
 //
 // Blender's framebuffers take six colour images, hence the packing; integers up to 2^24 are exact in a float.
 #include "lib/math.glsl"
@@ -20,8 +23,8 @@ struct Surface {
   vec3 diffuse;
   vec3 emission;
   float holdout;
-  int fresnel;
-  float glossy_weight;    // 0: no glossy closure
+  int kind;               // of the lobe: FRESNEL_* or LOBE_*
+  vec3 glossy_weight;     // 0: no lobe
   vec3 glossy_tint;
   vec3 glossy_edge;
   float glossy_ior;
@@ -51,6 +54,26 @@ vec3 unpack_three(float packed_value, float steps)
   return vec3(packed_value - n * (y + n * z), y, z) / steps;
 }
 
+// The share of a tint that is stored: of what the index of refraction gives, for dielectrics.
+vec3 stored_tint_scale(int kind, float ior)
+{
+  return vec3((kind == FRESNEL_DIELECTRIC) ? dielectric_f0(ior) : 1.0);
+}
+
+// The lobe's weight and packed tint. Where reflectance is about weight x tint, what the tint loses in eight bits goes
+// into the weight, so that the product is exact.
+vec4 tint_encode(int kind, vec3 weight, vec3 tint, float ior)
+{
+  vec3 share = tint / max(stored_tint_scale(kind, ior), vec3(1e-20));
+  vec3 root = floor(sqrt(clamp(share, vec3(0.0), vec3(1.0))) * 255.0 + 0.5) / 255.0;
+  if (kind != FRESNEL_DIELECTRIC) {
+    weight.x *= (root.x > 0.0) ? share.x / (root.x * root.x) : 1.0;
+    weight.y *= (root.y > 0.0) ? share.y / (root.y * root.y) : 1.0;
+    weight.z *= (root.z > 0.0) ? share.z / (root.z * root.z) : 1.0;
+  }
+  return vec4(weight, pack_three(root, 255.0));
+}
+
 Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe, vec4 emission)
 {
   Surface s;
@@ -64,13 +87,14 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.diffuse_roughness = shape.x;
   s.glossy_anisotropy = shape.y;
   s.tangent_angle = shape.z;
-  s.glossy_tint = tint.xyz;
-  s.glossy_weight = tint.w;
+  s.glossy_weight = tint.xyz;
   s.glossy_normal = octahedral_decode(lobe.xy);
   float kind = floor(lobe.z / 2097152.0);
-  s.fresnel = int(kind);
+  s.kind = int(kind);
   s.glossy_edge = unpack_three(lobe.z - kind * 2097152.0, 127.0);
   s.glossy_ior = lobe.w;
+  vec3 root = unpack_three(tint.w, 255.0);
+  s.glossy_tint = root * root * stored_tint_scale(s.kind, s.glossy_ior);
   s.emission = emission.xyz;
   s.glossy_roughness = emission.w;
   return s;

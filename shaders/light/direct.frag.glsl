@@ -5,6 +5,9 @@
 // densities (Veach's power heuristic), so the sum has the same mean.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
+#ifdef SOFT_LOBES
+#include "lib/soft_lobe.glsl"
+#endif
 #include "lib/shadow.glsl"
 #include "light/sources.glsl"
 
@@ -19,11 +22,14 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   bool has_diffuse = max_component(s.diffuse) > 0.0;
-  bool has_glossy = s.glossy_weight > 0.0;
+  bool has_glossy = max_component(s.glossy_weight) > 0.0;
+#ifdef SOFT_LOBES
+  SoftLobe soft = soft_lobe_begin(s, to_viewer);
+  has_glossy = has_glossy && !soft.exists;
+#endif
   Lobe lobe;
   if (has_glossy) {
-    lobe = lobe_begin(s.glossy_normal, s.tangent_angle, lobe_alpha(s.glossy_roughness, s.glossy_anisotropy),
-                      s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
+    lobe = lobe_begin(s, to_viewer);
     has_glossy = !lobe_is_mirror(lobe);
   }
   bool traced = s.glossy_roughness <= traced_roughness;
@@ -48,12 +54,21 @@ void main()
         from_glossy /= 1.0 + ratio * ratio;
       }
     }
+    vec3 facing = s.geometric_normal;
+#ifdef SOFT_LOBES
+    if (soft.exists) {
+      vec3 from_soft = soft_reflection(soft, direction);
+      from_diffuse += ((light.flags & LIGHT_DIFFUSE) != 0 && !soft.glossy) ? from_soft : vec3(0.0);
+      from_glossy += ((light.flags & LIGHT_GLOSSY) != 0 && soft.glossy) ? from_soft : vec3(0.0);
+      facing *= (soft.kind == LOBE_TRANSLUCENT && dot(direction, facing) < 0.0) ? -1.0 : 1.0;
+    }
+#endif
     from_diffuse *= arriving;
     from_glossy *= arriving;
     if (max_component(abs(from_diffuse) + abs(from_glossy)) > 0.0) {
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        visibility = shadow_visibility(light.first_view, light.view_count, s.position, s.geometric_normal);
+        visibility = shadow_visibility(light.first_view, light.view_count, s.position, facing);
       }
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;

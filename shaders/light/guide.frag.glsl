@@ -23,11 +23,13 @@ void main()
   float azimuth = (cell.x / float(columns) - 0.5) * 2.0 * PI;
   float ring = sqrt(max(1.0 - z * z, 0.0));
   vec3 direction = vec3(ring * cos(azimuth), ring * sin(azimuth), z);
-  float cosine = dot(direction, s.normal);
+  bool translucent = s.kind == LOBE_TRANSLUCENT && max_component(s.glossy_weight) > 0.0;
+  float cosine = translucent ? abs(dot(direction, s.normal)) : dot(direction, s.normal);
   if (cosine <= 0.0) {
     return;
   }
-  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+  float side = (dot(direction, s.geometric_normal) < 0.0 && translucent) ? -1.0 : 1.0;
+  vec3 origin = s.position + side * s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
   ivec2 hit;
   if (trace_until(origin, direction, 1e29, 1e29, bits.z, hit) >= 1e29) {
     out_useful = cosine;

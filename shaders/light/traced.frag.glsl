@@ -49,16 +49,15 @@ void main()
   out_diffuse = vec4(0.0);
   out_glossy = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (texelFetch(surface_position, pixel, 0).w == 0.0 || texelFetch(surface_tint, pixel, 0).w <= 0.0) {
+  if (texelFetch(surface_position, pixel, 0).w == 0.0 || max_component(texelFetch(surface_tint, pixel, 0).rgb) <= 0.0) {
     return;
   }
   Surface s = SURFACE_READ(pixel);
-  if (s.glossy_roughness > traced_roughness) {
+  if (s.glossy_roughness > traced_roughness || s.kind > FRESNEL_F82) {
     return;
   }
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
-  Lobe lobe = lobe_begin(s.glossy_normal, s.tangent_angle, lobe_alpha(s.glossy_roughness, s.glossy_anisotropy),
-                         s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
+  Lobe lobe = lobe_begin(s, to_viewer);
   bool mirror = lobe_is_mirror(lobe);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));

@@ -86,9 +86,48 @@ vec3 below_layer(vec3 weight, vec3 albedo)
   return weight * clamp(1.0 - largest(share), 0.0, 1.0);
 }
 
+// Adds a lobe without microfacets; its colour is its albedo.
+void add_soft(inout Closures closures, int kind, vec3 weight, float roughness, float smoothness, vec3 edge,
+              vec3 normal)
+{
+  closure_glossy(closures, weight, 1.0, kind, vec3(1.0), edge, 1.5, roughness, smoothness, vec3(0.0), normal);
+}
+
+// Adds a layer of microfiber sheen and returns its albedo, weight included.
+vec3 add_sheen(inout Closures closures, SurfacePoint point, vec3 weight, float roughness, vec3 normal)
+{
+  vec3 albedo = weight * sheen_terms(dot(normal, point.incoming), roughness).z;
+  add_soft(closures, LOBE_SHEEN, albedo, roughness, 0.0, vec3(1.0), normal);
+  return albedo;
+}
+
 void shader_diffuse(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
 {
   closure_diffuse(closures, weight * max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));
+}
+
+void shader_sheen(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
+{
+  add_sheen(closures, point, weight * max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));
+}
+
+void shader_velvet(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float spread, vec3 normal)
+{
+  add_soft(closures, LOBE_VELVET, weight * max(color, vec3(0.0)), clamp(spread, 0.0, 1.0), 0.0, vec3(1.0),
+           unit_or(normal, point.normal));
+}
+
+void shader_translucent(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 normal)
+{
+  add_soft(closures, LOBE_TRANSLUCENT, weight * max(color, vec3(0.0)), 1.0, 0.0, vec3(1.0),
+           unit_or(normal, point.normal));
+}
+
+void shader_toon(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float size, float smoothness,
+                 vec3 normal, float glossy)
+{
+  add_soft(closures, LOBE_TOON, weight * max(color, vec3(0.0)), clamp(size, 0.0, 1.0), clamp(smoothness, 0.0, 1.0),
+           vec3(glossy), unit_or(normal, point.normal));
 }
 
 // Glossy node: reflectance is the colour at all angles. Its anisotropy stretches the other way round than that of
@@ -151,19 +190,35 @@ void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
   closures.holdout += vector_average(weight);
 }
 
-// Glass without refraction: mirror as a dielectric, the rest passes straight through, tinted.
+// Glass without refraction: mirror as a rough dielectric, the rest passes straight through, tinted. What is scattered
+// more than once is shared between both as what is scattered once (Turquin 2019); `tint` colours the reflectance at
+// normal incidence.
 void shader_thin_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 reflected, vec3 transmitted,
                        vec3 tint, float ior, float roughness, vec3 normal, int distribution)
 {
   vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
-  vec3 f0 = clamp(dielectric_f0(ior) * tint, vec3(0.0), vec3(1.0));
-  vec3 albedo = vec3(0.0);
-  if (largest(reflected) > 0.0) {
-    albedo = add_glossy(closures, point, weight * reflected, distribution, FRESNEL_DIELECTRIC, f0, vec3(1.0), ior,
-                        clamp(roughness, 0.0, 1.0), 0.0, default_tangent(n), n);
+  float r = clamp(roughness, 0.0, 1.0);
+  float mu = view_cosine(point, n);
+  float real_f0 = dielectric_f0(ior);
+  vec3 f0 = clamp(real_f0 * tint, vec3(0.0), vec3(1.0));
+  vec2 energy = glass_energy(mu, r, ior);
+  // Reflectance rises from f0 to 1 along one curve: solved for its mean where f0 is the real one.
+  float unit_energy = ggx_energy(mu, r);
+  float rise = (energy.y - real_f0 * unit_energy) / max(1.0 - real_f0, 1e-6);
+  vec3 mirrored = clamp(vec3(rise) + f0 * (unit_energy - rise), vec3(0.0), vec3(1.0));
+  vec3 through = max(vec3(energy.x) - mirrored, vec3(0.0));
+  vec3 scale = weight;
+  if (distribution == DISTRIBUTION_MULTIPLE) {
+    float average = glass_energy_average(r, ior);
+    vec3 again = transmitted * average / max(vec3(1.0) - transmitted * (1.0 - average), vec3(1e-6));
+    scale *= vec3(1.0) + again * ((1.0 - energy.x) / max(energy.x, 1e-4));
   }
-  vec3 share = albedo / max(weight * reflected, vec3(1e-10));
-  closure_transparent(closures, weight * max(transmitted, vec3(0.0)) * clamp(1.0 - largest(share), 0.0, 1.0));
+  if (largest(reflected) > 0.0) {
+    vec3 lobe_scale = multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
+    closure_glossy(closures, scale * reflected / lobe_scale, color_luminance(mirrored), FRESNEL_DIELECTRIC, f0,
+                   vec3(1.0), ior, r, 0.0, default_tangent(n), n);
+  }
+  closure_transparent(closures, scale * max(transmitted, vec3(0.0)) * through);
 }
 
 void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, float ior,
@@ -206,13 +261,14 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
   return below * mix(vec3(1.0), absorption, clamp(coat_weight, 0.0, 1.0));
 }
 
-// Principled BSDF, from the top layer down: alpha, coat, emission, metal, transmission, specular, diffuse.
-// Not drawn: sheen, thin film. Drawn simpler: transmission passes straight through, subsurface is diffuse.
+// Principled BSDF, from the top layer down: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.
+// Not drawn: thin film. Drawn simpler: transmission passes straight through, subsurface is diffuse.
 void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
                        float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
                        float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
                        float transmission, float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
-                       vec3 coat_normal, vec3 emission_color, float emission_strength, int distribution)
+                       vec3 coat_normal, float sheen_weight, float sheen_roughness, vec3 sheen_tint,
+                       vec3 emission_color, float emission_strength, int distribution)
 {
   vec3 n = unit_or(normal, point.normal);
   vec3 mirror_normal = reflecting_normal(point, n);
@@ -222,8 +278,15 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   closure_transparent(closures, weight * (1.0 - coverage));
   vec3 w = weight * coverage;
 
+  vec3 coat_n = unit_or(coat_normal, n);
+  if (sheen_weight > SMALLEST_WEIGHT) {
+    vec3 sheen_normal = unit_or(mix(n, coat_n, clamp(coat_weight, 0.0, 1.0)), n);
+    vec3 albedo = add_sheen(closures, point, w * sheen_weight * max(sheen_tint, vec3(0.0)),
+                            clamp(sheen_roughness, 0.0, 1.0), sheen_normal);
+    w = below_layer(w, albedo);
+  }
   if (coat_weight > SMALLEST_WEIGHT) {
-    w = principled_coat(closures, point, w, coat_weight, coat_roughness, coat_ior, coat_tint, unit_or(coat_normal, n));
+    w = principled_coat(closures, point, w, coat_weight, coat_roughness, coat_ior, coat_tint, coat_n);
   }
   closure_emission(closures, w * emission_color * emission_strength);
 

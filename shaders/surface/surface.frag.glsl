@@ -43,14 +43,12 @@ void main()
   if (dot(c.glossy_tangent, c.glossy_tangent) > 0.0) {
     turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / (2.0 * PI) + 1.0);
   }
-  float weight = max_component(c.glossy_weight);
-  vec3 chroma = c.glossy_weight / max(weight, 1e-20);
 
   out_position = vec4(world_position, 1.0 + holdout);
   out_normal = vec4(octahedral_encode(c.diffuse_normal), octahedral_encode(point.geometric_normal));
   out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, turns), 255.0));
-  out_tint = vec4(c.glossy_tint * chroma, weight * covered);
-  out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.fresnel) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
+  out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
+  out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
                   c.glossy_ior);
   out_emission = vec4(c.emission * covered, c.glossy_roughness);
 }

@@ -16,7 +16,7 @@ FIELDS = (
     ("emission", 3),
     ("transparency", 3),
     ("holdout", 1),
-    ("fresnel", 1),
+    ("kind", 1),
     ("glossy_weight", 3),
     ("glossy_tint", 3),
     ("glossy_edge", 3),
@@ -60,7 +60,7 @@ void main()
   evaluate_material(point, c);
   closures_end(c);
   float mu = clamp(dot(c.glossy_normal, point.incoming), 0.0, 1.0);
-  vec3 glossy_albedo_value = c.glossy_weight * glossy_albedo(c.fresnel, c.glossy_tint, c.glossy_edge, c.glossy_ior,
+  vec3 glossy_albedo_value = c.glossy_weight * glossy_albedo(c.kind, c.glossy_tint, c.glossy_edge, c.glossy_ior,
                                                              c.glossy_roughness, mu);
 STORES}
 """

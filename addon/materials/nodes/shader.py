@@ -35,6 +35,14 @@ def _diffuse(sockets: dict[str, Estimate]) -> Summary:
     return Summary(diffuse=True)
 
 
+def _soft_diffuse(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(diffuse=True, soft=True)
+
+
+def _soft_glossy(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(glossy=True, soft=True)
+
+
 def _glossy(sockets: dict[str, Estimate]) -> Summary:
     return Summary(glossy=True)
 
@@ -44,16 +52,14 @@ def _emission(sockets: dict[str, Estimate]) -> Summary:
 
 
 def _transparent(sockets: dict[str, Estimate]) -> Summary:
-    return Summary(transparency=_colored("Color")(sockets))
+    color = _colored("Color")(sockets)
+    return Summary(transparency=color, tinted=not color.grey)
 
 
 def _glass(sockets: dict[str, Estimate]) -> Summary:
     # A dielectric at the usual indices reflects a tenth of what comes from all sides; the rest passes.
-    return Summary(transparency=_colored("Color")(sockets) * constant(0.9), glossy=True)
-
-
-def _refraction(sockets: dict[str, Estimate]) -> Summary:
-    return Summary(transparency=_colored("Color")(sockets))
+    color = _colored("Color")(sockets)
+    return Summary(transparency=color * constant(0.9), glossy=True, tinted=not color.grey)
 
 
 def _principled(sockets: dict[str, Estimate]) -> Summary:
@@ -61,10 +67,12 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
     metallic = sockets["Metallic"].clipped()
     transmission = sockets["Transmission Weight"].clipped()
     transparency = alpha.complement()
+    tinted = False
     if transmission.high.any():
         through = alpha * metallic.complement() * transmission
         root = _colored("Base Color")(sockets).map(lambda value: value**0.5)
         transparency += through * root * constant(0.9)
+        tinted = not root.grey
     emission = alpha * sockets["Emission Strength"]
     # Images are only looked at where they matter.
     if emission.high.any() or emission.low.any():
@@ -74,6 +82,8 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
         emission=emission,
         diffuse=bool((metallic.low < 1.0).any() and (transmission.low < 1.0).any() and (alpha.high > 0.0).any()),
         glossy=bool((alpha.high > 0.0).any()),
+        soft=bool((sockets["Sheen Weight"].high > 0.0).any()),
+        tinted=tinted,
     )
 
 
@@ -99,6 +109,9 @@ PRINCIPLED = Entry(
         Socket("Coat IOR", "FLOAT", 1.5),
         Socket("Coat Tint", "COLOR", WHITE),
         Socket("Coat Normal", "VECTOR", implicit="vec3(0.0)"),
+        Socket("Sheen Weight", "FLOAT"),
+        Socket("Sheen Roughness", "FLOAT", 0.5),
+        Socket("Sheen Tint", "COLOR", WHITE),
         Socket("Emission Color", "COLOR", WHITE),
         Socket("Emission Strength", "FLOAT"),
         DISTRIBUTION,
@@ -107,7 +120,6 @@ PRINCIPLED = Entry(
     approximations=(
         Approximation("Subsurface Weight", 0.0, SUBSURFACE),
         Approximation("Transmission Weight", 0.0, STRAIGHT_THROUGH),
-        Approximation("Sheen Weight", 0.0, "Sheen is not drawn."),
         THIN_FILM,
         Approximation("Anisotropic", 0.0, OUTSIDE_TANGENT, unless_linked="Tangent"),
     ),
@@ -115,6 +127,8 @@ PRINCIPLED = Entry(
 )
 
 ANISOTROPY = Approximation("Anisotropy", 0.0, OUTSIDE_TANGENT, unless_linked="Tangent")
+SHEEN = (Socket("Color", "COLOR", GREY), Socket("Roughness", "FLOAT", 0.5), NORMAL)
+TOON = (Socket("Color", "COLOR", GREY), Socket("Size", "FLOAT", 0.5), Socket("Smooth", "FLOAT"), NORMAL)
 GLOSSY_SHAPE = (
     Socket("Roughness", "FLOAT", 0.5),
     Socket("Anisotropy", "FLOAT"),
@@ -164,6 +178,37 @@ ENTRIES = (
         summary=_glossy,
     ),
     Entry(
+        "ShaderNodeBsdfSheen",
+        "shader_velvet",
+        SHEEN,
+        include="material/shader.glsl",
+        when={"distribution": "ASHIKHMIN"},
+        summary=_soft_glossy,
+    ),
+    Entry("ShaderNodeBsdfSheen", "shader_sheen", SHEEN, include="material/shader.glsl", summary=_soft_diffuse),
+    Entry(
+        "ShaderNodeBsdfTranslucent",
+        "shader_translucent",
+        (Socket("Color", "COLOR", GREY), NORMAL),
+        include="material/shader.glsl",
+        summary=_soft_diffuse,
+    ),
+    Entry(
+        "ShaderNodeBsdfToon",
+        "shader_toon",
+        (*TOON, Expression("1.0")),
+        include="material/shader.glsl",
+        when={"component": "GLOSSY"},
+        summary=_soft_glossy,
+    ),
+    Entry(
+        "ShaderNodeBsdfToon",
+        "shader_toon",
+        (*TOON, Expression("0.0")),
+        include="material/shader.glsl",
+        summary=_soft_diffuse,
+    ),
+    Entry(
         "ShaderNodeEmission",
         "shader_emission",
         (Socket("Color", "COLOR", WHITE), Socket("Strength", "FLOAT", 1.0)),
@@ -208,7 +253,7 @@ ENTRIES = (
         (Socket("Color", "COLOR", WHITE),),
         include="material/shader.glsl",
         note=STRAIGHT_THROUGH,
-        summary=_refraction,
+        summary=_transparent,
     ),
     *(
         Entry(
@@ -219,12 +264,7 @@ ENTRIES = (
             note=note,
             summary=_diffuse,
         )
-        for node_type, note in (
-            ("ShaderNodeSubsurfaceScattering", SUBSURFACE),
-            ("ShaderNodeBsdfTranslucent", "Translucency is drawn as diffuse, lit from the front."),
-            ("ShaderNodeBsdfSheen", "Sheen is drawn as diffuse."),
-            ("ShaderNodeBsdfToon", "The toon shader is drawn as diffuse."),
-        )
+        for node_type, note in (("ShaderNodeSubsurfaceScattering", SUBSURFACE),)
     ),
 )
 

@@ -1,0 +1,104 @@
+// Lobes without microfacets: microfiber sheen, Ashikhmin's velvet, diffuse transmission, toon. Wide enough that light
+// samples serve them, so no ray is drawn from them.
+//
+// Sheen: Zeltner, Burley & Chiang, "Practical multiple-scattering sheen using linearly transformed cosines", 2022.
+// Velvet: Ashikhmin, Premoze & Shirley, "A microfacet-based BRDF generator", 2000. Toon: constant within a cone.
+#include "lib/math.glsl"
+#include "lib/energy.glsl"
+#include "lib/gbuffer.glsl"
+
+struct SoftLobe {
+  bool exists;
+  int kind;
+  bool glossy;    // belongs to the glossy passes
+  vec3 weight;    // its albedo as Cycles counts it in the colour passes
+  vec2 shape;     // sheen: a, b of the map; velvet: 1 / spread^2; toon: lit angle and angle of the fall-off, radians
+  vec3 view;
+  vec3 normal;
+  vec3 tangent;   // sheen: towards the viewer; toon: the axis of the cone
+};
+
+SoftLobe soft_lobe_begin(Surface s, vec3 view)
+{
+  SoftLobe lobe;
+  lobe.exists = s.kind > FRESNEL_F82 && max_component(s.glossy_weight) > 0.0;
+  lobe.kind = s.kind;
+  lobe.glossy = s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
+  lobe.weight = s.glossy_weight;
+  lobe.shape = vec2(1.0, 0.0);
+  lobe.view = view;
+  lobe.normal = s.glossy_normal;
+  lobe.tangent = s.glossy_normal;
+  if (!lobe.exists) {
+    return lobe;
+  }
+  float mu = dot(lobe.normal, view);
+  if (s.kind == LOBE_SHEEN) {
+    vec3 terms = sheen_terms(mu, s.glossy_roughness);
+    lobe.shape = vec2(max(terms.x, 1e-5), terms.y);
+    vec3 side = view - mu * lobe.normal;
+    vec3 otherwise;
+    orthonormal_basis(lobe.normal, lobe.tangent, otherwise);
+    lobe.tangent = (dot(side, side) > 1e-12) ? normalize(side) : lobe.tangent;
+  }
+  else if (s.kind == LOBE_VELVET) {
+    float spread = max(s.glossy_roughness, 0.01);
+    lobe.shape = vec2(1.0 / (spread * spread), 0.0);
+  }
+  else if (s.kind == LOBE_TOON) {
+    lobe.shape = 0.5 * PI * vec2(s.glossy_roughness, s.glossy_anisotropy);
+    lobe.tangent = lobe.glossy ? 2.0 * mu * lobe.normal - view : lobe.normal;
+  }
+  return lobe;
+}
+
+float velvet_reflection(SoftLobe lobe, vec3 light)
+{
+  float nl = dot(lobe.normal, light);
+  float nv = dot(lobe.normal, lobe.view);
+  vec3 h = safe_normalize(light + lobe.view);
+  float nh = dot(lobe.normal, h);
+  float hv = abs(dot(lobe.view, h));
+  if (nl <= 0.0 || nv <= 0.0 || abs(nh) >= 1.0 - 1e-5 || hv <= 1e-5) {
+    return 0.0;
+  }
+  float sin_squared = 1.0 - nh * nh;
+  float fibers = exp(-nh * nh / sin_squared * lobe.shape.x) * lobe.shape.x / (PI * sin_squared * sin_squared);
+  float shadowing = min(1.0, 2.0 * max(nh / hv, 1e-5) * min(nv, nl));
+  return 0.25 * fibers * shadowing / nv;
+}
+
+float toon_reflection(SoftLobe lobe, vec3 light)
+{
+  if (dot(lobe.normal, light) <= 0.0) {
+    return 0.0;
+  }
+  float angle = acos(clamp(dot(lobe.tangent, light), 0.0, 1.0));
+  float inner = lobe.shape.x;
+  float outer = min(inner + lobe.shape.y, 0.5 * PI);
+  if (angle >= inner + lobe.shape.y && angle > inner) {
+    return 0.0;
+  }
+  float shade = (angle <= inner) ? 1.0 : 1.0 - (angle - inner) / lobe.shape.y;
+  return shade / (2.0 * PI * max(1.0 - cos(outer), 1e-6));
+}
+
+// f * cos for a light direction in world space.
+vec3 soft_reflection(SoftLobe lobe, vec3 light)
+{
+  float z = dot(lobe.normal, light);
+  if (lobe.kind == LOBE_SHEEN) {
+    vec3 bitangent = cross(lobe.normal, lobe.tangent);
+    vec3 mapped = vec3(lobe.shape.x * dot(lobe.tangent, light) + lobe.shape.y * z,
+                       lobe.shape.x * dot(bitangent, light), z);
+    float narrowing = lobe.shape.x / max(dot(mapped, mapped), 1e-20);
+    return lobe.weight * (max(z, 0.0) / PI * narrowing * narrowing);
+  }
+  if (lobe.kind == LOBE_VELVET) {
+    return lobe.weight * velvet_reflection(lobe, light);
+  }
+  if (lobe.kind == LOBE_TRANSLUCENT) {
+    return lobe.weight * (max(-z, 0.0) / PI);
+  }
+  return lobe.weight * toon_reflection(lobe, light);
+}
