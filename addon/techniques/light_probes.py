@@ -138,6 +138,9 @@ class LightProbes(Technique):
         distinct = list(dict.fromkeys(places))
         joint = [sum(np.sqrt(v) for v, place in zip(variance, places) if place == one) ** 2 for one in distinct]
         rates = dict(zip(distinct, allocate(joint, frame.settings.samples, frame.settings.get(self, "maps"))))
+        if any(material.transparent for material in frame.materials.compiled):
+            # Layers are drawn by lot in each sample: a light that misses samples would see few of the draws.
+            rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
         frame.rates = {key: rates[place] for (key, _), place in zip(trials, places)}
         frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * POINTS)
 

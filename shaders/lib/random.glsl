@@ -44,3 +44,10 @@ float scrambled(int bits, uint salt)
 {
   return to_unit(owen_scramble(uint(bits), salt));
 }
+
+// A number of this sample that is stratified over the samples and independent of those with other salts: the sequence
+// is also shuffled, since two scrambles of one sequence fall into the same or into opposite halves for ever.
+float shuffled(int index, uvec2 salt)
+{
+  return to_unit(owen_scramble(reverse_bits(owen_scramble(uint(index), salt.y)), salt.x));
+}

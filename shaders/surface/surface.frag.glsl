@@ -20,13 +20,14 @@ void main()
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
-  Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z));
+  Closures c = closures_begin(point.normal, scrambled(film_view.bits_z, bits.z));
   evaluate_material(point, c);
   closures_end(c);
 
   float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
-  if (transparent_mode == 0 ? scrambled(film_view.bits_z, layer.x) < through : (transparent_mode == 2 && through > 0.0)) {
+  bool passes = (transparent_mode == 0) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
+  if (transparent_mode != 1 && passes) {
     discard;
   }
   float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
