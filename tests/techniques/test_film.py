@@ -71,11 +71,11 @@ def test_the_picture_is_the_sum_of_its_light_paths(stage):
 
 @pytest.mark.parametrize("opacity", [0.25, 0.75])
 def test_coverage_of_a_see_through_surface_is_its_alpha(stage, opacity):
-    stage.rectangle((-9, -9), (9, 9), material=stage.principled(Alpha=opacity))
+    stage.mesh([(-40, -9, 0), (40, -9, 0), (0, 60, 0)], [(0, 1, 2)], material=stage.principled(Alpha=opacity))
     stage.camera_above(SPAN)
     stage.scene.render.film_transparent = True
     alpha = stage.render(256)["combined"][..., 3]
-    # Numbers are stratified over the samples of each pixel, so the error falls nearly like 1 / n.
+    # Numbers are stratified over the samples of each pixel and triangle, so the error falls nearly like 1 / n.
     np.testing.assert_allclose(alpha, opacity, atol=0.02)
     assert alpha.mean() == pytest.approx(opacity, abs=0.003)
 
