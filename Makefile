@@ -3,13 +3,14 @@
 # 5.2 (the current LTS), 5.0 or 4.5 (the older LTS), each in an environment of its own.
 BLENDER ?= 5.2
 PYTHON3 ?= python3
+STRESS ?= 2000
 
 ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast check package test-window bench-quick clean
+.PHONY: help environment demo pictures samples test test-fast stress check package test-window bench-quick clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
@@ -41,6 +42,9 @@ check: environment ## format, lint, every shader compiled, fast tests
 
 package: environment ## the extension as a zip, in build/
 	$(PYTHON) tools/package.py --output build
+
+stress: environment ## random scenes against what must be true of every picture (STRESS=number of scenes)
+	CANDELA_STRESS=$(STRESS) $(PYTHON) -m pytest tests/stress tests/techniques/test_stability.py
 
 test-window: package ## the packaged extension in a real Blender with a window (REAL_BLENDER=command)
 	$(PYTHON) -m pytest -m window tests/window

@@ -1,0 +1,3 @@
+"""The stage of the technique tests, shared."""
+
+from tests.techniques.conftest import kept_stage  # noqa: F401

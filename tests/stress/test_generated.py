@@ -1,0 +1,157 @@
+"""Scenes that nobody thought of: drawn by hypothesis, rendered by every technique, held against what must be true.
+
+`make test` draws a few, always the same; `make stress` draws CANDELA_STRESS (2000) new ones. What fails is shrunk, and
+the smallest failing scene is left as out/stress/<claim>.blend; moved to tests/stress/found it stays a test.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+
+from addon import engine
+from addon.techniques import REGISTRY
+from tests.stress.scenes import Scene, build
+from tests.stress.strategies import scenes
+
+EXAMPLES = int(os.environ.get("CANDELA_STRESS", "0"))
+SIZE, SAMPLES = (24, 16), 2
+FOUND = Path(__file__).parent / "found"
+SLOTS: dict[str, list[str]] = {}
+for _technique in REGISTRY:
+    if _technique.slot:
+        SLOTS.setdefault(_technique.slot, []).append(_technique.name)
+
+drawn = settings(
+    max_examples=EXAMPLES // 4 or 12,
+    derandomize=not EXAMPLES,
+    deadline=None,
+    database=None,
+    print_blob=False,
+    suppress_health_check=list(HealthCheck),
+)
+long_run = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+
+
+@contextmanager
+def kept(stage, scene: Scene, claim: str):
+    """Build the scene; where the claim fails, leave it as a file. The last one written is the smallest."""
+    build(stage, scene)
+    try:
+        yield
+    except Exception:
+        folder = Path(__file__).resolve().parents[2] / "out" / "stress"
+        folder.mkdir(parents=True, exist_ok=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{claim}.blend"), copy=True, check_existing=False)
+        raise
+
+
+def sound(images: dict[str, np.ndarray]) -> None:
+    """Every value is a number and no light is negative."""
+    for name, pixels in images.items():
+        assert np.isfinite(pixels).all(), f"{name} is not finite"
+        if name != "normal":
+            assert pixels.min() >= 0, f"{name} is negative"
+    assert images["combined"][..., 3].max() <= 1.0 + 1e-6
+
+
+@long_run
+@drawn
+@given(scene=scenes(SLOTS))
+def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, scene):
+    with kept(kept_stage, scene, "finite_and_same"):
+        first = kept_stage.render(SAMPLES, SIZE)
+        sound(first)
+        engine.free_sessions()
+        again = kept_stage.render(SAMPLES, SIZE)
+        for name in first:
+            np.testing.assert_array_equal(first[name], again[name], err_msg=name)
+
+
+@long_run
+@drawn
+@given(scene=scenes(SLOTS))
+def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, scene):
+    """A power of two, so that nothing is rounded. Colour, depth and normals stay."""
+    with kept(kept_stage, scene, "linear"):
+        assume(all(lamp.energy < 1e9 for lamp in scene.lamps) and (scene.world is None or scene.world[3] < 1e6))
+        once = kept_stage.render(SAMPLES, SIZE)
+        build(kept_stage, brighter(scene, 8.0))
+        eight_times = kept_stage.render(SAMPLES, SIZE)
+        for name in once:
+            factor = 8.0 if name.endswith(("direct", "indirect", "emission", "environment")) else 1.0
+            expected = once[name] * factor
+            tolerance = 1e-4 * float(np.abs(expected).max(initial=0.0))
+            if name != "combined":
+                np.testing.assert_allclose(eight_times[name], expected, rtol=1e-3, atol=tolerance, err_msg=name)
+
+
+def brighter(scene: Scene, factor: float) -> Scene:
+    """The scene with all its light times `factor`."""
+    lamps = tuple(replace(lamp, energy=lamp.energy * factor) for lamp in scene.lamps)
+    world = None if scene.world is None else (*scene.world[:3], scene.world[3] * factor)
+    surfaces = tuple(
+        replace(
+            surface,
+            inputs=tuple(
+                (name, value * factor if name == "Emission Strength" else value) for name, value in surface.inputs
+            )
+            + ((("Strength", factor),) if surface.node == "ShaderNodeEmission" else ()),
+        )
+        for surface in scene.surfaces
+    )
+    return replace(scene, lamps=lamps, world=world, surfaces=surfaces)
+
+
+@long_run
+@drawn
+@given(scene=scenes(SLOTS))
+def test_order_and_names_of_objects_change_nothing(kept_stage, scene):
+    with kept(kept_stage, scene, "order"):
+        first = kept_stage.render(SAMPLES, SIZE)["combined"]
+        build(kept_stage, replace(scene, shapes=scene.shapes[::-1], lamps=scene.lamps[::-1]))
+        for k, thing in enumerate(kept_stage.scene.objects):
+            thing.name = f"{997 * k % 1009:04d}"
+        second = kept_stage.render(SAMPLES, SIZE)["combined"]
+        assume(not coplanar(scene))
+        # Stochastic transparency and sums depend on the order in the last digits.
+        close = np.isclose(first, second, rtol=1e-3, atol=1e-4 * float(first.max(initial=0.0)))
+        assert close.all(axis=-1).mean() > 0.97
+
+
+def coplanar(scene: Scene) -> bool:
+    """Whether surfaces may lie in one plane, where the order decides which of them is seen."""
+    return len({shape.kind for shape in scene.shapes}) < len(scene.shapes) or any(
+        (shape.kind in ("twice", "floor") and shape is not scene.shapes[0]) or shape.copies > 1 or 0.0 in shape.scale
+        for shape in scene.shapes
+    )
+
+
+@long_run
+@drawn
+@given(scene=scenes(SLOTS))
+def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, scene):
+    with kept(kept_stage, scene, "halves"):
+        assume(scene.lamps)
+        whole = kept_stage.render(SAMPLES, SIZE)["combined"]
+        halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
+        build(kept_stage, replace(scene, lamps=halves))
+        np.testing.assert_allclose(
+            kept_stage.render(SAMPLES, SIZE)["combined"], whole, rtol=2e-3, atol=1e-4 * float(whole.max(initial=0.0))
+        )
+
+
+@pytest.mark.parametrize("path", sorted(FOUND.glob("*.blend")), ids=lambda path: path.stem)
+def test_what_was_once_found_stays_mended(registered, path):
+    from addon.compare.reference import render_passes
+
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    engine.free_sessions()
+    sound(render_passes(bpy.context.scene, "CANDELA", SAMPLES, 0, direct_only=True, size=SIZE).images)
