@@ -18,6 +18,7 @@ MOST_LIGHTS, MOST_VIEWS = 64, 96  # together just below the 16 KiB that every GP
 SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4", f"view[{MOST_VIEWS * VIEW_TEXELS}]"))
 POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = range(7)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG = 1, 2, 4, 8, 16, 32
 
 
@@ -97,6 +98,7 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
     zero = np.zeros(3)
     if light.kind == "SUN":
         half = float(np.clip(light.angle, 0.0, np.pi)) / 2
+        half = half if half > SMALLEST else 0.0
         disc = np.pi * np.sin(half) ** 2 if half > 0 else 1.0
         radiance = strength / disc if light.normalize and half > 0 else strength
         solid_angle = 4 * np.pi * np.sin(half / 2) ** 2 if half > 0 else 1.0
@@ -108,13 +110,14 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
         area = width * height * (np.pi / 4 if light.shape == "ELLIPSE" else 1.0)
         if not area > 0:
             return None
+        area = max(area, SMALLEST**2)
         radiance = strength / np.pi / (area if light.normalize else 1.0)
         spread = 0.0 if light.spread >= np.pi - 1e-6 else float(np.tan(max(light.spread, 2e-4) / 2))
         kind = ELLIPSE if light.shape == "ELLIPSE" else RECTANGLE
         return Emitter(
             light, kind, flags, centre, 0.0, radiance, area, axis, spread, u * width / 2, v * height / 2, zero
         )
-    radius = max(light.radius, 0.0)
+    radius = light.radius if light.radius > SMALLEST else 0.0
     disc = np.pi * radius**2
     if radius > 0:
         radiance = strength / np.pi / (4 * disc if light.normalize else 1.0)

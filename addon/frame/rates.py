@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FEWEST_POINTS = 8  # of a light in a whole picture, whatever its variance: it was estimated from few probes
+FEWEST_POINTS = 4  # of a light in a whole picture, whatever its variance: it was estimated from few probes
 MOST_EXPONENT = 3
 
 

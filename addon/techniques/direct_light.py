@@ -38,7 +38,7 @@ from .accumulated_maps import DepthMapService, rounds
 from .light_probes import rate_of
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
-CANDIDATES = 8  # directions that traced_glossy draws from a lobe per sample, of which it traces one
+CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
 
 LIGHTING = tuple(

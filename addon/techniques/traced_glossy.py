@@ -1,12 +1,12 @@
 """Traced glossy light: what narrow lobes and mirrors see of lights and world, by one ray per pixel and sample.
 
 Light samples shared by all pixels (direct_light, environment_light) cannot serve a narrow lobe: it would show them as
-dots, and a mirror would show nothing. Up to `roughness` eight directions are drawn from the lobe's visible normals
+dots, and a mirror would show nothing. Up to `roughness` four directions are drawn from the lobe's visible normals
 instead, and one of them, chosen by what it would bring unblocked, is traced (resampled importance sampling, Talbot et
-al. 2005): where nothing blocks, that is as good as eight rays. Both estimators, lobe and light samples, are weighted
+al. 2005): where nothing blocks, that is as good as four rays. Both estimators, lobe and light samples, are weighted
 by the power heuristic (Veach 1997), so that rough lobes keep the noise-free one:
 
-    sum over lights and world of  F G2/G1 * Le(w) * V(x, w) * (8 p_lobe)^2 / ((8 p_lobe)^2 + (n p_light)^2)
+    sum over lights and world of  F G2/G1 * Le(w) * V(x, w) * (4 p_lobe)^2 / ((4 p_lobe)^2 + (n p_light)^2)
 
 V comes from a bounding volume hierarchy (addon/frame/acceleration.py): no depth map has a view per pixel's direction.
 

@@ -13,7 +13,7 @@ def _one_of(*values):
 
 
 def _number(low: float, high: float, *special: float):
-    usual = st.floats(low, high, allow_nan=False, width=32)
+    usual = st.floats(low, high, allow_nan=False, allow_subnormal=False).map(lambda x: float(np.float32(x)))
     return usual | st.sampled_from(special) if special else usual
 
 

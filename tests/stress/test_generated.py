@@ -88,7 +88,8 @@ def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, scene):
         for name in once:
             factor = 8.0 if name.endswith(("direct", "indirect", "emission", "environment")) else 1.0
             expected = once[name] * factor
-            tolerance = 1e-4 * float(np.abs(expected).max(initial=0.0))
+            # Below 1e-30 GPUs may round to zero.
+            tolerance = 1e-4 * float(np.abs(expected).max(initial=0.0)) + 1e-30
             if name != "combined":
                 np.testing.assert_allclose(eight_times[name], expected, rtol=1e-3, atol=tolerance, err_msg=name)
 
@@ -127,10 +128,11 @@ def test_order_and_names_of_objects_change_nothing(kept_stage, scene):
 
 
 def coplanar(scene: Scene) -> bool:
-    """Whether surfaces may lie in one plane, where the order decides which of them is seen."""
+    """Whether surfaces may lie in one plane, such as a box on the floor, where the order decides which one is seen."""
+    standing = scene.shapes[1:]
     return len({shape.kind for shape in scene.shapes}) < len(scene.shapes) or any(
-        (shape.kind in ("twice", "floor") and shape is not scene.shapes[0]) or shape.copies > 1 or 0.0 in shape.scale
-        for shape in scene.shapes
+        shape.kind in ("twice", "floor") or shape.location[2] == 0.0 or shape.copies > 1 or 0.0 in shape.scale
+        for shape in standing
     )
 
 
