@@ -59,9 +59,8 @@ void main()
       out_diffuse.rgb += weight * near_radiance(origin, direction, false, roll);
     }
   }
-  if (s.glossy_weight > 0.0) {
-    Lobe lobe = lobe_begin(s.glossy_normal, s.tangent_angle, lobe_alpha(s.glossy_roughness, s.glossy_anisotropy),
-                           s.glossy_weight, s.fresnel, s.glossy_tint, s.glossy_edge, s.glossy_ior, to_viewer);
+  if (s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0) {
+    Lobe lobe = lobe_begin(s, to_viewer);
     vec3 weight;
     roll = hash3(roll);
     vec2 u = vec2(scrambled(film_view.bits_z, salt.y), scrambled(film_view.bits_w, salt.x));

@@ -15,7 +15,7 @@ Probe probe_read(int index)
   ivec2 pixel = ivec2((cell + within) / vec2(probes) * vec2(textureSize(surface_position, 0)));
   Surface s = SURFACE_READ(pixel);
   Probe probe;
-  probe.receives = s.hit && (max_component(s.diffuse) > 0.0 || s.glossy_weight > 0.0);
+  probe.receives = s.hit && (max_component(s.diffuse) > 0.0 || max_component(s.glossy_weight) > 0.0);
   probe.position = s.position;
   probe.normal = s.normal;
   probe.geometric_normal = s.geometric_normal;
