@@ -293,9 +293,9 @@ def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
     elif attribute.kind == "COLOR":
         source = mesh.colors.get(attribute.name or mesh.active_color)
     elif attribute.kind == "NAMED":
-        source = mesh.colors.get(attribute.name)
+        source, out[:, 3] = mesh.colors.get(attribute.name), 1.0
         if source is None and attribute.name in mesh.uv_maps:
-            source, out[:, 3] = mesh.uv_maps[attribute.name], 1.0
+            source, out[:, 3] = mesh.uv_maps[attribute.name], 2.0  # see material/input.glsl
     elif attribute.kind == "GENERATED":
         source = None if mesh.generated is None else mesh.generated[mesh.corner_vertices]
     else:

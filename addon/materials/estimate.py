@@ -120,6 +120,31 @@ def srgb_decode(encoded: np.ndarray) -> np.ndarray:
     return np.where(encoded < 0.04045, np.maximum(encoded, 0.0) / 12.92, curve)
 
 
+def between(factor: str, a: str, b: str, output: str):
+    """For the node table: bounds of a blend, which lies between its ends if the factor stays within 0..1."""
+
+    def estimate(sockets: dict[str, Estimate]) -> dict[str, Estimate]:
+        share = sockets[factor].clipped()
+        first, second = sockets[a], sockets[b]
+        if share.constant:
+            return {output: first * share.complement() + second * share}
+        mean = first.mean * (1.0 - share.mean) + second.mean * share.mean
+        low, high = np.minimum(first.low, second.low), np.maximum(first.high, second.high)
+        return {output: Estimate(low, mean, high)}
+
+    return estimate
+
+
+def average(*names: str):
+    """For the node table: no bounds, but the mean of the inputs as a better guess than a constant."""
+
+    def estimate(sockets: dict[str, Estimate]) -> dict[str, Estimate]:
+        guess = unknown()
+        return {"*": Estimate(guess.low, np.mean([sockets[name].mean for name in names], axis=0), guess.high)}
+
+    return estimate
+
+
 # Estimates of images that are still alive: (identity of the pixels, clipped, output) -> (the pixels, weakly; estimate).
 _image_estimates: dict[tuple[int, str, bool, str], tuple[weakref.ref, Estimate]] = {}
 

@@ -13,7 +13,7 @@ from .compiled import Attribute
 from .graph import Graph, Node
 from .nodes import entry as words
 from .nodes.entry import Entry
-from .nodes.texture import IMAGE_FUNCTIONS, MISSING_COLOR
+from .nodes.image import IMAGE_FUNCTIONS, MISSING_COLOR
 from .values import ValueBlock, glsl_number, to_kind
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl

@@ -32,7 +32,7 @@ KINDS = {
 # An output's constant may go by another name.
 CONSTANT_NODES = {"ShaderNodeRGB": {}, "ShaderNodeValue": {}, "ShaderNodeNormal": {"Normal": "Direction"}}
 
-CURVE_SAMPLES = 257  # points at which a curve is tabulated between the ends of its range
+TABLE_ROWS = 129  # points at which curves, and colour ramps that are no plain blends, are tabulated
 
 _BASE_SETTINGS = {prop.identifier for prop in bpy.types.Node.bl_rna.properties}
 _settings_of_type: dict[str, tuple] = {}
@@ -341,8 +341,12 @@ def _settings(node) -> dict[str, object]:
 
 
 def _color_ramp(name: str, ramp) -> dict[str, object]:
-    """The stops as (position, red, green, blue, alpha) in rising order, and how to go from one to the next."""
+    """The stops as (position, red, green, blue, alpha) in rising order, and how to go from one to the next; for ways
+    that are no plain blend of two stops, a table of the ramp's colours."""
+    plain = ramp.color_mode == "RGB" and ramp.interpolation in ("LINEAR", "EASE", "CONSTANT")
+    steps = () if plain else range(TABLE_ROWS)
     return {
+        f"{name}_table": tuple(tuple(ramp.evaluate(i / (TABLE_ROWS - 1))) for i in steps),
         name: tuple((stop.position, *stop.color) for stop in sorted(ramp.elements, key=lambda stop: stop.position)),
         f"{name}_interpolation": ramp.interpolation,
         f"{name}_mode": ramp.color_mode,
@@ -368,13 +372,21 @@ def _plain(value, type_name: str):
 
 
 def _curves(name: str, mapping) -> dict[str, object]:
-    """Each curve as evenly spaced samples over `range`, as Blender evaluates it, and how it goes on beyond the ends."""
-    points = [point.location[0] for curve in mapping.curves for point in curve.points]
-    first, last = min(points), max(points)
+    """A table of evenly spaced samples, as Blender evaluates the curves, where it begins, its extent, and whether it
+    goes on beyond its ends. Of four curves the last is applied to all channels before their own."""
     mapping.initialize()
-    steps = [first + (last - first) * i / (CURVE_SAMPLES - 1) for i in range(CURVE_SAMPLES)]
+    points = [point.location[0] for curve in mapping.curves for point in curve.points]
+    first, extent = min(points), max(points) - min(points)
+    curves = list(mapping.curves)
+    rows = []
+    for i in range(TABLE_ROWS):
+        x = first + extent * i / (TABLE_ROWS - 1)
+        x = mapping.evaluate(curves[3], x) if len(curves) == 4 else x
+        channels = [mapping.evaluate(curve, x) for curve in curves[:3]]
+        rows.append((*channels, *(0.0,) * (4 - len(channels))))
     return {
-        name: tuple(tuple(mapping.evaluate(curve, x) for x in steps) for curve in mapping.curves),
-        f"{name}_range": (first, last),
-        f"{name}_extend": mapping.extend,
+        f"{name}_table": tuple(rows),
+        f"{name}_start": first,
+        f"{name}_extent": extent,
+        f"{name}_onwards": mapping.extend == "EXTRAPOLATED",
     }

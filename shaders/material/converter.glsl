@@ -90,3 +90,12 @@ void convert_vector(vec3 value, out vec3 result)
 {
   result = value;
 }
+
+void hue_saturation(float hue, float saturation, float value, float share, vec3 color, out vec3 result)
+{
+  vec3 hsv = rgb_to_hsv(color);
+  hsv.x = hsv.x + hue + 0.5 - floor(hsv.x + hue + 0.5);
+  hsv.y = clamp(hsv.y * saturation, 0.0, 1.0);
+  hsv.z *= value;
+  result = max(mix(color, hsv_to_rgb(hsv), share), vec3(0.0));
+}

@@ -3,12 +3,13 @@
 #include "lib/closure.glsl"
 #include "lib/color.glsl"
 
+// An alpha of 2 marks coordinates of two dimensions, whose number is the first.
 void input_attribute(vec4 stored, out vec3 color, out vec3 vector, out float average, out float alpha)
 {
   color = stored.xyz;
   vector = stored.xyz;
-  average = vector_average(stored.xyz);
-  alpha = stored.w;
+  average = (stored.w > 1.5) ? stored.x : vector_average(stored.xyz);
+  alpha = min(stored.w, 1.0);
 }
 
 void input_color_attribute(vec4 stored, out vec3 color, out float alpha)
@@ -83,10 +84,10 @@ void input_texture_coordinate_object(SurfacePoint point, vec4 generated_attribut
                 dot(material_values.value[first + 2], place));
 }
 
-// Around the object's z axis where no texture coordinates say more.
-vec3 radial_tangent(SurfacePoint point, vec3 around)
+// A direction of object space as a tangent: turned to world space and laid into the surface.
+vec3 surface_tangent(SurfacePoint point, vec3 direction)
 {
-  vec3 turned = cross(world_from_object_normal(point, around), point.normal);
+  vec3 turned = cross(world_from_object_normal(point, direction), point.normal);
   return cross(point.normal, safe_normalize(turned));
 }
 
@@ -95,7 +96,7 @@ void input_geometry(SurfacePoint point, vec4 generated, out vec3 position, out v
 {
   position = point.position + material_scene.origin.xyz;
   normal = point.normal;
-  tangent = radial_tangent(point, vec3(0.5 - generated.y, generated.x - 0.5, 0.0));
+  tangent = surface_tangent(point, vec3(0.5 - generated.y, generated.x - 0.5, 0.0));
   true_normal = point.geometric_normal;
   incoming = point.incoming;
   backfacing = point.backfacing ? 1.0 : 0.0;
@@ -156,22 +157,22 @@ void input_value(float chosen, out float value)
 
 void input_tangent(SurfacePoint point, vec4 stored, out vec3 tangent)
 {
-  tangent = cross(point.normal, safe_normalize(cross(stored.xyz, point.normal)));
+  tangent = surface_tangent(point, stored.xyz);
 }
 
 void input_tangent_x(SurfacePoint point, vec4 generated, out vec3 tangent)
 {
-  tangent = radial_tangent(point, vec3(0.0, 0.5 - generated.z, generated.y - 0.5));
+  tangent = surface_tangent(point, vec3(0.0, 0.5 - generated.z, generated.y - 0.5));
 }
 
 void input_tangent_y(SurfacePoint point, vec4 generated, out vec3 tangent)
 {
-  tangent = radial_tangent(point, vec3(0.5 - generated.z, 0.0, generated.x - 0.5));
+  tangent = surface_tangent(point, vec3(0.5 - generated.z, 0.0, generated.x - 0.5));
 }
 
 void input_tangent_z(SurfacePoint point, vec4 generated, out vec3 tangent)
 {
-  tangent = radial_tangent(point, vec3(0.5 - generated.y, generated.x - 0.5, 0.0));
+  tangent = surface_tangent(point, vec3(0.5 - generated.y, generated.x - 0.5, 0.0));
 }
 
 // Fraction that a smooth dielectric reflects; `eta` is the index of the far side over that of the near one.

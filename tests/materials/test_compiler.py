@@ -101,7 +101,7 @@ def test_constants_are_converted_between_kinds_as_blender_does():
     assert roughness_of("VECTOR", (0.0, 1.0, 0.5))[3] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("node_type", ["ShaderNodeTexNoise", "NodeUndefined", "ShaderNodeScript"])
+@pytest.mark.parametrize("node_type", ["ShaderNodeBevel", "NodeUndefined", "ShaderNodeScript"])
 def test_an_unknown_value_node_leaves_the_constant_and_says_so(node_type):
     unknown = node("Strange", node_type, {"Color": "COLOR", "Fac": "FLOAT"})
     shader = Node(

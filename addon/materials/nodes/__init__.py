@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from . import converter, inputs, shader, texture, vector
+from . import color, converter, image, inputs, shader, texture, vector
 from .entry import Entry
 
-REGISTRY: tuple[Entry, ...] = shader.ENTRIES + texture.ENTRIES + inputs.ENTRIES + vector.ENTRIES + converter.ENTRIES
+REGISTRY: tuple[Entry, ...] = (
+    shader.ENTRIES
+    + image.ENTRIES
+    + texture.ENTRIES
+    + inputs.ENTRIES
+    + vector.ENTRIES
+    + converter.ENTRIES
+    + color.ENTRIES
+)
 
 _BY_TYPE: dict[str, tuple[Entry, ...]] = {}
 for _entry in REGISTRY:

@@ -1,11 +1,9 @@
-"""Nodes that compute with numbers and colours."""
+"""Nodes that compute with numbers and vectors, and take colours apart."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from ..estimate import Estimate, unknown
-from .entry import Entry, Rows, Socket
+from ..estimate import between
+from .entry import Choice, Entry, Socket
 
 SOURCE = "material/converter.glsl"
 
@@ -17,77 +15,16 @@ MATH_OPERATIONS = (
     *("TANH", "RADIANS", "DEGREES"),
 )
 
-BLEND_MODES = (
-    *("MIX", "DARKEN", "MULTIPLY", "BURN", "LIGHTEN", "SCREEN", "DODGE", "ADD", "OVERLAY", "SOFT_LIGHT"),
-    *("LINEAR_LIGHT", "DIFFERENCE", "EXCLUSION", "SUBTRACT", "DIVIDE", "HUE", "SATURATION", "COLOR", "VALUE"),
+VECTOR_OPERATIONS = (
+    *("ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "CROSS_PRODUCT", "PROJECT", "REFLECT", "REFRACT"),
+    *("FACEFORWARD", "SCALE", "NORMALIZE", "ABSOLUTE", "POWER", "SIGN", "MINIMUM", "MAXIMUM", "ROUND", "FLOOR"),
+    *("CEIL", "FRACTION", "MODULO", "WRAP", "SNAP", "SINE", "COSINE", "TANGENT"),
 )
+VECTORS = (Socket("Vector", "VECTOR"), Socket("Vector_001", "VECTOR"))
+BOUNDED = Choice("clamp", {True: "true", False: "false"}, missing="true")
+RANGES = ("LINEAR", "STEPPED", "SMOOTHSTEP", "SMOOTHERSTEP")
 
 COLOR_MODELS = ("RGB", "HSV", "HSL")
-
-
-def _between(factor: str, a: str, b: str, output: str):
-    """Bounds of a blend, which lies between its two ends if the factor stays within 0..1."""
-
-    def estimate(sockets: dict[str, Estimate]) -> dict[str, Estimate]:
-        share = sockets[factor].clipped()
-        first, second = sockets[a], sockets[b]
-        if share.constant:
-            return {output: first * share.complement() + second * share}
-        mean = first.mean * (1.0 - share.mean) + second.mean * share.mean
-        low, high = np.minimum(first.low, second.low), np.maximum(first.high, second.high)
-        return {output: Estimate(low, mean, high)}
-
-    return estimate
-
-
-def _average(*names: str):
-    """No bounds, but the mean of the inputs as a better guess than a constant."""
-
-    def estimate(sockets: dict[str, Estimate]) -> dict[str, Estimate]:
-        guess = unknown()
-        return {"*": Estimate(guess.low, np.mean([sockets[name].mean for name in names], axis=0), guess.high)}
-
-    return estimate
-
-
-def _mix(node_type: str, factor: str, a: str, b: str, output: str, clamp_factor: str, clamp_result: str, when: dict):
-    """Blend of two colours; plain mixing has bounds, other modes do not."""
-    arguments = (
-        Socket(factor, "FLOAT", 0.5, clamp=clamp_factor),
-        Socket(a, "COLOR", (0.5, 0.5, 0.5)),
-        Socket(b, "COLOR", (0.5, 0.5, 0.5)),
-    )
-    outputs = ((output, "COLOR"),)
-    bounds = _between(factor, a, b, output)
-    return (
-        Entry(
-            node_type,
-            "blend_mix",
-            arguments,
-            outputs,
-            "material/blend.glsl",
-            {**when, "blend_type": "MIX"},
-            clamp_result=clamp_result,
-            estimate=bounds,
-        ),
-        Entry(
-            node_type,
-            "blend_{blend_type}",
-            arguments,
-            outputs,
-            "material/blend.glsl",
-            when,
-            {"blend_type": BLEND_MODES},
-            clamp_result=clamp_result,
-            estimate=_average(a, b),
-        ),
-    )
-
-
-def _stops(stops) -> list[tuple[float, float, float, float]]:
-    """Two rows per stop of a colour ramp: its colour, then its position."""
-    stops = stops or ((0.0, 0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0, 1.0))
-    return [row for position, *color in stops for row in (tuple(color), (position, 0.0, 0.0, 0.0))]
 
 
 ENTRIES = (
@@ -104,17 +41,55 @@ ENTRIES = (
         choices={"operation": MATH_OPERATIONS},
         clamp_result="use_clamp",
     ),
-    *_mix(
-        "ShaderNodeMix",
-        "Factor_Float",
-        "A_Color",
-        "B_Color",
-        "Result_Color",
-        "clamp_factor",
-        "clamp_result",
-        {"data_type": "RGBA"},
+    Entry(
+        "ShaderNodeVectorMath",
+        "vector_{operation}",
+        (*VECTORS, Socket("Vector_002", "VECTOR"), Socket("Scale", "FLOAT", 1.0)),
+        (("Vector", "VECTOR"),),
+        "material/vector_math.glsl",
+        choices={"operation": VECTOR_OPERATIONS},
     ),
-    *_mix("ShaderNodeMixRGB", "Fac", "Color1", "Color2", "Color", "*", "use_clamp", {}),
+    Entry(
+        "ShaderNodeVectorMath",
+        "vector_{operation}",
+        VECTORS,
+        (("Value", "FLOAT"),),
+        "material/vector_math.glsl",
+        choices={"operation": ("DOT_PRODUCT", "DISTANCE", "LENGTH")},
+    ),
+    Entry(
+        "ShaderNodeMapRange",
+        "map_range_vector_{interpolation_type}",
+        (
+            Socket("Vector", "VECTOR"),
+            Socket("From_Min_FLOAT3", "VECTOR"),
+            Socket("From_Max_FLOAT3", "VECTOR", (1.0, 1.0, 1.0)),
+            Socket("To_Min_FLOAT3", "VECTOR"),
+            Socket("To_Max_FLOAT3", "VECTOR", (1.0, 1.0, 1.0)),
+            Socket("Steps_FLOAT3", "VECTOR", (4.0, 4.0, 4.0)),
+            BOUNDED,
+        ),
+        (("Vector", "VECTOR"),),
+        "material/map_range.glsl",
+        when={"data_type": "FLOAT_VECTOR"},
+        choices={"interpolation_type": RANGES},
+    ),
+    Entry(
+        "ShaderNodeMapRange",
+        "map_range_{interpolation_type}",
+        (
+            Socket("Value", "FLOAT", 1.0),
+            Socket("From Min", "FLOAT"),
+            Socket("From Max", "FLOAT", 1.0),
+            Socket("To Min", "FLOAT"),
+            Socket("To Max", "FLOAT", 1.0),
+            Socket("Steps", "FLOAT", 4.0),
+            BOUNDED,
+        ),
+        (("Result", "FLOAT"),),
+        "material/map_range.glsl",
+        choices={"interpolation_type": RANGES},
+    ),
     Entry(
         "ShaderNodeMix",
         "mix_float",
@@ -126,7 +101,7 @@ ENTRIES = (
         (("Result_Float", "FLOAT"),),
         SOURCE,
         when={"data_type": "FLOAT"},
-        estimate=_between("Factor_Float", "A_Float", "B_Float", "Result_Float"),
+        estimate=between("Factor_Float", "A_Float", "B_Float", "Result_Float"),
     ),
     Entry(
         "ShaderNodeMix",
@@ -151,13 +126,6 @@ ENTRIES = (
         (("Result_Vector", "VECTOR"),),
         SOURCE,
         when={"data_type": "VECTOR"},
-    ),
-    Entry(
-        "ShaderNodeInvert",
-        "invert",
-        (Socket("Fac", "FLOAT", 1.0), Socket("Color", "COLOR")),
-        (("Color", "COLOR"),),
-        SOURCE,
     ),
     Entry(
         "ShaderNodeSeparateColor",
@@ -196,46 +164,6 @@ ENTRIES = (
         (("Result", "FLOAT"),),
         SOURCE,
         choices={"clamp_type": ("MINMAX", "RANGE")},
-    ),
-    Entry(
-        "ShaderNodeRGBToBW",
-        "rgb_to_bw",
-        (Socket("Color", "COLOR", (0.5, 0.5, 0.5)),),
-        (("Val", "FLOAT"),),
-        SOURCE,
-        estimate=lambda sockets: {"Val": sockets["Color"].luminance()},
-    ),
-    Entry(
-        "ShaderNodeGamma",
-        "gamma_color",
-        (Socket("Color", "COLOR", (1.0, 1.0, 1.0)), Socket("Gamma", "FLOAT", 1.0)),
-        (("Color", "COLOR"),),
-        SOURCE,
-        estimate=_average("Color"),
-    ),
-    Entry(
-        "ShaderNodeBrightContrast",
-        "bright_contrast",
-        (Socket("Color", "COLOR", (1.0, 1.0, 1.0)), Socket("Bright", "FLOAT"), Socket("Contrast", "FLOAT")),
-        (("Color", "COLOR"),),
-        SOURCE,
-        estimate=_average("Color"),
-    ),
-    Entry(
-        "ShaderNodeValToRGB",
-        "color_ramp_{color_ramp_interpolation}",
-        (Socket("Fac", "FLOAT", 0.5), Rows("color_ramp", _stops)),
-        (("Color", "COLOR"), ("Alpha", "FLOAT")),
-        "material/color_ramp.glsl",
-        choices={"color_ramp_interpolation": ("LINEAR", "EASE", "CONSTANT"), "color_ramp_mode": ("RGB",)},
-    ),
-    Entry(
-        "ShaderNodeValToRGB",
-        "color_ramp_linear",
-        (Socket("Fac", "FLOAT", 0.5), Rows("color_ramp", _stops)),
-        (("Color", "COLOR"), ("Alpha", "FLOAT")),
-        "material/color_ramp.glsl",
-        note="This interpolation of the colour ramp is drawn as linear RGB.",
     ),
     # Made by the reader where a group's socket changes the kind of what passes through it.
     Entry("Convert", "convert_float", (Socket("Value", "FLOAT"),), (("Value", "FLOAT"),), SOURCE, {"kind": "FLOAT"}),

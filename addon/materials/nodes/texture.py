@@ -1,70 +1,195 @@
-"""Textures. Image lookups filter by texelFetch (material/image.glsl); the compiler generates each image's own function.
-
-Linear and closest interpolation, all four extensions, alpha and colour as Cycles treats them: colour is premultiplied
-before interpolation, stays so unless the Alpha output is used, and is decoded from sRGB after interpolation.
-"""
+"""Procedural textures: patterns that are computed from a coordinate, Generated unless another is linked."""
 
 from __future__ import annotations
 
-from .entry import Choice, Entry, ImageFlags, Socket, Used
+import numpy as np
 
-# One image's own functions; {k} is the index of its sampler. Texels outside of a clipped image are transparent black.
-IMAGE_FUNCTIONS = """\
-vec4 material_image{k}_texel(ivec2 size, ivec2 texel, int extension, int flags)
-{{
-  ivec2 at = ivec2(image_wrap(texel.x, size.x, extension), image_wrap(texel.y, size.y, extension));
-  if (at.x < 0 || at.y < 0) {{
-    return vec4(0.0);
-  }}
-  return image_associate(texelFetch(material_image{k}, at, 0), flags);
-}}
+from ..estimate import Estimate
+from .entry import Choice, Entry, Setting, Socket, Used
 
-void material_image{k}_sample(vec3 coordinate, int interpolation, int extension, float storage, bool alpha_used,
-                           out vec3 color, out float alpha)
-{{
-  int flags = int(storage + 0.5);
-  ivec2 size = textureSize(material_image{k}, 0);
-  vec2 position = image_position(coordinate, size, extension);
-  vec4 filtered;
-  if (interpolation == 1) {{
-    filtered = material_image{k}_texel(size, ivec2(floor(position)), extension, flags);
-  }}
-  else {{
-    position -= vec2(0.5);
-    vec2 lower = floor(position);
-    vec2 share = position - lower;
-    ivec2 texel = ivec2(lower);
-    vec4 low = mix(material_image{k}_texel(size, texel, extension, flags),
-                   material_image{k}_texel(size, texel + ivec2(1, 0), extension, flags), share.x);
-    vec4 high = mix(material_image{k}_texel(size, texel + ivec2(0, 1), extension, flags),
-                    material_image{k}_texel(size, texel + ivec2(1, 1), extension, flags), share.x);
-    filtered = mix(low, high, share.y);
-  }}
-  filtered = image_finish(filtered, flags, alpha_used);
-  color = filtered.rgb;
-  alpha = filtered.a;
-}}
-"""
+NOISE = "material/noise.glsl"
+VORONOI = "material/voronoi.glsl"
+PATTERN = "material/pattern.glsl"
 
-MISSING_COLOR = (1.0, 0.0, 1.0)  # where an image cannot be read
+VECTOR = Socket("Vector", "VECTOR", implicit="@GENERATED")
+W = Socket("W", "FLOAT")
+SCALE = Socket("Scale", "FLOAT", 5.0)
+WHITE = (1.0, 1.0, 1.0)
+BLACK = (0.0, 0.0, 0.0)
+
+NOISE_TYPES = ("FBM", "MULTIFRACTAL", "HYBRID_MULTIFRACTAL", "RIDGED_MULTIFRACTAL", "HETERO_TERRAIN")
+METRICS = ("EUCLIDEAN", "MANHATTAN", "CHEBYCHEV", "MINKOWSKI")
+GRADIENTS = ("LINEAR", "QUADRATIC", "EASING", "DIAGONAL", "SPHERICAL", "QUADRATIC_SPHERE", "RADIAL")
+
+COLOR_AND_FAC = (("Color", "COLOR"), ("Fac", "FLOAT"))
+FAC_AND_COLOR = (("Fac", "FLOAT"), ("Color", "COLOR"))
+
+
+def _numbered(names: tuple[str, ...]) -> dict[object, int]:
+    return {name: number for number, name in enumerate(names)}
+
+
+def _switch(name: str, missing: bool = False) -> Choice:
+    return Choice(name, {True: "true", False: "false"}, missing=str(missing).lower())
+
+
+def _dimensions(name: str) -> Choice:
+    return Choice(name, {f"{count}D": count for count in range(1, 5)}, missing=3)
+
+
+def _within_unit(sockets: dict[str, Estimate]) -> dict[str, Estimate]:
+    """A pattern between 0 and 1, on average half way."""
+    return {"*": Estimate(np.zeros(3), np.full(3, 0.5), np.ones(3))}
+
+
+def _between_colors(first: str, second: str):
+    """A mosaic of two colours; its other output is a share."""
+
+    def estimate(sockets: dict[str, Estimate]) -> dict[str, Estimate]:
+        a, b = sockets[first], sockets[second]
+        low, high = np.minimum(a.low, b.low), np.maximum(a.high, b.high)
+        return {**_within_unit(sockets), "Color": Estimate(low, 0.5 * (a.mean + b.mean), high)}
+
+    return estimate
+
+
+VORONOI_COMMON = (
+    SCALE,
+    Socket("Detail", "FLOAT"),
+    Socket("Roughness", "FLOAT", 0.5),
+    Socket("Lacunarity", "FLOAT", 2.0),
+)
+RANDOMNESS = Socket("Randomness", "FLOAT", 1.0)
+VORONOI_DIMENSIONS = _dimensions("voronoi_dimensions")
 
 ENTRIES = (
     Entry(
-        "ShaderNodeTexImage",
-        "material_image{image}_sample",
+        "ShaderNodeTexNoise",
+        "noise_texture",
         (
-            Socket("Vector", "VECTOR", implicit="@UV"),
-            Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 0, "Smart": 0}),
-            Choice("extension", {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}),
-            ImageFlags(),
-            Used("Alpha"),
+            VECTOR,
+            W,
+            SCALE,
+            Socket("Detail", "FLOAT", 2.0),
+            Socket("Roughness", "FLOAT", 0.5),
+            Socket("Lacunarity", "FLOAT", 2.0),
+            Socket("Offset", "FLOAT"),
+            Socket("Gain", "FLOAT", 1.0),
+            Socket("Distortion", "FLOAT"),
+            _dimensions("noise_dimensions"),
+            Choice("noise_type", _numbered(NOISE_TYPES)),
+            _switch("normalize", True),
+            Used("Color"),
         ),
-        (("Color", "COLOR"), ("Alpha", "FLOAT")),
-        include="material/image.glsl",
-        image=True,
-        setting_approximations=(
-            ("interpolation", ("Cubic", "Smart"), "Cubic interpolation is drawn as linear."),
-            ("projection", ("BOX", "SPHERE", "TUBE"), "This projection of the image is drawn as flat."),
+        FAC_AND_COLOR,
+        NOISE,
+    ),
+    Entry(
+        "ShaderNodeTexWhiteNoise",
+        "white_noise_texture",
+        (Socket("Vector", "VECTOR"), W, _dimensions("noise_dimensions")),
+        (("Value", "FLOAT"), ("Color", "COLOR")),
+        NOISE,
+        estimate=_within_unit,
+    ),
+    Entry(
+        "ShaderNodeTexWave",
+        "wave_texture",
+        (
+            VECTOR,
+            SCALE,
+            Socket("Distortion", "FLOAT"),
+            Socket("Detail", "FLOAT", 2.0),
+            Socket("Detail Scale", "FLOAT", 1.0),
+            Socket("Detail Roughness", "FLOAT", 0.5),
+            Socket("Phase Offset", "FLOAT"),
+            Choice("wave_type", _numbered(("BANDS", "RINGS"))),
+            Choice("bands_direction", _numbered(("X", "Y", "Z", "DIAGONAL"))),
+            Choice("rings_direction", _numbered(("X", "Y", "Z", "SPHERICAL"))),
+            Choice("wave_profile", _numbered(("SIN", "SAW", "TRI"))),
         ),
+        COLOR_AND_FAC,
+        NOISE,
+        estimate=_within_unit,
+    ),
+    Entry(
+        "ShaderNodeTexVoronoi",
+        "voronoi_edge_texture",
+        (VECTOR, W, *VORONOI_COMMON, RANDOMNESS, VORONOI_DIMENSIONS, _switch("normalize")),
+        (("Distance", "FLOAT"),),
+        VORONOI,
+        when={"feature": "DISTANCE_TO_EDGE"},
+    ),
+    Entry(
+        "ShaderNodeTexVoronoi",
+        "voronoi_radius_texture",
+        (VECTOR, W, SCALE, RANDOMNESS, VORONOI_DIMENSIONS),
+        (("Radius", "FLOAT"),),
+        VORONOI,
+        when={"feature": "N_SPHERE_RADIUS"},
+    ),
+    Entry(
+        "ShaderNodeTexVoronoi",
+        "voronoi_texture",
+        (
+            VECTOR,
+            W,
+            *VORONOI_COMMON,
+            Socket("Smoothness", "FLOAT", 1.0),
+            Socket("Exponent", "FLOAT", 0.5),
+            RANDOMNESS,
+            VORONOI_DIMENSIONS,
+            Choice("feature", _numbered(("F1", "F2", "SMOOTH_F1"))),
+            Choice("distance", _numbered(METRICS)),
+            _switch("normalize"),
+        ),
+        (("Distance", "FLOAT"), ("Color", "COLOR"), ("Position", "VECTOR"), ("W", "FLOAT")),
+        VORONOI,
+    ),
+    Entry(
+        "ShaderNodeTexChecker",
+        "checker_texture",
+        (VECTOR, Socket("Color1", "COLOR", WHITE), Socket("Color2", "COLOR", (0.2, 0.2, 0.2)), SCALE),
+        COLOR_AND_FAC,
+        PATTERN,
+        estimate=_between_colors("Color1", "Color2"),
+    ),
+    Entry(
+        "ShaderNodeTexBrick",
+        "brick_texture",
+        (
+            VECTOR,
+            Socket("Color1", "COLOR", (0.8, 0.8, 0.8)),
+            Socket("Color2", "COLOR", (0.2, 0.2, 0.2)),
+            Socket("Mortar", "COLOR", BLACK),
+            SCALE,
+            Socket("Mortar Size", "FLOAT", 0.02),
+            Socket("Mortar Smooth", "FLOAT", 0.1),
+            Socket("Bias", "FLOAT"),
+            Socket("Brick Width", "FLOAT", 0.5),
+            Socket("Row Height", "FLOAT", 0.25),
+            Setting("offset", 0.5),
+            Setting("offset_frequency", 2.0),
+            Setting("squash", 1.0),
+            Setting("squash_frequency", 2.0),
+        ),
+        COLOR_AND_FAC,
+        PATTERN,
+    ),
+    Entry(
+        "ShaderNodeTexGradient",
+        "gradient_{gradient_type}",
+        (VECTOR,),
+        COLOR_AND_FAC,
+        PATTERN,
+        choices={"gradient_type": GRADIENTS},
+        estimate=_within_unit,
+    ),
+    Entry(
+        "ShaderNodeTexMagic",
+        "magic_texture",
+        (VECTOR, SCALE, Socket("Distortion", "FLOAT", 1.0), Choice("turbulence_depth", {n: n for n in range(11)}, 2)),
+        COLOR_AND_FAC,
+        PATTERN,
     ),
 )

@@ -1,0 +1,230 @@
+// Noise Texture: fractal sums of gradient noise.
+// Musgrave in Ebert et al., "Texturing and Modeling", 2003, chapter 16: the five sums and their names.
+// `dimensions` and `type` are literals, so a compiler keeps the one path that is meant. A coordinate of one dimension
+// is W, of two are X and Y, of four X, Y, Z and W.
+
+#include "lib/math.glsl"
+#include "material/perlin.glsl"
+
+#define NOISE_FBM 0
+#define NOISE_MULTIFRACTAL 1
+#define NOISE_HYBRID_MULTIFRACTAL 2
+#define NOISE_RIDGED_MULTIFRACTAL 3
+#define NOISE_HETERO_TERRAIN 4
+
+float noise_octave(vec4 p, int dimensions)
+{
+  if (dimensions == 1) {
+    return perlin_noise(p.x);
+  }
+  if (dimensions == 2) {
+    return perlin_noise(p.xy);
+  }
+  if (dimensions == 3) {
+    return perlin_noise(p.xyz);
+  }
+  return perlin_noise(p);
+}
+
+// A last octave fades in with the fraction of `detail`.
+float noise_fbm(vec4 p, int dimensions, float detail, float roughness, float lacunarity, bool normalized)
+{
+  int whole = int(detail);
+  float fraction = detail - floor(detail);
+  float scale = 1.0;
+  float amplitude = 1.0;
+  float amplitudes = 0.0;
+  float sum = 0.0;
+  for (int i = 0; i <= whole; i++) {
+    sum += amplitude * noise_octave(scale * p, dimensions);
+    amplitudes += amplitude;
+    amplitude *= roughness;
+    scale *= lacunarity;
+  }
+  float value = normalized ? 0.5 * sum / amplitudes + 0.5 : sum;
+  if (fraction > 0.0) {
+    sum += amplitude * noise_octave(scale * p, dimensions);
+    value = mix(value, normalized ? 0.5 * sum / (amplitudes + amplitude) + 0.5 : sum, fraction);
+  }
+  return value;
+}
+
+float noise_multifractal(vec4 p, int dimensions, float detail, float roughness, float lacunarity)
+{
+  int whole = int(detail);
+  float fraction = detail - floor(detail);
+  int last = (fraction > 0.0) ? whole + 1 : whole;
+  float value = 1.0;
+  float power = 1.0;
+  for (int i = 0; i <= last; i++) {
+    value *= ((i > whole) ? fraction : 1.0) * power * noise_octave(p, dimensions) + 1.0;
+    power *= roughness;
+    p *= lacunarity;
+  }
+  return value;
+}
+
+float noise_hybrid_multifractal(vec4 p, int dimensions, float detail, float roughness, float lacunarity, float offset,
+                                float gain)
+{
+  int whole = int(detail);
+  float fraction = detail - floor(detail);
+  int last = (fraction > 0.0) ? whole + 1 : whole;
+  float power = 1.0;
+  float value = 0.0;
+  float weight = 1.0;
+  for (int i = 0; i <= last && weight > 0.001; i++) {
+    weight = min(weight, 1.0);
+    float signal = (noise_octave(p, dimensions) + offset) * power;
+    value += ((i > whole) ? fraction : 1.0) * weight * signal;
+    weight *= gain * signal;
+    power *= roughness;
+    p *= lacunarity;
+  }
+  return value;
+}
+
+float noise_ridged_multifractal(vec4 p, int dimensions, float detail, float roughness, float lacunarity, float offset,
+                                float gain)
+{
+  int whole = int(detail);
+  float power = 1.0;
+  float value = 0.0;
+  float weight = 1.0;
+  for (int i = 0; i <= whole; i++) {
+    float signal = offset - abs(noise_octave(p, dimensions));
+    signal *= signal * weight;
+    value += signal * power;
+    weight = clamp(signal * gain, 0.0, 1.0);
+    power *= roughness;
+    p *= lacunarity;
+  }
+  return value;
+}
+
+float noise_hetero_terrain(vec4 p, int dimensions, float detail, float roughness, float lacunarity, float offset)
+{
+  int whole = int(detail);
+  float fraction = detail - floor(detail);
+  int last = (fraction > 0.0) ? whole + 1 : whole;
+  float power = roughness;
+  float value = offset + noise_octave(p, dimensions);
+  for (int i = 1; i <= last; i++) {
+    p *= lacunarity;
+    value += ((i > whole) ? fraction : 1.0) * (noise_octave(p, dimensions) + offset) * power * value;
+    power *= roughness;
+  }
+  return value;
+}
+
+float noise_of_type(vec4 p, int dimensions, int type, bool normalized, float detail, float roughness,
+                    float lacunarity, float offset, float gain)
+{
+  if (type == NOISE_MULTIFRACTAL) {
+    return noise_multifractal(p, dimensions, detail, roughness, lacunarity);
+  }
+  if (type == NOISE_HYBRID_MULTIFRACTAL) {
+    return noise_hybrid_multifractal(p, dimensions, detail, roughness, lacunarity, offset, gain);
+  }
+  if (type == NOISE_RIDGED_MULTIFRACTAL) {
+    return noise_ridged_multifractal(p, dimensions, detail, roughness, lacunarity, offset, gain);
+  }
+  if (type == NOISE_HETERO_TERRAIN) {
+    return noise_hetero_terrain(p, dimensions, detail, roughness, lacunarity, offset);
+  }
+  return noise_fbm(p, dimensions, detail, roughness, lacunarity, normalized);
+}
+
+// Far places that serve as other seeds; one dimension has its own hash.
+vec4 noise_seed(int seed, int dimensions)
+{
+  float s = float(seed);
+  if (dimensions == 1) {
+    return vec4(100.0 + 100.0 * hash_float(s), 0.0, 0.0, 0.0);
+  }
+  return vec4(100.0) + 100.0 * vec4(hash_float(vec2(s, 0.0)), hash_float(vec2(s, 1.0)), hash_float(vec2(s, 2.0)),
+                                    hash_float(vec2(s, 3.0)));
+}
+
+void noise_texture(vec3 vector, float w, float scale, float detail, float roughness, float lacunarity, float offset,
+                   float gain, float distortion, int dimensions, int type, bool normalized, bool color_used,
+                   out float value, out vec3 color)
+{
+  vec4 p = scale * ((dimensions == 1) ? vec4(w, 0.0, 0.0, 0.0) : vec4(vector, w));
+  float octaves = clamp(detail, 0.0, 15.0);
+  float rough = max(roughness, 0.0);
+  if (distortion != 0.0) {
+    vec4 start = p;
+    for (int i = 0; i < dimensions; i++) {
+      float pushed = distortion * noise_octave(start + noise_seed(i, dimensions), dimensions);
+      p += pushed * vec4(float(i == 0), float(i == 1), float(i == 2), float(i == 3));
+    }
+  }
+  float channels[3];
+  for (int i = 0; i < (color_used ? 3 : 1); i++) {
+    vec4 q = (i == 0) ? p : p + noise_seed(dimensions + i - 1, dimensions);
+    channels[i] = noise_of_type(q, dimensions, type, normalized, octaves, rough, lacunarity, offset, gain);
+  }
+  value = channels[0];
+  color = color_used ? vec3(channels[0], channels[1], channels[2]) : vec3(value);
+}
+
+void white_noise_texture(vec3 vector, float w, int dimensions, out float value, out vec3 color)
+{
+  if (dimensions == 1) {
+    color = hash_color(w);
+  }
+  else if (dimensions == 2) {
+    color = hash_color(vector.xy);
+  }
+  else if (dimensions == 3) {
+    color = hash_color(vector);
+  }
+  else {
+    color = hash_color(vec4(vector, w));
+  }
+  value = color.x;
+}
+
+#define WAVE_BANDS 0
+#define WAVE_RINGS 1
+
+#define WAVE_X 0
+#define WAVE_Y 1
+#define WAVE_Z 2
+#define WAVE_ALL 3  // diagonal bands, spherical rings
+
+#define WAVE_SINE 0
+#define WAVE_SAW 1
+#define WAVE_TRIANGLE 2
+
+void wave_texture(vec3 vector, float scale, float distortion, float detail, float detail_scale,
+                  float detail_roughness, float phase, int type, int bands, int rings, int profile, out vec3 color,
+                  out float value)
+{
+  // Off the whole numbers, where rounding would decide between two neighbouring stripes.
+  vec3 p = (vector * scale + vec3(0.000001)) * 0.999999;
+  float n;
+  if (type == WAVE_BANDS) {
+    n = (bands == WAVE_X) ? 20.0 * p.x
+                          : ((bands == WAVE_Y) ? 20.0 * p.y : ((bands == WAVE_Z) ? 20.0 * p.z : 10.0 * (p.x + p.y + p.z)));
+  }
+  else {
+    vec3 across = vec3(float(rings != WAVE_X), float(rings != WAVE_Y), float(rings != WAVE_Z));
+    n = 20.0 * length(p * across);
+  }
+  n += phase;
+  if (distortion != 0.0) {
+    float octaves = clamp(detail, 0.0, 15.0);
+    n += distortion
+         * (2.0 * noise_fbm(vec4(p * detail_scale, 0.0), 3, octaves, detail_roughness, 2.0, true) - 1.0);
+  }
+  if (profile == WAVE_SINE) {
+    value = 0.5 + 0.5 * sin(n - 0.5 * PI);
+  }
+  else {
+    n /= 2.0 * PI;
+    value = (profile == WAVE_SAW) ? n - floor(n) : 2.0 * abs(n - floor(n + 0.5));
+  }
+  color = vec3(value);
+}
