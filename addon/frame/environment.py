@@ -11,8 +11,9 @@ import numpy as np
 
 from ..gfx import images
 from ..gfx.struct import Block, Struct
-from ..snapshot.scene import World
+from ..snapshot.scene import Note, World
 from .lights import LUMINANCE
+from .world_tree import WorldTree
 
 WORLD = Struct(
     "World",
@@ -30,9 +31,10 @@ GUIDE_ROWS, GUIDE_COLUMNS = 16, 32
 class Environment:
     """GPU images and sampling tables of one World."""
 
-    def __init__(self, world: World, transparent_film: bool):
+    def __init__(self, world: World, transparent_film: bool, tree: WorldTree | None = None):
         self.color = np.asarray(world.color, np.float64)
-        pixels, mapping = _pixels(world)
+        self.tree = tree  # what the camera sees instead of the map, if not None
+        pixels, mapping = _pixels(world) if tree is None else (_finite(tree.bake()), np.eye(3))
         self.pixels = pixels
         self.rotation = mapping[:, :3]
         luminance = np.maximum(pixels @ np.abs(LUMINANCE * np.sign(self.color)), 0.0)
@@ -42,10 +44,16 @@ class Environment:
         self.map = images.upload(np.dstack([pixels, np.ones(pixels.shape[:2])]).astype(np.float32))
         rows = np.concatenate([mapping, np.zeros((3, 4 - mapping.shape[1]))], axis=1)
         self.block = Block(
-            WORLD, color=(*self.color, float(world.visibility.camera)), map_x=rows[0], map_y=rows[1], map_z=rows[2],
+            WORLD, color=(*self.color, float(world.visibility.camera and tree is None)),
+            map_x=rows[0], map_y=rows[1], map_z=rows[2],
             map_options=(float(transparent_film), 0, 0, 0),
         )  # fmt: skip
         self._set_density(density)
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What of the world is drawn otherwise than Cycles would."""
+        return () if self.tree is None else self.tree.notes
 
     def guide(self, usefulness: np.ndarray | None) -> None:
         """Prefer directions from which light reaches what the camera sees.
@@ -130,7 +138,7 @@ def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
     """Radiance image (H, W, 3) finite and linear, and the mapping to it, which is a rotation (3, 3)."""
     if world.image is None:
         return np.ones((1, 1, 3)), np.eye(3)
-    pixels = np.nan_to_num(world.image.pixels[..., :3].astype(np.float64), nan=0.0, posinf=65504.0, neginf=0.0)
+    pixels = _finite(world.image.pixels[..., :3].astype(np.float64))
     if world.image.encoding == "SRGB":
         pixels = np.where(pixels < 0.04045, pixels / 12.92, ((np.maximum(pixels, 0) + 0.055) / 1.055) ** 2.4)
     mapping = np.eye(3, 4) if world.mapping is None else np.asarray(world.mapping, np.float64)
@@ -150,6 +158,10 @@ def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
     column = (0.5 - np.arctan2(mapped[..., 1], mapped[..., 0]) / (2 * np.pi)) * width
     row = (0.5 + np.arcsin(np.clip(mapped[..., 2], -1, 1)) / np.pi) * height
     return pixels[np.clip(row.astype(int), 0, height - 1), column.astype(int) % width], np.eye(3)
+
+
+def _finite(pixels: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(pixels, nan=0.0, posinf=65504.0, neginf=0.0)
 
 
 def _density(luminance: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ class MaterialSet:
         self.notes = tuple(notes)
         needed = {key for compiled in self.compiled for key in compiled.images}
         self._images = {
-            key: self._images.get(key) or _upload(snapshot.images[key[0]])
+            key: self._images.get(key) or upload_image(snapshot.images[key[0]])
             for key in ((name, _version(snapshot, name)) for name in needed)
         }
         self._versions = dict(self._images.keys())  # the keys are pairs of name and version
@@ -138,9 +138,20 @@ def _version(snapshot: Snapshot, name: str) -> int:
     return snapshot.images[name].version if name in snapshot.images else 0
 
 
-def _upload(image: Image) -> images.Image:
+def upload_image(image: Image) -> images.Image:
+    """The pixels of an image as materials sample them."""
     # Eight-bit content fits a half float exactly enough only when it stays encoded; floats keep full precision.
     return images.upload(image.pixels, "RGBA32F")
+
+
+def values_struct(compiled: CompiledMaterial) -> Struct:
+    """The block in which a compiled tree finds its values."""
+    return _struct(len(compiled.values))
+
+
+def values_block(compiled: CompiledMaterial) -> Block:
+    """A block that holds them."""
+    return Block(values_struct(compiled), value=np.asarray(compiled.values, np.float32))
 
 
 _structs: dict[int, Struct] = {}

@@ -25,6 +25,7 @@ from .sequence import point, third
 from .settings import Settings
 from .technique import Technique
 from .view import VIEW, View, blackman_harris_offset
+from .world_tree import WorldTree
 
 
 @dataclass
@@ -127,7 +128,7 @@ class Renderer:
         ledger.times["upload"] = compile_started - started
         compile_programs(self._programs(plan), progress)
         ledger.times["compile"] = time.perf_counter() - compile_started
-        ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes)))
+        ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes)))
 
         key = self._content_key(snapshot, settings, plan)
         if self.frame is not None and not geometry_changed and key == self._frame_key:
@@ -250,9 +251,14 @@ class Renderer:
         world = snapshot.world
         image = (world.image.key, world.image.version) if world.image else None
         mapping = None if world.mapping is None else np.asarray(world.mapping).tobytes()
-        key = (image, np.asarray(world.color).tobytes(), mapping, world.visibility, snapshot.film.transparent)
+        tree = None
+        if world.graph is not None:
+            named = (snapshot.images.get(node.image) for node in world.graph.nodes.values())
+            tree = (world.graph, tuple((shown.key, shown.version) for shown in named if shown is not None))
+        key = (image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent)
         if self._environment is None or self._environment[0] != key:
-            self._environment = (key, Environment(world, snapshot.film.transparent))
+            compiled = WorldTree(world, snapshot.images, self.materials.energy_table) if tree else None
+            self._environment = (key, Environment(world, snapshot.film.transparent, compiled))
         return self._environment[1]
 
     def _programs(self, plan: Plan) -> list:

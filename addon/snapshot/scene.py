@@ -155,7 +155,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class World:
-    """Radiance from infinitely far away: `color` alone, or an equirectangular `image` times `color`.
+    """Radiance from infinitely far away: `color` alone, an equirectangular `image` times `color`, or a node tree.
 
     For an image, a world direction d is looked up at `mapping[:, :3] @ d + mapping[:, 3]`, normalised, with
     u = -atan2(y, x)/2pi + 0.5 and v = asin(z)/pi + 0.5 (Blender's equirectangular convention).
@@ -164,6 +164,7 @@ class World:
     color: np.ndarray  # (3,) float64 radiance, or factor of the image
     image: Image | None = None
     mapping: np.ndarray = None  # (3, 4) float64
+    graph: Graph | None = None  # a tree that is more than that; it then says all, and `color` is white
     visibility: Visibility = Visibility()
 
 

@@ -102,6 +102,11 @@ class Film(Technique):
             constants={"light_count": self._light_count},
         )  # fmt: skip
         frame.count(self, "passes")
+        if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
+            frame.environment.tree.add_background(
+                frame.target("radiance.environment"), frame.view, frame.view_block, surface_bindings(frame)
+            )
+            frame.count(self, "passes")
 
     def release(self) -> None:
         self._sources.release()

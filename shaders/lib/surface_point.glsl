@@ -2,6 +2,7 @@
 
 #define RAY_CAMERA 0  // the viewer looks at the point
 #define RAY_SHADOW 1  // light asks whether the point lets it pass
+#define RAY_LIGHT 2   // a surface is lit by the point, which belongs to the world
 
 struct SurfacePoint {
   vec3 position;          // world space, metres, relative to the render origin

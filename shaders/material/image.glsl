@@ -32,6 +32,19 @@ int image_wrap(int index, int size, int extension)
   return (wrapped < size) ? wrapped : period - 1 - wrapped;
 }
 
+// Place in an image of all directions; `projection` 0: equirectangular, 1: mirror ball.
+vec3 image_environment(vec3 toward, int projection)
+{
+  vec3 d = safe_normalize(toward);
+  if (projection == 1) {
+    float spread = 2.0 * sqrt(max(0.5 * (1.0 - d.y), 0.0));
+    vec2 place = (spread > 0.0) ? d.xz / spread : vec2(0.0);
+    return vec3(0.5 * place + 0.5, 0.0);
+  }
+  float azimuth = (d.x == 0.0 && d.y == 0.0) ? 0.0 : atan(d.y, d.x);
+  return vec3(0.5 - azimuth / 6.283185307, 0.5 + asin(clamp(d.z, -1.0, 1.0)) / 3.141592654, 0.0);
+}
+
 // Position in texels, kept within what an int can count, so that wild coordinates cannot overflow.
 vec2 image_position(vec3 coordinate, ivec2 size, int extension)
 {

@@ -44,8 +44,17 @@ void material_image{k}_sample(vec3 coordinate, int interpolation, int extension,
   color = filtered.rgb;
   alpha = filtered.a;
 }}
+
+void material_image{k}_environment(vec3 toward, int projection, int interpolation, float storage, out vec3 color)
+{{
+  float alpha;
+  vec3 place = image_environment(toward, projection);
+  material_image{k}_sample(place, interpolation, EXTENSION_REPEAT, storage, false, color, alpha);
+}}
 """
 
+INTERPOLATION = Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 0, "Smart": 0})
+CUBIC = ("interpolation", ("Cubic", "Smart"), "Cubic interpolation is drawn as linear.")
 MISSING_COLOR = (1.0, 0.0, 1.0)  # where an image cannot be read
 
 ENTRIES = (
@@ -54,7 +63,7 @@ ENTRIES = (
         "material_image{image}_sample",
         (
             Socket("Vector", "VECTOR", implicit="@UV"),
-            Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 0, "Smart": 0}),
+            INTERPOLATION,
             Choice("extension", {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}),
             ImageFlags(),
             Used("Alpha"),
@@ -63,8 +72,22 @@ ENTRIES = (
         include="material/image.glsl",
         image=True,
         setting_approximations=(
-            ("interpolation", ("Cubic", "Smart"), "Cubic interpolation is drawn as linear."),
+            CUBIC,
             ("projection", ("BOX", "SPHERE", "TUBE"), "This projection of the image is drawn as flat."),
         ),
+    ),
+    Entry(
+        "ShaderNodeTexEnvironment",
+        "material_image{image}_environment",
+        (
+            Socket("Vector", "VECTOR", implicit="(point.position + material_scene.origin.xyz)"),
+            Choice("projection", {"EQUIRECTANGULAR": 0, "MIRROR_BALL": 1}),
+            INTERPOLATION,
+            ImageFlags(),
+        ),
+        (("Color", "COLOR"),),
+        include="material/image.glsl",
+        image=True,
+        setting_approximations=(CUBIC,),
     ),
 )

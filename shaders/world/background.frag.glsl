@@ -1,0 +1,16 @@
+// The world's tree behind all surfaces, as the camera sees it, through the coloured layers before it.
+#include "lib/math.glsl"
+#include "lib/closure.glsl"
+#include "film/view_direction.glsl"
+#include "generated/material"
+#include "world/point.glsl"
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  out_radiance = vec4(0.0);
+  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
+    vec3 passed = texelFetch(surface_emission, pixel, 0).rgb;
+    out_radiance.rgb = world_radiance(view_direction(gl_FragCoord.xy), RAY_CAMERA) * passed;
+  }
+}
