@@ -16,7 +16,7 @@ comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose 
 
 | cost | per sample |
 |---|---|
-| virtual lights | see virtual_lights.py: 512 candidates, `virtual_lights` kept |
+| virtual lights | see virtual_lights.py: 1152 candidates, `virtual_lights` kept |
 | rays per pixel | `rays` + 1 short one, + 2 for each surface within r, + 1 to 3 for glossy surfaces |
 | arithmetic per pixel | 2 kernels per virtual light |
 
@@ -39,9 +39,8 @@ from ..gfx import passes
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .surfaces import SURFACES
-from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VIRTUAL_LIGHTS, VirtualLights
+from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VIRTUAL_LIGHTS, VirtualLights, near_radius
 
-NEAR = 0.1  # the bound r, in median distances of what is seen
 GATHER = passes.fullscreen_program(
     "instant radiosity",
     "indirect/gather.frag.glsl",
@@ -81,8 +80,8 @@ class InstantRadiosity(Technique):
     label = "Instant radiosity"
     slot = "indirect"
     params = (
-        Param("virtual_lights", "Virtual lights", 32, "Points of surfaces that light the picture in a sample", 1, 128),
-        Param("rays", "Rays", 2, "How many of the virtual lights each pixel traces in a sample", 1, 64),
+        Param("virtual_lights", "Virtual lights", 128, "Points of surfaces that light the picture in a sample", 1, 128),
+        Param("rays", "Rays", 4, "How many of the virtual lights each pixel traces in a sample", 1, 64),
     )
     reads = SURFACES
     writes = INDIRECT_WRITES
@@ -101,7 +100,7 @@ class InstantRadiosity(Technique):
         bindings["blocks"]["virtual_lights"] = lights.block
         bindings["constants"] |= {
             "virtual_count": len(lights), "rays": frame.settings.get(self, "rays"),
-            "near_radius": NEAR * float(np.median(frame.receivers.distance)),
+            "near_radius": near_radius(frame),
         }  # fmt: skip
         passes.fullscreen(
             GATHER,

@@ -15,17 +15,18 @@ density of candidates there is the sum over all probes x (the balance heuristic)
 
 and a candidate stands for the area 1 / n(y): it has the intensity L / n. `count` of them are kept by systematic
 resampling in proportion to L, which is what they bring to the picture (L / n times the probes that see them), each
-weighted by the inverse of its chance (Georgiev & Slusallek 2010 keep by the same measure, by lot).
+weighted by the inverse of its chance (Georgiev & Slusallek 2010 keep by the same measure, by lot). Only for those the
+densities are traced.
 
 Colours of a path's surfaces are those of the picture where the camera sees them, else the mean of the material
 (reflectance.py); glossy reflection counts as diffuse there, so the energy is right and only its direction is blurred.
 
-| cost | per sample, with P = 64, R = 8 |
+| cost | per sample, with P = 96, R = 12 |
 |---|---|
-| rays | 512 x (2 per bounce + 4), then 512 x 64 for the densities |
-| readback | 24 KB of candidates, 128 KB of densities |
+| rays | 1152 x (2 per bounce + 4), then 96 per virtual light for the densities |
+| readback | 72 KB of candidates, 48 KB of densities |
 
-Bias: points that only pixels see which no probe of a sample came near are missing in that sample. With 64 probes, that
+Bias: points that only pixels see which no probe of a sample came near are missing in that sample. With 96 probes, that
 is light which reaches less than about a hundredth of the picture. Alpha is taken as the material's mean opacity.
 """
 
@@ -45,10 +46,11 @@ from .emissive_light import EmissiveTriangles
 from .reflectance import Reflectance
 from .surfaces import SURFACE_TEXTURES, surface_bindings
 
-PROBES = (8, 8)
-RAYS = 8  # per probe
+PROBES = (12, 8)
+RAYS = 12  # per probe
+NEAR = 0.1  # the bound of virtual lights, in median distances of what is seen
 MOST_SOURCES = 32  # points of light sources that a sample's paths look for
-FLOOR = 0.1  # share of the mean importance that every candidate keeps
+FLOOR = 1.0  # share of the mean importance that every candidate keeps
 MOST_VIRTUAL = 128
 TEXELS = 3
 VIRTUAL_LIGHTS = Struct("VirtualLights", ("vec4", f"light[{MOST_VIRTUAL * TEXELS}]"))
@@ -73,7 +75,7 @@ CANDIDATES = passes.fullscreen_program(
 DENSITY = passes.fullscreen_program(
     "virtual light density",
     "indirect/density.frag.glsl",
-    textures=(*PATH_TEXTURES, ("FLOAT_2D", "candidate_point"), ("FLOAT_2D", "candidate_normal")),
+    textures=(*PATH_TEXTURES, ("FLOAT_2D", "candidate_point"), ("FLOAT_2D", "candidate_normal"), ("FLOAT_2D", "kept")),
     blocks=PATH_BLOCKS,
     constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
     outputs=(("FLOAT", "out_density"),),
@@ -111,11 +113,18 @@ class VirtualLights:
             self._begin(frame)
         rows = self._source_rows(frame)
         self._source_block, self._source_count = self._sources.set(rows), len(rows)
-        point, normal, radiance, shorter, density = self._candidates(frame)
+        found = self._candidates(frame)
+        point, normal, radiance, shorter = (
+            images.read(image).reshape(-1, 4)[:, :3].astype(np.float64) for image in found.colors
+        )
+        keep, weight = _resample(radiance, count, frame.random("virtual lights/keep")[0])
+        density = self._densities(frame, found, keep)
+        for image in found.colors:
+            images.pool.give(image)
+        keep, weight = keep[density > 0], (weight[density > 0] / density[density > 0])
         candidates = PROBES[0] * PROBES[1] * RAYS
         frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
-        frame.count(technique, "density rays", candidates * PROBES[0] * PROBES[1])
-        keep, weight = _resample(radiance, density, count, frame.random("virtual lights/keep")[0])
+        frame.count(technique, "density rays", len(density) * PROBES[0] * PROBES[1])
         intensity = radiance[keep] * weight[:, None]
         light = np.zeros((MOST_VIRTUAL * TEXELS, 4), np.float32)
         packed = light.reshape(MOST_VIRTUAL, TEXELS, 4)[: len(keep)]
@@ -200,24 +209,32 @@ class VirtualLights:
                 rows.append(emitter.row(sample, 0, shadowed, weight / points, points=total))
         return rows
 
-    def _candidates(self, frame: Frame) -> tuple[np.ndarray, ...]:
-        """Points, normals, radiances, radiances of paths one bounce shorter, each (C, 3), and densities (C,) per m2."""
-        probes = PROBES[0] * PROBES[1]
-        found = images.Target(tuple(images.pool.take(RAYS, probes, "RGBA32F") for _ in range(4)))
+    def _probing(self, frame: Frame) -> dict:
         bindings = self.path_bindings(frame)
         bindings["constants"] |= {"probes": PROBES, "rays": RAYS}
-        passes.fullscreen(CANDIDATES, found, **bindings)
-        with images.borrowed(RAYS * probes, probes, "R32F") as target:
-            bindings["textures"] |= {"candidate_point": found.colors[0], "candidate_normal": found.colors[1]}
+        return bindings
+
+    def _candidates(self, frame: Frame) -> images.Target:
+        """Points, normals, radiances, and radiances of paths one bounce shorter: a row per probe."""
+        size = (RAYS, PROBES[0] * PROBES[1])
+        found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(4)))
+        passes.fullscreen(CANDIDATES, found, **self._probing(frame))
+        return found
+
+    def _densities(self, frame: Frame, found: images.Target, keep: np.ndarray) -> np.ndarray:
+        """(N,) how many rays of all probes fall on a square metre around each candidate that is kept."""
+        if not len(keep):
+            return np.zeros(0)
+        bindings = self._probing(frame)
+        kept = np.zeros((1, MOST_VIRTUAL), np.float32)
+        kept[0, : len(keep)] = keep
+        bindings["textures"] |= {
+            "candidate_point": found.colors[0], "candidate_normal": found.colors[1],
+            "kept": images.upload(kept, "R32F"),
+        }  # fmt: skip
+        with images.borrowed(len(keep), PROBES[0] * PROBES[1], "R32F") as target:
             passes.fullscreen(DENSITY, target, **bindings)
-            density = images.read(target.colors[0])[..., 0].astype(np.float64).sum(axis=0)
-        point, normal, radiance, shorter = (
-            images.read(image).reshape(-1, 4).astype(np.float64) for image in found.colors
-        )
-        for image in found.colors:
-            images.pool.give(image)
-        there = (point[:, 3] > 0) & (density > 0) & np.isfinite(radiance).all(axis=1)
-        return *(array[there, :3] for array in (point, normal, radiance, shorter)), density[there]
+            return images.read(target.colors[0])[..., 0].astype(np.float64).sum(axis=0)
 
     def release(self) -> None:
         self.reflectance.release()
@@ -225,15 +242,18 @@ class VirtualLights:
         self._source_block = self._block = self._emissive = None
 
 
-def _resample(radiance: np.ndarray, density: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
-    """Which candidates are kept, and what each stands for: m2 over the chance of being kept."""
-    importance = np.abs(radiance) @ lights.LUMINANCE
+def near_radius(frame: Frame) -> float:
+    """Distance below which virtual lights leave light to short rays, m."""
+    return NEAR * float(np.median(frame.receivers.distance))
+
+
+def _resample(radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the candidates that are kept, and how many candidates each stands for."""
+    importance = np.abs(np.nan_to_num(radiance, posinf=0.0, neginf=0.0)) @ lights.LUMINANCE
     if not importance.sum() > 0:
         return np.zeros(0, int), np.zeros(0)
     importance = np.where(importance > 0, importance + FLOOR * importance.mean(), 0.0)
-    edges = np.cumsum(importance) / importance.sum() * count
-    marks = np.arange(count) + u
-    picked = np.minimum(np.searchsorted(edges, marks, side="right"), len(edges) - 1)
-    keep, times = np.unique(picked, return_counts=True)
-    expected = importance[keep] / importance.sum() * count
-    return keep, times / (expected * density[keep])
+    expected = importance / importance.sum() * count
+    picked = np.searchsorted(np.cumsum(expected), np.arange(count) + u, side="right")
+    keep, times = np.unique(np.minimum(picked, len(expected) - 1), return_counts=True)
+    return keep, times / expected[keep]

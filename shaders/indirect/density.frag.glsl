@@ -1,4 +1,4 @@
-// How densely the rays of a probe (row) fall on a candidate (column): rays per m2 there.
+// How densely the rays of the probes fall on a candidate that was kept (column): rays per m2 per probe (row).
 #include "indirect/path.glsl"
 #include "indirect/probe.glsl"
 
@@ -6,15 +6,16 @@ void main()
 {
   out_density = 0.0;
   ivec2 place = ivec2(gl_FragCoord.xy);
-  ivec2 candidate = ivec2(place.x % rays, place.x / rays);
-  vec4 point = texelFetch(candidate_point, candidate, 0);
+  int number = int(texelFetch(kept, ivec2(place.x, 0), 0).x);
+  ivec2 candidate = ivec2(number % rays, number / rays);
+  vec3 normal = texelFetch(candidate_normal, candidate, 0).xyz;
+  vec3 point = ray_origin(texelFetch(candidate_point, candidate, 0).xyz, normal);
   Probe probe = probe_read(place.y);
-  if (point.w == 0.0 || !probe.receives) {
+  if (!probe.receives) {
     return;
   }
-  vec3 normal = texelFetch(candidate_normal, candidate, 0).xyz;
   vec3 origin = ray_origin(probe.position, probe.geometric_normal);
-  vec3 path = ray_origin(point.xyz, normal) - origin;
+  vec3 path = point - origin;
   float squared = max(dot(path, path), 1e-30);
   vec3 direction = path * inversesqrt(squared);
   float cosines = max(dot(probe.normal, direction), 0.0) * max(-dot(normal, direction), 0.0);

@@ -1,0 +1,149 @@
+"""Indirect light by virtual lights against closed forms: rooms whose light is known to the last reflection."""
+
+import numpy as np
+import pytest
+
+from addon.compare.passes import light_paths
+from addon.compare.reference import render_passes
+from addon.frame import ledger
+
+SAMPLES = 32
+
+
+@pytest.fixture
+def render(stage):
+    """Radiance per light path of the stage, by a number of bounces."""
+
+    def render(bounces, samples=SAMPLES, size=(24, 24), seed=0):
+        images = render_passes(stage.scene, "CANDELA", samples, seed, size=size, bounces=bounces).images
+        assert ledger.latest().bad_pixels == 0
+        return light_paths(images)
+
+    return render
+
+
+def sphere(stage, material, rings=24):
+    """The unit sphere from inside, seen from a point off its centre."""
+    turn = np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False)
+    height = np.linspace(0, np.pi, rings + 1)[1:-1]
+    vertices = [(np.sin(h) * np.cos(a), np.sin(h) * np.sin(a), np.cos(h)) for h in height for a in turn]
+    count, last = 2 * rings, (rings - 2) * 2 * rings
+    faces = [
+        (r * count + k, r * count + (k + 1) % count, (r + 1) * count + (k + 1) % count, (r + 1) * count + k)
+        for r in range(rings - 2)
+        for k in range(count)
+    ]
+    vertices += [(0, 0, 1), (0, 0, -1)]
+    top, bottom = len(vertices) - 2, len(vertices) - 1
+    faces += [(top, (k + 1) % count, k) for k in range(count)]
+    faces += [(bottom, last + k, last + (k + 1) % count) for k in range(count)]
+    stage.camera((0.3, 0.2, -0.1), (1.2, 0.3, 0.4), angle=1.4)
+    return stage.mesh(vertices, faces, material=material)
+
+
+@pytest.mark.parametrize("bounces", [1, 2, 3, 8])
+def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces):
+    """Albedo 1/2 under irradiance pi: 1/2 straight, and half as much again with every bounce, the same everywhere."""
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    light = render(bounces)["diffuse_indirect"]
+    # The facets are nearer to the lamp than the sphere by up to half a percent, which is in the direct light too.
+    assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
+    assert light.mean(axis=2).std() < 0.06 * light.mean()
+
+
+def test_a_sphere_that_shines_itself_reflects_its_own_light(stage, render):
+    """Radiance 1 and albedo 1/2: 1 / (1 - 1/2) in all, half of the first reflection is direct light."""
+    shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
+    shining.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1, 1, 1, 1)
+    sphere(stage, shining, rings=12)
+    assert render(12)["diffuse_indirect"].mean() == pytest.approx(0.5, rel=0.03)
+
+
+def wall_irradiance(height):
+    """At the middle of a unit wall, `height` above a floor of radiosity 8: the form factor to a unit square."""
+    far = np.sqrt(1 + height**2)
+    return 8 / np.pi * (np.arctan(0.5 / height) - height / far * np.arctan(0.5 / far))
+
+
+def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render):
+    """The unit squares share an edge; the sun stands straight above, so the wall gets the floor's light alone."""
+    stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
+    corners = [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
+    stage.mesh(corners, [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    camera = stage.camera((3, 0.5, 0.5), (np.pi / 2, 0, np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
+    irradiance = render(1, samples=64, size=(20, 20))["diffuse_indirect"].mean(axis=2) * np.pi
+    assert irradiance.mean() == pytest.approx(8 * 0.200044, rel=0.02)
+    height = (np.arange(20) + 0.5) / 20
+    np.testing.assert_allclose(irradiance[:, 9:11].mean(axis=1), wall_irradiance(height), rtol=0.06)
+
+
+def corner(stage, albedo=0.7, energy=60.0, lamps=1):
+    """A floor, a wall and a ceiling with a lamp between them."""
+    material = stage.diffuse(albedo)
+    stage.rectangle((-1, -1), (1, 1), material=material)
+    stage.rectangle((-1, -1), (1, 1), z=2.0, material=material)
+    stage.mesh([(-1, 1, 0), (1, 1, 0), (1, 1, 2), (-1, 1, 2)], [(0, 1, 2, 3)], material=material)
+    for _ in range(lamps):
+        stage.light("POINT", (0.2, 0, 1.2), energy=energy / lamps, shadow_soft_size=0.1)
+    stage.camera((0, -3, 1), (np.pi / 2, 0, 0), angle=0.8)
+
+
+def test_no_bounces_mean_no_indirect_light_and_no_work(stage, render):
+    corner(stage)
+    assert not render(0, samples=1)["diffuse_indirect"].any()
+    row = next(row for row in ledger.latest().rows if row.name == "instant_radiosity")
+    assert (row.state, row.reason) == ("skipped", "the scene's bounces are set to 0")
+
+
+def test_a_surface_alone_gets_no_indirect_light(stage, render):
+    stage.floor()
+    stage.light("POINT", (0, 0, 2))
+    stage.camera_above()
+    assert not render(4, samples=4)["diffuse_indirect"].any()
+
+
+def test_light_is_linear_and_two_half_lamps_are_one(stage, render):
+    corner(stage)
+    once = render(3, samples=4)["diffuse_indirect"]
+    stage.clear()
+    corner(stage, energy=120.0)
+    np.testing.assert_allclose(render(3, samples=4)["diffuse_indirect"], 2 * once, rtol=1e-3, atol=1e-5)
+    stage.clear()
+    corner(stage, lamps=2)
+    assert render(3)["diffuse_indirect"].mean() == pytest.approx(once.mean(), rel=0.05)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e4])
+def test_light_does_not_depend_on_the_scale_of_the_scene(stage, render, scale):
+    corner(stage)
+    unit = render(3, samples=8)["diffuse_indirect"]
+    stage.clear()
+    corner(stage, energy=60.0 * scale**2)
+    for placed in stage.scene.objects:
+        placed.location *= scale
+        if placed.type == "LIGHT":
+            placed.data.shadow_soft_size *= scale
+        elif placed.type == "MESH":
+            placed.scale *= scale
+        else:
+            placed.data.clip_start, placed.data.clip_end = 0.01 * scale, 100 * scale
+    scaled = render(3, samples=8)["diffuse_indirect"]
+    assert scaled.mean() == pytest.approx(unit.mean(), rel=0.02)
+
+
+def test_what_a_mirror_shows_of_lit_surfaces_is_glossy_indirect_light(stage, render):
+    """A mirror on the floor shows the ceiling, whose direct light is known from the picture of the ceiling itself."""
+    stage.rectangle(
+        (-5, -5), (5, 5), material=stage.material("ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.0)
+    )
+    stage.rectangle((-5, -5), (5, 5), z=2.0, material=stage.diffuse(0.6))
+    stage.light("AREA", (0, 0, 0.5), (np.pi, 0, 0), energy=50.0, size=0.5)
+    stage.camera((0, 0, 1.0), (np.pi / 4, 0, 0), angle=0.3)
+    shown = render(1, samples=64)["glossy_indirect"].mean()
+    stage.scene.camera.rotation_euler = (3 * np.pi / 4, 0, 0)
+    stage.scene.camera.location = (0, 0, -1.0)
+    stage.scene.objects["Mesh"].visible_camera = False
+    assert shown == pytest.approx(render(1, samples=64)["diffuse_direct"].mean(), rel=0.03)
