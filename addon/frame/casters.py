@@ -6,7 +6,7 @@ its opaque triangles are therefore written out once, neighbours side by side: a 
 it sees, each vertex is three numbers, and a call covers many objects. While objects move, and in scenes above LARGEST
 triangles (instances counted), casters are drawn as instances instead (depth_maps.py); both give the same maps.
 
-Closed meshes stand apart from open ones, so that their back faces can be left out (culling.py).
+Closed meshes and closed parts of others stand apart, so that their back faces can be left out (culling.py).
 
 Costs 12 bytes a vertex and 12 a triangle, and a sort when geometry has changed.
 """
@@ -14,17 +14,18 @@ Costs 12 bytes a vertex and 12 a triangle, and a sort when geometry has changed.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..gfx import geometry as gfx_geometry
 from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
-from .culling import Boxes, closed
+from .culling import Boxes, closed_triangles
 from .morton import morton_codes
 
 LARGEST = 2_000_000  # triangles
+NOBODY = np.zeros(0, np.int64)
 CLUSTER = 256  # triangles: enough to keep a GPU busy, few enough to cull
 
 
@@ -34,11 +35,18 @@ class Clusters:
 
     batch: gfx_geometry.Batch
     boxes: Boxes  # of the clusters
-    shells: Boxes | None  # of the meshes, if all of them are closed; else back faces count
+    shells: Boxes | None = None  # of the objects (P), if all triangles belong to closed parts; else back faces count
+    # Which objects have triangles in which cluster, (M,) each.
+    member_clusters: np.ndarray = field(default_factory=lambda: NOBODY)
+    member_objects: np.ndarray = field(default_factory=lambda: NOBODY)
 
-    def one_sided(self, light_point: np.ndarray | None) -> bool:
-        """Whether back faces may be left out: closed, and the light (None: at infinity) stands outside of all."""
-        return self.shells is not None and (light_point is None or bool(self.shells.without(light_point).all()))
+    def one_sided(self, light_point: np.ndarray | None) -> np.ndarray:
+        """(C,) where back faces may be left out: the light (None: at infinity) stands outside of all objects there."""
+        count = len(self.boxes.centre)
+        if self.shells is None or light_point is None:
+            return np.full(count, self.shells is not None)
+        around = ~self.shells.without(light_point)
+        return np.bincount(self.member_clusters[around[self.member_objects]], minlength=count) == 0
 
     def runs(self, seen: np.ndarray) -> Iterator[tuple[int, int]]:
         """First triangle and number of triangles for each run of clusters in the mask `seen`."""
@@ -50,14 +58,14 @@ class Clusters:
 def clusters(
     instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial], origin: np.ndarray
 ) -> list[Clusters] | None:
-    """Clusters of what blocks all light, positions relative to `origin`: of closed meshes, and of others.
+    """Clusters of what blocks all light, positions relative to `origin`: of closed meshes and parts, and of others.
 
     None where that would be more than LARGEST triangles.
     """
     if sum(meshes[instance.mesh].triangle_count for instance in instances) > LARGEST:
         return None
-    bounding: dict[str, bool] = {}
-    sorts: dict[bool, list] = {True: [], False: []}
+    known: dict[str, np.ndarray] = {}
+    sorts: dict[bool, list[_Part]] = {True: [], False: []}  # closed or not
     opaque = ~np.array([material.transparent for material in materials])
     for instance in instances:
         mesh = meshes[instance.mesh]
@@ -67,22 +75,33 @@ def clusters(
         blocks = opaque[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
         if not blocks.any():
             continue
-        if mesh.key not in bounding:
-            bounding[mesh.key] = closed(mesh)
+        if mesh.key not in known:
+            known[mesh.key] = closed_triangles(mesh)
         matrix = instance.matrix.copy()
         matrix[:3, 3] -= origin
         world = mesh.positions @ matrix[:3, :3].T.astype(np.float32) + matrix[:3, 3].astype(np.float32)
-        triangles = mesh.corner_vertices[mesh.triangle_corners[blocks]]
+        triangles = mesh.corner_vertices[mesh.triangle_corners]
         if np.linalg.det(matrix[:3, :3]) < 0.0:
             triangles = triangles[:, ::-1]
-        sorts[bounding[mesh.key] and bool(blocks.all())].append((world, triangles))
-    return [_cluster(parts, shell) for shell, parts in sorts.items() if parts]
+        # What lets light pass is drawn elsewhere, and what is left of its mesh need not be closed any more.
+        whole = known[mesh.key] & blocks.all()
+        for is_closed in (True, False):
+            own = blocks & (whole == is_closed)
+            if own.any():
+                sorts[is_closed].append(_Part(world, triangles[own]))
+    return [_cluster(parts, is_closed) for is_closed, parts in sorts.items() if parts]
 
 
-def _cluster(parts: list[tuple[np.ndarray, np.ndarray]], shell: bool) -> Clusters:
-    start = np.cumsum([0] + [len(world) for world, _ in parts])
-    positions = np.concatenate([world for world, _ in parts]).astype(np.float32, copy=False)
-    triangles = np.concatenate([part + first for (_, part), first in zip(parts, start)])
+@dataclass(frozen=True)
+class _Part:
+    world: np.ndarray  # (V, 3) positions
+    triangles: np.ndarray  # (T, 3) vertices
+
+
+def _cluster(parts: list[_Part], is_closed: bool) -> Clusters:
+    start = np.cumsum([0] + [len(part.world) for part in parts])
+    positions = np.concatenate([part.world for part in parts]).astype(np.float32, copy=False)
+    triangles = np.concatenate([part.triangles + first for part, first in zip(parts, start)])
     corners = positions[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     order = np.argsort(morton_codes(np.nan_to_num((low + high) * 0.5)), kind="stable")
@@ -98,7 +117,9 @@ def _cluster(parts: list[tuple[np.ndarray, np.ndarray]], shell: bool) -> Cluster
     where[turn] = np.arange(len(used), dtype=np.int32)
     vertices = gfx_geometry.vertex_buffer(position=positions[used[turn]])
     batch = gfx_geometry.triangle_batch(vertices, where[place.reshape(-1, 3)])
-    shells = None
-    if shell:
-        shells = Boxes.between([world.min(axis=0) for world, _ in parts], [world.max(axis=0) for world, _ in parts])
-    return Clusters(batch, boxes, shells)
+    if not is_closed:
+        return Clusters(batch, boxes)
+    low, high = [part.world.min(axis=0) for part in parts], [part.world.max(axis=0) for part in parts]
+    owner = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])[order]
+    members = np.unique(np.arange(len(owner)) // CLUSTER * len(parts) + owner)
+    return Clusters(batch, boxes, Boxes.between(low, high), members // len(parts), members % len(parts))

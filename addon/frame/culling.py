@@ -19,6 +19,7 @@ from ..snapshot.scene import Mesh
 if TYPE_CHECKING:
     from .geometry import Draw
 
+LARGEST_OPEN, MOST_PARTS = 20_000, 64  # triangles and parts of a mesh that is taken apart
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
 
 
@@ -90,23 +91,59 @@ def calls(draws: list[Draw], indices: Iterable[int]) -> Iterator[Call]:
         yield current
 
 
-def closed(mesh: Mesh) -> bool:
-    """Whether the triangles bound a volume and face outwards, so that every line out of it leaves by a front face.
+def closed(positions: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether triangles (T, 3) over `positions` (V, 3) bound a volume and face outwards: every line out of it leaves by
+    a front face.
 
     The boundary of the surface is the sum of its directed edges, an edge and its reverse cancelling; it is zero if a
     sum of hashes is, each with the sign of the edge's direction. Outwards means that the signed volume is positive.
     """
-    if not mesh.triangle_count:
+    if not len(triangles):
         return False
-    vertices = mesh.corner_vertices[mesh.triangle_corners].astype(np.uint64)
-    start, end = vertices, np.roll(vertices, -1, axis=1)
+    start = triangles.astype(np.uint64)
+    end = np.roll(start, -1, axis=1)
     low, high = np.minimum(start, end), np.maximum(start, end)
     with np.errstate(over="ignore"):
         mixed = (low * np.uint64(0x9E3779B97F4A7C15)) ^ (high * np.uint64(0xC2B2AE3D27D4EB4F) + np.uint64(0x165667B1))
         mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
         mixed ^= mixed >> np.uint64(32)
         boundary = mixed[start < end].sum(dtype=np.uint64) - mixed[start > end].sum(dtype=np.uint64)
-    if boundary != 0:
-        return False
-    a, b, c = np.moveaxis(mesh.positions[vertices] - mesh.positions[vertices[0, 0]], 1, 0).astype(np.float64)
-    return bool(np.einsum("ti,ti->", a, np.cross(b, c)) > 0.0)
+    corners = positions[triangles].astype(np.float64)
+    return bool(boundary == 0 and _volume(corners, corners[0, 0]) > 0.0)
+
+
+def _volume(corners: np.ndarray, apex: np.ndarray) -> float:
+    """Six times the signed volume of the cones from `apex` to triangles (T, 3, 3)."""
+    a, b, c = np.moveaxis(corners - apex, 1, 0)
+    return float(np.einsum("ti,ti->", a, np.cross(b, c)))
+
+
+def closed_triangles(mesh: Mesh) -> np.ndarray:
+    """(T,) which triangles belong to closed parts of the mesh: the crown of a tree, but not its open trunk.
+
+    Parts hang together by their vertices. Large open meshes and those of many parts are not taken apart.
+    """
+    triangles = mesh.corner_vertices[mesh.triangle_corners]
+    if closed(mesh.positions, triangles):
+        return np.ones(len(triangles), bool)
+    found = np.zeros(len(triangles), bool)
+    if len(triangles) <= LARGEST_OPEN:
+        label = _parts(triangles, len(mesh.positions))
+        names = np.unique(label)
+        for name in names if len(names) <= MOST_PARTS else ():
+            own = label == name
+            found[own] = closed(mesh.positions, triangles[own])
+    return found
+
+
+def _parts(triangles: np.ndarray, vertices: int) -> np.ndarray:
+    """(T,) a number that triangles share if they hang together: the least vertex of their part."""
+    label = np.arange(vertices)
+    while True:
+        before = label.copy()
+        least = label[triangles].min(axis=1)
+        for corner in range(3):
+            np.minimum.at(label, triangles[:, corner], least)
+        label = label[label]  # follow what the least vertex has learnt itself
+        if np.array_equal(label, before):
+            return label[triangles[:, 0]]

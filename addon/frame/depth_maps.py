@@ -295,14 +295,16 @@ def draw_views(
 
 
 def _draw_resting(atlas: Atlas, viewport, constants: dict, clusters: Clusters, view: MapView, light_point) -> int:
-    cull = "BACK" if clusters.one_sided(light_point) else "NONE"
     shader = passes.get(RESTING)
+    seen = clusters.boxes.seen(view.rows, view.least_q)
+    one_sided = seen & clusters.one_sided(light_point)
     sent = 0
-    with passes.drawing(atlas.target, viewport=viewport, cull=cull):
-        shader.bind(constants=constants)
-        for first, count in clusters.runs(clusters.boxes.seen(view.rows, view.least_q)):
-            passes.draw_range(shader, clusters.batch, first, count)
-            sent += count
+    for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
+        with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+            shader.bind(constants=constants)
+            for first, count in clusters.runs(drawn):
+                passes.draw_range(shader, clusters.batch, first, count)
+                sent += count
     return sent
 
 

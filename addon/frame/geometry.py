@@ -217,13 +217,17 @@ class SceneGeometry:
             mesh = meshes[instance.mesh]
             key = (mesh.key, mesh.version)
             if key not in kept:
-                kept[key] = self._closed[key] if key in self._closed else closed(mesh)
+                kept[key] = self._closed[key] if key in self._closed else _closed(mesh)
             shell[k] = kept[key] and not any(materials[slot].transparent for slot in instance.materials)
         self._closed = kept
         return shell
 
     def release(self) -> None:
         self.__init__()
+
+
+def _closed(mesh: Mesh) -> bool:
+    return closed(mesh.positions, mesh.corner_vertices[mesh.triangle_corners])
 
 
 def _neighbourhood(instances: list[Instance]) -> np.ndarray:

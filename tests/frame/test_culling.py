@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 
 from addon.frame import casters
-from addon.frame.culling import Boxes, calls, closed
+from addon.frame.culling import Boxes, calls, closed, closed_triangles
 
 
 def mesh(positions, triangles):
-    triangles = np.asarray(triangles, np.int32)
-    corners = np.arange(triangles.size, dtype=np.int32).reshape(-1, 3)
+    triangles = np.asarray(triangles, np.int32).reshape(-1, 3)
     return SimpleNamespace(
-        key="mesh", positions=np.asarray(positions, np.float32), corner_vertices=triangles.reshape(-1),
-        triangle_corners=corners, triangle_slots=np.zeros(len(triangles), np.int32), triangle_count=len(triangles),
+        positions=np.asarray(positions, np.float32), corner_vertices=triangles.reshape(-1),
+        triangle_corners=np.arange(triangles.size, dtype=np.int32).reshape(-1, 3),
     )  # fmt: skip
+
+
+def surface(triangles, positions=None):
+    """Arguments of `closed`."""
+    return np.array(TETRAHEDRON if positions is None else positions, np.float32), np.array(triangles).reshape(-1, 3)
 
 
 TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -23,7 +27,7 @@ OUTWARD = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
 
 
 def test_a_tetrahedron_that_faces_outwards_is_closed():
-    assert closed(mesh(TETRAHEDRON, OUTWARD))
+    assert closed(*surface(OUTWARD))
 
 
 @pytest.mark.parametrize(
@@ -32,13 +36,31 @@ def test_a_tetrahedron_that_faces_outwards_is_closed():
     ids=["open", "inside out", "one face turned", "degenerate", "empty"],
 )
 def test_what_is_open_or_turned_is_not(triangles):
-    assert not closed(mesh(TETRAHEDRON, triangles))
+    assert not closed(*surface(triangles))
 
 
 def test_two_shells_in_one_mesh_are_closed_together():
     shifted = np.array(TETRAHEDRON) + 5.0
-    both = mesh(np.concatenate([TETRAHEDRON, shifted]), OUTWARD + [tuple(k + 4 for k in t) for t in OUTWARD])
-    assert closed(both)
+    both = OUTWARD + [tuple(k + 4 for k in t) for t in OUTWARD]
+    assert closed(*surface(both, np.concatenate([TETRAHEDRON, shifted])))
+
+
+def test_a_mesh_is_taken_apart_into_closed_parts_and_others():
+    """A tree: a closed crown, a trunk without a bottom, a leaf."""
+    positions = np.concatenate([TETRAHEDRON, np.array(TETRAHEDRON) + 5.0, np.array(TETRAHEDRON) + 9.0])
+    trunk = [tuple(k + 4 for k in t) for t in OUTWARD[1:]]
+    leaf = [(8, 9, 10), (8, 10, 9), (8, 9, 11)]
+    found = closed_triangles(mesh(positions, [*trunk, *OUTWARD, *leaf]))
+    assert found.tolist() == [False] * 3 + [True] * 4 + [False] * 3
+
+
+@pytest.mark.parametrize(
+    ("light", "one_sided"), [(None, [True, True]), ((9, 9, 9), [True, True]), ((0.5, 0.5, 0.5), [False, True])]
+)
+def test_back_faces_count_where_the_light_stands_within_an_object(light, one_sided):
+    boxes = Boxes.between([(0, 0, 0), (5, 0, 0)], [(1, 1, 1), (6, 1, 1)])
+    clusters = casters.Clusters(None, boxes, boxes, np.array([0, 1]), np.array([0, 1]))
+    assert clusters.one_sided(None if light is None else np.array(light)).tolist() == one_sided
 
 
 def perspective(least_q=-np.inf):
@@ -85,7 +107,7 @@ def test_neighbouring_groups_of_one_batch_are_one_call():
 
 def test_runs_of_clusters_cover_exactly_what_is_seen():
     batch = SimpleNamespace(triangles=2 * casters.CLUSTER + 7)
-    clusters = casters.Clusters(batch, None, None)
+    clusters = casters.Clusters(batch, None)
     size = casters.CLUSTER
     assert list(clusters.runs(np.array([True, True, True]))) == [(0, 2 * size + 7)]
     assert list(clusters.runs(np.array([True, False, True]))) == [(0, size), (2 * size, 7)]
