@@ -53,10 +53,16 @@ class MapView:
     light_point: tuple[float, float, float, float]  # xyz, w: position (1) or direction (0)
     scale: int = 1  # resolution is divided by this
     least_q: float = -np.inf  # of the receivers: what lies farther from the light casts no shadow on any of them
+    cell: float = 0.0  # share of the light's extent, along each axis, that the map stands for; 0: a point
 
 
-def directional_views(direction, receivers: Receivers, geometry: SceneGeometry, jitter, resolution) -> list[MapView]:
-    """Orthographic views for light from `direction` (unit, towards the light). `jitter`: four uniform numbers."""
+def directional_views(
+    direction, receivers: Receivers, geometry: SceneGeometry, jitter, resolution, reach: float = 0.0
+) -> list[MapView]:
+    """Orthographic views for light from `direction` (unit, towards the light). `jitter`: four uniform numbers.
+
+    `reach`: the light's tangent of half angle, if the map also serves directions around this one.
+    """
     if not len(receivers.distance):
         return []
     u, v = _frame(direction, jitter[2] * 2 * np.pi)
@@ -73,7 +79,7 @@ def directional_views(direction, receivers: Receivers, geometry: SceneGeometry, 
     q = (corners @ direction - bottom) / (top - bottom)
     views = []
     for low, high, members in _merged_rectangles(place, receivers.groups(), 1e-6 * geometry.size):
-        low, high = _padded(low, high, jitter, resolution)
+        low, high = _padded(*_widened(low, high, reach * (top - bottom)), jitter, resolution)
         row_x = np.append(2 * u, -(low[0] + high[0])) / (high[0] - low[0])
         row_y = np.append(2 * v, -(low[1] + high[1])) / (high[1] - low[1])
         rows = np.stack([row_x, row_y, one, row_q])
@@ -82,12 +88,20 @@ def directional_views(direction, receivers: Receivers, geometry: SceneGeometry, 
 
 
 def point_views(
-    position, axis, cone_tangent: float, receivers: Receivers, geometry: SceneGeometry, jitter, resolution
+    position,
+    axis,
+    cone_tangent: float,
+    receivers: Receivers,
+    geometry: SceneGeometry,
+    jitter,
+    resolution,
+    reach: float = 0.0,
 ) -> list[MapView]:
     """Perspective views from `position` (relative to the origin).
 
     `axis` is None for a light that shines everywhere; else the unit axis of emission, and only receivers within
-    `cone_tangent` (inf for a half space) of it matter. Empty if no receiver can be lit.
+    `cone_tangent` (inf for a half space) of it matter. Empty if no receiver can be lit. `reach`: half the light's
+    extent in metres, if the map also serves points around this one.
     """
     near = 1e-4 * geometry.size
     offsets = receivers.corners - position
@@ -113,10 +127,15 @@ def point_views(
     wide = ~np.isfinite(tangents).all(axis=(1, 2)) | (np.abs(tangents) > WIDEST_TANGENT).any(axis=(1, 2))
     if not wide.any():
         groups = [g for g in (np.flatnonzero(np.isin(index, group)) for group in receivers.groups()) if len(g)]
-        return [
-            _perspective(position, u, v, forward, *_padded(low, high, jitter, resolution), near, depth[members].max())
-            for low, high, members in _merged_rectangles(tangents, groups, 1e-6)
-        ]
+        scene_low, scene_high = geometry.bounds_min - geometry.origin, geometry.bounds_max - geometry.origin
+        nearest = float(((scene_low + CORNERS * (scene_high - scene_low) - position) @ forward).min())
+        views = []
+        for low, high, members in _merged_rectangles(tangents, groups, 1e-6):
+            far = float(depth[members].max())
+            wide = reach * (1.0 / max(nearest, 0.1 * far) - 1.0 / far)
+            low, high = _padded(*_widened(low, high, wide), jitter, resolution)
+            views.append(_perspective(position, u, v, forward, low, high, near, far))
+        return views
     views = []
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
     for face_forward, face_u, face_v in (
@@ -171,11 +190,23 @@ def _padded(low, high, jitter, resolution):
     return low + shift, high + shift
 
 
+def _widened(low, high, margin: float):
+    """Room for blockers beside the receivers, at most as much again on all sides together."""
+    margin = np.minimum(margin, 0.5 * (high - low))
+    return low - margin, high + margin
+
+
 def _frame(normal, turn: float):
     helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     a = _unit(np.cross(helper, normal))
     b = np.cross(normal, a)
     return np.cos(turn) * a + np.sin(turn) * b, np.cos(turn) * b - np.sin(turn) * a
+
+
+def turn_along(normal, direction) -> float:
+    """The third number of `jitter` that lays the rows of views against `normal` along `direction`."""
+    a, b = _frame(normal, 0.0)
+    return float(np.arctan2(direction @ b, direction @ a) / (2 * np.pi))
 
 
 def _unit(v):
@@ -243,7 +274,7 @@ class Atlas:
         texels = np.zeros((len(views), VIEW_TEXELS, 4))
         for k, view in enumerate(views):
             texels[k, :4] = view.rows
-            texels[k, 4] = *cells[k], 0.0
+            texels[k, 4] = *cells[k], view.cell
         return cells, texels
 
     def release(self) -> None:

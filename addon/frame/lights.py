@@ -19,7 +19,7 @@ SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4",
 POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = range(7)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
-DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG = 1, 2, 4, 8, 16, 32
+DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,19 @@ class Emitter:
             return self.centre + (2 * x - 1) * self.u[:3] + (2 * y - 1) * self.v[:3]
         radius, turn = np.sqrt(x), 2 * np.pi * y
         return self.centre + radius * (np.cos(turn) * self.u[:3] + np.sin(turn) * self.v[:3])
+
+    def middle(self) -> np.ndarray:
+        """The sample that stands for the whole light."""
+        return np.zeros(3) if self.kind in (POINT, SPHERE) else self.centre
+
+    @property
+    def reach(self) -> float:
+        """Half of the longest extent, metres; not for suns."""
+        return float(np.hypot(np.linalg.norm(self.u[:3]), np.linalg.norm(self.v[:3]))) if self.has_span else self.radius
+
+    @property
+    def extended(self) -> bool:
+        return self.has_span or self.radius > 0
 
     def position(self, sample: np.ndarray) -> np.ndarray:
         """World position (relative to the origin) of a sample; not for suns."""
@@ -147,7 +160,7 @@ def footprint(area: float, points: float) -> float:
 
 def traceable(emitters: list[Emitter]) -> list[Emitter]:
     """The lights that rays of narrow lobes look for: those with extent, the strongest where a block cannot hold all."""
-    extended = [e for e in emitters if e.kind in (RECTANGLE, ELLIPSE) or e.radius > 0]
+    extended = [e for e in emitters if e.extended]
     return sorted(extended, key=lambda e: (-e.power, e.light.key))[:MOST_LIGHTS]
 
 

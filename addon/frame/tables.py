@@ -126,18 +126,21 @@ def pyramid_size(width: int, height: int) -> tuple[int, int]:
     return max(width // 2, 1), height
 
 
-def _level_program(name: str, glsl: str, textures, images) -> Program:
+def level_program(source: PyramidSource) -> Program:
+    """Level 1 from a source."""
     return Program(
-        name=f"{name} pyramid",
+        name=f"{source.name} pyramid",
         compute="table/bounds.comp.glsl",
-        textures=textures,
-        images=images,
+        textures=source.textures,
+        images=(("pyramid", "RG32F", "FLOAT_2D", "READ_WRITE"),),
         constants=(("IVEC2", "extent"), ("INT", "source_row"), ("INT", "row")),
-        snippets=(("generated/source", glsl),),
+        snippets=(("generated/source", source.glsl),),
     )
 
 
-_LEVEL = "vec2 bounds_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel).xy;\n}\n"
+_LEVELS = level_program(
+    PyramidSource("min-max", "vec2 bounds_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel).xy;\n}\n")
+)
 
 
 def build_pyramid(source: PyramidSource, pyramid: images.Image, levels: int, **bindings) -> None:
@@ -148,15 +151,9 @@ def build_pyramid(source: PyramidSource, pyramid: images.Image, levels: int, **b
     width, height = 2 * pyramid.width, pyramid.height
     if width % (1 << levels) or height % (1 << levels):
         raise ValueError(f"A pyramid of {levels} levels needs sides that 2^{levels} divides, not {width}x{height}.")
-    out = (("pyramid", "RG32F", "FLOAT_2D", "READ_WRITE"),)
     for level in range(1, levels + 1):
         first = level == 1
-        program = _level_program(
-            source.name if first else "min-max",
-            source.glsl if first else _LEVEL,
-            source.textures if first else (),
-            out,
-        )
+        program = level_program(source) if first else _LEVELS
         extent = (width >> level, height >> level)
         passes.compute(
             program, extent, images={"pyramid": pyramid}, textures=bindings.get("textures", {}) if first else {},

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 from . import nodes
 from .compiled import Attribute
-from .graph import Graph, Node
+from .graph import Graph
 from .nodes import entry as words
 
-IMPLICIT = {
-    "@UV": Attribute("UV", ""), "@GENERATED": Attribute("GENERATED", ""), "@RADIAL": Attribute("GENERATED", ""),
-}  # fmt: skip
-
-
-def asked_for(node: Node, socket: words.Socket) -> bool:
-    """Whether the implicit value of an unlinked socket matters, see Socket.only_with."""
-    other = node.inputs.get(socket.only_with)
-    return not socket.only_with or (other is not None and (other.link is not None or bool(other.value)))
+IMPLICIT = {"@UV": Attribute("UV", ""), "@GENERATED": Attribute("GENERATED", "")}
 
 
 def attributes_of(graph: Graph) -> frozenset[Attribute]:
@@ -29,6 +21,6 @@ def attributes_of(graph: Graph) -> frozenset[Attribute]:
                 found.add(Attribute(argument.kind, str(node.properties.get(argument.property, ""))))
             elif isinstance(argument, words.Socket) and argument.implicit in IMPLICIT:
                 given = node.inputs.get(argument.identifier)
-                if (given is None or given.link is None) and asked_for(node, argument):
+                if given is None or given.link is None:
                     found.add(IMPLICIT[argument.implicit])
     return frozenset(found)

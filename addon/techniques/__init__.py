@@ -12,11 +12,13 @@ from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
+from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
     Surfaces,
     LightProbes,
     AccumulatedMaps,
+    VarianceSoftShadows,
     DirectLight,
     EmissiveLight,
     EnvironmentLight,

@@ -26,6 +26,7 @@ unshadowed: at most that share of light too much, for views and casters that a p
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -55,6 +56,31 @@ def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
 
 
+@dataclass(frozen=True)
+class Lookup:
+    """GLSL file with `float light_visibility(Light, vec3 position, vec3 normal)` and what else it binds."""
+
+    name: str
+    file: str
+    textures: tuple[tuple[str, str], ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+    defines: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Depth maps that were drawn: the atlas, its views for the uniform block, and what the lookup binds besides."""
+
+    atlas: images.Image
+    views: np.ndarray  # (V, VIEW_TEXELS, 4)
+    lookup: Lookup
+    textures: dict[str, images.Image] = field(default_factory=dict)
+    constants: dict[str, object] = field(default_factory=dict)
+
+
+HARD = Lookup("hard", "lib/hard_visibility.glsl")
+
+
 class DepthMapService:
     """Draws depth maps for any technique that needs visibility from points or directions."""
 
@@ -71,8 +97,8 @@ class DepthMapService:
         }
         return depth_maps.AlphaCasters(draws, programs)
 
-    def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> tuple[images.Image, np.ndarray]:
-        """Draw the views; returns the atlas and the views' part of the uniform block `sources`."""
+    def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> Maps:
+        """Draw the views, to be asked point by point."""
         cells, texels = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
         if views:
             sent = depth_maps.draw_views(
@@ -80,7 +106,7 @@ class DepthMapService:
             )
             frame.count(technique, "maps", len(views))
             frame.count(technique, "caster triangles", sent)
-        return self._atlas.target.colors[0], texels
+        return Maps(self._atlas.target.colors[0], texels, HARD)
 
     def release(self) -> None:
         self._atlas.release()
@@ -163,14 +189,22 @@ class AccumulatedMaps(Technique):
     def resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
 
-    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int) -> list:
+    def cell(self, frame: Frame, number: int, points: float) -> float:
+        """Share of a light's extent, along each axis, that the map of point `number` of `points` stands for; 0: a point
+        alone; 1: the whole light, from its middle."""
+        return 0.0
+
+    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""
         receivers = self._reached.get(emitter.light.key)
         if not emitter.light.cast_shadow or receivers is None or not len(receivers.distance):
             return []
-        jitter = (*frame.random_at(number, "map"), *frame.random_at(number, "map/turn"))
+        jitter = self.jitter(frame, emitter, number)
         if emitter.kind == lights.SUN:
-            return depth_maps.directional_views(sample, frame.receivers, frame.geometry, jitter, self.resolution(frame))
+            reach = cell * np.tan(min(emitter.radius, 1.5))
+            return depth_maps.directional_views(
+                sample, frame.receivers, frame.geometry, jitter, self.resolution(frame), reach
+            )
         axis, cone = None, np.inf
         if emitter.kind in (lights.RECTANGLE, lights.ELLIPSE):
             axis, cone = emitter.axis, emitter.spread or np.inf
@@ -179,10 +213,15 @@ class AccumulatedMaps(Technique):
             if half < np.pi / 2 - 0.01:
                 axis, cone = emitter.axis, _spot_tangent(emitter, half)
         return depth_maps.point_views(
-            emitter.position(sample), axis, cone, receivers, frame.geometry, jitter, self.resolution(frame)
-        )
+            emitter.position(sample), axis, cone, receivers, frame.geometry, jitter, self.resolution(frame),
+            cell * emitter.reach,
+        )  # fmt: skip
 
-    def draw(self, frame: Frame, views: list) -> tuple[images.Image, np.ndarray]:
+    def jitter(self, frame: Frame, emitter: lights.Emitter, number: int) -> tuple[float, float, float, float]:
+        """Shift and turn of the maps of point `number`."""
+        return (*frame.random_at(number, "map"), *frame.random_at(number, "map/turn"))
+
+    def draw(self, frame: Frame, views: list) -> Maps:
         return self.service.draw(frame, self, views, self.resolution(frame))
 
     def release(self) -> None:

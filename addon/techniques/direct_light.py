@@ -24,6 +24,7 @@ sqrt(a / pi) no more than at that distance: otherwise single points beside a sur
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
@@ -33,45 +34,50 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..frame.view import VIEW
 from ..gfx import passes
+from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import DepthMapService, rounds
+from .accumulated_maps import HARD, DepthMapService, Lookup, Maps, rounds
 from .light_probes import rate_of
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
 CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
 
-LIGHTING = tuple(
-    passes.fullscreen_program(
-        "direct light",
+
+@cache
+def lighting(lookup: Lookup, soft_lobes: bool) -> Program:
+    """The lighting pass with the visibility of a technique, for scenes with or without soft lobes."""
+    return passes.fullscreen_program(
+        f"direct light, {lookup.name}",
         "light/direct.frag.glsl",
-        textures=(
-            *SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"),
-        ),
+        textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"), *lookup.textures),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness")),
-        defines=TRACED_DEFINES + soft_defines,
+        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
+        defines=(*TRACED_DEFINES, *SOFT_DEFINES[soft_lobes], *lookup.defines),
+        snippets=(("generated/visibility", f'#include "{lookup.file}"\n'),),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
     )
-    for soft_defines in SOFT_DEFINES
-)  # fmt: skip
+
+
+LIGHTING = tuple(lighting(HARD, soft_lobes) for soft_lobes in (False, True))
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
     Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
 )
 
 
-def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: lights.Sources, maps) -> None:
-    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images. `maps` = (atlas, views) of depth maps."""
-    atlas, views = maps
+def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: lights.Sources, maps: Maps) -> None:
+    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images."""
+    textures = {"depth_maps": maps.atlas, "energy_table": frame.materials.energy_table, **maps.textures}
     passes.fullscreen(
-        LIGHTING[frame.materials.soft],
+        lighting(maps.lookup, frame.materials.soft),
         frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
         blend="ADDITIVE_PREMULT",
-        textures={**surface_bindings(frame), "depth_maps": atlas, "energy_table": frame.materials.energy_table},
-        blocks={"film_view": frame.view_block, "sources": sources.set(rows, views)},
+        textures={**surface_bindings(frame), **textures},
+        blocks={"film_view": frame.view_block, "sources": sources.set(rows, maps.views)},
         constants={
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
+            **maps.constants,
         },
     )  # fmt: skip
     frame.count(technique, "passes")
@@ -115,11 +121,14 @@ class DirectLight(Technique):
         for emitter, weight in self._chosen(frame):
             rate = rate_of(frame, emitter.light.key)
             for number in rate.points(frame.sample):
-                # The same numbers for all lights: then two half lights are one, and names and order change nothing.
-                sample = emitter.sample(*frame.random_volume_at(number, "light"))
-                views = shadow.views(frame, emitter, sample, number) if shadow else []
                 points = rate.per_sample * frame.settings.samples / weight
+                cell = shadow.cell(frame, number, points) if shadow else 0.0
+                whole = cell >= 1.0 and emitter.extended
+                # The same numbers for all lights: then two half lights are one, and names and order change nothing.
+                sample = emitter.middle() if whole else emitter.sample(*frame.random_volume_at(number, "light"))
+                views = shadow.views(frame, emitter, sample, number, cell) if shadow else []
                 row = emitter.row(sample, 0, len(views), weight, rate.per_sample, points)
+                row[0, 1] += lights.WHOLE_FLAG * whole
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
                 items.append((row, views))
         resolution = shadow.resolution(frame) if shadow else 16

@@ -20,7 +20,19 @@ vec2 shadow_behind(vec4 caster, vec2 offset, float q, vec2 receiver_gradient)
   return vec2(caster.x + dot(caster.yz, offset) - q, caster.x - q + dot(receiver_gradient, offset));
 }
 
-float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal)
+// A receiver as the first view that contains it sees it.
+struct ShadowReceiver {
+  int view;
+  vec4 rectangle;  // of the view in the atlas: origin, size; w: share of the light's extent that the map stands for
+  vec2 ndc;
+  float w;  // distance along the view's axis; 1 for orthographic views
+  vec2 texel;  // from the view's corner
+  float q;
+  vec2 gradient;  // of q on the receiver's plane, per texel
+  float slack;  // difference in q that is no difference
+};
+
+bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out ShadowReceiver r)
 {
   vec4 p = vec4(position, 1.0);
   vec3 t1;
@@ -34,44 +46,62 @@ float shadow_visibility(int first_view, int view_count, vec3 position, vec3 norm
     }
     vec4 row_x = sources.view[view * VIEW_TEXELS];
     vec4 row_y = sources.view[view * VIEW_TEXELS + 1];
-    vec2 ndc = vec2(dot(row_x, p), dot(row_y, p)) / w;
-    if (max(abs(ndc.x), abs(ndc.y)) >= 1.0) {
+    r.w = w;
+    r.ndc = vec2(dot(row_x, p), dot(row_y, p)) / w;
+    if (max(abs(r.ndc.x), abs(r.ndc.y)) >= 1.0) {
       continue;
     }
     vec4 row_q = sources.view[view * VIEW_TEXELS + 3];
-    vec4 rectangle = sources.view[view * VIEW_TEXELS + 4];
-    float q = dot(row_q, p) / w;
-    vec2 texel = (ndc * 0.5 + 0.5) * rectangle.z;
-    vec2 cell = min(floor(texel), vec2(rectangle.z - 1.0));
+    r.view = view;
+    r.rectangle = sources.view[view * VIEW_TEXELS + 4];
+    r.q = dot(row_q, p) / w;
+    r.texel = (r.ndc * 0.5 + 0.5) * r.rectangle.z;
 
     // Gradient of the receiver's plane in texels: two tangents give two equations for it.
-    float scale = 0.5 * rectangle.z / w;
-    vec2 d1 = (vec2(dot(row_x.xyz, t1), dot(row_y.xyz, t1)) - ndc * dot(row_w.xyz, t1)) * scale;
-    vec2 d2 = (vec2(dot(row_x.xyz, t2), dot(row_y.xyz, t2)) - ndc * dot(row_w.xyz, t2)) * scale;
-    float q1 = (dot(row_q.xyz, t1) - q * dot(row_w.xyz, t1)) / w;
-    float q2 = (dot(row_q.xyz, t2) - q * dot(row_w.xyz, t2)) / w;
+    float scale = 0.5 * r.rectangle.z / w;
+    vec2 d1 = (vec2(dot(row_x.xyz, t1), dot(row_y.xyz, t1)) - r.ndc * dot(row_w.xyz, t1)) * scale;
+    vec2 d2 = (vec2(dot(row_x.xyz, t2), dot(row_y.xyz, t2)) - r.ndc * dot(row_w.xyz, t2)) * scale;
+    float q1 = (dot(row_q.xyz, t1) - r.q * dot(row_w.xyz, t1)) / w;
+    float q2 = (dot(row_q.xyz, t2) - r.q * dot(row_w.xyz, t2)) / w;
     float determinant = d1.x * d2.y - d1.y * d2.x;
-    vec2 receiver_gradient = vec2(0.0);
+    r.gradient = vec2(0.0);
     if (abs(determinant) > 1e-4 * dot(abs(d1), vec2(1.0)) * dot(abs(d2), vec2(1.0))) {
-      receiver_gradient = vec2(q1 * d2.y - q2 * d1.y, q2 * d1.x - q1 * d2.x) / determinant;
+      r.gradient = vec2(q1 * d2.y - q2 * d1.y, q2 * d1.x - q1 * d2.x) / determinant;
     }
-
     // Rasterisers snap vertices to 1/256 texel: 3 % of the slope covers it; 1e-5 covers float32 in q itself.
-    float slack = 1e-5 * abs(q) + 0.03 * dot(abs(receiver_gradient), vec2(1.0));
-    vec4 caster = texelFetch(depth_maps, ivec2(rectangle.xy + cell), 0);
-    vec2 behind = shadow_behind(caster, texel - cell - 0.5, q, receiver_gradient);
-    float turn = length(caster.yz - receiver_gradient);
-    if (behind.x > slack && behind.y <= slack && turn > 0.6 * (length(caster.yz) + length(receiver_gradient))) {
-      // Only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
-      // convex edge, or it overhangs a steep receiver. One texel out along the receiver's normal the edge is gone, the
-      // overhang is not.
-      vec2 outward = vec2(dot(row_x.xyz, normal), dot(row_y.xyz, normal)) - ndc * dot(row_w.xyz, normal);
-      outward *= inversesqrt(max(dot(outward, outward), 1e-30));
-      vec2 beside = clamp(floor(texel + outward), vec2(0.0), vec2(rectangle.z - 1.0));
-      caster = texelFetch(depth_maps, ivec2(rectangle.xy + beside), 0);
-      behind = shadow_behind(caster, texel - beside - 0.5, q, receiver_gradient);
-    }
-    return (behind.x > slack && behind.y > slack) ? 0.0 : 1.0;
+    r.slack = 1e-5 * abs(r.q) + 0.03 * dot(abs(r.gradient), vec2(1.0));
+    return true;
   }
-  return 1.0;
+  return false;
+}
+
+// Whether the caster in a texel of the view (from its corner) stands between light and receiver.
+bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
+{
+  vec4 caster = texelFetch(depth_maps, ivec2(r.rectangle.xy + cell), 0);
+  vec2 behind = shadow_behind(caster, r.texel - cell - 0.5, r.q, r.gradient);
+  float turn = length(caster.yz - r.gradient);
+  if (behind.x > r.slack && behind.y <= r.slack && turn > 0.6 * (length(caster.yz) + length(r.gradient))) {
+    // Only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
+    // convex edge, or it overhangs a steep receiver. One texel out along the receiver's normal the edge is gone, the
+    // overhang is not.
+    vec3 row_x = sources.view[r.view * VIEW_TEXELS].xyz;
+    vec3 row_y = sources.view[r.view * VIEW_TEXELS + 1].xyz;
+    vec3 row_w = sources.view[r.view * VIEW_TEXELS + 2].xyz;
+    vec2 outward = vec2(dot(row_x, normal), dot(row_y, normal)) - r.ndc * dot(row_w, normal);
+    outward *= inversesqrt(max(dot(outward, outward), 1e-30));
+    vec2 beside = clamp(floor(r.texel + outward), vec2(0.0), vec2(r.rectangle.z - 1.0));
+    caster = texelFetch(depth_maps, ivec2(r.rectangle.xy + beside), 0);
+    behind = shadow_behind(caster, r.texel - beside - 0.5, r.q, r.gradient);
+  }
+  return behind.x > r.slack && behind.y > r.slack;
+}
+
+float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal)
+{
+  ShadowReceiver r;
+  if (!shadow_find(first_view, view_count, position, normal, r)) {
+    return 1.0;
+  }
+  return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
 }

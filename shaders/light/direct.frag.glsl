@@ -1,5 +1,6 @@
-// Direct light of this sample: one point on each light, visibility from its depth maps.
+// Direct light of this sample: one point on each light, or the light as a whole; visibility from depth maps.
 //
+// `generated/visibility` is the lookup of the technique in the shadow slot.
 // The point is the same for all pixels, so a narrow glossy lobe would see a few bright dots. Where rays are traced
 // (light/traced.frag.glsl) such lobes take part of their light from there; both are weighted by the balance of squared
 // densities (Veach's power heuristic), so the sum has the same mean.
@@ -8,8 +9,19 @@
 #ifdef SOFT_LOBES
 #include "lib/soft_lobe.glsl"
 #endif
-#include "lib/shadow.glsl"
-#include "light/sources.glsl"
+#include "light/whole.glsl"
+#include "generated/visibility"
+
+// Irradiance in closed form times the closure towards the light's middle: exact for Lambert's.
+vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
+{
+  vec3 irradiance = whole_irradiance(light, s.position, s.normal, direction);
+  float cosine = dot(s.normal, direction);
+  // From a middle below the horizon the part above it shines in along the surface.
+  vec3 raised = (cosine > 0.05) ? direction : safe_normalize(direction + s.normal * (0.05 - cosine));
+  vec3 share = diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, raised);
+  return share * irradiance / max(dot(s.normal, raised), 1e-3);
+}
 
 void main()
 {
@@ -37,38 +49,54 @@ void main()
   vec3 glossy = vec3(0.0);
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
-    vec3 direction;
-    float density;
-    vec3 arriving = light_sample(light, s.position, direction, density);
+    bool whole = (light.flags & LIGHT_WHOLE) != 0;
+    int parts = whole ? WHOLE_PARTS : 1;
+    bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;
+    bool on_glossy = has_glossy && (light.flags & LIGHT_GLOSSY) != 0;
     vec3 from_diffuse = vec3(0.0);
     vec3 from_glossy = vec3(0.0);
-    if (has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0) {
-      from_diffuse = diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction);
-    }
-    if (has_glossy && (light.flags & LIGHT_GLOSSY) != 0) {
-      float lobe_density;
-      from_glossy = lobe_reflection(lobe, direction, lobe_density);
-      if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
-        float rays = (light.kind == LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
-        float ratio = rays * lobe_density / (light.rate * density);
-        from_glossy /= 1.0 + ratio * ratio;
-      }
-    }
     vec3 facing = s.geometric_normal;
-#ifdef SOFT_LOBES
-    if (soft.exists) {
-      vec3 from_soft = soft_reflection(soft, direction);
-      from_diffuse += ((light.flags & LIGHT_DIFFUSE) != 0 && !soft.glossy) ? from_soft : vec3(0.0);
-      from_glossy += ((light.flags & LIGHT_GLOSSY) != 0 && soft.glossy) ? from_soft : vec3(0.0);
-      facing *= (soft.kind == LOBE_TRANSLUCENT && dot(direction, facing) < 0.0) ? -1.0 : 1.0;
+    if (whole && on_diffuse) {
+      vec3 to_middle = (light.kind == LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
+      from_diffuse = whole_diffuse(light, s, to_viewer, to_middle);
     }
+    for (int part = 0; part < parts; part++) {
+      Light source = light;
+      if (whole) {
+        source = whole_part(light, part, s.position);
+      }
+      vec3 direction;
+      float density;
+      vec3 arriving = light_sample(source, s.position, direction, density);
+      if (on_diffuse && !whole) {
+        from_diffuse += arriving *
+                        diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction);
+      }
+      if (on_glossy) {
+        float lobe_density;
+        vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
+        if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
+          float rays = (light.kind == LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
+          float ratio = rays * lobe_density / (light.rate * density);
+          reflected /= 1.0 + ratio * ratio;
+        }
+        from_glossy += reflected * arriving;
+      }
+#ifdef SOFT_LOBES
+      if (soft.exists) {
+        vec3 from_soft = soft_reflection(soft, direction) * arriving;
+        from_diffuse += ((light.flags & LIGHT_DIFFUSE) != 0 && !soft.glossy) ? from_soft : vec3(0.0);
+        from_glossy += ((light.flags & LIGHT_GLOSSY) != 0 && soft.glossy) ? from_soft : vec3(0.0);
+        if (soft.kind == LOBE_TRANSLUCENT && dot(direction, s.geometric_normal) < 0.0) {
+          facing = -s.geometric_normal;
+        }
+      }
 #endif
-    from_diffuse *= arriving;
-    from_glossy *= arriving;
+    }
     if (max_component(abs(from_diffuse) + abs(from_glossy)) > 0.0) {
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        visibility = shadow_visibility(light.first_view, light.view_count, s.position, facing);
+        visibility = light_visibility(light, s.position, facing);
       }
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;

@@ -15,13 +15,14 @@ from addon.materials.compiler import compile_material, default_graph
 
 
 def _found(kind: type) -> list:
-    """Values of `kind` at the top of any module, each once."""
+    """Values of `kind` at the top of any module, alone or in tuples, each once."""
     values = {}
     for module in pkgutil.walk_packages(addon.__path__, "addon."):
         if not module.name.endswith("__main__"):
-            for value in vars(importlib.import_module(module.name)).values():
-                if isinstance(value, kind):
-                    values[id(value)] = value
+            for declared in vars(importlib.import_module(module.name)).values():
+                for value in declared if isinstance(declared, tuple) else (declared,):
+                    if isinstance(value, kind):
+                        values[id(value)] = value
     return list(values.values())
 
 

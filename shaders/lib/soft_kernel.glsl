@@ -1,0 +1,112 @@
+// The part of a depth map that hides a light with extent from a receiver (Fernando, "Percentage-closer soft shadows",
+// SIGGRAPH 2005 sketches, written for the depth measure q).
+//
+// A point at the light's centre plus e and a receiver at the texel p see each other past a blocker that is nearer to
+// the light by h (in q) at the texel  p + e' h,  e' = e projected into the map: exact for perspective and orthographic
+// maps alike. So all blockers at height h lie in the light's own shape, centred at p and scaled by h: the kernel.
+#include "lib/shadow.glsl"
+#include "light/sources.glsl"
+
+// Half extents of the kernel, in texels per unit of q, of the part of the light that the map stands for.
+vec2 kernel_extent(Light light, ShadowReceiver r)
+{
+  vec3 row_w = sources.view[r.view * VIEW_TEXELS + 2].xyz;
+  vec3 across = sources.view[r.view * VIEW_TEXELS].xyz - r.ndc.x * row_w;
+  vec3 along = sources.view[r.view * VIEW_TEXELS + 1].xyz - r.ndc.y * row_w;
+  vec2 extent;
+  float share = r.rectangle.w;
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+    vec3 u = sources.light[light.base + 5].xyz;
+    vec3 v = sources.light[light.base + 6].xyz;
+    // A light that reaches towards the receiver as far as half its distance, as faces beside its axis see it, has no
+    // kernel in this map: only a part of it that has.
+    float towards = length(vec2(dot(row_w, u), dot(row_w, v)));
+    share = min(share, 0.25 * r.w / max(towards, 1e-30));
+    extent = vec2(length(vec2(dot(across, u), dot(across, v))), length(vec2(dot(along, u), dot(along, v))));
+  }
+  else {
+    float radius = light.radius;
+    if (light.kind == LIGHT_SUN) {
+      radius = tan(min(light.radius, 1.5)) / length(sources.view[r.view * VIEW_TEXELS + 3].xyz);
+    }
+    extent = radius * vec2(length(across), length(along));
+  }
+  return extent * (0.5 * r.rectangle.z * share);
+}
+
+// Share of a cell of the kernel that belongs to the light's shape. `place`: of the cell's centre, in half extents.
+float kernel_weight(Light light, vec2 place, float cell)
+{
+  return (light.kind == LIGHT_RECTANGLE) ? 1.0 : clamp((1.0 - length(place)) / cell + 0.5, 0.0, 1.0);
+}
+
+// Least and largest q of a pyramid entry; level 0 is the map itself. Where nothing was drawn: 0, behind everything.
+vec2 kernel_entry(ivec2 texel, int level)
+{
+  if (level == 0) {
+    vec4 caster = texelFetch(depth_maps, texel, 0);
+    return (caster.w > 0.0) ? caster.xx : vec2(0.0);
+  }
+  return texelFetch(depth_bounds, texel + ivec2(0, bounds_rows - (bounds_rows >> (level - 1))), 0).xy;
+}
+
+// Bounds of q over the texels first..last (from the view's corner, inclusive): those of a block that contains them.
+// `deepest`: least q of the receiver's plane within that block.
+vec2 kernel_bounds(ShadowReceiver r, ivec2 first, ivec2 last, out float deepest)
+{
+  int span = max(last.x - first.x, last.y - first.y);
+  int level = (span < 2) ? 0 : int(ceil(log2(float(span)))) - 1;
+  ivec2 origin = ivec2(r.rectangle.xy);
+  ivec2 low = (origin + first) >> level;
+  ivec2 high = (origin + last) >> level;
+  vec2 near_corner = vec2((low << level) - origin) - r.texel;
+  vec2 far_corner = vec2(((high + 1) << level) - origin) - r.texel;
+  deepest = r.q + dot(min(r.gradient * near_corner, r.gradient * far_corner), vec2(1.0));
+  vec2 bounds = vec2(1e30, -1e30);
+  for (int y = low.y; y <= high.y; y++) {
+    for (int x = low.x; x <= high.x; x++) {
+      vec2 entry = kernel_entry(ivec2(x, y), level);
+      bounds = vec2(min(bounds.x, entry.x), max(bounds.y, entry.y));
+    }
+  }
+  return bounds;
+}
+
+// Texels that the box centre -+ half_size touches, cut off at the view's edges.
+void kernel_texels(ShadowReceiver r, vec2 half_size, out ivec2 first, out ivec2 last)
+{
+  float size = r.rectangle.z;
+  first = ivec2(clamp(floor(r.texel - half_size), vec2(0.0), vec2(size - 1.0)));
+  last = ivec2(clamp(ceil(r.texel + half_size) - 1.0, vec2(0.0), vec2(size - 1.0)));
+}
+
+#define KERNEL_SEARCHES 4
+
+// How high above the receiver (in q) blockers can stand that the kernel reaches: 0 = lit, below 0 = all of the kernel
+// is blocked whatever its size.
+//
+// The kernel of the highest caster in the map contains every blocker; the highest caster within that kernel gives a
+// smaller one, and so on.
+float kernel_height(ShadowReceiver r, vec2 extent, float most_size)
+{
+  float size = r.rectangle.z;
+  ivec2 first = ivec2(0);
+  ivec2 last = ivec2(size - 1.0);
+  float deepest;
+  vec2 bounds = kernel_bounds(r, first, last, deepest);
+  float height = bounds.y - r.q;
+  for (int k = 0; k < KERNEL_SEARCHES; k++) {
+    if (height <= r.slack) {
+      return 0.0;
+    }
+    vec2 half_size = clamp(extent * height, vec2(0.5), vec2(most_size));
+    kernel_texels(r, half_size, first, last);
+    bounds = kernel_bounds(r, first, last, deepest);
+    float tilt = dot(abs(r.gradient), half_size + 1.0);
+    if (bounds.x > r.q + tilt + r.slack) {
+      return -1.0;
+    }
+    height = min(height, bounds.y - r.q);
+  }
+  return (height <= r.slack) ? 0.0 : height;
+}

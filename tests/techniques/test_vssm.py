@@ -1,0 +1,157 @@
+"""Variance soft shadow maps: penumbrae of one map against clipped areas, points that stand for parts, no leaks."""
+
+import numpy as np
+import pytest
+
+from tests.techniques import light_model as model
+from tests.techniques.test_shadows import EVERYWHERE, HEIGHT, LIGHTS, SPAN, irradiance, receivers
+
+# RMS of the visibility over a 4 m wide strip. What remains is the technique's assumption that every part of the light
+# counts the same for the receiver: a long light seen from its end, and discs that the horizon foreshortens, do not.
+PENUMBRA_RMS = {
+    "square": 0.015, "rectangle": 0.032, "disc": 0.025, "sphere": 0.006, "soft point": 0.006, "sun": 0.008,
+}  # fmt: skip
+EDGE = ((-EVERYWHERE, -EVERYWHERE), (0.0, EVERYWHERE), 1.0)
+
+
+@pytest.fixture
+def floor(stage):
+    """A floor under one map per light and sample."""
+    stage.floor()
+    stage.camera_above(SPAN)
+    stage.scene.candela.slot_shadow = "vssm"
+    stage.scene.candela.light_probes_maps = 0.0
+    return stage
+
+
+def visibility(stage, source, samples=1, size=(64, 4)):
+    return irradiance(stage, samples, size).ravel() / model.irradiance(source, receivers(size))
+
+
+def rms(found, expected):
+    return float(np.sqrt(((found - expected) ** 2).mean()))
+
+
+def expected_visibility(source, blockers, size=(64, 4)):
+    points = receivers(size)
+    return model.irradiance(source, points, blockers) / model.irradiance(source, points)
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_one_sample_without_blockers_is_the_whole_light(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    floor.blocker((30, 30), (31, 31), 0.5)  # casts no shadow here
+    assert visibility(floor, source) == pytest.approx(1.0, abs=2e-4)
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_one_map_shows_the_penumbra_of_an_edge(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    floor.blocker(*EDGE)
+    expected = expected_visibility(source, [EDGE])
+    found = visibility(floor, source)
+    assert ((expected > 0.05) & (expected < 0.95)).sum() > 10
+    assert rms(found, expected) < PENUMBRA_RMS[name]
+    assert found[expected == 0].max() < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["square", "sphere", "sun"])
+def test_points_that_stand_for_parts_of_the_light_leave_less_error_than_points(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    floor.blocker(*EDGE)
+    expected = expected_visibility(source, [EDGE])
+    parts = [rms(visibility(floor, source, n), expected) for n in (16, 64)]
+    floor.scene.candela.slot_shadow = "accumulated_maps"
+    points = [rms(visibility(floor, source, n), expected) for n in (16, 64)]
+    assert parts[0] < 0.8 * points[0]
+    assert parts[1] < 0.7 * points[1]
+    assert parts[1] < 0.5 * parts[0]
+
+
+@pytest.mark.parametrize("name", ["square", "sphere", "sun"])
+def test_blockers_at_two_heights_that_close_the_light_together_leak_nothing(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    edges = [((-EVERYWHERE, -EVERYWHERE), (0.0, EVERYWHERE), 1.2), ((0.0, -EVERYWHERE), (EVERYWHERE, EVERYWHERE), 1.2)]
+    floor.blocker(*edges[0])
+    floor.blocker(edges[1][0], edges[1][1], 0.6)
+    closed = expected_visibility(source, [edges[0], (edges[1][0], edges[1][1], 0.6)]) == 0
+    found = visibility(floor, source)
+    assert closed.sum() > 64
+    assert found[closed].max() <= 0.02
+
+
+def test_the_shadow_of_a_slanted_edge_is_sharp_where_it_starts(floor):
+    """A wall that stands on the floor: the penumbra of its top edge grows with the height of what casts it."""
+    floor.light("SUN", (0, 0, HEIGHT), (0.0, 0.7, 0.0), angle=0.3)
+    floor.mesh([(-0.5, -2, 0), (-0.5, 0, 0), (-0.5, 0, 2.0), (-0.5, -2, 2.0)], [(0, 1, 2, 3)])
+    share = irradiance(floor, 1, (64, 64))
+    share = share / share.max()
+    widths = [((share[:, x] > 0.1) & (share[:, x] < 0.9)).sum() for x in (26, 14)]  # beside the wall, and farther
+    assert widths[0] < widths[1]
+
+
+def test_a_closed_roof_lets_no_light_pass_whatever_its_distance(floor):
+    for name in ("square", "sphere", "sun"):
+        kind, settings, _ = LIGHTS[name]
+        light = floor.light(kind, (0, 0, HEIGHT), **settings)
+        for z in (0.01, 0.5, 1.4):
+            roof = floor.blocker((-EVERYWHERE, -EVERYWHERE), (EVERYWHERE, EVERYWHERE), z)
+            assert not irradiance(floor, 1, (24, 24)).any()
+            floor.remove(roof)
+        light.hide_render = True
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "settings", "height"),
+    [
+        ("AREA", {"size": 200.0}, 2.0),
+        ("AREA", {"size": 1.0}, 1e-6),
+        ("POINT", {"shadow_soft_size": 50.0}, 1.0),
+        ("POINT", {"shadow_soft_size": 0.5}, -1.0),
+        ("SUN", {"angle": 3.1}, 1.0),
+        ("AREA", {"size": 1e-6}, 1e4),
+    ],
+    ids=["wider than the scene", "on the floor", "around the scene", "behind the floor", "half the sky", "far away"],
+)
+def test_lights_beyond_reason_give_finite_light_between_none_and_all(floor, kind, settings, height):
+    floor.light(kind, (0, 0, height), **settings)
+    bars = [floor.blocker((x, -0.5), (x + 0.3, 0.5), 0.4) for x in (-1.0, 0.0, 1.0)]
+    shadowed = irradiance(floor, 1, (32, 32))
+    for bar in bars:
+        bar.visible_shadow = False
+    free = irradiance(floor, 1, (32, 32))
+    assert (shadowed >= 0).all()
+    assert (shadowed <= free * 1.0001 + 1e-12).all()
+
+
+@pytest.mark.slow
+def test_slats_over_a_deep_pit_behind_bars_are_lit_right_by_the_bounds_rule(floor):
+    """Every cell of the kernel holds near blockers, the receiver, and what lies far below it."""
+    floor.clear()
+    candela = floor.scene.candela
+    candela.slot_shadow, candela.light_probes_maps, candela.vssm_texels_per_pixel = "vssm", 0.0, 8.0
+    floor.camera_above(SPAN)
+    for x in np.arange(-2.0, 2.0, 0.25):
+        floor.rectangle((x, -9.0), (x + 0.125, 9.0), material=floor.diffuse())
+    floor.rectangle((-20.0, -20.0), (20.0, 20.0), z=-12.0, material=floor.diffuse()).visible_camera = False
+    bars = [((x, -EVERYWHERE), (x + 0.06, EVERYWHERE), 1.0) for x in np.arange(-1.0, 1.0, 0.2)]
+    for bar in bars:
+        floor.blocker(*bar)
+    kind, settings, source = LIGHTS["square"]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    size = (64, 4)
+    x = receivers(size)[:, 0]
+    on_slats = (abs(x) < 1.0) & ((x + 2.0) % 0.25 > 0.02) & ((x + 2.0) % 0.25 < 0.105)
+    expected = expected_visibility(source, bars, size)
+    errors = {}
+    for rule in ("BOUNDS", "MEAN"):
+        candela.vssm_rule = rule
+        errors[rule] = rms(visibility(floor, source, 1, size)[on_slats], expected[on_slats])
+    assert errors["BOUNDS"] < 0.03
+    assert errors["BOUNDS"] < 0.3 * errors["MEAN"]
