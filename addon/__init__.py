@@ -4,20 +4,26 @@
 def register():
     """Called by Blender when the extension is enabled."""
     from . import cli, engine
-    from .ui import panels, properties
+    from .ui import panels, pass_operators, pass_run, pass_tree, properties
 
+    pass_tree.register()
     properties.register()
     engine.register()
+    pass_run.register()
     panels.register()
+    pass_operators.register()
     cli.register()
 
 
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
     from . import cli, engine
-    from .ui import panels, properties
+    from .ui import panels, pass_operators, pass_run, pass_tree, properties
 
     cli.unregister()
+    pass_operators.unregister()
     panels.unregister()
+    pass_run.unregister()
     engine.unregister()
     properties.unregister()
+    pass_tree.unregister()

@@ -20,6 +20,7 @@ from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
 from .snapshot.scene import Snapshot
 from .techniques import make_registry
+from .techniques.film import resolve
 from .ui import ENGINE
 from .ui.passes import RenderPass, wanted_passes
 from .ui.properties import settings_of
@@ -116,7 +117,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         shared = session(scene, "preview" if self.is_preview else "final")
         settings = settings_of(scene, viewport=False, preview=self.is_preview)
         try:
-            with viewport.turn:
+            with context.turn:
                 frame = shared.renderer.begin(snapshot, settings, self._compiling)
             frame.ledger.times["sync"] = self._sync_seconds
             width, height = frame.size
@@ -124,15 +125,15 @@ class CandelaEngine(bpy.types.RenderEngine):
             while frame.samples_done < settings.samples:
                 if self.test_break():
                     self.end_result(result, cancel=True)
-                    with viewport.turn:
+                    with context.turn:
                         shared.renderer.finish(frame, ())
                     return
-                with viewport.turn:
+                with context.turn:
                     shared.renderer.advance(frame)
                 self.update_stats("Candela", f"Sample {frame.samples_done} of {settings.samples}")
                 self.update_progress(frame.samples_done / settings.samples)
             wanted = wanted_passes(layer)
-            with viewport.turn:
+            with context.turn:
                 pixels = _finished(shared.renderer, frame, wanted)
             for name, array in pixels.items():
                 render_pass = result.layers[0].passes.find_by_name(name, "")
@@ -176,30 +177,7 @@ class CandelaEngine(bpy.types.RenderEngine):
 
 def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
-    from .techniques.film import resolve
-
     resolve(frame)
-    names = {"film.combined"}
-    for asked in wanted:
-        names.update(asked.source.split(" / "))
-    arrays = renderer.finish(frame, sorted(names))
-    out = {"Combined": arrays["film.combined"]}
-    exposure = frame.snapshot.film.exposure
-    for asked in wanted:
-        image, _, color = asked.source.partition(" / ")
-        pixels = arrays[image][..., : len(asked.channels)]
-        if color:
-            pixels = divide_by_color(pixels, arrays[color][..., :3])
-        if image.startswith("radiance."):
-            pixels = pixels * exposure
-        out[asked.name] = pixels
-    return out
-
-
-def divide_by_color(light: np.ndarray, color: np.ndarray) -> np.ndarray:
-    """Light over colour per channel, as Cycles writes its passes: a channel without colour takes the mean of others."""
-    has = color != 0.0
-    quotient = np.where(has, light / np.where(has, color, 1.0), 0.0)
-    count = has.sum(axis=-1, keepdims=True)
-    mean = quotient.sum(axis=-1, keepdims=True) / np.maximum(count, 1)
-    return np.where(has, quotient, mean).astype(np.float32)
+    arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
+    pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
+    return {"Combined": arrays["film.combined"], **pixels}

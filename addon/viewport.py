@@ -13,7 +13,6 @@ the instance's end itself, which may come where no GPU context is, but by a time
 
 from __future__ import annotations
 
-import threading
 import time
 import traceback
 import weakref
@@ -30,6 +29,7 @@ from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import context as gpu_context
 from .gfx import images, library
+from .gfx.context import turn
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, camera_of_view, take
 from .snapshot.scene import Camera, Snapshot
 from .techniques.film import resolve
@@ -41,10 +41,7 @@ REST_S = 0.25  # without a change for so long, the picture is drawn in full reso
 SCALES = (1, 2, 4, 8)  # screen pixels per side of a drawn pixel
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
 
-# GPU programs hold the constants of their next draw, for all contexts together. A final render draws from a thread of
-# its own, so whoever draws takes a turn; the longest turn is one sample.
-turn = threading.Lock()
-TURN_WAIT_S = 0.02
+TURN_WAIT_S = 0.02  # for the GPU, while a final render draws a sample
 
 
 @dataclass

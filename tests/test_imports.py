@@ -37,6 +37,7 @@ ROOMS = {
     "techniques": Room(rooms=BELOW_TECHNIQUES, modules=("numpy",)),
     "compare": Room(rooms=BELOW_COMPARE, modules=("numpy",), optional=("flip_evaluator", "matplotlib")),
     "compare.reference": Room(rooms=BELOW_COMPARE, modules=BLENDER),
+    "compare.beside": Room(rooms=BELOW_COMPARE, modules=BLENDER),
     "ui": Room(rooms=(*BELOW_COMPARE, "compare"), modules=(*BLENDER, "gpu")),
     "viewport": Room(rooms=(*BELOW_COMPARE, "ui"), modules=(*BLENDER, "gpu", "gpu_extras")),
     "engine": Room(rooms=(*BELOW_COMPARE, "ui", "viewport"), modules=(*BLENDER, "gpu")),

@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from addon import engine, viewport
 from addon.frame import ledger
-from addon.gfx import images
+from addon.gfx import context, images
 from addon.snapshot import camera_of_scene, camera_of_view, take
 from addon.ui import ENGINE
 from addon.ui.properties import settings_of
@@ -214,7 +214,8 @@ def test_sample_that_was_left_unfinished_is_not_continued_from(scene, region):
 
 
 @pytest.mark.parametrize("scale", [1, 4])
-def test_only_the_border_is_drawn(region, scale):
+def test_only_the_border_is_drawn(scene, region, scale):
+    scene.candela.bounces = 0  # which lights stand for indirect light follows from what the picture shows
     whole = region.rest()
     border = (24, 16, 72, 40)
     settings = settings_of(bpy.context.scene, viewport=True)
@@ -451,7 +452,7 @@ def test_region_shows_its_picture_while_another_renders(window):
     made = Engine()
     window.update(made)
     window.draw(made)
-    with viewport.turn:
+    with context.turn:
         before = made.redraws
         pixels = window.draw(made)
     assert made.redraws > before

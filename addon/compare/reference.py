@@ -146,15 +146,20 @@ def reference(
     found = cache.load(folder, key) if folder else None
     if found:
         return found
-    first, second = (render_passes(scene, "CYCLES", samples, seed, direct_only, size, view_layer) for seed in SEEDS)
-    images, half = cache.two_seeds(first.images, second.images)
-    made = Reference(images, half, samples, first.seconds + second.seconds, first.film_transparent, False, key)
+    made = render_reference(scene, samples, direct_only, size, view_layer, key)
     if folder:
         try:
             cache.save(folder, made)
         except OSError as error:
             print(error)  # the comparison does not depend on it
     return made
+
+
+def render_reference(scene, samples: int, direct_only: bool, size, view_layer, key: str) -> Reference:
+    """The reference without the cache; arguments as in `reference`, all needed. Raises `RenderFailed`."""
+    first, second = (render_passes(scene, "CYCLES", samples, seed, direct_only, size, view_layer) for seed in SEEDS)
+    images, half = cache.two_seeds(first.images, second.images)
+    return Reference(images, half, samples, first.seconds + second.seconds, first.film_transparent, False, key)
 
 
 def cache_folder() -> Path:

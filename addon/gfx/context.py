@@ -7,6 +7,7 @@ one during a render by an engine with `bl_use_gpu_context`, and keep it afterwar
 from __future__ import annotations
 
 import inspect
+import threading
 import weakref
 from collections.abc import Callable
 
@@ -14,6 +15,11 @@ import bpy
 import gpu
 
 _releases: list[Callable[[], Callable[[], None] | None]] = []  # each gives the function, or None once it has gone
+
+
+# GPU programs hold the constants of their next draw, for all contexts together. A final render draws from a thread of
+# its own, so whoever draws takes a turn; the longest turn is one sample.
+turn = threading.Lock()
 
 
 def available() -> bool:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from . import nodes
 from .compiled import Attribute
-from .graph import Graph
+from .graph import Graph, Node
 from .nodes import entry as words
 
-IMPLICIT = {"@UV": Attribute("UV", ""), "@GENERATED": Attribute("GENERATED", "")}
+IMPLICIT = {
+    "@UV": Attribute("UV", ""), "@GENERATED": Attribute("GENERATED", ""), "@RADIAL": Attribute("GENERATED", ""),
+}  # fmt: skip
+
+
+def asked_for(node: Node, socket: words.Socket) -> bool:
+    """Whether the implicit value of an unlinked socket matters, see Socket.only_with."""
+    other = node.inputs.get(socket.only_with)
+    return not socket.only_with or (other is not None and (other.link is not None or bool(other.value)))
 
 
 def attributes_of(graph: Graph) -> frozenset[Attribute]:
@@ -21,6 +29,6 @@ def attributes_of(graph: Graph) -> frozenset[Attribute]:
                 found.add(Attribute(argument.kind, str(node.properties.get(argument.property, ""))))
             elif isinstance(argument, words.Socket) and argument.implicit in IMPLICIT:
                 given = node.inputs.get(argument.identifier)
-                if given is None or given.link is None:
+                if (given is None or given.link is None) and asked_for(node, argument):
                     found.add(IMPLICIT[argument.implicit])
     return frozenset(found)

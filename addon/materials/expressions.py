@@ -9,6 +9,7 @@ and called for both neighbours; at the point itself the height is an ordinary va
 from __future__ import annotations
 
 from . import nodes
+from .attributes import asked_for
 from .compiled import Attribute
 from .graph import Graph, Node
 from .nodes import entry as words
@@ -257,6 +258,12 @@ class Expressions:
                     f"The output '{given.link[1]}' of '{source.label}' is not supported yet; what it feeds keeps the "
                     "value set there.",
                 )
+        if not asked_for(node, socket):
+            return glsl_number(0.0, socket.kind)
+        if socket.implicit == "@RADIAL":
+            self.includes["material/input.glsl"] = None
+            generated = self._attribute(node, "GENERATED", "")
+            return f"surface_tangent(point, vec3(0.5 - {generated}.y, {generated}.x - 0.5, 0.0))"
         if socket.implicit == "@UV":
             return f"vec3({self._attribute(node, 'UV', '')}.xy, 0.0)"
         if socket.implicit == "@GENERATED":

@@ -48,11 +48,16 @@ def _plain(graph: Graph, link, images) -> tuple[np.ndarray, Image | None, np.nda
     if linked is not None and linked.type == "ShaderNodeTexEnvironment":
         image, mapping = images.get(linked.image), _direction(graph, linked.inputs.get("Vector"))
         equirectangular = linked.properties.get("projection", "EQUIRECTANGULAR") == "EQUIRECTANGULAR"
-        if image is None or mapping is None or not equirectangular:
+        if image is None or mapping is None or not equirectangular or _has_holes(image):
             return None
         return np.full(3, strength), image, mapping
     color, exact = constant_color(graph, node, "Color")
     return (color * strength, None, IDENTITY.copy()) if exact else None
+
+
+def _has_holes(image: Image) -> bool:
+    """Whether the colour has to be weighed by alpha."""
+    return image.alpha_mode == "STRAIGHT" and bool((image.pixels[..., 3] != 1.0).any())
 
 
 def _direction(graph: Graph, source) -> np.ndarray | None:

@@ -55,7 +55,10 @@ class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
     def draw(self, context):
         column = _columns(self)
         for slot in slots():
-            column.prop(context.scene.candela, f"slot_{slot}")
+            row = column.row()
+            row.active = context.scene.candela.pass_tree is None  # a tree decides by its nodes
+            row.prop(context.scene.candela, f"slot_{slot}")
+        column.prop(context.scene.candela, "pass_tree")
 
 
 def _technique_panel(technique) -> type:

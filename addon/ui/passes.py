@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,19 @@ class RenderPass:
     channels: str
     kind: str  # of the values, as Blender calls it
     source: str
+
+    @property
+    def images(self) -> list[str]:
+        """Names of the frame's images that it is made from."""
+        return self.source.split(" / ")
+
+    def pixels(self, arrays: dict[str, np.ndarray], exposure: float) -> np.ndarray:
+        """The pass, (H, W, channels) float32, from the frame's mean images."""
+        image, *color = self.images
+        pixels = arrays[image][..., : len(self.channels)]
+        if color:
+            pixels = divide_by_color(pixels, arrays[color[0]][..., :3])
+        return pixels * exposure if image.startswith("radiance.") else pixels
 
 
 # Switch of the view layer, Blender's name since 5.0 and before, channels, type, source.
@@ -47,3 +61,12 @@ PASSES = tuple(
 def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     """The passes that a view layer asks for."""
     return [render_pass for render_pass in PASSES if getattr(layer, render_pass.switch)]
+
+
+def divide_by_color(light: np.ndarray, color: np.ndarray) -> np.ndarray:
+    """Light over colour per channel, as Cycles writes its passes: a channel without colour takes the mean of others."""
+    has = color != 0.0
+    quotient = np.where(has, light / np.where(has, color, 1.0), 0.0)
+    count = has.sum(axis=-1, keepdims=True)
+    mean = quotient.sum(axis=-1, keepdims=True) / np.maximum(count, 1)
+    return np.where(has, quotient, mean).astype(np.float32)

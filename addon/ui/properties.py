@@ -7,6 +7,7 @@ import bpy
 from ..frame.settings import AUTO, BOUNCES, SAMPLES, SEED, Settings
 from ..frame.technique import Param
 from ..techniques import REGISTRY
+from .pass_tree import TREE, order_of
 
 
 def _property(param: Param, **changes):
@@ -53,6 +54,10 @@ def _annotations() -> dict:
         "seed": _property(SEED),
         "bounces": _property(BOUNCES),
     }
+    out["pass_tree"] = bpy.props.PointerProperty(
+        type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE,
+        description="Render the passes of this tree; without one, Candela chooses them by slot and scene",
+    )  # fmt: skip
     for slot in slots():
         out[f"slot_{slot}"] = bpy.props.EnumProperty(
             name=slot.capitalize(), description=f"Technique for the {slot} slot", items=_slot_items(slot), default=AUTO
@@ -73,12 +78,14 @@ CandelaSceneSettings = type(
 def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
     """The scene's Blender properties as plain settings."""
     group = scene.candela
+    tree = group.pass_tree
     samples = 8 if preview else (group.viewport_samples if viewport else group.samples)
     return Settings(
         samples=samples,
         whole=not viewport,
         seed=group.seed,
         bounces=group.bounces,
+        passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
         values={
             (technique.name, param.name): getattr(group, identifier(technique.name, param.name))

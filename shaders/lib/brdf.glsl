@@ -4,7 +4,8 @@
 #include "lib/energy.glsl"
 #include "lib/gbuffer.glsl"
 
-// Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model.
+// Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model. That term depends on
+// the colour; below a layer it gets the colour times what the layer leaves, which darkens it (plastic: 0.6 % at most).
 float oren_nayar_albedo_term(float c)
 {
   c = clamp(c, 0.0, 1.0);

@@ -42,7 +42,7 @@ float view_cosine(SurfacePoint point, vec3 normal)
   return clamp(dot(normal, point.incoming), 0.0, 1.0);
 }
 
-// Around the vertical axis, which is the tangent of any surface of revolution about it, such as a lathed pan.
+// Any direction that changes smoothly, for lobes without one and where none can be told.
 vec3 default_tangent(vec3 normal)
 {
   return unit_or(vec3(-normal.y, normal.x, 0.0), vec3(1.0, 0.0, 0.0));

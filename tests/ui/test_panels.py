@@ -79,7 +79,9 @@ def test_every_slot_and_parameter_has_a_place(scene):
         if technique.params:
             shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_{technique.name}"))
     assert sorted(shown) == sorted(
-        [f"slot_{slot}" for slot in slots()] + [identifier(t.name, p.name) for t in REGISTRY for p in t.params]
+        ["pass_tree"]
+        + [f"slot_{slot}" for slot in slots()]
+        + [identifier(t.name, p.name) for t in REGISTRY for p in t.params]
     )
 
 

@@ -27,7 +27,8 @@ class Socket:
     identifier: str
     kind: str  # FLOAT, VECTOR, COLOR
     default: Number = 0.0
-    implicit: str = ""  # GLSL expression; "@UV", "@GENERATED": coordinates of that attribute
+    implicit: str = ""  # GLSL expression; "@UV", "@GENERATED": that attribute; "@RADIAL": around Generated's z
+    only_with: str = ""  # another socket: while it is unlinked and 0, nobody asks for the implicit value, which is 0
     clamp: str = ""  # name of a boolean property of the node: when true the argument is clamped to 0..1
 
 

@@ -18,9 +18,8 @@ OTHER_DISTRIBUTIONS = (
     ("distribution", ("BECKMANN", "ASHIKHMIN_SHIRLEY"), "This distribution of microfacets is drawn as GGX."),
 )
 NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
-TANGENT = Socket("Tangent", "VECTOR", implicit="vec3(0.0)")
+TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
-OUTSIDE_TANGENT = "Without a Tangent node, anisotropy runs around the world's vertical axis instead of the object's."
 STRAIGHT_THROUGH = "Light passes straight through, without refraction or roughness."
 SUBSURFACE = "Subsurface scattering is drawn as diffuse."
 THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
@@ -102,7 +101,7 @@ PRINCIPLED = Entry(
         Socket("Specular Tint", "COLOR", WHITE),
         Socket("Anisotropic", "FLOAT"),
         Socket("Anisotropic Rotation", "FLOAT"),
-        TANGENT,
+        Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropic"),
         Socket("Transmission Weight", "FLOAT"),
         Socket("Coat Weight", "FLOAT"),
         Socket("Coat Roughness", "FLOAT", 0.03),
@@ -121,12 +120,10 @@ PRINCIPLED = Entry(
         Approximation("Subsurface Weight", 0.0, SUBSURFACE),
         Approximation("Transmission Weight", 0.0, STRAIGHT_THROUGH),
         THIN_FILM,
-        Approximation("Anisotropic", 0.0, OUTSIDE_TANGENT, unless_linked="Tangent"),
     ),
     summary=_principled,
 )
 
-ANISOTROPY = Approximation("Anisotropy", 0.0, OUTSIDE_TANGENT, unless_linked="Tangent")
 SHEEN = (Socket("Color", "COLOR", GREY), Socket("Roughness", "FLOAT", 0.5), NORMAL)
 TOON = (Socket("Color", "COLOR", GREY), Socket("Size", "FLOAT", 0.5), Socket("Smooth", "FLOAT"), NORMAL)
 GLOSSY_SHAPE = (
@@ -152,7 +149,6 @@ ENTRIES = (
         "shader_glossy",
         (Socket("Color", "COLOR", GREY), *GLOSSY_SHAPE),
         include="material/shader.glsl",
-        approximations=(ANISOTROPY,),
         setting_approximations=OTHER_DISTRIBUTIONS,
         summary=_glossy,
     ),
@@ -162,7 +158,7 @@ ENTRIES = (
         (Socket("Base Color", "COLOR", GREY), Socket("Edge Tint", "COLOR", WHITE), *GLOSSY_SHAPE),
         include="material/shader.glsl",
         when={"fresnel_type": "F82"},
-        approximations=(ANISOTROPY, THIN_FILM),
+        approximations=(THIN_FILM,),
         setting_approximations=OTHER_DISTRIBUTIONS,
         summary=_glossy,
     ),
@@ -172,7 +168,7 @@ ENTRIES = (
         (Socket("IOR", "VECTOR", (2.757, 2.513, 2.231)), Socket("Extinction", "VECTOR", (3.867, 3.404, 3.009)))
         + GLOSSY_SHAPE,
         include="material/shader.glsl",
-        approximations=(ANISOTROPY, THIN_FILM),
+        approximations=(THIN_FILM,),
         setting_approximations=OTHER_DISTRIBUTIONS,
         note="The reflectance of the physical conductor is fitted by an F82 curve.",
         summary=_glossy,

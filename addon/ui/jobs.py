@@ -1,0 +1,85 @@
+"""Work that takes its time, as an operator: at once from a script, step by step with progress and Esc in a window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+TICK_S = 0.02  # between two steps of a job, in which Blender answers
+
+
+class Job:
+    """Base of operators whose work is the generator `work(context)`.
+
+    It yields (share done, sentence) and may end early with a ValueError or RuntimeError, which becomes a report. What
+    it holds must be given back in a `finally`: on Esc it is closed. One job runs at a time.
+    """
+
+    running: Job | None = None
+
+    @classmethod
+    def poll(cls, context):
+        return Job.running is None
+
+    def work(self, context) -> Iterator[tuple[float, str]]:
+        raise NotImplementedError
+
+    def execute(self, context):
+        try:
+            for _ in self.work(context):
+                pass
+        except (ValueError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def invoke(self, context, event):
+        if bpy.app.background:
+            return self.execute(context)
+        Job.running = self
+        self._work = self.work(context)
+        self._timer = context.window_manager.event_timer_add(TICK_S, window=context.window)
+        context.window_manager.progress_begin(0, 100)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self._work.close()
+            self._end(context)
+            self.report({"INFO"}, f"{self.bl_label} was cancelled.")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            share, sentence = next(self._work)
+            context.window_manager.progress_update(100 * share)
+            context.workspace.status_text_set(f"{self.bl_label}: {sentence} — Esc to cancel")
+        except StopIteration:
+            self._end(context)
+            return {"FINISHED"}
+        except (ValueError, RuntimeError) as error:
+            self._end(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except BaseException:
+            self._end(context)
+            raise
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Blender ends the operator: the window is closed or another file is opened."""
+        self._work.close()
+        Job.running = None
+
+    def _end(self, context) -> None:
+        Job.running = None
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+        for window in manager.windows:
+            for area in window.screen.areas:
+                if area.type in ("NODE_EDITOR", "IMAGE_EDITOR", "PROPERTIES"):
+                    area.tag_redraw()

@@ -1,0 +1,276 @@
+"""What can be done with a pass tree: make it of what Auto planned, run it, compare it with Cycles, keep a picture.
+
+All work in background mode too, on the tree that is named; in the node editor on the one that is shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import bpy
+
+from ..compare import metrics
+from ..compare.beside import reference_steps
+from ..frame import pass_graph
+from ..frame.plan import PlanError, make_plan
+from ..snapshot import SnapshotCache, UnsupportedScene, take
+from ..techniques import REGISTRY, make_registry
+from . import ENGINE, shown_images
+from .jobs import Job
+from .pass_run import Rendered, reference_images, render_steps
+from .pass_tree import (
+    TREE,
+    Result,
+    checked,
+    fill,
+    forget_results,
+    graph_of,
+    pictures_of,
+    result,
+    set_result,
+)
+from .properties import settings_of
+
+
+def tree_of(context, name: str):
+    """The tree that is meant: by name, else the one in the node editor, else the scene's. ValueError if none is."""
+    if name:
+        tree = bpy.data.node_groups.get(name)
+        if tree is None or tree.bl_idname != TREE:
+            raise ValueError(f"There is no pass tree '{name}'.")
+        return tree
+    space = context.space_data
+    tree = space.edit_tree if space is not None and space.type == "NODE_EDITOR" else None
+    tree = tree if tree is not None and tree.bl_idname == TREE else context.scene.candela.pass_tree
+    if tree is None:
+        raise ValueError("No pass tree is open: choose New from Auto first.")
+    return tree
+
+
+def run_size(scene, tree) -> tuple[int, int]:
+    """Width and height of a run in pixels."""
+    share = scene.render.resolution_percentage / 100 * tree.percentage / 100
+    return max(int(scene.render.resolution_x * share), 1), max(int(scene.render.resolution_y * share), 1)
+
+
+class _OnTree:
+    tree: bpy.props.StringProperty(
+        name="Tree", description="Name of the pass tree; by default the one that is open", options={"SKIP_SAVE"}
+    )
+
+
+class CANDELA_OT_passes_from_auto(_OnTree, bpy.types.Operator):
+    """Make a pass tree of what Auto would run for this scene now"""
+
+    bl_idname = "candela.passes_from_auto"
+    bl_label = "New from Auto"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        scene = context.scene
+        try:
+            snapshot = take(context.evaluated_depsgraph_get(), SnapshotCache(), 64, 64)
+            plan = make_plan(make_registry(), snapshot, replace(settings_of(scene, viewport=False), passes=None))
+        except (UnsupportedScene, PlanError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        tree = bpy.data.node_groups.new(self.tree or "Passes", TREE)
+        graph = pass_graph.from_plan(plan)
+        fill(tree, graph, pass_graph.depths(graph))
+        scene.candela.pass_tree = tree
+        space = context.space_data
+        if space is not None and space.type == "NODE_EDITOR" and space.tree_type == TREE:
+            space.node_tree = tree
+        return {"FINISHED"}
+
+
+class CANDELA_OT_passes_run(_OnTree, Job, bpy.types.Operator):
+    """Run the passes, and show each one's picture and time on its node and the output in the Image Editor"""
+
+    bl_idname = "candela.passes_run"
+    bl_label = "Run"
+
+    node: bpy.props.StringProperty(
+        name="Node", description="Run only what this node needs, and show it", options={"SKIP_SAVE"}
+    )
+    compare: bpy.props.BoolProperty(
+        name="Compare", description="Compare what comes out with Cycles", options={"SKIP_SAVE", "HIDDEN"}
+    )
+
+    def work(self, context) -> Iterator[tuple[float, str]]:
+        scene, tree = context.scene, tree_of(context, self.tree)
+        if self.node and self.node not in tree.nodes:
+            raise ValueError(f"The tree '{tree.name}' has no node '{self.node}'.")
+        found = checked(graph_of(tree), self.node)
+        if not found.order:
+            raise ValueError(
+                "Nothing leads to an Image Output: link a pass to one, or choose New from Auto."
+                if not self.node
+                else f"'{self.node}' needs no pass to be run."
+            )
+        size, share = run_size(scene, tree), 0.5 if self.compare else 1.0
+        settings = replace(settings_of(scene, viewport=False), samples=tree.samples, passes=found.order, profile=True)
+        depsgraph = context.evaluated_depsgraph_get()
+        for done, sentence in (steps := _Returning(render_steps(scene, depsgraph, size, settings))):
+            yield share * done, sentence
+        rendered, reference = steps.value, None
+        if self.compare:
+            steps = _Returning(reference_steps(scene, tree.reference_samples, size=size, view_layer=context.view_layer))
+            for done in steps:
+                yield share + (1 - share) * done, "Cycles renders the reference"
+            reference = steps.value
+        truth = reference_images(reference) if reference is not None else {}
+        self._show(context, tree, rendered, truth, reference)
+        yield 1.0, "done"
+
+    def _show(self, context, tree, rendered: Rendered, truth: dict, reference) -> None:
+        shown = pictures_of(tree, rendered.images, truth)
+        errors = _errors(rendered, reference) if reference is not None else {}
+        forget_results(tree)
+        times = {row.name: row.milliseconds for row in rendered.ledger.rows if row.state == "ran"}
+        writers = {name: technique for technique in REGISTRY for name in (w.name for w in technique.writes)}
+        for node in tree.nodes:
+            if node.name not in shown and getattr(node, "technique", "") not in times:
+                continue
+            lines = [line for name, line in errors.items() if node.technique and writers[name].name == node.technique]
+            set_result(node, Result(shown.get(node.name), times.get(node.technique), lines))
+        outputs = [node for node in tree.nodes if node.bl_idname == "CandelaPassOutput" and node.name in shown]
+        best = self.node or next((node.name for node in outputs), "")
+        if best in shown:
+            shown_images.show(context, f"Candela {tree.name}", shown[best])
+
+
+def _errors(rendered: Rendered, reference) -> dict[str, str]:
+    """A line about each image of the frame that Cycles has a picture of."""
+    (mean, half), lines = reference.paths(), {}
+    for name, truth in reference_images(reference).items():
+        if name not in rendered.images or name == "film.depth":
+            continue
+        path = name.removeprefix("radiance.")
+        exposure = rendered.exposure if name.startswith("radiance.") else 1.0
+        noise = half.get(path) if path in mean else None
+        error = metrics.compare_radiance(path, rendered.images[name][..., :3] * exposure, truth, noise)
+        relmse, _, _, bias, _ = metrics.figures(error)
+        lines[name] = f"{path.replace('_', ' ')}: relMSE {relmse}, bias {bias}"
+    return lines
+
+
+class _Returning:
+    """Iterates a generator and keeps what it returns as `value`."""
+
+    def __init__(self, generator):
+        self._generator = generator
+
+    def __iter__(self):
+        self.value = yield from self._generator
+
+
+class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
+    """Run only what the active node needs, and show what it gives"""
+
+    bl_idname = "candela.passes_run_to_node"
+    bl_label = "Run to Node"
+
+    @classmethod
+    def poll(cls, context):
+        space = context.space_data
+        return Job.running is None and space is not None and space.type == "NODE_EDITOR" and context.active_node
+
+    def execute(self, context):
+        return bpy.ops.candela.passes_run("INVOKE_DEFAULT", tree=self.tree, node=context.active_node.name)
+
+
+class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
+    """Run the passes and Cycles, and show the error of each light path on the nodes. The reference is kept"""
+
+    bl_idname = "candela.passes_compare"
+    bl_label = "Compare with Cycles"
+
+    @classmethod
+    def poll(cls, context):
+        return Job.running is None
+
+    def execute(self, context):
+        mode = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+        return bpy.ops.candela.passes_run(mode, tree=self.tree, compare=True)
+
+
+class CANDELA_OT_passes_bake(_OnTree, bpy.types.Operator):
+    """Keep a node's picture of the last run as an image in this file, in scene-linear floats"""
+
+    bl_idname = "candela.passes_bake"
+    bl_label = "Bake to Image"
+    bl_options = {"REGISTER", "UNDO"}
+
+    node: bpy.props.StringProperty(
+        name="Node", description="Node whose picture is kept; by default the active one", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context):
+        try:
+            tree = tree_of(context, self.tree)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        node = tree.nodes.get(self.node) if self.node else tree.nodes.active
+        found = result(node) if node is not None else None
+        if found is None or found.picture is None:
+            self.report({"ERROR"}, "The node has no picture yet: run the tree first, and choose a node that shows one.")
+            return {"CANCELLED"}
+        image = shown_images.write(f"{tree.name} {node.name}", found.picture)
+        image.pack()
+        image.use_fake_user = True
+        self.report({"INFO"}, f"The picture is kept as image '{image.name}'.")
+        return {"FINISHED"}
+
+
+class NODE_PT_candela_passes(bpy.types.Panel):
+    bl_label = "Passes"
+    bl_space_type = "NODE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Candela"
+
+    @classmethod
+    def poll(cls, context):
+        return context.space_data.tree_type == TREE
+
+    def draw(self, context):
+        layout, tree = self.layout, context.space_data.edit_tree
+        layout.operator("candela.passes_from_auto", icon="ADD")
+        if tree is None:
+            return
+        settings = layout.column()
+        settings.use_property_split, settings.use_property_decorate = True, False
+        settings.prop(tree, "samples")
+        settings.prop(tree, "percentage")
+        settings.prop(tree, "reference_samples")
+        column = layout.column(align=True)
+        column.operator("candela.passes_run", icon="PLAY")
+        column.operator("candela.passes_run_to_node", icon="NODE")
+        column.operator("candela.passes_compare", icon="SPLIT_HORIZONTAL")
+        column.operator("candela.passes_bake", icon="IMAGE_DATA")
+        row = layout.column()
+        row.use_property_split, row.use_property_decorate = True, False
+        if context.scene.render.engine == ENGINE:
+            row.prop(context.scene.candela, "pass_tree", text="Render With")
+
+
+_CLASSES = (
+    CANDELA_OT_passes_from_auto,
+    CANDELA_OT_passes_run,
+    CANDELA_OT_passes_run_to_node,
+    CANDELA_OT_passes_compare,
+    CANDELA_OT_passes_bake,
+    NODE_PT_candela_passes,
+)
+
+
+def register() -> None:
+    for made in _CLASSES:
+        bpy.utils.register_class(made)
+
+
+def unregister() -> None:
+    for made in reversed(_CLASSES):
+        bpy.utils.unregister_class(made)

@@ -1,0 +1,115 @@
+"""Rendering outside of Blender's render jobs: the frame's own images, for the pass tree and for comparisons.
+
+Pictures are plain arrays here, by the frame's names. The renderers are kept by scene, so that a second run of a tree
+that has changed a little does little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ..compare.cache import Reference
+from ..compare.passes import IMAGE_OF_PASS, Passes
+from ..frame.ledger import Ledger
+from ..frame.run import Renderer
+from ..frame.settings import Settings
+from ..gfx import context as gpu_context
+from ..gfx import images
+from ..gfx.context import turn
+from ..snapshot import SnapshotCache, UnsupportedScene, take
+from ..techniques import make_registry
+from ..techniques.film import resolve
+from .passes import PASSES
+
+
+@dataclass
+class Rendered:
+    """What came out of a run: mean images by the frame's names, (H, W, C) float32, bottom row first."""
+
+    images: dict[str, np.ndarray]
+    ledger: Ledger
+    samples: int
+    seed: int
+    exposure: float
+    film_transparent: bool
+
+    def passes(self) -> Passes:
+        """The same under the names of comparisons, made as a final render makes its passes."""
+        named = {"combined": self.images["film.combined"]}
+        for made in PASSES:
+            if all(name in self.images for name in made.images):
+                named[IMAGE_OF_PASS[made.name]] = made.pixels(self.images, self.exposure)
+        seconds = self.ledger.times.get("total", 0.0)
+        return Passes(named, "CANDELA", self.samples, self.seed, seconds, self.film_transparent)
+
+
+@dataclass
+class _Kept:
+    renderer: Renderer = field(default_factory=lambda: Renderer(make_registry))
+    cache: SnapshotCache = field(default_factory=SnapshotCache)
+
+
+_kept: dict[int, _Kept] = {}  # by session_uid of the scene
+
+
+def render_steps(scene, depsgraph, size: tuple[int, int], settings: Settings) -> Iterator[tuple[float, str]]:
+    """Render the scene with these settings; yields the share done and a sentence, returns `Rendered`.
+
+    Raises ValueError with a sentence when there is nothing to look through or the passes do not fit together, and
+    RuntimeError when the GPU cannot.
+    """
+    gpu_context.ensure()
+    kept = _kept.setdefault(scene.session_uid, _Kept())
+    try:
+        snapshot = take(depsgraph, kept.cache, *size)
+    except UnsupportedScene as error:
+        raise ValueError(str(error)) from None
+    yield 0.0, "compiling shaders"
+    with turn:
+        frame = kept.renderer.begin(snapshot, settings)
+    while frame.samples_done < settings.samples:
+        with turn:
+            kept.renderer.advance(frame)
+        yield frame.samples_done / settings.samples, f"sample {frame.samples_done} of {settings.samples}"
+    with turn:
+        if "film.combined" in frame.images:
+            resolve(frame)
+        colors = sorted(name for name, image in frame.images.items() if image.format == "RGBA32F")
+        arrays = kept.renderer.finish(frame, colors)
+    ledger = frame.ledger
+    ledger.times["total"] = sum(ledger.times.values())
+    return Rendered(arrays, ledger, settings.samples, settings.seed, snapshot.film.exposure, snapshot.film.transparent)
+
+
+def reference_images(reference: Reference) -> dict[str, np.ndarray]:
+    """Cycles' pictures under the frame's names, where both mean the same."""
+    paths, _ = reference.paths()
+    found = {f"radiance.{name}": path for name, path in paths.items()}
+    found |= {f"color.{name.removesuffix('_color')}": p for name, p in reference.images.items() if "_color" in name}
+    return found | {"film.combined": reference.images["combined"], "film.depth": reference.images["depth"]}
+
+
+def free() -> None:
+    """Free what runs hold."""
+    for kept in _kept.values():
+        kept.renderer.release()
+    _kept.clear()
+    images.pool.trim()
+
+
+@bpy.app.handlers.persistent
+def _another_file(*_) -> None:
+    free()
+
+
+def register() -> None:
+    bpy.app.handlers.load_post.append(_another_file)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_another_file)
+    free()

@@ -1,0 +1,37 @@
+"""Pictures as Blender's images, so that the Image Editor can show them."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+
+def write(name: str, picture: np.ndarray):
+    """The image of this name with the content of `picture`, (H, W, 1 to 4) scene-linear; made if it is not there."""
+    height, width = picture.shape[:2]
+    image = bpy.data.images.get(name)
+    if image is None or image.source != "GENERATED" or not image.is_float:
+        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    pixels = np.ones((height, width, 4), np.float32)
+    channels = picture.shape[2]
+    if channels < 3:
+        pixels[..., :3] = picture[..., :1]
+    else:
+        pixels[..., :channels] = picture
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    return image
+
+
+def show(context, name: str, picture: np.ndarray):
+    """Write the image and show it in every Image Editor of the window that shows nothing else of the artist's."""
+    image = write(name, picture)
+    window = context.window
+    for area in window.screen.areas if window is not None else ():
+        space = area.spaces.active
+        if area.type == "IMAGE_EDITOR" and (space.image is None or space.image.name.startswith("Candela ")):
+            space.image = image
+            area.tag_redraw()
+    return image
