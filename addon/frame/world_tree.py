@@ -24,6 +24,7 @@ import numpy as np
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
+from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..snapshot.scene import Image, Note, World
 from .materials import MATERIAL_SCENE, upload_image, values_block, values_struct
@@ -53,7 +54,7 @@ class WorldTree:
         """Radiance that arrives from all directions, (H, W, 3) float64, equirectangular, bottom row first."""
         with images.borrowed(*self.size, "RGBA32F") as target:
             passes.fullscreen(
-                self._program("world bake", "world/bake.frag.glsl", (), ()),
+                bake_program(self.compiled),
                 target,
                 textures=self._textures,
                 blocks={"material_values": self._values, "material_scene": self._scene},
@@ -72,32 +73,44 @@ class WorldTree:
                 "window": (left, bottom, right - left, top - bottom),
             }
         )
-        seen = ("surface_position", "surface_emission")
         passes.fullscreen(
-            self._program("world background", "world/background.frag.glsl", seen, ((VIEW, "film_view"),)),
+            background_program(self.compiled),
             target,
             blend="ADDITIVE_PREMULT",
-            textures={**self._textures, **{name: surfaces[name] for name in seen}},
+            textures={**self._textures, **{name: surfaces[name] for name in SEEN}},
             blocks={"material_values": self._values, "material_scene": self._scene, "film_view": view_block},
         )
 
-    def _program(self, name: str, fragment: str, textures: tuple, blocks: tuple) -> Program:
-        fill = "".join(
-            f"  point.attributes[{k}] = vec4(point.position, 1.0);\n"
-            for k, attribute in enumerate(self.compiled.attributes)
-            if attribute.kind == "GENERATED"
-        )
-        head = "void fill_attributes(inout SurfacePoint point)"
-        return passes.fullscreen_program(
-            f"{name} {self.compiled.program_key[:8]}",
-            fragment,
-            textures=tuple(("FLOAT_2D", name) for name in (*textures, *self._textures)),
-            blocks=(
-                *blocks, (values_struct(self.compiled), "material_values"), (MATERIAL_SCENE, "material_scene"),
-            ),
-            outputs=(("VEC4", "out_radiance"),),
-            snippets=(("generated/material", f"{self.compiled.glsl}\n{head}\n{{\n{fill}}}\n"),),
-        )  # fmt: skip
+
+SEEN = ("surface_position", "surface_emission")  # what the background pass reads of the surfaces
+
+
+def bake_program(compiled: CompiledMaterial) -> Program:
+    """Evaluates a world's tree for all directions."""
+    return _program(compiled, "world bake", "world/bake.frag.glsl")
+
+
+def background_program(compiled: CompiledMaterial) -> Program:
+    """Evaluates a world's tree where the camera sees it."""
+    return _program(compiled, "world background", "world/background.frag.glsl", SEEN, ((VIEW, "film_view"),))
+
+
+def _program(compiled: CompiledMaterial, name: str, fragment: str, textures: tuple = (), blocks: tuple = ()) -> Program:
+    fill = "".join(
+        f"  point.attributes[{k}] = vec4(point.position, 1.0);\n"
+        for k, attribute in enumerate(compiled.attributes)
+        if attribute.kind == "GENERATED"
+    )
+    head = "void fill_attributes(inout SurfacePoint point)"
+    own = ("energy_table", *(f"material_image{slot}" for slot in range(len(compiled.images))))
+    return passes.fullscreen_program(
+        f"{name} {compiled.program_key[:8]}",
+        fragment,
+        textures=tuple(("FLOAT_2D", name) for name in (*textures, *own)),
+        blocks=(*blocks, (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
+        outputs=(("VEC4", "out_radiance"),),
+        snippets=(("generated/material", f"{compiled.glsl}\n{head}\n{{\n{fill}}}\n"),),
+    )
 
 
 def _size(world: World, named: dict[str, Image]) -> tuple[int, int]:

@@ -8,6 +8,7 @@ import numpy as np
 
 import addon
 from addon.frame import materials
+from addon.frame.world_tree import background_program, bake_program
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
 from addon.materials import nodes
@@ -36,7 +37,7 @@ def programs() -> list[Program]:
     """Programs of passes and techniques, and of one material for each file that the node table includes."""
     plain = compile_material("plain", default_graph())
     files = sorted({entry.include for entry in nodes.REGISTRY if entry.include})
-    made = _found(Program)
+    made = [*_found(Program), materials._tint_program(plain), bake_program(plain), background_program(plain)]
     for length, file in enumerate(files, len(plain.values)):  # blocks of several lengths among the structs
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)
