@@ -4,7 +4,7 @@
 def register():
     """Called by Blender when the extension is enabled."""
     from . import cli, engine
-    from .ui import panels, pass_operators, pass_run, pass_tree, properties
+    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties
 
     pass_tree.register()
     properties.register()
@@ -12,15 +12,17 @@ def register():
     pass_run.register()
     panels.register()
     pass_operators.register()
+    compare_editor.register()
     cli.register()
 
 
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
     from . import cli, engine
-    from .ui import panels, pass_operators, pass_run, pass_tree, properties
+    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties
 
     cli.unregister()
+    compare_editor.unregister()
     pass_operators.unregister()
     panels.unregister()
     pass_run.unregister()

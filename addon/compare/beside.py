@@ -21,22 +21,23 @@ from . import cache
 from .reference import RenderFailed, active_view_layer, cache_folder, reference, reference_key, render_reference
 
 _SAMPLE = re.compile(r"Sample (\d+)/(\d+)")
+DOING = "Cycles renders the reference"
 LAST_LINES = 5  # of the other Blender's output, shown when it fails
 
 
 def reference_steps(
     scene: bpy.types.Scene, samples: int, direct_only: bool = False, size=None, view_layer=None
-) -> Iterator[float]:
-    """`reference` as a generator of the share that is done; returns the Reference. Closing it ends the other Blender.
+) -> Iterator[tuple[float, str]]:
+    """`reference` as a generator of (share done, sentence); returns the Reference. Closing it ends the other Blender.
 
     In background mode the reference is rendered here, in one step. Raises `RenderFailed`.
     """
     view_layer = view_layer or active_view_layer(scene)
     if bpy.app.background or not bpy.app.binary_path:
-        yield 0.0
+        yield 0.0, DOING
         return reference(scene, samples, direct_only, size, view_layer)
     key, folder = reference_key(scene, samples, direct_only, size, view_layer), cache_folder()
-    yield 0.0
+    yield 0.0, DOING
     if not (folder / f"{key}.npz").exists():
         with tempfile.TemporaryDirectory(prefix="candela_") as temporary:
             path = Path(temporary) / "scene.blend"
@@ -50,7 +51,7 @@ def reference_steps(
     return made
 
 
-def _watched(path: Path, output: Path, job: dict) -> Iterator[float]:
+def _watched(path: Path, output: Path, job: dict) -> Iterator[tuple[float, str]]:
     """Run the other Blender until it ends; yields the share of samples that its output tells."""
     program = f"import importlib; importlib.import_module({__name__!r}).run({json.dumps(job)!r})"
     command = [bpy.app.binary_path, "--background", str(path), "--python-exit-code", "1", "--python-expr", program]
@@ -60,7 +61,7 @@ def _watched(path: Path, output: Path, job: dict) -> Iterator[float]:
             while process.poll() is None:
                 told = [int(done) for done, _ in _SAMPLE.findall(output.read_text(errors="replace"))]
                 finished = sum(later < earlier for earlier, later in pairwise(told))
-                yield (finished + told[-1] / job["samples"]) / renders if told else 0.0
+                yield (finished + told[-1] / job["samples"]) / renders if told else 0.0, DOING
         finally:
             if process.poll() is None:
                 process.kill()

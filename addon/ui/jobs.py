@@ -9,6 +9,18 @@ import bpy
 TICK_S = 0.02  # between two steps of a job, in which Blender answers
 
 
+def part(steps: Iterator, first: float, last: float) -> Iterator[tuple[float, str]]:
+    """Steps of a part of a job, whose own shares run from 0 to 1, as shares of the whole; returns what they return."""
+    try:
+        while True:
+            share, sentence = next(steps)
+            yield first + (last - first) * share, sentence
+    except StopIteration as end:
+        return end.value
+    finally:
+        steps.close()
+
+
 class Job:
     """Base of operators whose work is the generator `work(context)`.
 

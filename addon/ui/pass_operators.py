@@ -17,7 +17,7 @@ from ..frame.plan import PlanError, make_plan
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
 from . import ENGINE, shown_images
-from .jobs import Job
+from .jobs import Job, part
 from .pass_run import Rendered, reference_images, render_steps
 from .pass_tree import (
     TREE,
@@ -112,14 +112,11 @@ class CANDELA_OT_passes_run(_OnTree, Job, bpy.types.Operator):
         size, share = run_size(scene, tree), 0.5 if self.compare else 1.0
         settings = replace(settings_of(scene, viewport=False), samples=tree.samples, passes=found.order, profile=True)
         depsgraph = context.evaluated_depsgraph_get()
-        for done, sentence in (steps := _Returning(render_steps(scene, depsgraph, size, settings))):
-            yield share * done, sentence
-        rendered, reference = steps.value, None
+        rendered = yield from part(render_steps(scene, depsgraph, size, settings), 0.0, share)
+        reference = None
         if self.compare:
-            steps = _Returning(reference_steps(scene, tree.reference_samples, size=size, view_layer=context.view_layer))
-            for done in steps:
-                yield share + (1 - share) * done, "Cycles renders the reference"
-            reference = steps.value
+            steps = reference_steps(scene, tree.reference_samples, settings.bounces == 0, size, context.view_layer)
+            reference = yield from part(steps, share, 1.0)
         truth = reference_images(reference) if reference is not None else {}
         self._show(context, tree, rendered, truth, reference)
         yield 1.0, "done"
@@ -154,16 +151,6 @@ def _errors(rendered: Rendered, reference) -> dict[str, str]:
         relmse, _, _, bias, _ = metrics.figures(error)
         lines[name] = f"{path.replace('_', ' ')}: relMSE {relmse}, bias {bias}"
     return lines
-
-
-class _Returning:
-    """Iterates a generator and keeps what it returns as `value`."""
-
-    def __init__(self, generator):
-        self._generator = generator
-
-    def __iter__(self):
-        self.value = yield from self._generator
 
 
 class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):

@@ -205,3 +205,19 @@ def test_opengl_and_vulkan_render_the_same_picture(installed):
     assert (wrong & ~other_surface).mean() <= 1e-4
     assert other_surface.mean() <= 0.005
     assert difference.mean() <= 0.02
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def passed(request, installed):
+    """The pass tree of one backend."""
+    return run_script(request.param, "passes")
+
+
+def test_pass_tree_is_made_run_and_compared_in_the_window(passed):
+    folder, result = passed
+    assert result.get("error") is None
+    assert not complaints(folder)
+    assert result["from_auto"] == ["FINISHED"]
+    assert result["times"]["Film"] > 0 and result["times"]["Direct light"] > 0
+    assert any(line.startswith("combined: relMSE") for line in result["errors"])
+    assert result["viewport"].startswith("Sample 4 of 4")

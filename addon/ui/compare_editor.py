@@ -1,0 +1,185 @@
+"""The comparison with Cycles in the Image Editor: one image that shows either engine, their difference or the error.
+
+The pictures of all light paths are kept as arrays; the image of this name is rewritten when another is chosen, so that
+one key press (or a click) swaps the two engines in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ..compare import metrics, pictures
+from ..compare.beside import reference_steps
+from ..compare.comparison import Picture, compare_passes
+from ..compare.report import shown_pixels
+from . import shown_images
+from .jobs import Job, part
+from .pass_run import render_steps
+from .properties import settings_of
+
+IMAGE = "Candela Comparison"
+VIEWS = (
+    ("CANDELA", "Candela", "The picture by Candela", 0),
+    ("CYCLES", "Cycles", "The reference by Cycles: the mean of two renders", 1),
+    ("DIFFERENCE", "Difference", "Absolute difference, channel by channel", 2),
+    ("ERROR", "Error", "Relative squared error of each pixel, from dark (1e-5) to light (10)", 3),
+)
+
+
+_rows: tuple[Picture, ...] = ()
+
+
+def latest() -> tuple[Picture, ...]:
+    """The rows of the last comparison; empty before the first."""
+    return _rows
+
+
+def picture_of(row: Picture, view: str) -> np.ndarray:
+    """What the image shows of a row, (H, W, 3) linear."""
+    if row.x is None or row.reference is None:
+        return np.zeros((1, 1, 3), np.float32)
+    if row.row.name in ("depth", "normal"):
+        x, reference = (shown_pixels(row.row.name, image, row.reference) for image in (row.x, row.reference))
+    else:
+        x, reference = row.x, row.reference
+    made = {
+        "CANDELA": lambda: x,
+        "CYCLES": lambda: reference,
+        "DIFFERENCE": lambda: pictures.difference(x, reference),
+        "ERROR": lambda: pictures.error_map(x, reference),
+    }
+    return np.nan_to_num(made[view]()[..., :3]).astype(np.float32)
+
+
+def _show(self, context) -> None:
+    rows = latest()
+    if rows:
+        shown_images.show(context, IMAGE, picture_of(rows[min(self.row, len(rows) - 1)], self.view))
+
+
+class CandelaComparison(bpy.types.PropertyGroup):
+    """What the Image Editor shows of the last comparison."""
+
+    samples: bpy.props.IntProperty(
+        name="Samples", description="Samples of Candela's picture", default=32, min=1, max=65536
+    )
+    reference_samples: bpy.props.IntProperty(
+        name="Reference Samples", description="Samples of each of the two renders by Cycles", default=128, min=1,
+        max=65536,
+    )  # fmt: skip
+    percentage: bpy.props.IntProperty(
+        name="Resolution", description="Size of the comparison, of the render's resolution", default=50, min=1, max=100,
+        subtype="PERCENTAGE",
+    )  # fmt: skip
+    view: bpy.props.EnumProperty(name="View", description="What the image shows", items=VIEWS, update=_show)
+    row: bpy.props.IntProperty(name="Light Path", description="Which light path it shows", min=0, update=_show)
+
+
+class CANDELA_OT_compare(Job, bpy.types.Operator):
+    """Render this scene with Candela and with Cycles, and compare every light path. The reference is kept"""
+
+    bl_idname = "candela.compare"
+    bl_label = "Compare with Cycles"
+
+    def work(self, context) -> Iterator[tuple[float, str]]:
+        scene, options = context.scene, context.window_manager.candela_comparison
+        share = scene.render.resolution_percentage * options.percentage / 10000
+        size = tuple(max(int(side * share), 1) for side in (scene.render.resolution_x, scene.render.resolution_y))
+        settings = replace(settings_of(scene, viewport=False), samples=options.samples)
+        layer = context.view_layer
+        rendered = yield from part(render_steps(scene, context.evaluated_depsgraph_get(), size, settings), 0.0, 0.5)
+        steps = reference_steps(scene, options.reference_samples, settings.bounces == 0, size, layer)
+        reference = yield from part(steps, 0.5, 1.0)
+        global _rows
+        _rows = compare_passes(rendered.passes(), reference, with_flip=False)
+        _show(options, context)
+        yield 1.0, "done"
+
+
+class CANDELA_OT_compare_show(bpy.types.Operator):
+    """Show this light path"""
+
+    bl_idname = "candela.compare_show"
+    bl_label = "Show Light Path"
+    bl_options = {"INTERNAL"}
+
+    row: bpy.props.IntProperty(options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        context.window_manager.candela_comparison.row = self.row
+        return {"FINISHED"}
+
+
+class CANDELA_OT_compare_swap(bpy.types.Operator):
+    """Swap the picture by Candela and the one by Cycles in place"""
+
+    bl_idname = "candela.compare_swap"
+    bl_label = "Swap Candela and Cycles"
+
+    @classmethod
+    def poll(cls, context):
+        return bool(latest())
+
+    def execute(self, context):
+        options = context.window_manager.candela_comparison
+        options.view = "CYCLES" if options.view == "CANDELA" else "CANDELA"
+        return {"FINISHED"}
+
+
+class IMAGE_PT_candela_compare(bpy.types.Panel):
+    bl_label = "Compare with Cycles"
+    bl_space_type = "IMAGE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Candela"
+
+    def draw(self, context):
+        layout, options = self.layout, context.window_manager.candela_comparison
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(options, "samples")
+        column.prop(options, "reference_samples")
+        column.prop(options, "percentage")
+        layout.operator("candela.compare", icon="PLAY")
+        if not latest():
+            return
+        layout.row(align=True).prop(options, "view", expand=True)
+        layout.operator("candela.compare_swap", icon="ARROW_LEFTRIGHT")
+        table = layout.column(align=True)
+        head = table.row()
+        for text in ("", "relMSE", "Bias"):
+            head.label(text=text)
+        for number, made in enumerate(latest()):
+            row = table.row()
+            row.operator("candela.compare_show", text=made.row.label, depress=number == options.row).row = number
+            if metrics.is_surface(made.error):
+                row.label(text=made.error.remark or f"{made.error.median:.1e}")
+                row.label(text="")
+            else:
+                relmse, _, _, bias, _ = metrics.figures(made.error)
+                row.label(text=relmse)
+                row.label(text=bias)
+
+
+_CLASSES = (
+    CandelaComparison,
+    CANDELA_OT_compare,
+    CANDELA_OT_compare_show,
+    CANDELA_OT_compare_swap,
+    IMAGE_PT_candela_compare,
+)
+
+
+def register() -> None:
+    for made in _CLASSES:
+        bpy.utils.register_class(made)
+    bpy.types.WindowManager.candela_comparison = bpy.props.PointerProperty(type=CandelaComparison)
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.candela_comparison
+    for made in reversed(_CLASSES):
+        bpy.utils.unregister_class(made)

@@ -1,0 +1,71 @@
+"""The comparison in the Image Editor, run as an operator without a window."""
+
+import warnings
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import engine
+from addon.compare import pictures
+from addon.ui import ENGINE, compare_editor
+
+
+@pytest.fixture
+def compared(registered, gpu_context, empty_scene, tmp_path, monkeypatch):
+    """A lit floor, compared."""
+    monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        bpy.ops.mesh.primitive_plane_add(size=8)
+        bpy.ops.object.light_add(type="POINT", location=(0, 0, 4))
+        bpy.context.object.data.energy = 400
+        bpy.ops.object.camera_add(location=(0, 0, 8))
+    scene = empty_scene
+    scene.camera, scene.render.engine = bpy.context.object, ENGINE
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.candela.bounces = 0
+    options = bpy.context.window_manager.candela_comparison
+    options.samples, options.reference_samples, options.percentage = 8, 16, 50
+    options.row, options.view = 0, "CANDELA"
+    assert bpy.ops.candela.compare() == {"FINISHED"}
+    yield options
+    engine.free_sessions()
+
+
+def shown():
+    image = bpy.data.images[compare_editor.IMAGE]
+    return np.array(image.pixels[:]).reshape(image.size[1], image.size[0], 4)[..., :3]
+
+
+def test_comparison_has_a_row_for_each_light_path_and_small_errors(compared):
+    rows = {picture.row.label: picture for picture in compare_editor.latest()}
+    assert {"Combined", "Diffuse direct", "Glossy direct", "Normal", "Depth"} <= set(rows)
+    assert rows["Combined"].x.shape[:2] == (24, 32)
+    assert rows["Combined"].error.relmse < 0.01
+    assert rows["Combined"].error.bias == pytest.approx(1, abs=0.02)
+
+
+def test_image_shows_what_is_chosen(compared):
+    row = compare_editor.latest()[0]
+    assert np.allclose(shown(), row.x[..., :3], atol=1e-6)
+    assert bpy.ops.candela.compare_swap() == {"FINISHED"}
+    assert np.allclose(shown(), row.reference[..., :3], atol=1e-6)
+    compared.view = "ERROR"
+    assert np.allclose(shown(), pictures.error_map(row.x, row.reference), atol=1e-6)
+    compared.view = "DIFFERENCE"
+    bpy.ops.candela.compare_show(row=1)
+    row = compare_editor.latest()[1]
+    assert np.allclose(shown(), np.abs(row.x[..., :3] - row.reference[..., :3]), atol=1e-6)
+
+
+def test_every_row_can_be_shown_in_every_view(compared):
+    for number in range(len(compare_editor.latest())):
+        for view, *_ in compare_editor.VIEWS:
+            compared.row, compared.view = number, view
+            assert np.isfinite(shown()).all()
+
+
+def test_scene_without_a_camera_is_refused_with_a_sentence(registered, gpu_context, empty_scene):
+    with pytest.raises(RuntimeError, match="no camera"):
+        bpy.ops.candela.compare()
