@@ -221,6 +221,26 @@ void shader_thin_glass(inout Closures closures, SurfacePoint point, vec3 weight,
   closure_transparent(closures, scale * max(transmitted, vec3(0.0)) * through);
 }
 
+// A wall that is thin against its surroundings: what enters leaves again in the same direction. Of a ray that is reflected
+// with R at each face and absorbed to a on each way through, the wall reflects R + (1 - R)^2 R a^2 / (1 - R^2 a^2) and
+// lets (1 - R)^2 a / (1 - R^2 a^2) pass; the way through grows with the refracted angle.
+void shader_thin_wall(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base, vec3 tint, float ior,
+                      float roughness, vec3 normal)
+{
+  float mu = view_cosine(point, normal);
+  vec3 f0 = clamp(dielectric_f0(ior) * tint, vec3(0.0), vec3(1.0));
+  float cos_inside = sqrt(max(1.0 - (1.0 - mu * mu) / (ior * ior), 1e-4));
+  vec3 absorbed = pow(clamp(base, vec3(0.0), vec3(1.0)), vec3(1.0 / cos_inside));
+  // As in Cycles, roughness spreads the light and leaves its amount.
+  vec3 face = clamp(fresnel_reflectance(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, mu), vec3(1e-6), vec3(1.0));
+  vec3 entering = (1.0 - face) * (1.0 - face) / max(1.0 - face * face * absorbed * absorbed, vec3(1e-6));
+  vec3 mirrored = face + entering * face * absorbed * absorbed;
+  vec3 lobe = glossy_albedo(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, roughness, mu);
+  closure_glossy(closures, weight * mirrored / max(lobe, vec3(1e-6)), color_luminance(mirrored), FRESNEL_DIELECTRIC,
+                 f0, vec3(1.0), ior, roughness, 0.0, default_tangent(normal), normal);
+  closure_transparent(closures, weight * entering * absorbed);
+}
+
 void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, float ior,
                   vec3 normal, int distribution)
 {
@@ -266,7 +286,8 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
                        float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
                        float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
-                       float transmission, float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
+                       float transmission, float thin_wall, float subsurface, float subsurface_anisotropy,
+                       float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
                        vec3 coat_normal, float sheen_weight, float sheen_roughness, vec3 sheen_tint,
                        vec3 emission_color, float emission_strength, int distribution)
 {
@@ -300,8 +321,14 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   }
   float through = clamp(transmission, 0.0, 1.0);
   if (through > SMALLEST_WEIGHT) {
-    shader_thin_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)),
-                      max(ior, 1e-5), r, mirror_normal, distribution);
+    if (thin_wall > 0.5) {
+      shader_thin_wall(closures, point, w * through, base, max(specular_tint, vec3(0.0)), max(ior, 1.0), r,
+                       mirror_normal);
+    }
+    else {
+      shader_thin_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)),
+                        max(ior, 1e-5), r, mirror_normal, distribution);
+    }
     w *= 1.0 - through;
   }
   if (largest(w) < SMALLEST_WEIGHT) {
@@ -314,6 +341,12 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
     vec3 albedo = add_glossy(closures, point, w, distribution, FRESNEL_DIELECTRIC, f0, vec3(1.0), specular_ior, r,
                              stretch, t, mirror_normal);
     w = below_layer(w, albedo);
+  }
+  if (thin_wall > 0.5 && subsurface > SMALLEST_WEIGHT) {
+    // Light that scatters in a thin wall leaves on both sides, by the direction that it prefers.
+    float forward = clamp(subsurface, 0.0, 1.0) * 0.5 * (1.0 + clamp(subsurface_anisotropy, -1.0, 1.0));
+    add_soft(closures, LOBE_TRANSLUCENT, w * base * forward, 1.0, 0.0, vec3(1.0), n);
+    w *= 1.0 - forward;
   }
   closure_diffuse(closures, w * base, clamp(diffuse_roughness, 0.0, 1.0), n);
 }

@@ -116,6 +116,24 @@ def test_soft_lobes_reflect_a_sun_as_in_cycles(stage, kind):
         stage.scene.collection.objects.unlink(sun)
 
 
+@pytest.mark.parametrize("degrees", [pytest.param(20, marks=SLOW), 70])
+def test_thin_walls_have_cycles_albedo(stage, degrees):
+    inputs = [
+        {"Transmission_Weight": 1.0, "Roughness": 0.0}, {"Transmission_Weight": 1.0, "Roughness": 0.4},
+        {"Transmission_Weight": 1.0, "IOR": 2.0, "Roughness": 0.2}, {"Transmission_Weight": 0.5},
+        {"Subsurface_Weight": 0.6}, {"Subsurface_Weight": 1.0, "Subsurface_Anisotropy": 0.5},
+    ]  # fmt: skip
+    try:
+        materials = [stage.principled(Base_Color=COLOR, Thin_Wall=True, **given) for given in inputs]
+    except KeyError:
+        pytest.skip("this Blender's Principled has no thin wall")
+    size = strips(stage, materials, degrees)
+    ours = means(stage.render(128, size), "combined")
+    cycles = means(stage.render(512, size, engine="CYCLES"), "combined")
+    for given, a, b in zip(inputs, ours, cycles, strict=True):
+        assert a == pytest.approx(b, abs=0.01 * b.max()), given
+
+
 def test_a_translucent_sheet_shows_the_light_of_its_other_side(stage):
     stage.floor(material=stage.material("ShaderNodeBsdfTranslucent", Color=(1, 1, 1, 1)))
     stage.camera_above(4.0)

@@ -2,7 +2,13 @@
 
 Principled in Cycles' order, top layer first: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.
 Each layer takes weight * albedo and leaves weight * (1 - largest channel of its albedo) to the next; albedos come from
-the tables of `materials/energy.py`. Sources: Cycles' Principled closure; Blender manual, "Principled BSDF" (4.5, 5.2).
+the tables of `materials/energy.py`.
+
+Light through glass, thin walls and alpha goes straight on, with the amount and colour that Cycles lets through: what
+is behind glass is seen at its place, not bent or blurred. Light that a single sheet bends from a source to the viewer
+is therefore in the passes of what stands behind it, not in Transmission Direct.
+
+Sources: Cycles' Principled closure; Blender manual, "Principled BSDF" (4.5, 5.2).
 """
 
 from __future__ import annotations
@@ -21,6 +27,7 @@ NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
 TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
 STRAIGHT_THROUGH = "Light passes straight through, without refraction or roughness."
+# Its albedo is then the colour itself; Cycles' random walk gives up to 7 % less seen from the front.
 SUBSURFACE = "Subsurface scattering is drawn as diffuse."
 THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
 
@@ -65,6 +72,7 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
     alpha = sockets["Alpha"].clipped()
     metallic = sockets["Metallic"].clipped()
     transmission = sockets["Transmission Weight"].clipped()
+    thin = bool((sockets["Thin Wall"].high > 0.0).any())
     transparency = alpha.complement()
     tinted = False
     if transmission.high.any():
@@ -81,7 +89,10 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
         emission=emission,
         diffuse=bool((metallic.low < 1.0).any() and (transmission.low < 1.0).any() and (alpha.high > 0.0).any()),
         glossy=bool((alpha.high > 0.0).any()),
-        soft=bool((sockets["Sheen Weight"].high > 0.0).any()),
+        soft=any(
+            bool((sockets[name].high > 0.0).any())
+            for name in (("Sheen Weight", "Subsurface Weight") if thin else ("Sheen Weight",))
+        ),
         tinted=tinted,
     )
 
@@ -103,6 +114,9 @@ PRINCIPLED = Entry(
         Socket("Anisotropic Rotation", "FLOAT"),
         Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropic"),
         Socket("Transmission Weight", "FLOAT"),
+        Socket("Thin Wall", "FLOAT"),
+        Socket("Subsurface Weight", "FLOAT"),
+        Socket("Subsurface Anisotropy", "FLOAT"),
         Socket("Coat Weight", "FLOAT"),
         Socket("Coat Roughness", "FLOAT", 0.03),
         Socket("Coat IOR", "FLOAT", 1.5),
@@ -251,16 +265,21 @@ ENTRIES = (
         note=STRAIGHT_THROUGH,
         summary=_transparent,
     ),
-    *(
-        Entry(
-            node_type,
-            "shader_diffuse",
-            (Socket("Color", "COLOR", GREY), Expression("0.0"), NORMAL),
-            include="material/shader.glsl",
-            note=note,
-            summary=_diffuse,
-        )
-        for node_type, note in (("ShaderNodeSubsurfaceScattering", SUBSURFACE),)
+    Entry(
+        "ShaderNodeBsdfRayPortal",
+        "shader_transparent",
+        (Socket("Color", "COLOR", WHITE),),
+        include="material/shader.glsl",
+        note="Rays pass straight on instead of leaving elsewhere.",
+        summary=_transparent,
+    ),
+    Entry(
+        "ShaderNodeSubsurfaceScattering",
+        "shader_diffuse",
+        (Socket("Color", "COLOR", GREY), Expression("0.0"), NORMAL),
+        include="material/shader.glsl",
+        note=SUBSURFACE,
+        summary=_diffuse,
     ),
 )
 
