@@ -14,6 +14,7 @@ from ..techniques import REGISTRY
 from . import ENGINE, blender_panels, notes
 from .passes import PASSES
 from .properties import identifier, slots
+from .quality import CANDELA_PT_quality_presets
 
 MOST_NOTES = 12  # more than these are counted only
 _STATE_ICONS = {ledgers.RAN: "CHECKMARK", ledgers.REUSED: "LOOP_BACK", ledgers.SKIPPED: "REMOVE"}
@@ -39,6 +40,9 @@ def _columns(panel, animatable: bool = True):
 
 class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
     bl_label = "Sampling"
+
+    def draw_header_preset(self, context):
+        CANDELA_PT_quality_presets.draw_panel_header(self.layout)
 
     def draw(self, context):
         settings = context.scene.candela

@@ -1,0 +1,46 @@
+"""Quality presets: they are found by Blender, set what they name, and cost more the finer they are."""
+
+import bpy
+import pytest
+
+from addon.ui import quality
+
+NAMES = ("Fast", "Balanced", "Fine")
+
+
+def files():
+    found = {}
+    for folder in bpy.utils.preset_paths(quality.FOLDER):
+        found |= {path.stem: path for path in quality.Path(folder).glob("*.py")}
+    return found
+
+
+def values(scene, name):
+    assert bpy.ops.script.execute_preset(filepath=str(files()[name]), menu_idname="CANDELA_PT_quality_presets") == {
+        "FINISHED"
+    }
+    return scene.candela.samples, scene.candela.viewport_samples, scene.candela.accumulated_maps_texels_per_pixel
+
+
+@pytest.fixture
+def scene(registered, empty_scene):
+    return empty_scene
+
+
+def test_presets_come_with_candela(scene):
+    assert set(NAMES) <= set(files())
+
+
+def test_finer_presets_take_more_of_everything(scene):
+    fast, balanced, fine = (values(scene, name) for name in NAMES)
+    assert all(a < b < c for a, b, c in zip(fast, balanced, fine, strict=True))
+
+
+def test_balanced_is_what_a_new_scene_has(scene):
+    new = scene.candela.samples, scene.candela.viewport_samples, scene.candela.accumulated_maps_texels_per_pixel
+    assert values(scene, "Balanced") == new
+
+
+def test_a_preset_of_the_artist_may_hold_every_parameter(scene):
+    for name in quality.CANDELA_OT_quality_preset_add.preset_values:
+        assert name.removeprefix("candela.") in scene.candela.bl_rna.properties
