@@ -89,6 +89,20 @@ vec3 unblocked_irradiance(Light light, vec3 position, vec3 normal, out vec3 dire
   return ((light.flags & LIGHT_DIFFUSE) != 0) ? arriving * max(dot(normal, direction), 0.0) : vec3(0.0);
 }
 
+// Whether this sample's point of a light is seen along `direction`.
+float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
+{
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+    // Aimed anew from the ray's origin: beside the surface it would meet an emissive triangle a little before the point.
+    vec3 path = light.point - origin;
+    float reach = max(length(path), 1e-30);
+    return clear_path(origin, path / reach, reach * 0.9999, salt);
+  }
+  bool far = light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION;
+  float reach = far ? 1e29 : length(light.centre - origin) - light.radius;
+  return (reach > 0.0) ? clear_path(origin, direction, reach, salt) : 1.0;
+}
+
 // Irradiance straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they
 // bring unblocked (systematic resampling): only visibility is sampled.
 vec3 direct_irradiance(vec3 position, vec3 normal, int rays, float u, uint salt)
@@ -116,12 +130,7 @@ vec3 direct_irradiance(vec3 position, vec3 normal, int rays, float u, uint salt)
       mark += marks * step_size;
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        bool far = light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION;
-        bool flat_light = light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE;
-        float reach = far ? 1e29 : length((flat_light ? light.point : light.centre) - position) - light.radius;
-        // An emissive triangle lies at the end of the ray.
-        reach *= (light.kind == LIGHT_SURFACE) ? 0.9999 : 1.0;
-        visibility = (reach > 0.0) ? clear_path(origin, direction, reach, salt + uint(i)) : 1.0;
+        visibility = light_visibility(light, origin, direction, salt + uint(i));
       }
       sum += arriving * (visibility * marks * step_size / share);
     }
