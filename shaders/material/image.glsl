@@ -5,11 +5,17 @@
 // Rules of extension, of premultiplied interpolation and of decoding after it as in Cycles.
 
 #include "lib/color.glsl"
+#include "lib/math.glsl"
+#include "lib/surface_point.glsl"
 
 #define EXTENSION_REPEAT 0
 #define EXTENSION_EXTEND 1
 #define EXTENSION_CLIP 2
 #define EXTENSION_MIRROR 3
+
+#define INTERPOLATION_LINEAR 0
+#define INTERPOLATION_CLOSEST 1
+#define INTERPOLATION_CUBIC 2
 
 #define IMAGE_SRGB 1       // stored with the sRGB curve
 #define IMAGE_ASSOCIATE 2  // alpha is coverage and colour is stored without it
@@ -32,23 +38,10 @@ int image_wrap(int index, int size, int extension)
   return (wrapped < size) ? wrapped : period - 1 - wrapped;
 }
 
-// Place in an image of all directions; `projection` 0: equirectangular, 1: mirror ball.
-vec3 image_environment(vec3 toward, int projection)
-{
-  vec3 d = safe_normalize(toward);
-  if (projection == 1) {
-    float spread = 2.0 * sqrt(max(0.5 * (1.0 - d.y), 0.0));
-    vec2 place = (spread > 0.0) ? d.xz / spread : vec2(0.0);
-    return vec3(0.5 * place + 0.5, 0.0);
-  }
-  float azimuth = (d.x == 0.0 && d.y == 0.0) ? 0.0 : atan(d.y, d.x);
-  return vec3(0.5 - azimuth / 6.283185307, 0.5 + asin(clamp(d.z, -1.0, 1.0)) / 3.141592654, 0.0);
-}
-
 // Position in texels, kept within what an int can count, so that wild coordinates cannot overflow.
-vec2 image_position(vec3 coordinate, ivec2 size, int extension)
+vec2 image_position(vec2 coordinate, ivec2 size, int extension)
 {
-  vec2 uv = coordinate.xy;
+  vec2 uv = coordinate;
   if (extension == EXTENSION_REPEAT) {
     uv -= floor(uv);
   }
@@ -82,4 +75,97 @@ vec4 image_finish(vec4 filtered, int flags, bool alpha_used)
     color = srgb_decode(color);
   }
   return vec4(color, filtered.a);
+}
+
+// Uniform cubic B-spline over four texels: smooth, and a little blurred.
+vec4 image_cubic_weights(float t)
+{
+  float s = 1.0 - t;
+  return vec4(s * s * s, t * t * (3.0 * t - 6.0) + 4.0, s * s * (3.0 * s - 6.0) + 4.0, t * t * t) * (1.0 / 6.0);
+}
+
+// Coordinates 0..1 of a box, seen from its middle.
+vec2 image_on_sphere(vec3 coordinate)
+{
+  vec3 d = 2.0 * coordinate - vec3(1.0);
+  float squared = dot(d, d);
+  if (squared == 0.0) {
+    return vec2(0.0);
+  }
+  float u = (d.x == 0.0 && d.y == 0.0) ? 0.0 : 0.5 - atan(d.x, d.y) / (2.0 * PI);
+  return vec2(u, 1.0 - acos(clamp(d.z * inversesqrt(squared), -1.0, 1.0)) / PI);
+}
+
+vec2 image_on_tube(vec3 coordinate)
+{
+  vec3 d = 2.0 * coordinate - vec3(1.0);
+  if (d.x == 0.0 && d.y == 0.0) {
+    return vec2(0.0);
+  }
+  return vec2(0.5 - atan(d.x, d.y) / (2.0 * PI), 0.5 * (d.z + 1.0));
+}
+
+vec2 image_around(vec3 direction)
+{
+  vec3 d = safe_normalize(direction);
+  if (dot(direction, direction) == 0.0) {
+    return vec2(0.0);
+  }
+  float angle = (d.x == 0.0 && d.y == 0.0) ? 0.0 : atan(d.y, d.x);
+  return vec2(0.5 - angle / (2.0 * PI), 1.0 - acos(clamp(d.z, -1.0, 1.0)) / PI);
+}
+
+// A photograph of a mirror ball as seen from far along the y axis.
+vec2 image_on_mirror_ball(vec3 direction)
+{
+  vec3 d = safe_normalize(direction) - vec3(0.0, 1.0, 0.0);
+  float across = 2.0 * sqrt(max(-0.5 * d.y, 0.0));
+  return (across > 0.0) ? 0.5 * (d.xz / across + vec2(1.0)) : vec2(0.5);
+}
+
+// Shares of the three sides of a box that is projected onto a surface with this normal. One side alone where the normal
+// is far from the others, two or three blended over a zone of width `blend`.
+vec3 image_box_weights(vec3 normal, float blend)
+{
+  vec3 n = abs(normal);
+  n /= max(n.x + n.y + n.z, 1e-20);
+  float limit = 0.5 * (1.0 + blend);
+  if (n.x > limit * (n.x + n.y) && n.x > limit * (n.x + n.z)) {
+    return vec3(1.0, 0.0, 0.0);
+  }
+  if (n.y > limit * (n.x + n.y) && n.y > limit * (n.y + n.z)) {
+    return vec3(0.0, 1.0, 0.0);
+  }
+  if (n.z > limit * (n.x + n.z) && n.z > limit * (n.y + n.z)) {
+    return vec3(0.0, 0.0, 1.0);
+  }
+  if (blend <= 0.0) {
+    return vec3(1.0, 0.0, 0.0);
+  }
+  float edge = 0.5 * (1.0 - blend);
+  if (n.z < (1.0 - limit) * (n.x + n.y)) {
+    float x = clamp((n.x / (n.x + n.y) - edge) / blend, 0.0, 1.0);
+    return vec3(x, 1.0 - x, 0.0);
+  }
+  if (n.x < (1.0 - limit) * (n.y + n.z)) {
+    float y = clamp((n.y / (n.y + n.z) - edge) / blend, 0.0, 1.0);
+    return vec3(0.0, y, 1.0 - y);
+  }
+  if (n.y < (1.0 - limit) * (n.x + n.z)) {
+    float x = clamp((n.x / (n.x + n.z) - edge) / blend, 0.0, 1.0);
+    return vec3(x, 0.0, 1.0 - x);
+  }
+  return ((2.0 - limit) * n + vec3(limit - 1.0)) / (2.0 * limit - 1.0);
+}
+
+// Coordinates on one side of the box, turned so that no side shows the image mirrored.
+vec2 image_on_box(vec3 coordinate, vec3 normal, int side)
+{
+  if (side == 0) {
+    return vec2((normal.x < 0.0) ? 1.0 - coordinate.y : coordinate.y, coordinate.z);
+  }
+  if (side == 1) {
+    return vec2((normal.y > 0.0) ? 1.0 - coordinate.x : coordinate.x, coordinate.z);
+  }
+  return vec2((normal.z > 0.0) ? 1.0 - coordinate.y : coordinate.y, coordinate.x);
 }

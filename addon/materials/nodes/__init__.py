@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import color, converter, image, inputs, shader, texture, vector
+from . import color, converter, image, inputs, shader, stand_in, texture, vector
 from .entry import Entry
 
 REGISTRY: tuple[Entry, ...] = (
@@ -13,6 +13,7 @@ REGISTRY: tuple[Entry, ...] = (
     + vector.ENTRIES
     + converter.ENTRIES
     + color.ENTRIES
+    + stand_in.ENTRIES
 )
 
 _BY_TYPE: dict[str, tuple[Entry, ...]] = {}

@@ -157,6 +157,26 @@ ENTRIES = (
         (("Vector", "VECTOR"),),
         SOURCE,
     ),
+    # Nodes of files before Blender 3.3, which 4.5 still has.
+    *(
+        Entry(
+            f"ShaderNode{way}{model}",
+            f"{way.lower()}_{model.lower()}",
+            (Socket("Color" if model == "HSV" else "Image", "COLOR", (0.8, 0.8, 0.8)),),
+            tuple((channel, "FLOAT") for channel in model),
+            SOURCE,
+        )
+        if way == "Separate"
+        else Entry(
+            f"ShaderNode{way}{model}",
+            f"{way.lower()}_{model.lower()}",
+            tuple(Socket(channel, "FLOAT") for channel in model),
+            (("Color" if model == "HSV" else "Image", "COLOR"),),
+            SOURCE,
+        )
+        for way in ("Separate", "Combine")
+        for model in ("RGB", "HSV")
+    ),
     Entry(
         "ShaderNodeClamp",
         "clamp_{clamp_type}",

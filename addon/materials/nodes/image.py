@@ -1,12 +1,13 @@
-"""Textures. Image lookups filter by texelFetch (material/image.glsl); the compiler generates each image's own function.
+"""Images. Lookups filter by texelFetch (material/image.glsl); the compiler generates each image's own function.
 
-Linear and closest interpolation, all four extensions, alpha and colour as Cycles treats them: colour is premultiplied
-before interpolation, stays so unless the Alpha output is used, and is decoded from sRGB after interpolation.
+Linear, closest and cubic interpolation, all four extensions, alpha and colour as Cycles treats them: colour is
+premultiplied before interpolation, stays so unless the Alpha output is used, and is decoded from sRGB after
+interpolation.
 """
 
 from __future__ import annotations
 
-from .entry import Choice, Entry, ImageFlags, Socket, Used
+from .entry import POINT, Choice, Entry, Expression, ImageFlags, Setting, Socket, Used
 
 # One image's own functions; {k} is the index of its sampler. Texels outside of a clipped image are transparent black.
 IMAGE_FUNCTIONS = """\
@@ -19,75 +20,138 @@ vec4 material_image{k}_texel(ivec2 size, ivec2 texel, int extension, int flags)
   return image_associate(texelFetch(material_image{k}, at, 0), flags);
 }}
 
-void material_image{k}_sample(vec3 coordinate, int interpolation, int extension, float storage, bool alpha_used,
-                           out vec3 color, out float alpha)
+vec4 material_image{k}_filtered(vec2 coordinate, int interpolation, int extension, int flags)
 {{
-  int flags = int(storage + 0.5);
   ivec2 size = textureSize(material_image{k}, 0);
   vec2 position = image_position(coordinate, size, extension);
-  vec4 filtered;
-  if (interpolation == 1) {{
-    filtered = material_image{k}_texel(size, ivec2(floor(position)), extension, flags);
+  if (interpolation == INTERPOLATION_CLOSEST) {{
+    return material_image{k}_texel(size, ivec2(floor(position)), extension, flags);
   }}
-  else {{
-    position -= vec2(0.5);
-    vec2 lower = floor(position);
-    vec2 share = position - lower;
-    ivec2 texel = ivec2(lower);
-    vec4 low = mix(material_image{k}_texel(size, texel, extension, flags),
-                   material_image{k}_texel(size, texel + ivec2(1, 0), extension, flags), share.x);
-    vec4 high = mix(material_image{k}_texel(size, texel + ivec2(0, 1), extension, flags),
-                    material_image{k}_texel(size, texel + ivec2(1, 1), extension, flags), share.x);
-    filtered = mix(low, high, share.y);
+  position -= vec2(0.5);
+  vec2 lower = floor(position);
+  vec2 share = position - lower;
+  ivec2 texel = ivec2(lower);
+  if (interpolation == INTERPOLATION_CUBIC) {{
+    vec4 weights_x = image_cubic_weights(share.x);
+    vec4 weights_y = image_cubic_weights(share.y);
+    vec4 sum = vec4(0.0);
+    for (int j = 0; j < 4; j++) {{
+      for (int i = 0; i < 4; i++) {{
+        sum += weights_x[i] * weights_y[j]
+               * material_image{k}_texel(size, texel + ivec2(i - 1, j - 1), extension, flags);
+      }}
+    }}
+    return sum;
   }}
-  filtered = image_finish(filtered, flags, alpha_used);
-  color = filtered.rgb;
-  alpha = filtered.a;
+  vec4 low = mix(material_image{k}_texel(size, texel, extension, flags),
+                 material_image{k}_texel(size, texel + ivec2(1, 0), extension, flags), share.x);
+  vec4 high = mix(material_image{k}_texel(size, texel + ivec2(0, 1), extension, flags),
+                  material_image{k}_texel(size, texel + ivec2(1, 1), extension, flags), share.x);
+  return mix(low, high, share.y);
 }}
 
-void material_image{k}_environment(vec3 toward, int projection, int interpolation, float storage, out vec3 color)
+vec4 material_image{k}_at(vec2 coordinate, int interpolation, int extension, int flags, bool alpha_used)
 {{
-  float alpha;
-  vec3 place = image_environment(toward, projection);
-  material_image{k}_sample(place, interpolation, EXTENSION_REPEAT, storage, false, color, alpha);
+  return image_finish(material_image{k}_filtered(coordinate, interpolation, extension, flags), flags, alpha_used);
+}}
+
+void material_image{k}_flat(vec3 coordinate, int interpolation, int extension, float storage, bool alpha_used,
+                            out vec3 color, out float alpha)
+{{
+  vec4 found = material_image{k}_at(coordinate.xy, interpolation, extension, int(storage + 0.5), alpha_used);
+  color = found.rgb;
+  alpha = found.a;
+}}
+
+void material_image{k}_sphere(vec3 coordinate, int interpolation, int extension, float storage, bool alpha_used,
+                              out vec3 color, out float alpha)
+{{
+  material_image{k}_flat(vec3(image_on_sphere(coordinate), 0.0), interpolation, extension, storage, alpha_used, color,
+                         alpha);
+}}
+
+void material_image{k}_tube(vec3 coordinate, int interpolation, int extension, float storage, bool alpha_used,
+                            out vec3 color, out float alpha)
+{{
+  material_image{k}_flat(vec3(image_on_tube(coordinate), 0.0), interpolation, extension, storage, alpha_used, color,
+                         alpha);
+}}
+
+void material_image{k}_box(vec3 coordinate, int interpolation, int extension, float storage, bool alpha_used,
+                           SurfacePoint point, float blend, out vec3 color, out float alpha)
+{{
+  int flags = int(storage + 0.5);
+  vec3 normal = object_from_world_normal(point, point.normal);
+  vec3 weights = image_box_weights(normal, blend);
+  vec4 sum = vec4(0.0);
+  for (int side = 0; side < 3; side++) {{
+    if (weights[side] > 0.0) {{
+      vec2 place = image_on_box(coordinate, normal, side);
+      sum += weights[side] * material_image{k}_at(place, interpolation, extension, flags, alpha_used);
+    }}
+  }}
+  color = sum.rgb;
+  alpha = sum.a;
+}}
+
+void material_image{k}_equirectangular(vec3 direction, int interpolation, float storage, bool alpha_used,
+                                       out vec3 color, out float alpha)
+{{
+  material_image{k}_flat(vec3(image_around(direction), 0.0), interpolation, EXTENSION_REPEAT, storage, alpha_used,
+                         color, alpha);
+}}
+
+void material_image{k}_mirror_ball(vec3 direction, int interpolation, float storage, bool alpha_used, out vec3 color,
+                                   out float alpha)
+{{
+  material_image{k}_flat(vec3(image_on_mirror_ball(direction), 0.0), interpolation, EXTENSION_REPEAT, storage,
+                         alpha_used, color, alpha);
 }}
 """
 
-INTERPOLATION = Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 0, "Smart": 0})
-CUBIC = ("interpolation", ("Cubic", "Smart"), "Cubic interpolation is drawn as linear.")
 MISSING_COLOR = (1.0, 0.0, 1.0)  # where an image cannot be read
+
+INTERPOLATION = Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 2, "Smart": 2})  # INTERPOLATION_*
+LOOKUP = (
+    INTERPOLATION,
+    Choice("extension", {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}),  # EXTENSION_*
+    ImageFlags(),
+    Used("Alpha"),
+)
+OUTPUTS = (("Color", "COLOR"), ("Alpha", "FLOAT"))
+SOURCE = "material/image.glsl"
 
 ENTRIES = (
     Entry(
         "ShaderNodeTexImage",
-        "material_image{image}_sample",
-        (
-            Socket("Vector", "VECTOR", implicit="@UV"),
-            INTERPOLATION,
-            Choice("extension", {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}),
-            ImageFlags(),
-            Used("Alpha"),
-        ),
-        (("Color", "COLOR"), ("Alpha", "FLOAT")),
-        include="material/image.glsl",
+        "material_image{image}_box",
+        (Socket("Vector", "VECTOR", implicit="@UV"), *LOOKUP, POINT, Setting("projection_blend")),
+        OUTPUTS,
+        SOURCE,
+        when={"projection": "BOX"},
         image=True,
-        setting_approximations=(
-            CUBIC,
-            ("projection", ("BOX", "SPHERE", "TUBE"), "This projection of the image is drawn as flat."),
-        ),
+    ),
+    Entry(
+        "ShaderNodeTexImage",
+        "material_image{image}_{projection}",
+        (Socket("Vector", "VECTOR", implicit="@UV"), *LOOKUP),
+        OUTPUTS,
+        SOURCE,
+        choices={"projection": ("FLAT", "SPHERE", "TUBE")},
+        image=True,
     ),
     Entry(
         "ShaderNodeTexEnvironment",
-        "material_image{image}_environment",
+        "material_image{image}_{projection}",
         (
             Socket("Vector", "VECTOR", implicit="(point.position + material_scene.origin.xyz)"),
-            Choice("projection", {"EQUIRECTANGULAR": 0, "MIRROR_BALL": 1}),
             INTERPOLATION,
             ImageFlags(),
+            Expression("false"),
         ),
-        (("Color", "COLOR"),),
-        include="material/image.glsl",
+        OUTPUTS,
+        SOURCE,
+        choices={"projection": ("EQUIRECTANGULAR", "MIRROR_BALL")},
         image=True,
-        setting_approximations=(CUBIC,),
     ),
 )

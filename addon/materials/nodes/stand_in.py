@@ -1,0 +1,122 @@
+"""Stand-ins: nodes that ask more than a surface point can answer give a stated value, and the artist is told.
+
+A node that only makes sense on hair, points or volumes gives what it gives on a mesh in Cycles; that needs no sentence.
+"""
+
+from __future__ import annotations
+
+from .entry import Entry, Socket
+
+SOURCE = "material/stand_in.glsl"
+NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
+
+
+def _floats(*names: str) -> tuple[tuple[str, str], ...]:
+    return tuple((name, "FLOAT") for name in names)
+
+
+ENTRIES = (
+    Entry(
+        "ShaderNodeBevel",
+        "unbent_normal",
+        (NORMAL,),
+        (("Normal", "VECTOR"),),
+        SOURCE,
+        note="Edges are not rounded; the node hands on the surface's normal.",
+    ),
+    Entry(
+        "ShaderNodeAmbientOcclusion",
+        "open_occlusion",
+        (Socket("Color", "COLOR", (1.0, 1.0, 1.0)),),
+        (("Color", "COLOR"), ("AO", "FLOAT")),
+        SOURCE,
+        note="Occlusion is not measured; the node says that nothing is near.",
+    ),
+    Entry(
+        "ShaderNodeWireframe",
+        "no_wire",
+        outputs=_floats("Fac"),
+        include=SOURCE,
+        note="Wires are not drawn; the node gives 0 everywhere.",
+    ),
+    Entry(
+        "ShaderNodeRaycast",
+        "no_hit",
+        (Socket("Length", "FLOAT", 1.0),),
+        (*_floats("Is Hit", "Self Hit", "Hit Distance"), ("Hit Position", "VECTOR"), ("Hit Normal", "VECTOR")),
+        SOURCE,
+        note="Rays are not cast from materials; the node says that nothing is hit.",
+    ),
+    Entry(
+        "ShaderNodeTexSky",
+        "even_sky",
+        outputs=(("Color", "COLOR"),),
+        include=SOURCE,
+        note="The sky is drawn in one colour on surfaces.",
+    ),
+    Entry(
+        "ShaderNodeTexGabor",
+        "even_pattern",
+        outputs=_floats("Value", "Phase", "Intensity"),
+        include=SOURCE,
+        note="The Gabor texture is drawn as an even grey.",
+    ),
+    Entry(
+        "ShaderNodeTexIES",
+        "no_light_profile",
+        (Socket("Strength", "FLOAT", 1.0),),
+        _floats("Fac"),
+        SOURCE,
+        note="Light profiles are not read; the node gives its strength in all directions.",
+    ),
+    Entry(
+        "ShaderNodeLightFalloff",
+        "no_falloff",
+        (Socket("Strength", "FLOAT", 100.0),),
+        _floats("Quadratic", "Linear", "Constant"),
+        SOURCE,
+        note="All outputs give the strength; light falls off with the square of the distance.",
+    ),
+    Entry(
+        "ShaderNodeParticleInfo",
+        "no_particle",
+        outputs=(
+            *_floats("Index", "Random", "Age", "Lifetime"),
+            ("Location", "VECTOR"),
+            ("Size", "FLOAT"),
+            ("Velocity", "VECTOR"),
+            ("Angular Velocity", "VECTOR"),
+        ),
+        include=SOURCE,
+        note="Particles are not told apart; all outputs are 0. Object Info gives a random number per instance.",
+    ),
+    Entry(
+        "ShaderNodeAttribute",
+        "absent_attribute",
+        outputs=(("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
+        include=SOURCE,
+        note="Attributes of objects, instancers and view layers are not read; all outputs are 0.",
+    ),
+    Entry(
+        "ShaderNodeHairInfo",
+        "no_strand",
+        outputs=(
+            *_floats("Is Strand", "Intercept", "Length", "Thickness"),
+            ("Tangent Normal", "VECTOR"),
+            ("Random", "FLOAT"),
+        ),
+        include=SOURCE,
+    ),
+    Entry(
+        "ShaderNodePointInfo",
+        "no_point",
+        outputs=(("Position", "VECTOR"), *_floats("Radius", "Random")),
+        include=SOURCE,
+    ),
+    Entry(
+        "ShaderNodeVolumeInfo",
+        "no_volume",
+        outputs=(("Color", "COLOR"), *_floats("Density", "Flame", "Temperature")),
+        include=SOURCE,
+    ),
+)

@@ -1,0 +1,100 @@
+// What stands in for nodes that ask more than a surface point can answer.
+
+#include "lib/color.glsl"
+#include "lib/math.glsl"
+
+void unbent_normal(vec3 normal, out vec3 result)
+{
+  result = normal;
+}
+
+void open_occlusion(vec3 color, out vec3 shown, out float open)
+{
+  shown = color;
+  open = 1.0;
+}
+
+void no_wire(out float share)
+{
+  share = 0.0;
+}
+
+void no_strand(out float is_strand, out float intercept, out float extent, out float thickness, out vec3 normal,
+               out float random)
+{
+  is_strand = 0.0;
+  intercept = 0.0;
+  extent = 0.0;
+  thickness = 0.0;
+  normal = vec3(0.0);
+  random = 0.0;
+}
+
+void no_point(out vec3 position, out float radius, out float random)
+{
+  position = vec3(0.0);
+  radius = 0.0;
+  random = 0.0;
+}
+
+void no_volume(out vec3 color, out float density, out float flame, out float temperature)
+{
+  color = vec3(0.0);
+  density = 0.0;
+  flame = 0.0;
+  temperature = 0.0;
+}
+
+void no_particle(out float index, out float random, out float age, out float lifetime, out vec3 place,
+                 out float size, out vec3 velocity, out vec3 angular_velocity)
+{
+  index = 0.0;
+  random = 0.0;
+  age = 0.0;
+  lifetime = 0.0;
+  place = vec3(0.0);
+  size = 0.0;
+  velocity = vec3(0.0);
+  angular_velocity = vec3(0.0);
+}
+
+void no_falloff(float strength, out float with_square, out float with_distance, out float with_nothing)
+{
+  with_square = strength;
+  with_distance = strength;
+  with_nothing = strength;
+}
+
+void no_light_profile(float strength, out float share)
+{
+  share = strength;
+}
+
+void no_hit(float reach, out float hit, out float own, out float distance, out vec3 position, out vec3 normal)
+{
+  hit = 0.0;
+  own = 0.0;
+  distance = reach;
+  position = vec3(0.0);
+  normal = vec3(0.0);
+}
+
+void even_sky(out vec3 color)
+{
+  color = vec3(0.3, 0.4, 0.6);
+}
+
+void even_pattern(out float value, out float phase, out float intensity)
+{
+  value = 0.5;
+  phase = 0.5;
+  intensity = 0.5;
+}
+
+void absent_attribute(out vec3 color, out vec3 vector, out float average, out float alpha)
+{
+  color = vec3(0.0);
+  vector = vec3(0.0);
+  average = 0.0;
+  alpha = 0.0;
+}
