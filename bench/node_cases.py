@@ -30,6 +30,7 @@ class Case:
     coordinate: str = ""  # output of Texture Coordinate, or CELLS
     into: str = "Vector"
     signed: bool = False
+    scale: float = 1.0  # what the output is multiplied by, so that it fits a display
     procedural: bool = False  # bit patterns: 99 % of pixels count
     sphere: bool = False
     through: str = ""  # a node type that turns the output into a colour: Bump, Displacement
@@ -156,11 +157,13 @@ def _sphere() -> bpy.types.Mesh:
 
 def _paint(mesh: bpy.types.Mesh) -> None:
     """A colour and a number per vertex, from the vertex's place."""
-    color = mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
-    number = mesh.attributes.new("Number", "FLOAT", "POINT")
-    for vertex in mesh.vertices:
-        color.data[vertex.index].color = (*(0.5 + 0.5 * axis for axis in vertex.co), 0.6)
-        number.data[vertex.index].value = 0.5 + 0.3 * vertex.co.x
+    places = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", places.ravel())
+    colors = np.concatenate([0.5 + 0.5 * places, np.full((len(places), 1), 0.6)], axis=1).astype(np.float32)
+    mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT").data.foreach_set("color", colors.ravel())
+    # A new layer may move the others: nothing of the first is kept.
+    numbers = (0.5 + 0.3 * places[:, 0]).astype(np.float32)
+    mesh.attributes.new("Number", "FLOAT", "POINT").data.foreach_set("value", numbers)
 
 
 def picture() -> bpy.types.Image:
@@ -208,24 +211,32 @@ def _material(case: Case) -> bpy.types.Material:
             snap.inputs[1].default_value = (0.13, 0.13, 0.13)
             link(source, snap.inputs[0])
             source = snap.outputs[0]
-        if case.into in ("Fac", "Value", "Color", "W", "Height", "Factor"):  # one number of the coordinate
+        if case.into in ("Fac", "Value", "W"):  # one number of the coordinate
             split = nodes.new("ShaderNodeSeparateXYZ")
             link(source, split.inputs[0])
             source = split.outputs[0]
         link(source, socket(node.inputs, case.into))
     shown = socket(node.outputs, case.output)
+    emission, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
+    if case.through == "Displacement":
+        lift = nodes.new("ShaderNodeDisplacement")
+        lift.inputs["Scale"].default_value = 0.05
+        link(shown, lift.inputs["Height"])
+        link(lift.outputs[0], output.inputs["Displacement"])
+        shown = nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
     if case.through == "Bump":
         bump = nodes.new("ShaderNodeBump")
         bump.inputs["Distance"].default_value = 0.05
         link(shown, bump.inputs["Height"])
         shown = bump.outputs["Normal"]
-    if case.signed or case.through:
+    if case.signed or case.through or case.scale != 1.0:
         half = nodes.new("ShaderNodeVectorMath")
         half.operation = "MULTIPLY_ADD"
-        half.inputs[1].default_value = half.inputs[2].default_value = (0.5, 0.5, 0.5)
+        middle = 0.5 if case.signed or case.through else 0.0
+        half.inputs[1].default_value = ((0.5 if middle else 1.0) * case.scale,) * 3
+        half.inputs[2].default_value = (middle,) * 3
         link(shown, half.inputs[0])
         shown = half.outputs[0]
-    emission, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
     link(shown, emission.inputs["Color"])
     link(emission.outputs[0], output.inputs["Surface"])
     return material

@@ -24,8 +24,28 @@ def measured(cases: list[Case]) -> np.ndarray:
 
 def main() -> None:
     kelvin = [Case("", "Blackbody", "Color", {}, {"Temperature": 1.0 / place}) for place in BLACKBODY.places()]
-    nanometres = [Case("", "Wavelength", "Color", {}, {"Wavelength": place}) for place in WAVELENGTH.places()]
-    np.savez_compressed(TABLE, blackbody=measured(kelvin), wavelength=measured(nanometres))
+    np.savez_compressed(TABLE, blackbody=measured(kelvin), wavelength=unclamped_wavelengths())
+
+
+def unclamped_wavelengths() -> np.ndarray:
+    """(81, 3) colours of wavelengths before Cycles cuts what is negative, which it does after interpolation.
+
+    Between rows Cycles' colours are straight lines. Where a row is cut and its neighbour is not, the line from the
+    neighbour, known by a point one nanometre off it, tells how far below zero the row is.
+    """
+    places = WAVELENGTH.places()
+    at, before, behind = (
+        measured([Case("", "Wavelength", "Color", {}, {"Wavelength": place + step}) for place in places])
+        for step in (0.0, -1.0, 1.0)
+    )
+    rows = at.copy()
+    for row in range(len(places)):
+        for neighbour, beside in ((row - 1, behind), (row + 1, before)):
+            if 0 <= neighbour < len(places):
+                line = 5.0 * beside[neighbour] - 4.0 * at[neighbour]  # five steps from the neighbour
+                cut = (at[row] == 0.0) & (at[neighbour] > 0.0) & (beside[neighbour] > 0.0)
+                rows[row] = np.where(cut, np.minimum(line, 0.0), rows[row])
+    return rows
 
 
 main()

@@ -241,6 +241,8 @@ class _Reading:
         """What a node says about something that is not in the tree."""
         if node.bl_idname == "ShaderNodeObjectInfo":
             return {"material_index": float(self.material_index)}
+        if node.bl_idname == "ShaderNodeTexVoronoi":
+            return {"cell_hash": "PCG" if bpy.app.version >= (5, 0, 0) else "LOOKUP3"}
         if node.bl_idname == "ShaderNodeTexCoord" and node.object is not None:
             inverse = node.object.matrix_world.inverted_safe()
             return {"of_another_object": True, "object_matrix": tuple(tuple(row) for row in inverse[:3])}

@@ -206,8 +206,8 @@ void wave_texture(vec3 vector, float scale, float distortion, float detail, floa
   vec3 p = (vector * scale + vec3(0.000001)) * 0.999999;
   float n;
   if (type == WAVE_BANDS) {
-    n = (bands == WAVE_X) ? 20.0 * p.x
-                          : ((bands == WAVE_Y) ? 20.0 * p.y : ((bands == WAVE_Z) ? 20.0 * p.z : 10.0 * (p.x + p.y + p.z)));
+    vec3 along = vec3(float(bands == WAVE_X), float(bands == WAVE_Y), float(bands == WAVE_Z));
+    n = dot(p, (bands == WAVE_ALL) ? vec3(10.0) : 20.0 * along);
   }
   else {
     vec3 across = vec3(float(rings != WAVE_X), float(rings != WAVE_Y), float(rings != WAVE_Z));

@@ -1,8 +1,9 @@
 // Voronoi Texture: distances to feature points, one per cell of a grid.
 // Worley, "A Cellular Texture Basis Function", 1996; smooth minimum and exact distance to the edges after Inigo
 // Quilez, "Smooth Voronoi" (2014) and "Voronoi Borders" (2012).
-// `dimensions`, `feature` and `metric` are literals, so a compiler keeps the one path that is meant. Unused coordinates
-// are 0 and their cells are not visited; in one dimension the coordinate stands in x.
+// Up to Blender 4.5 cells are hashed by lookup3, from 5.0 on by PCG (`pcg`), but in one dimension.
+// `dimensions`, `pcg`, `feature` and `metric` are literals, so a compiler keeps the one path that is meant. Unused
+// coordinates are 0 and their cells are not visited; in one dimension the coordinate stands in x.
 
 #include "material/hash.glsl"
 
@@ -28,24 +29,29 @@ ivec4 voronoi_reach(int dimensions, int radius)
 }
 
 // Where in its cell the feature point stands, 0..1.
-vec4 voronoi_point(ivec4 cell, int dimensions)
+vec4 voronoi_point(ivec4 cell, int dimensions, bool pcg)
 {
+  vec4 k = vec4(cell);
   if (dimensions == 1) {
-    return vec4(hash_float(float(cell.x)), 0.0, 0.0, 0.0);
+    return vec4(hash_float(k.x), 0.0, 0.0, 0.0);
   }
   if (dimensions == 2) {
-    return vec4(hash_cell(cell.xy), 0.0, 0.0);
+    return vec4(pcg ? hash_cell(cell.xy) : vec2(hash_float(k.xy), hash_float(vec3(k.xy, 1.0))), 0.0, 0.0);
   }
   if (dimensions == 3) {
-    return vec4(hash_cell(cell.xyz), 0.0);
+    return vec4(pcg ? hash_cell(cell.xyz) : hash_color(k.xyz), 0.0);
   }
-  return hash_cell(cell);
+  return pcg ? hash_cell(cell) : vec4(hash_float(k), hash_float(k.wxyz), hash_float(k.zwxy), hash_float(k.yzwx));
 }
 
-vec3 voronoi_color(ivec4 cell, int dimensions)
+vec3 voronoi_color(ivec4 cell, int dimensions, bool pcg)
 {
+  vec4 k = vec4(cell);
   if (dimensions == 1) {
-    return hash_color(float(cell.x));
+    return hash_color(k.x);
+  }
+  if (!pcg) {
+    return (dimensions == 2) ? hash_color(k.xy) : ((dimensions == 3) ? hash_color(k.xyz) : hash_color(k));
   }
   return (dimensions < 4) ? hash_cell(cell.xyz) : hash_cell(cell).xyz;
 }
@@ -67,7 +73,8 @@ float voronoi_distance(vec4 a, vec4 b, int dimensions, int metric, float exponen
   return length(d);
 }
 
-VoronoiCell voronoi_nearest(vec4 coordinate, int dimensions, bool second, int metric, float exponent, float randomness)
+VoronoiCell voronoi_nearest(vec4 coordinate, int dimensions, bool pcg, bool second, int metric, float exponent,
+                            float randomness)
 {
   vec4 corner = floor(coordinate);
   vec4 place = coordinate - corner;
@@ -84,7 +91,7 @@ VoronoiCell voronoi_nearest(vec4 coordinate, int dimensions, bool second, int me
       for (int j = -reach.y; j <= reach.y; j++) {
         for (int i = -reach.x; i <= reach.x; i++) {
           ivec4 offset = ivec4(i, j, k, u);
-          vec4 position = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions);
+          vec4 position = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions, pcg);
           float distance = voronoi_distance(position, place, dimensions, metric, exponent);
           if (distance < first_distance) {
             second_distance = first_distance;
@@ -105,12 +112,12 @@ VoronoiCell voronoi_nearest(vec4 coordinate, int dimensions, bool second, int me
   }
   VoronoiCell found;
   found.distance = second ? second_distance : first_distance;
-  found.color = voronoi_color(cell + (second ? second_offset : first_offset), dimensions);
+  found.color = voronoi_color(cell + (second ? second_offset : first_offset), dimensions, pcg);
   found.position = corner + (second ? second_position : first_position);
   return found;
 }
 
-VoronoiCell voronoi_smooth(vec4 coordinate, int dimensions, int metric, float exponent, float randomness,
+VoronoiCell voronoi_smooth(vec4 coordinate, int dimensions, bool pcg, int metric, float exponent, float randomness,
                            float smoothness)
 {
   vec4 corner = floor(coordinate);
@@ -126,14 +133,14 @@ VoronoiCell voronoi_smooth(vec4 coordinate, int dimensions, int metric, float ex
       for (int j = -reach.y; j <= reach.y; j++) {
         for (int i = -reach.x; i <= reach.x; i++) {
           ivec4 offset = ivec4(i, j, k, u);
-          vec4 position = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions);
+          vec4 position = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions, pcg);
           float distance = voronoi_distance(position, place, dimensions, metric, exponent);
           float h = begun ? smoothstep(0.0, 1.0, 0.5 + 0.5 * (smooth_distance - distance) / smoothness) : 1.0;
           begun = true;
           float correction = smoothness * h * (1.0 - h);
           smooth_distance = mix(smooth_distance, distance, h) - correction;
           correction /= 1.0 + 3.0 * smoothness;
-          smooth_color = mix(smooth_color, voronoi_color(cell + offset, dimensions), h) - vec3(correction);
+          smooth_color = mix(smooth_color, voronoi_color(cell + offset, dimensions, pcg), h) - vec3(correction);
           smooth_position = mix(smooth_position, position, h) - vec4(correction);
         }
       }
@@ -146,15 +153,15 @@ VoronoiCell voronoi_smooth(vec4 coordinate, int dimensions, int metric, float ex
   return found;
 }
 
-float voronoi_edge(vec4 coordinate, int dimensions, float randomness)
+float voronoi_edge(vec4 coordinate, int dimensions, bool pcg, float randomness)
 {
   vec4 corner = floor(coordinate);
   vec4 place = coordinate - corner;
   ivec4 cell = ivec4(corner);
   if (dimensions == 1) {
-    float middle = randomness * voronoi_point(cell, 1).x;
-    float left = -1.0 + randomness * voronoi_point(cell - ivec4(1, 0, 0, 0), 1).x;
-    float right = 1.0 + randomness * voronoi_point(cell + ivec4(1, 0, 0, 0), 1).x;
+    float middle = randomness * voronoi_point(cell, 1, pcg).x;
+    float left = -1.0 + randomness * voronoi_point(cell - ivec4(1, 0, 0, 0), 1, pcg).x;
+    float right = 1.0 + randomness * voronoi_point(cell + ivec4(1, 0, 0, 0), 1, pcg).x;
     return min(abs(0.5 * (middle + left) - place.x), abs(0.5 * (middle + right) - place.x));
   }
   ivec4 reach = voronoi_reach(dimensions, 1);
@@ -169,7 +176,7 @@ float voronoi_edge(vec4 coordinate, int dimensions, float randomness)
         for (int j = -reach.y; j <= reach.y; j++) {
           for (int i = -reach.x; i <= reach.x; i++) {
             ivec4 offset = ivec4(i, j, k, u);
-            vec4 arm = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions) - place;
+            vec4 arm = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions, pcg) - place;
             vec4 apart = arm - nearest;
             float squared = dot(arm, arm);
             if (pass == 0) {
@@ -188,7 +195,7 @@ float voronoi_edge(vec4 coordinate, int dimensions, float randomness)
   return least;
 }
 
-float voronoi_radius(vec4 coordinate, int dimensions, float randomness)
+float voronoi_radius(vec4 coordinate, int dimensions, bool pcg, float randomness)
 {
   vec4 corner = floor(coordinate);
   vec4 place = coordinate - corner;
@@ -207,7 +214,7 @@ float voronoi_radius(vec4 coordinate, int dimensions, float randomness)
         for (int j = -reach.y; j <= reach.y; j++) {
           for (int i = -reach.x; i <= reach.x; i++) {
             ivec4 offset = ivec4(i, j, k, u) + middle;
-            vec4 position = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions);
+            vec4 position = vec4(offset) + randomness * voronoi_point(cell + offset, dimensions, pcg);
             float distance = length(position - from);
             if (distance < least && !(pass == 1 && offset == middle)) {
               least = distance;
@@ -233,8 +240,9 @@ vec4 voronoi_coordinate(vec3 vector, float w, float scale, int dimensions)
 
 // Octaves as of fractal noise; sums of positions and distances to edges are blends instead.
 void voronoi_texture(vec3 vector, float w, float scale, float detail, float roughness, float lacunarity,
-                     float smoothness, float exponent, float randomness, int dimensions, int feature, int metric,
-                     bool normalized, out float distance, out vec3 color, out vec3 position, out float w_position)
+                     float smoothness, float exponent, float randomness, int dimensions, bool pcg, int feature,
+                     int metric, bool normalized, out float distance, out vec3 color, out vec3 position,
+                     out float w_position)
 {
   vec4 coordinate = voronoi_coordinate(vector, w, scale, dimensions);
   float octaves = clamp(detail, 0.0, 15.0);
@@ -252,10 +260,11 @@ void voronoi_texture(vec3 vector, float w, float scale, float detail, float roug
   for (int i = 0; i <= int(ceil(octaves)); i++) {
     VoronoiCell octave;
     if (feature == VORONOI_SMOOTH_F1 && soft != 0.0) {
-      octave = voronoi_smooth(coordinate * octave_scale, dimensions, metric, exponent, spread, soft);
+      octave = voronoi_smooth(coordinate * octave_scale, dimensions, pcg, metric, exponent, spread, soft);
     }
     else {
-      octave = voronoi_nearest(coordinate * octave_scale, dimensions, feature == VORONOI_F2, metric, exponent, spread);
+      octave = voronoi_nearest(coordinate * octave_scale, dimensions, pcg, feature == VORONOI_F2, metric, exponent,
+                               spread);
     }
     if (plain) {
       amplitudes = 1.0;
@@ -284,7 +293,7 @@ void voronoi_texture(vec3 vector, float w, float scale, float detail, float roug
 }
 
 void voronoi_edge_texture(vec3 vector, float w, float scale, float detail, float roughness, float lacunarity,
-                          float randomness, int dimensions, bool normalized, out float distance)
+                          float randomness, int dimensions, bool pcg, bool normalized, out float distance)
 {
   vec4 coordinate = voronoi_coordinate(vector, w, scale, dimensions);
   float octaves = clamp(detail, 0.0, 15.0);
@@ -297,7 +306,7 @@ void voronoi_edge_texture(vec3 vector, float w, float scale, float detail, float
   float octave_scale = 1.0;
   distance = 8.0;
   for (int i = 0; i <= int(ceil(octaves)); i++) {
-    float octave = voronoi_edge(coordinate * octave_scale, dimensions, spread);
+    float octave = voronoi_edge(coordinate * octave_scale, dimensions, pcg, spread);
     if (octaves == 0.0 || rough == 0.0) {
       distance = octave;
       break;
@@ -312,8 +321,9 @@ void voronoi_edge_texture(vec3 vector, float w, float scale, float detail, float
   distance = normalized ? distance / reach : distance;
 }
 
-void voronoi_radius_texture(vec3 vector, float w, float scale, float randomness, int dimensions, out float radius)
+void voronoi_radius_texture(vec3 vector, float w, float scale, float randomness, int dimensions, bool pcg,
+                            out float radius)
 {
   vec4 coordinate = voronoi_coordinate(vector, w, scale, dimensions);
-  radius = voronoi_radius(coordinate, dimensions, clamp(randomness, 0.0, 1.0));
+  radius = voronoi_radius(coordinate, dimensions, pcg, clamp(randomness, 0.0, 1.0));
 }

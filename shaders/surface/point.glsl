@@ -47,7 +47,11 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
   point.object_index = instance.pass_index;
   instance_extras(instance_flat.x, point.object_color, point.instancer_generated, point.instancer_uv);
   float width = pixel_width(world_position);
-  orthonormal_basis(flat_normal, point.position_dx, point.position_dy);
+  // Heights are compared in one direction only, so bumps depend on it a little: Cycles' choice.
+  vec3 beside = cross(vec3(1.0), flat_normal);
+  beside = (dot(beside, beside) > 1e-12) ? beside : cross(vec3(-1.0, 1.0, 1.0), flat_normal);
+  point.position_dx = normalize(beside);
+  point.position_dy = cross(flat_normal, point.position_dx);
   point.position_dx *= width;
   point.position_dy *= width;
   fill_attributes(point, window_steps(point.position_dx, flat_normal), window_steps(point.position_dy, flat_normal));

@@ -60,7 +60,8 @@ VORONOI_COMMON = (
     Socket("Lacunarity", "FLOAT", 2.0),
 )
 RANDOMNESS = Socket("Randomness", "FLOAT", 1.0)
-VORONOI_DIMENSIONS = _dimensions("voronoi_dimensions")
+# How many dimensions, and by which hash: Blender 5.0 changed it.
+VORONOI_SPACE = (_dimensions("voronoi_dimensions"), Choice("cell_hash", {"PCG": "true", "LOOKUP3": "false"}, "true"))
 
 ENTRIES = (
     Entry(
@@ -115,7 +116,7 @@ ENTRIES = (
     Entry(
         "ShaderNodeTexVoronoi",
         "voronoi_edge_texture",
-        (VECTOR, W, *VORONOI_COMMON, RANDOMNESS, VORONOI_DIMENSIONS, _switch("normalize")),
+        (VECTOR, W, *VORONOI_COMMON, RANDOMNESS, *VORONOI_SPACE, _switch("normalize")),
         (("Distance", "FLOAT"),),
         VORONOI,
         when={"feature": "DISTANCE_TO_EDGE"},
@@ -123,7 +124,7 @@ ENTRIES = (
     Entry(
         "ShaderNodeTexVoronoi",
         "voronoi_radius_texture",
-        (VECTOR, W, SCALE, RANDOMNESS, VORONOI_DIMENSIONS),
+        (VECTOR, W, SCALE, RANDOMNESS, *VORONOI_SPACE),
         (("Radius", "FLOAT"),),
         VORONOI,
         when={"feature": "N_SPHERE_RADIUS"},
@@ -138,7 +139,7 @@ ENTRIES = (
             Socket("Smoothness", "FLOAT", 1.0),
             Socket("Exponent", "FLOAT", 0.5),
             RANDOMNESS,
-            VORONOI_DIMENSIONS,
+            *VORONOI_SPACE,
             Choice("feature", _numbered(("F1", "F2", "SMOOTH_F1"))),
             Choice("distance", _numbered(METRICS)),
             _switch("normalize"),
