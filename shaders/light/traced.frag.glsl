@@ -61,7 +61,7 @@ void main()
   bool mirror = lobe_is_mirror(lobe);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 11u));
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
-  float choice = scrambled(film_view.bits_w, salt.z);
+  float choice = shuffled(film_view.sample_index, salt.zx);  // apart from what chose the lobe
 
   // Resampled importance sampling (Talbot et al. 2005): candidates of the lobe, one of which is kept in proportion to
   // what it would bring if nothing blocked it. The mean over the candidates is exact; only visibility is sampled.

@@ -20,7 +20,7 @@ void main()
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
-  Closures c = closures_begin(point.normal, scrambled(film_view.bits_z, bits.z));
+  Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z));
   evaluate_material(point, c);
   closures_end(c);
 

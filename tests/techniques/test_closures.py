@@ -39,7 +39,7 @@ def with_setting(material, **settings):
 
 SWEEP = [
     {"Roughness": r, "Metallic": m, "Transmission_Weight": t, "Coat_Weight": c, "Sheen_Weight": s}
-    for r, m, t, c, s in itertools.product((0.1, 0.5, 1.0), (0.0, 0.5, 1.0), (0.0, 0.5, 1.0), (0.0, 1.0), (0.0, 1.0))
+    for r, m, t, c, s in itertools.product((0.1, 0.5, 1.0), (0.0, 0.6), (0.0, 0.7), (0.0, 1.0), (0.0, 1.0))
 ]
 
 
@@ -168,7 +168,7 @@ def smooth_sphere(stage, material, **placement):
     import bpy
 
     data, shape = bpy.data.meshes.new("Sphere"), bmesh.new()
-    bmesh.ops.create_uvsphere(shape, u_segments=64, v_segments=32, radius=1.0)
+    bmesh.ops.create_uvsphere(shape, u_segments=48, v_segments=24, radius=1.0)
     for face in shape.faces:
         face.smooth = True
     shape.to_mesh(data)
@@ -214,7 +214,7 @@ LIT_SWEEP = [
     {"Sheen_Weight": 0.7, "Sheen_Tint": (0.2, 0.5, 0.9, 1.0), "Coat_Weight": 0.5, "Coat_Roughness": 0.3},
     {"Metallic": 1.0, "Sheen_Weight": 0.5, "Roughness": 0.5},
 ]  # fmt: skip
-COLUMNS, CELL = 5, 20  # spheres in a row, pixels of each
+COLUMNS, CELL = 5, 16  # spheres in a row, pixels of each
 
 
 @SLOW
