@@ -198,14 +198,15 @@ def test_render_writes_the_files_passes_as_multilayer_exr(tmp_path):
 
 
 @pytest.mark.slow
-def test_compare_writes_a_page_and_prints_every_light_path(tmp_path):
-    options = ("--reference-samples", "2", "--output", "page")
+@pytest.mark.parametrize(("option", "bounces"), [("--direct-only", "without bounces"), ("", "with all bounces")])
+def test_compare_writes_a_page_and_prints_every_light_path(tmp_path, option, bounces):
+    options = ("--reference-samples", "2", "--output", "page", *option.split())
     done = candela("compare", CORNELL, *TINY, *options, folder=tmp_path)
     assert done.returncode == 0 and done.stderr == ""
-    for word in ("relMSE", "FLIP", "bias", "floor", "Combined", "Diffuse direct", "without bounces", "Direct light"):
+    for word in ("relMSE", "FLIP", "bias", "floor", "Combined", "Diffuse direct", bounces, "Direct light"):
         assert word in done.stdout
     assert done.stdout.splitlines()[-1] == str(tmp_path / "page" / "index.html")
     assert sorted(path.name for path in (tmp_path / "page").iterdir()) == ["candela.png", "cycles.png", "index.html"]
-    assert "without bounces" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+    assert bounces in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
     again = candela("compare", CORNELL, *TINY, *options, folder=tmp_path)
     assert again.returncode == 0 and "from the cache" in again.stdout
