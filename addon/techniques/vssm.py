@@ -25,7 +25,7 @@ classification by bounds and the plane-relative moments are ours.
 |---|---|
 | pyramid, table | log2 N + 4 dispatches, 20 bytes per texel written |
 | lookup, lit or all blocked pixels | up to 45 fetches |
-| lookup, penumbra | 2 grids: up to 130 fetches of 16 bytes and 450 of 8, most pixels a third of that |
+| lookup, penumbra | 2 grids: up to 130 fetches of 16 bytes and 450 of 8, usually a third; 9 more per mixed cell |
 | bytes | 36 per texel and 16 borrowed, beside the map's 20 |
 
 Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the
@@ -36,8 +36,16 @@ right behind muntins: half of the light is lost at one sample); kernels wider th
 
 Measured, RMS of the visibility behind an edge half way to the light, one map: square 0.012, rectangle 5:1 0.029, disc
 0.021, sphere 0.003, sun 0.005. Refined, 16 and 64 points: square 0.006 and 0.0015, where points alone leave 0.015 and
-0.0039. A garden of soft shadows gains (0.0072 against 0.0081 relMSE of direct diffuse light at 16 samples, equal at
-64), a room lit through muntins loses (0.21 against 0.13): accumulated maps therefore stay the choice of Auto.
+0.0039. Against Cycles, relMSE of direct diffuse light at 128x96 (accumulated maps in brackets):
+
+| scene | 1 sample | 16 samples |
+|---|---|---|
+| Cornell box | 0.051 (0.061) | 0.0038 (0.0042) |
+| garden of soft shadows | 0.127 (0.182) | 0.0205 (0.0171) |
+| room behind muntins | 1.08 (0.83) | 0.32 (0.23) |
+
+On a software rasteriser a refined sample costs about 2 to 4 times one of points alone. Hence Auto keeps accumulated
+maps.
 """
 
 from __future__ import annotations

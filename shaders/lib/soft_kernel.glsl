@@ -72,12 +72,41 @@ vec2 kernel_bounds(ShadowReceiver r, ivec2 first, ivec2 last, out float deepest)
   return bounds;
 }
 
-// Texels that the box centre -+ half_size touches, cut off at the view's edges.
-void kernel_texels(ShadowReceiver r, vec2 half_size, out ivec2 first, out ivec2 last)
+// Texels of the view (first..last) that can hold blockers: in front of an area light's plane. Views beside its axis
+// have that plane's horizon along a row or a column (turn_along in addon/frame/depth_maps.py).
+void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
 {
-  float size = r.rectangle.z;
-  first = ivec2(clamp(floor(r.texel - half_size), vec2(0.0), vec2(size - 1.0)));
-  last = ivec2(clamp(ceil(r.texel + half_size) - 1.0, vec2(0.0), vec2(size - 1.0)));
+  first = vec2(0.0);
+  last = vec2(r.rectangle.z - 1.0);
+  if (light.kind != LIGHT_RECTANGLE && light.kind != LIGHT_ELLIPSE) {
+    return;
+  }
+  vec3 forward = sources.view[r.view * VIEW_TEXELS + 2].xyz;
+  if (abs(dot(forward, light.axis)) > 0.01) {
+    return;
+  }
+  vec3 across = sources.view[r.view * VIEW_TEXELS].xyz;
+  vec3 along = sources.view[r.view * VIEW_TEXELS + 1].xyz;
+  vec2 rise = vec2(dot(across, light.axis), dot(along, light.axis));
+  vec2 horizon = (vec2(dot(across, forward), dot(along, forward)) * 0.5 + 0.5) * r.rectangle.z;
+  int k = (abs(rise.x) > abs(rise.y)) ? 0 : 1;
+  float here = clamp(horizon[k], 0.0, r.rectangle.z - 1.0);
+  if (rise[k] > 0.0) {
+    first[k] = ceil(here);
+  }
+  else {
+    last[k] = max(floor(here) - 1.0, 0.0);
+  }
+}
+
+// Texels that the box centre -+ half_size touches, cut off at the view's edges and at the light's plane.
+void kernel_texels(Light light, ShadowReceiver r, vec2 half_size, out ivec2 first, out ivec2 last)
+{
+  vec2 low;
+  vec2 high;
+  kernel_limits(light, r, low, high);
+  first = ivec2(clamp(floor(r.texel - half_size), low, high));
+  last = ivec2(clamp(ceil(r.texel + half_size) - 1.0, low, high));
 }
 
 #define KERNEL_SEARCHES 4
@@ -87,7 +116,7 @@ void kernel_texels(ShadowReceiver r, vec2 half_size, out ivec2 first, out ivec2 
 //
 // The kernel of the highest caster in the map contains every blocker; the highest caster within that kernel gives a
 // smaller one, and so on.
-float kernel_height(ShadowReceiver r, vec2 extent, float most_size)
+float kernel_height(Light light, ShadowReceiver r, vec2 extent, float most_size)
 {
   float size = r.rectangle.z;
   ivec2 first = ivec2(0);
@@ -100,7 +129,7 @@ float kernel_height(ShadowReceiver r, vec2 extent, float most_size)
       return 0.0;
     }
     vec2 half_size = clamp(extent * height, vec2(0.5), vec2(most_size));
-    kernel_texels(r, half_size, first, last);
+    kernel_texels(light, r, half_size, first, last);
     bounds = kernel_bounds(r, first, last, deepest);
     float tilt = dot(abs(r.gradient), half_size + 1.0);
     if (bounds.x > r.q + tilt + r.slack) {

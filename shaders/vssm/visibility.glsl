@@ -107,7 +107,7 @@ Blockers vssm_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, ve
   bool smooth_edges = extent.x <= 0.0;
   ivec2 first;
   ivec2 last;
-  kernel_texels(r, half_size, first, last);
+  kernel_texels(light, r, half_size, first, last);
   vec2 low = max(r.texel - half_size, vec2(first));
   vec2 high = min(r.texel + half_size, vec2(last + 1));
   ivec2 count = last - first + 1;
@@ -173,7 +173,7 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   }
   vec2 extent = kernel_extent(light, r);
   float most = min(0.5 * r.rectangle.z, 4.0 * float(CELL_TEXELS));
-  float height = kernel_height(r, extent, most);
+  float height = kernel_height(light, r, extent, most);
   if (height <= 0.0) {
     return 1.0 + height;
   }

@@ -95,6 +95,15 @@ def test_the_shadow_of_a_slanted_edge_is_sharp_where_it_starts(floor):
     assert widths[0] < widths[1]
 
 
+def test_a_ceiling_behind_an_area_light_hides_none_of_it(floor):
+    """Seen from the light's middle it stands beside far receivers, but no ray from them to the light meets it."""
+    low = 0.3
+    floor.light("AREA", (0, 0, low), size=0.4)
+    floor.blocker((-EVERYWHERE, -EVERYWHERE), (EVERYWHERE, EVERYWHERE), low + 0.01)
+    source = model.area((0, 0, low), (0.4, 0, 0), (0, 0.4, 0), 100)
+    assert visibility(floor, source, 1, (32, 32)) == pytest.approx(1.0, abs=5e-3)
+
+
 def test_a_closed_roof_lets_no_light_pass_whatever_its_distance(floor):
     for name in ("square", "sphere", "sun"):
         kind, settings, _ = LIGHTS[name]
