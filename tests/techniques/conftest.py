@@ -131,11 +131,11 @@ class Stage:
 
     # Pictures ------------------------------------------------------------------------------------------------------
 
-    def render(self, samples=1, size=(32, 32), seed=0, engine="CANDELA", finite=True):
+    def render(self, samples=1, size=(32, 32), seed=0, engine="CANDELA", finite=True, bounces=0):
         """Passes by Candela's names, (H, W, C) float32, bottom row first."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
-            images = render_passes(self.scene, engine, samples, seed, direct_only=True, size=size).images
+            images = render_passes(self.scene, engine, samples, seed, size=size, bounces=bounces).images
         if engine == "CANDELA" and finite:
             assert ledger.latest().bad_pixels == 0
             for name, pixels in images.items():
