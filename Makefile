@@ -10,7 +10,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check package test-window nodes bench-quick clean
+.PHONY: help environment demo pictures samples test test-fast stress check package test-window window-walk nodes bench-quick clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
@@ -48,6 +48,9 @@ stress: environment ## random scenes against what must be true of every picture 
 
 test-window: package ## the packaged extension in a real Blender with a window (REAL_BLENDER=command)
 	$(PYTHON) -m pytest -m window tests/window
+
+window-walk: package ## ten minutes of random edits in a real Blender with a window
+	STROLL_SECONDS=600 $(PYTHON) -m pytest -m window tests/window -k random_walk
 
 nodes: environment ## every shader node beside Cycles: docs/nodes.md
 	$(PYTHON) -m bench.nodes

@@ -13,6 +13,7 @@ import bpy
 from ..compare import metrics
 from ..compare.beside import reference_steps
 from ..frame import pass_graph
+from ..frame.ledger import RAN, SKIPPED
 from ..frame.plan import PlanError, make_plan
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
@@ -124,14 +125,17 @@ class CANDELA_OT_passes_run(_OnTree, Job, bpy.types.Operator):
     def _show(self, context, tree, rendered: Rendered, truth: dict, reference) -> None:
         shown = pictures_of(tree, rendered.images, truth)
         errors = _errors(rendered, reference) if reference is not None else {}
+        known = {node.name: result(node).milliseconds for node in tree.nodes if result(node)}
         forget_results(tree)
-        times = {row.name: row.milliseconds for row in rendered.ledger.rows if row.state == "ran"}
-        writers = {name: technique for technique in REGISTRY for name in (w.name for w in technique.writes)}
+        rows = {row.name: row for row in rendered.ledger.rows}
+        written = {technique.name: {write.name for write in technique.writes} for technique in REGISTRY}
         for node in tree.nodes:
-            if node.name not in shown and getattr(node, "technique", "") not in times:
+            row = rows.get(getattr(node, "technique", ""))
+            if node.name not in shown and (row is None or row.state == SKIPPED):
                 continue
-            lines = [line for name, line in errors.items() if node.technique and writers[name].name == node.technique]
-            set_result(node, Result(shown.get(node.name), times.get(node.technique), lines))
+            took = row.milliseconds if row is not None and row.state == RAN else known.get(node.name)
+            lines = [line for name, line in errors.items() if row is not None and name in written[node.technique]]
+            set_result(node, Result(shown.get(node.name), took, lines))
         outputs = [node for node in tree.nodes if node.bl_idname == "CandelaPassOutput" and node.name in shown]
         best = self.node or next((node.name for node in outputs), "")
         if best in shown:
@@ -144,12 +148,12 @@ def _errors(rendered: Rendered, reference) -> dict[str, str]:
     for name, truth in reference_images(reference).items():
         if name not in rendered.images or name == "film.depth":
             continue
-        path = name.removeprefix("radiance.")
+        path = name.removeprefix("radiance.").removeprefix("film.")
         exposure = rendered.exposure if name.startswith("radiance.") else 1.0
         noise = half.get(path) if path in mean else None
         error = metrics.compare_radiance(path, rendered.images[name][..., :3] * exposure, truth, noise)
         relmse, _, _, bias, _ = metrics.figures(error)
-        lines[name] = f"{path.replace('_', ' ')}: relMSE {relmse}, bias {bias}"
+        lines[name] = f"{path.replace('_', ' ')}: {relmse}, bias {bias}"
     return lines
 
 

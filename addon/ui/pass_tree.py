@@ -114,13 +114,15 @@ def fill(tree, graph: PassGraph, columns: dict[str, int]) -> None:
     for node in graph.nodes:
         new = made[node.name] = tree.nodes.new(f"CandelaPass_{node.technique}")
         new.name = node.name
+        new.select = False
         column = columns[node.name]
-        new.location = 320 * column, -height.get(column, 0)
+        new.location = 360 * column, -height.get(column, 0)
         height[column] = height.get(column, 0) + 260 + 22 * (len(new.inputs) + len(new.outputs))
     for link in graph.links:
         tree.links.new(_socket(made[link.target].inputs, link.input), _socket(made[link.source].outputs, link.output))
     output = tree.nodes.new("CandelaPassOutput")
-    output.location = 320 * (max(columns.values(), default=0) + 1), 0
+    output.select = False
+    output.location = 360 * (max(columns.values(), default=0) + 1), 0
     for node in reversed(list(made.values())):
         picture = _socket(node.outputs, "film.combined")
         if picture is not None:
@@ -222,6 +224,8 @@ class _Node:
         name = f"{self.id_data.session_uid} {self.name}"
         if shown.picture is not None and _previews is not None and name in _previews:
             layout.template_icon(icon_value=_previews[name].icon_id, scale=PREVIEW_SCALE)
+        if shown.errors:
+            layout.label(text="relMSE against Cycles", icon="SPLIT_HORIZONTAL")
         for line in shown.errors:
             layout.label(text=line)
 
@@ -259,7 +263,7 @@ def _technique_node(technique) -> type:
         "__annotations__": {},
         "bl_idname": f"CandelaPass_{technique.name}",
         "bl_label": technique.label,
-        "bl_width_default": 220.0,
+        "bl_width_default": 260.0,
         "technique": technique.name,
         "init": init,
         "draw_settings": draw_settings,

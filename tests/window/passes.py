@@ -37,6 +37,9 @@ def steps():
     tree = scene.candela.pass_tree
     tree.samples, tree.percentage, tree.reference_samples = 4, 100, 16
     upper.spaces.active.show_region_ui = True
+    yield 0.3
+    sidebar = next(region for region in upper.regions if region.type == "UI")
+    sidebar.active_panel_category = "Candela"
     yield 0.5
     yield from job("run", upper, bpy.ops.candela.passes_run)
     frame_all(upper)

@@ -1,0 +1,200 @@
+"""Runs inside a windowed Blender: a seeded random walk of edits, undo, views, modes, engines and renders.
+
+    blender FILE.blend --python stroll.py -- SECONDS FOLDER
+
+Each step is one thing that an artist may do at any time, without waiting for the viewport to be ready. Memory is noted
+at every rest that the walk comes to.
+"""
+
+import random
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from stage import (
+    ENGINE,
+    picture,
+    render,
+    resident_mib,
+    result,
+    run,
+    there,
+    viewport_area,
+    viewports,
+    wait_for_rest,
+    window,
+)
+
+SECONDS = float(sys.argv[-2])
+SEED = 6
+MEASURE_EVERY_S = 15.0
+dice = random.Random(SEED)
+result.update(steps={}, memory_mib=[], seconds=SECONDS, seed=SEED)
+
+
+def show():
+    scene = window().scene
+    scene.render.engine = ENGINE
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
+    scene.candela.samples = scene.candela.viewport_samples = 2
+    scene.candela.bounces = 0
+    space = viewport_area().spaces.active
+    space.region_3d.view_perspective = "CAMERA"
+    space.shading.type = "RENDERED"
+
+
+def one(kind):
+    found = [thing for thing in window().scene.objects if thing.type == kind]
+    return dice.choice(found) if found else None
+
+
+def push(message):
+    with there():
+        bpy.ops.ed.undo_push(message=message)
+
+
+def move_object():
+    thing = dice.choice(list(window().scene.objects))
+    thing.location.x += dice.uniform(-0.3, 0.3)
+    push("move")
+
+
+def change_light():
+    light = one("LIGHT")
+    if light is not None:
+        light.data.energy *= dice.choice((0.5, 2.0))
+        light.data.color = [dice.random() for _ in range(3)]
+        push("light")
+
+
+def change_material():
+    thing = one("MESH")
+    material = thing.active_material if thing is not None else None
+    if material is not None and material.node_tree is not None:
+        shader = next((node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
+        if shader is not None:
+            shader.inputs["Roughness"].default_value = dice.random()
+            push("material")
+
+
+def add_object():
+    with there():
+        if bpy.context.mode == "OBJECT":
+            bpy.ops.mesh.primitive_cube_add(size=0.4, location=(dice.uniform(-2, 2), dice.uniform(-2, 2), 1.0))
+            push("add")
+
+
+def delete_object():
+    added = [thing for thing in window().scene.objects if thing.name.startswith("Cube")]
+    if added:
+        bpy.data.objects.remove(dice.choice(added))
+        push("delete")
+
+
+def undo():
+    with there():
+        if bpy.ops.ed.undo.poll():
+            bpy.ops.ed.undo()
+
+
+def redo():
+    with there():
+        if bpy.ops.ed.redo.poll():
+            bpy.ops.ed.redo()
+
+
+def edit_mode():
+    thing = one("MESH")
+    if thing is None or thing.name not in window().view_layer.objects or not thing.visible_get():
+        return
+    window().view_layer.objects.active = thing
+    with there():
+        if bpy.ops.object.mode_set.poll():
+            bpy.ops.object.mode_set(mode="EDIT" if bpy.context.mode == "OBJECT" else "OBJECT")
+
+
+def turn_view():
+    region = viewport_area().spaces.active.region_3d
+    region.view_perspective = dice.choice(("PERSP", "ORTHO", "CAMERA"))
+    region.view_distance *= dice.uniform(0.8, 1.25)
+
+
+def shading():
+    viewport_area().spaces.active.shading.type = dice.choice(("SOLID", "RENDERED", "RENDERED", "MATERIAL"))
+
+
+def engine():
+    window().scene.render.engine = dice.choice(("BLENDER_WORKBENCH", ENGINE, ENGINE))
+
+
+def settings():
+    candela = window().scene.candela
+    candela.seed = dice.randrange(4)
+    candela.viewport_samples = dice.choice((1, 2, 4))
+
+
+def frame():
+    window().scene.frame_set(dice.randrange(1, 20))
+
+
+def border():
+    scene = window().scene
+    scene.render.use_border = not scene.render.use_border
+    scene.render.border_min_x, scene.render.border_max_x = 0.2, dice.uniform(0.3, 1.0)
+
+
+def tree():
+    candela = window().scene.candela
+    if candela.pass_tree is not None:
+        candela.pass_tree = None
+    elif window().scene.camera is not None:
+        with there():
+            bpy.ops.candela.passes_from_auto()
+
+
+STEPS = (
+    *(move_object, change_light, change_material, add_object, delete_object, undo, undo, redo, edit_mode, turn_view),
+    *(turn_view, shading, engine, settings, frame, border, tree),
+)
+
+
+def steps():
+    show()
+    yield from wait_for_rest()
+    started = measured = time.monotonic()
+    while time.monotonic() - started < SECONDS:
+        if dice.random() < 0.03:
+            count("render")
+            ended = yield from render()
+            result.setdefault("renders", []).append(ended)
+        else:
+            step = dice.choice(STEPS)
+            count(step.__name__)
+            step()
+        yield dice.choice((0.01, 0.05, 0.2, 0.5))
+        if time.monotonic() - measured > MEASURE_EVERY_S:
+            with there():
+                if bpy.context.mode != "OBJECT":
+                    bpy.ops.object.mode_set(mode="OBJECT")
+            show()
+            yield from wait_for_rest()
+            result["memory_mib"].append(resident_mib())
+            measured = time.monotonic()
+    with there():
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+    show()
+    yield from wait_for_rest()
+    result["viewports"] = len(viewports())
+    picture("strolled.png")
+
+
+def count(name):
+    result["steps"][name] = result["steps"].get(name, 0) + 1
+
+
+run(steps)
