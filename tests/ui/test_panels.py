@@ -194,3 +194,17 @@ def test_blenders_panels_are_shown_and_left_as_they_were(registered):
     finally:
         blender_panels.show(ENGINE)
     assert compatible() == shown
+
+
+def test_every_setting_has_a_tooltip_and_can_be_keyframed(scene):
+    for declared in scene.candela.bl_rna.properties:
+        if declared.identifier in ("rna_type", "name"):
+            continue
+        assert declared.description, declared.identifier
+        if declared.type != "POINTER":
+            assert declared.is_animatable, declared.identifier
+    scene.candela.keyframe_insert("samples", frame=1)
+    scene.candela.samples = 7
+    scene.candela.keyframe_insert("samples", frame=9)
+    scene.frame_set(9)
+    assert scene.candela.samples == 7
