@@ -14,7 +14,7 @@ from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 
 SCENES = Path(__file__).resolve().parents[2] / "sample_blends"
-SIZE, SAMPLES, REFERENCE_SAMPLES, BOUNCES = (64, 48), 64, 256, 16
+SIZE, SAMPLES, REFERENCE_SAMPLES, BOUNCES = (64, 48), 64, 128, 16
 RELMSE, BIAS = 0.01, 0.03
 MISSED = {  # measured at 96x72
     "colonnade_hall": "relMSE 0.014: grain of partly hidden virtual lights",
