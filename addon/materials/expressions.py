@@ -18,7 +18,7 @@ from .nodes.image import IMAGE_FUNCTIONS, MISSING_COLOR
 from .values import ValueBlock, glsl_number, to_kind
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
-DEEPEST_BUMP = 3  # bump nodes within the heights of bump nodes: each level is written and evaluated three times
+DEEPEST_BUMP = 3  # bump nodes within the heights of bump nodes: each level is evaluated three times
 MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the programs that include the material
 
 IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
@@ -42,6 +42,7 @@ class _Scope:
         self.lines: list[str] = []
         self.outputs: dict[tuple[str, str], tuple[str, str]] = {}  # link -> GLSL variable, kind
         self.done: set[str] = set()
+        self.depth = 0  # how many functions stand in each other at the deepest of its calls
 
 
 class Expressions:
@@ -57,6 +58,7 @@ class Expressions:
         self._scopes = [_Scope()]
         self._functions: list[str] = []
         self._function_names: dict[tuple[tuple[str, str], str], str] = {}
+        self._function_depths: dict[str, int] = {}
         self._constants: dict[tuple[str, words.Argument], str] = {}
         self._read_outputs = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
 
@@ -216,10 +218,12 @@ class Expressions:
         here = self.socket(node, words.Socket(heights.identifier, "FLOAT"))
         if given is None or given.link not in self.outputs:
             return f"{here}, {here}, {here}"
-        if len(self._scopes) > DEEPEST_BUMP:
+        name = self.function(given.link, "FLOAT")
+        depth = self._function_depths[name]
+        if depth > DEEPEST_BUMP:
             self.note(node, "Bump within the heights of bump is left out from the fourth level on.")
             return f"{here}, {here}, {here}"
-        name = self.function(given.link, "FLOAT")
+        self._scopes[-1].depth = max(self._scopes[-1].depth, depth)
         width = self.socket(node, heights.width)
         x = f"{name}(surface_point_moved(point, vec2({width}, 0.0)))"
         y = f"{name}(surface_point_moved(point, vec2(0.0, {width})))"
@@ -233,7 +237,7 @@ class Expressions:
             value = convert(*self.outputs[link], kind) if link in self.outputs else glsl_number(0.0, kind)
             name = f"tree{len(self._functions)}"
             body = "".join(f"  {line}\n" for line in (*self.lines, f"return {value};"))
-            self._scopes.pop()
+            self._function_depths[name] = self._scopes.pop().depth + 1
             self._functions.append(f"\n{GLSL_TYPES[kind]} {name}(SurfacePoint point)\n{{\n{body}}}\n")
             self._function_names[link, kind] = name
         return self._function_names[link, kind]

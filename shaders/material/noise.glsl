@@ -12,127 +12,62 @@
 #define NOISE_RIDGED_MULTIFRACTAL 3
 #define NOISE_HETERO_TERRAIN 4
 
-float noise_octave(vec4 p, int dimensions)
-{
-  if (dimensions == 1) {
-    return perlin_noise(p.x);
-  }
-  if (dimensions == 2) {
-    return perlin_noise(p.xy);
-  }
-  if (dimensions == 3) {
-    return perlin_noise(p.xyz);
-  }
-  return perlin_noise(p);
-}
-
-// A last octave fades in with the fraction of `detail`.
-float noise_fbm(vec4 p, int dimensions, float detail, float roughness, float lacunarity, bool normalized)
+// The sum of type `type` over the octaves of `detail`, whose last fades in with the fraction. One loop for all types,
+// so that the noise itself is written once (see perlin.glsl).
+float noise_sum(vec4 start, int dimensions, int type, bool normalized, float detail, float roughness,
+                float lacunarity, float offset, float gain)
 {
   int whole = int(detail);
-  float fraction = detail - floor(detail);
-  float scale = 1.0;
-  float amplitude = 1.0;
-  float amplitudes = 0.0;
-  float sum = 0.0;
-  for (int i = 0; i <= whole; i++) {
-    sum += amplitude * noise_octave(scale * p, dimensions);
-    amplitudes += amplitude;
-    amplitude *= roughness;
-    scale *= lacunarity;
-  }
-  float value = normalized ? 0.5 * sum / amplitudes + 0.5 : sum;
-  if (fraction > 0.0) {
-    sum += amplitude * noise_octave(scale * p, dimensions);
-    value = mix(value, normalized ? 0.5 * sum / (amplitudes + amplitude) + 0.5 : sum, fraction);
-  }
-  return value;
-}
-
-float noise_multifractal(vec4 p, int dimensions, float detail, float roughness, float lacunarity)
-{
-  int whole = int(detail);
-  float fraction = detail - floor(detail);
+  float fraction = (type == NOISE_RIDGED_MULTIFRACTAL) ? 0.0 : detail - floor(detail);
   int last = (fraction > 0.0) ? whole + 1 : whole;
-  float value = 1.0;
+  vec4 p = start;
   float power = 1.0;
+  float powers = 0.0;
+  float whole_powers = 0.0;
+  float weight = 1.0;  // what the octave before leaves to this one
+  float value = (type == NOISE_MULTIFRACTAL) ? 1.0 : 0.0;
+  float whole_value = 0.0;
   for (int i = 0; i <= last; i++) {
-    value *= ((i > whole) ? fraction : 1.0) * power * noise_octave(p, dimensions) + 1.0;
+    float share = (i > whole) ? fraction : 1.0;
+    float n = perlin_noise(p, dimensions);
+    if (type == NOISE_FBM) {
+      if (i <= whole) {
+        whole_value += power * n;
+        whole_powers += power;
+      }
+      value += power * n;
+      powers += power;
+    }
+    else if (type == NOISE_MULTIFRACTAL) {
+      value *= share * power * n + 1.0;
+    }
+    else if (type == NOISE_HYBRID_MULTIFRACTAL) {
+      if (weight <= 0.001) {
+        break;
+      }
+      float signal = (n + offset) * power;
+      weight = min(weight, 1.0);
+      value += share * weight * signal;
+      weight *= gain * signal;
+    }
+    else if (type == NOISE_RIDGED_MULTIFRACTAL) {
+      float signal = offset - abs(n);
+      signal *= signal * weight;
+      value += signal * power;
+      weight = clamp(signal * gain, 0.0, 1.0);
+    }
+    else {
+      value += (i == 0) ? n + offset : share * (n + offset) * power * value;
+    }
     power *= roughness;
     p *= lacunarity;
   }
-  return value;
-}
-
-float noise_hybrid_multifractal(vec4 p, int dimensions, float detail, float roughness, float lacunarity, float offset,
-                                float gain)
-{
-  int whole = int(detail);
-  float fraction = detail - floor(detail);
-  int last = (fraction > 0.0) ? whole + 1 : whole;
-  float power = 1.0;
-  float value = 0.0;
-  float weight = 1.0;
-  for (int i = 0; i <= last && weight > 0.001; i++) {
-    weight = min(weight, 1.0);
-    float signal = (noise_octave(p, dimensions) + offset) * power;
-    value += ((i > whole) ? fraction : 1.0) * weight * signal;
-    weight *= gain * signal;
-    power *= roughness;
-    p *= lacunarity;
+  if (type == NOISE_FBM) {
+    float all = normalized ? 0.5 * value / powers + 0.5 : value;
+    float before = normalized ? 0.5 * whole_value / whole_powers + 0.5 : whole_value;
+    return mix(before, all, fraction);
   }
   return value;
-}
-
-float noise_ridged_multifractal(vec4 p, int dimensions, float detail, float roughness, float lacunarity, float offset,
-                                float gain)
-{
-  int whole = int(detail);
-  float power = 1.0;
-  float value = 0.0;
-  float weight = 1.0;
-  for (int i = 0; i <= whole; i++) {
-    float signal = offset - abs(noise_octave(p, dimensions));
-    signal *= signal * weight;
-    value += signal * power;
-    weight = clamp(signal * gain, 0.0, 1.0);
-    power *= roughness;
-    p *= lacunarity;
-  }
-  return value;
-}
-
-float noise_hetero_terrain(vec4 p, int dimensions, float detail, float roughness, float lacunarity, float offset)
-{
-  int whole = int(detail);
-  float fraction = detail - floor(detail);
-  int last = (fraction > 0.0) ? whole + 1 : whole;
-  float power = roughness;
-  float value = offset + noise_octave(p, dimensions);
-  for (int i = 1; i <= last; i++) {
-    p *= lacunarity;
-    value += ((i > whole) ? fraction : 1.0) * (noise_octave(p, dimensions) + offset) * power * value;
-    power *= roughness;
-  }
-  return value;
-}
-
-float noise_of_type(vec4 p, int dimensions, int type, bool normalized, float detail, float roughness,
-                    float lacunarity, float offset, float gain)
-{
-  if (type == NOISE_MULTIFRACTAL) {
-    return noise_multifractal(p, dimensions, detail, roughness, lacunarity);
-  }
-  if (type == NOISE_HYBRID_MULTIFRACTAL) {
-    return noise_hybrid_multifractal(p, dimensions, detail, roughness, lacunarity, offset, gain);
-  }
-  if (type == NOISE_RIDGED_MULTIFRACTAL) {
-    return noise_ridged_multifractal(p, dimensions, detail, roughness, lacunarity, offset, gain);
-  }
-  if (type == NOISE_HETERO_TERRAIN) {
-    return noise_hetero_terrain(p, dimensions, detail, roughness, lacunarity, offset);
-  }
-  return noise_fbm(p, dimensions, detail, roughness, lacunarity, normalized);
 }
 
 // Far places that serve as other seeds; one dimension has its own hash.
@@ -156,14 +91,14 @@ void noise_texture(vec3 vector, float w, float scale, float detail, float roughn
   if (distortion != 0.0) {
     vec4 start = p;
     for (int i = 0; i < dimensions; i++) {
-      float pushed = distortion * noise_octave(start + noise_seed(i, dimensions), dimensions);
+      float pushed = distortion * perlin_noise(start + noise_seed(i, dimensions), dimensions);
       p += pushed * vec4(float(i == 0), float(i == 1), float(i == 2), float(i == 3));
     }
   }
   float channels[3];
   for (int i = 0; i < (color_used ? 3 : 1); i++) {
     vec4 q = (i == 0) ? p : p + noise_seed(dimensions + i - 1, dimensions);
-    channels[i] = noise_of_type(q, dimensions, type, normalized, octaves, rough, lacunarity, offset, gain);
+    channels[i] = noise_sum(q, dimensions, type, normalized, octaves, rough, lacunarity, offset, gain);
   }
   value = channels[0];
   color = color_used ? vec3(channels[0], channels[1], channels[2]) : vec3(value);
@@ -217,7 +152,8 @@ void wave_texture(vec3 vector, float scale, float distortion, float detail, floa
   if (distortion != 0.0) {
     float octaves = clamp(detail, 0.0, 15.0);
     n += distortion
-         * (2.0 * noise_fbm(vec4(p * detail_scale, 0.0), 3, octaves, detail_roughness, 2.0, true) - 1.0);
+         * (2.0 * noise_sum(vec4(p * detail_scale, 0.0), 3, NOISE_FBM, true, octaves, detail_roughness, 2.0, 0.0, 1.0)
+            - 1.0);
   }
   if (profile == WAVE_SINE) {
     value = 0.5 + 0.5 * sin(n - 0.5 * PI);

@@ -283,8 +283,9 @@ def trees(draw):
 
 @hypothesis.settings(max_examples=30, deadline=None, suppress_health_check=list(hypothesis.HealthCheck))
 @hypothesis.given(trees())
-def test_random_trees_compile(evaluate, tree):
+def test_random_trees_compile_and_stay_finite(evaluate, tree):
     material = compile_material("Test", tree, {"picture": PICTURE})
-    evaluate(material, points(attributes=[(0.3, 0.4, 0.0, 1.0)] * 8), {"picture": PICTURE})
+    closures = evaluate(material, points(attributes=[(0.3, 0.4, 0.0, 1.0)] * 8), {"picture": PICTURE})
     assert np.isfinite(material.values).all()
+    assert all(np.isfinite(values).all() for values in closures.values()), closures
     assert 0.0 <= material.opacity <= 1.0
