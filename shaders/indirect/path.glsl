@@ -20,17 +20,6 @@ vec3 ray_origin(vec3 position, vec3 normal)
   return position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
 }
 
-// Cosine-distributed around a unit normal (Malley); density cos / pi per steradian.
-vec3 cosine_direction(vec3 normal, vec2 u)
-{
-  vec3 tangent;
-  vec3 bitangent;
-  orthonormal_basis(normal, tangent, bitangent);
-  float radius = sqrt(u.x);
-  float turn = 2.0 * PI * u.y;
-  return safe_normalize(radius * cos(turn) * tangent + radius * sin(turn) * bitangent + sqrt(max(1.0 - u.x, 0.0)) * normal);
-}
-
 // What a point reflects: exactly where the camera sees it, else the mean of its material.
 vec3 albedo_at(ivec2 hit, vec3 position, vec3 normal)
 {

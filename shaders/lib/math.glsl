@@ -32,6 +32,17 @@ void orthonormal_basis(vec3 n, out vec3 tangent, out vec3 bitangent)
   bitangent = vec3(b, sign_z + n.y * n.y * a, -n.y);
 }
 
+// Cosine-distributed around a unit normal (Malley); density cos / pi per steradian.
+vec3 cosine_direction(vec3 normal, vec2 u)
+{
+  vec3 tangent;
+  vec3 bitangent;
+  orthonormal_basis(normal, tangent, bitangent);
+  float radius = sqrt(u.x);
+  float turn = 2.0 * PI * u.y;
+  return safe_normalize(radius * cos(turn) * tangent + radius * sin(turn) * bitangent + sqrt(max(1.0 - u.x, 0.0)) * normal);
+}
+
 // Unit vector <-> two numbers in [-1, 1] (octahedral map).
 vec2 octahedral_encode(vec3 n)
 {
