@@ -10,7 +10,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check package test-window window-walk nodes bench-quick clean
+.PHONY: help environment demo pictures samples test test-fast stress check package test-window window-walk nodes bench bench-quick clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
@@ -54,6 +54,10 @@ window-walk: package ## ten minutes of random edits in a real Blender with a win
 
 nodes: environment ## every shader node beside Cycles: docs/nodes.md
 	$(PYTHON) -m bench.nodes
+
+bench: environment ## run time against error of every technique, EEVEE and Cycles (BUDGET=minutes): docs/performance.md
+	$(PYTHON) -m bench run $(if $(BUDGET),--budget $(BUDGET))
+	$(PYTHON) -m bench page
 
 bench-quick: environment ## time against error, beside EEVEE and Cycles
 	$(PYTHON) -m bench.quick

@@ -1,0 +1,28 @@
+"""`python -m bench run | page | profile | growth`: see the module of each. `make bench` runs them all."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+from bench import page, run
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    commands = parser.add_subparsers(metavar="run|page", required=True)
+    for name, module in (("run", run), ("page", page)):
+        about = module.__doc__.split("\n\n")[0]
+        one = commands.add_parser(name, help=about.split(": `")[0], description=module.__doc__)
+        module.add_options(one)
+        one.set_defaults(command=module.command)
+    options = parser.parse_args(arguments)
+    return options.command(options)
+
+
+if __name__ == "__main__":
+    code = main(sys.argv[1:])
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # Blender 4.5 as a module waits forever in its exit handlers once a GPU was used

@@ -1,0 +1,179 @@
+"""What the benchmark measures: scenes × series × samples, as plain data, and the file that keeps every measured cell.
+
+A cell is one engine with one set of settings at one number of samples on one scene. Its key is a hash of all that its
+figures depend on: the scene's file (or the source of its family), the settings, the size, Blender's version and device,
+and, for Candela, every source file of the add-on. A run that is interrupted, or started again after a change, measures
+only the cells whose keys it does not find.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENES = ROOT / "sample_blends"
+
+SWEEP = (1, 2, 4, 8, 16, 32, 64)  # of Candela
+CYCLES_SWEEP = (1, 2, 4, 8, 16, 32, 64, 128, 256)
+EEVEE_SWEEP = (16, 4, 64)
+MAIN_SAMPLES = {  # what is dropped last when time runs out
+    "CANDELA": (1, 4, 16, 64),
+    "BLENDER_EEVEE": (16,),
+    "CYCLES": (1, 4, 16, 64),
+}
+
+
+@dataclass(frozen=True)
+class Series:
+    """An engine with settings; its samples are swept. `label` names it in tables and plots."""
+
+    label: str
+    engine: str
+    samples: tuple[int, ...]
+    main: bool = False  # the engine as it comes, without any setting chosen by hand
+    bounces: int | None = None  # None: all that the engine renders by itself
+    denoised: bool = False
+    ray_traced: bool = False  # EEVEE's own ray tracing
+    slots: tuple[tuple[str, str], ...] = ()  # Candela's technique by slot, where not Auto
+
+    @property
+    def own(self) -> bool:
+        return self.engine == "CANDELA"
+
+    @property
+    def paths(self) -> bool:
+        """Whether its light paths can be compared one by one: EEVEE splits light otherwise, denoising knows only
+        Combined."""
+        return self.engine != "BLENDER_EEVEE" and not self.denoised
+
+
+PEERS = (
+    Series("EEVEE", "BLENDER_EEVEE", EEVEE_SWEEP, main=True),
+    Series("EEVEE, ray traced", "BLENDER_EEVEE", EEVEE_SWEEP, main=True, ray_traced=True),
+    Series("Cycles", "CYCLES", CYCLES_SWEEP, main=True),
+    Series("Cycles, denoised", "CYCLES", CYCLES_SWEEP, main=True, denoised=True),
+    Series("Cycles, no bounces", "CYCLES", (1, 4, 16, 64), bounces=0),
+)
+
+
+def own_series(registry: Iterable) -> tuple[Series, ...]:
+    """Candela as it comes, without bounces, and with each technique of a slot that has several to choose from."""
+    found = [Series("Candela", "CANDELA", SWEEP, main=True)]
+    found.append(Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0))
+    by_slot: dict[str, list] = {}
+    for technique in registry:
+        if technique.slot:
+            by_slot.setdefault(technique.slot, []).append(technique)
+    for slot, techniques in by_slot.items():
+        if len(techniques) > 1:
+            found += [
+                Series(f"Candela, {one.label.lower()}", "CANDELA", SWEEP, slots=((slot, one.name),))
+                for one in techniques
+            ]
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A sample file, or a member of a procedural family: family and value of its dial."""
+
+    name: str
+    family: str = ""
+    dial: float = 0.0
+
+    @property
+    def file(self) -> Path | None:
+        return None if self.family else SCENES / f"{self.name}.blend"
+
+    def content(self) -> str:
+        """Hash of what defines the scene."""
+        source = self.file or Path(__file__).with_name("families.py")
+        return hashlib.blake2b(source.read_bytes() + f"{self.family} {self.dial}".encode(), digest_size=12).hexdigest()
+
+
+def sample_scenes() -> tuple[Scene, ...]:
+    return tuple(Scene(path.stem) for path in sorted(SCENES.glob("*.blend")))
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One point of a plot. `size` is (width, height) in pixels."""
+
+    scene: Scene
+    series: Series
+    samples: int
+    size: tuple[int, int]
+    reference_samples: int
+
+    @property
+    def main(self) -> bool:
+        return self.series.main and self.samples in MAIN_SAMPLES[self.series.engine]
+
+    def key(self, machine: str) -> str:
+        """Name of the cell in the store; `machine` is Blender's version and the device."""
+        settings = {name: value for name, value in asdict(self.series).items() if name not in ("samples", "main")}
+        about = {
+            "scene": self.scene.content(),
+            "settings": settings,
+            "samples": self.samples,
+            "size": self.size,
+            "reference": self.reference_samples,
+            "machine": machine,
+            "sources": sources() if self.series.own else "",
+        }
+        return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
+
+
+@cache
+def sources() -> str:
+    """Hash of everything that Candela is made of."""
+    digest = hashlib.blake2b(digest_size=12)
+    for folder in ("addon", "shaders"):
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in (".py", ".glsl", ".npz"):
+                digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def in_turns(cells: Iterable[Cell]) -> list[Cell]:
+    """The cells of each scene in alternating order of their series, from few samples to many, main ones first."""
+    cells = list(cells)
+    places: dict[tuple[Scene, Series], int] = {}
+    order = {}
+    for cell in cells:
+        place = places.setdefault((cell.scene, cell.series), 0)
+        places[cell.scene, cell.series] = place + 1
+        order[cell] = place
+    scenes = list(dict.fromkeys(cell.scene for cell in cells))
+    return sorted(cells, key=lambda cell: (scenes.index(cell.scene), not cell.series.main, order[cell]))
+
+
+@dataclass
+class Store:
+    """Measured cells by key, in a file of one JSON object per line, to which each cell is added at once."""
+
+    path: Path
+    found: dict[str, dict] = field(default_factory=dict)
+
+    def __post_init__(self):
+        if self.path.exists():
+            for line in self.path.read_text(encoding="utf-8").splitlines():
+                try:
+                    row = json.loads(line)
+                except ValueError:
+                    continue  # the line that was being written when the machine went down
+                self.found[row["key"]] = row
+
+    def add(self, key: str, figures: dict) -> dict:
+        """Keep the figures of a cell; returns the row as it was written."""
+        row = {"key": key, **figures}
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row, ensure_ascii=False) + "\n")
+        self.found[key] = row
+        return row

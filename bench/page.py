@@ -1,0 +1,303 @@
+"""The page of the benchmark, the README's picture and the table of docs/performance.md: `python -m bench page`.
+
+Reads bench/results/bench.json (and growth.json, profile.json beside it, where they are) and renders nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import html
+import json
+from pathlib import Path
+from string import Template
+
+from bench import plots
+from bench.cells import ROOT
+from bench.figures import (
+    MIDDLE,
+    OWN,
+    Results,
+    against,
+    at_fault,
+    bias_floor,
+    geometric_mean,
+    load,
+)
+from bench.run import OUT, RESULTS
+
+PEERS = ("EEVEE", "EEVEE, ray traced", "Cycles", "Cycles, denoised")
+PERFORMANCE = ROOT / "docs" / "performance.md"
+PICTURE = ROOT / "docs" / "images" / "bench.png"
+BEGIN, END = "<!-- written by `python -m bench page` -->", "<!-- end of what is written -->"
+
+PAGE = Template("""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Candela: time against error</title>
+<style>
+body { margin: 0; background: #f6f5f2; color: #1d1c1a; font: 15px/1.5 system-ui, "Segoe UI", sans-serif; }
+main { max-width: 1240px; margin: 0 auto; padding: 28px 20px 60px; }
+h1 { font-size: 26px; margin: 0; } h2 { font-size: 19px; margin: 40px 0 8px; }
+p { max-width: 86ch; margin: 6px 0; } .dim { color: #6b675f; }
+img { max-width: 100%; background: #fff; border: 1px solid #e3dfd7; border-radius: 8px; }
+table { border-collapse: collapse; background: #fff; font-size: 14px; margin: 8px 0; }
+th, td { padding: 5px 12px; border-bottom: 1px solid #e3dfd7; text-align: right; white-space: nowrap;
+  font-variant-numeric: tabular-nums; }
+th { color: #6b675f; font-weight: 550; } th:first-child, td:first-child { text-align: left; }
+td:last-child.words { text-align: left; white-space: normal; }
+.good { color: #2f7d4f; } .bad { color: #b3261e; } details { margin: 8px 0; } summary { cursor: pointer; }
+</style></head><body><main>
+<h1>Time against error</h1>
+<p class="dim">$facts</p>
+<h2>All scenes</h2>
+<p>$reading</p>
+<img src="$overview" alt="Time against error of every scene">
+$tables
+$scenes
+$growth
+$left_out
+</main></body></html>
+""")
+
+READING = (
+    "Seconds of a whole render to the right, relMSE of the picture upwards, both logarithmic: lower left is better. "
+    "A marker is one setting, its line the staircase of settings that no other of its series beats. The grey band is "
+    "the noise of the reference, below which no error is quoted; a dotted line is the error that a series tends to."
+)
+
+
+# -------------------------------------------------------------------------------------------------------------- tables
+
+Table = list[tuple[str, ...]]  # the first row is the head
+
+
+def summary(results: Results) -> Table:
+    """Per scene and peer: speed-up at equal error and error ratio at equal time; the last row is the mean."""
+    head = ("scene", *(f"{peer}: {what}" for peer in PEERS for what in ("speed-up", "error ratio")))
+    rows: Table = [head]
+    columns: list[list[float]] = [[] for _ in range(2 * len(PEERS))]
+    for scene in results.scenes:
+        cells = [scene.replace("_", " ")]
+        own = results.curve(scene, OWN)
+        for number, peer in enumerate(PEERS):
+            found = against(own, results.curve(scene, peer), peer)
+            for place, value in ((2 * number, found.speed_up), (2 * number + 1, found.gain)):
+                cells.append(times(value))
+                if value is not None:
+                    columns[place].append(value)
+        rows.append(tuple(cells))
+    rows.append(("geometric mean", *(times(geometric_mean(column)) for column in columns)))
+    return rows
+
+
+def claims(results: Results) -> list[str]:
+    """What the benchmark was made to show, with the figures found."""
+    sentences = []
+    scenes = results.scenes
+    tenth = []
+    for scene in scenes:
+        own, peer = results.curve(scene, OWN), results.curve(scene, "EEVEE, ray traced")
+        sixteen = next((point for point in peer if point.samples == MIDDLE), None)
+        if own and sixteen:
+            first = min((p.seconds for p in own if p.error <= sixteen.error), default=None)
+            tenth.append((scene, None if first is None else sixteen.seconds / first))
+    if tenth:
+        reached = [scene for scene, ratio in tenth if ratio is not None and ratio >= 10]
+        sentences.append(
+            f"The error of EEVEE with ray tracing and 16 samples is reached in a tenth of its time or less on "
+            f"{len(reached)} of {len(tenth)} scenes"
+            + listed("; not on", [f"{s} ({times(r)})" for s, r in tenth if s not in reached])
+            + "."
+        )
+    gains = []
+    for scene in scenes:
+        found = against(results.curve(scene, OWN), results.curve(scene, "Cycles, denoised"), "")
+        if found.gain is not None:
+            gains.append((scene, found.gain))
+    if gains:
+        won = [scene for scene, gain in gains if gain > 1]
+        sentences.append(
+            f"At the time of Candela's {MIDDLE} samples it has less error than Cycles with its denoiser on "
+            f"{len(won)} of {len(gains)} scenes" + listed("; not on", [f"{s} ({times(g)})" for s, g in gains if g <= 1])
+            + "."
+        )  # fmt: skip
+    return sentences
+
+
+def listed(before: str, names: list[str]) -> str:
+    return f"{before} {', '.join(name.replace('_', ' ') for name in names)}" if names else ""
+
+
+def faults(results: Results) -> Table:
+    """Per scene: error at 16 and at the most samples, bias, floor of the reference, and the path at fault."""
+    rows: Table = [("scene", "relMSE at 16", "at most", "samples", "bias", "tends to", "noise floor", "path at fault")]
+    for scene in results.scenes:
+        points = results.curve(scene, OWN)
+        if not points:
+            continue
+        last, floor = points[-1], results.floor(scene)
+        cell = results.cell(scene, OWN, last.samples)
+        middle = next((point.error for point in points if point.samples == MIDDLE), None)
+        tends, paths = bias_floor(points, floor), at_fault(results, scene)
+        said = ", ".join(f"{path.replace('_', ' ')} {100 * share:.0f} %" for path, share in paths[:2])
+        rows.append((
+            scene.replace("_", " "), scientific(middle), scientific(last.error), str(last.samples),
+            f"{cell['errors']['combined']['bias']:.3f}", "still falling" if tends is None else scientific(tends),
+            scientific(floor), said or "–",
+        ))  # fmt: skip
+    return rows
+
+
+def pass_times(results: Results, scene: str) -> Table:
+    """Per technique at 16 samples: share of the passes' time, and what it counted."""
+    cell = results.cell(scene, OWN, MIDDLE) or next(
+        (c for c in results.cells if c["scene"] == scene and c.get("techniques")), None
+    )
+    if cell is None or not cell.get("techniques"):
+        return []
+    total = sum(row["ms"] for row in cell["techniques"]) or 1.0
+    rows: Table = [("technique", "ms", "share", "counted in the frame")]
+    for row in sorted(cell["techniques"], key=lambda row: -row["ms"]):
+        counted = ", ".join(f"{value} {name}" for name, value in row["counters"].items())
+        rows.append((row["label"], f"{row['ms']:.0f}", f"{100 * row['ms'] / total:.0f} %", counted or "–"))
+    return rows
+
+
+def times(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.0f} ×" if value >= 9.95 else f"{value:.1f} ×" if value >= 1 else f"{value:.2f} ×"
+
+
+def scientific(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1e}"
+
+
+# --------------------------------------------------------------------------------------------------------------- texts
+
+
+def markdown(table: Table) -> str:
+    head, *rows = table
+    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def as_html(table: Table) -> str:
+    if not table:
+        return ""
+    head, *rows = table
+    lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
+    lines += ["<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows]
+    return "<table>" + "".join(lines) + "</table>"
+
+
+def _cell(text: str) -> str:
+    number = text.removesuffix(" ×")
+    kind = ""
+    if text.endswith("×"):
+        kind = ' class="good"' if float(number) > 1 else ' class="bad"'
+    return f"<td{kind}>{html.escape(text)}</td>"
+
+
+def facts(results: Results) -> str:
+    about = results.about
+    width, height = about["size"]
+    load = about.get("load")
+    busy = "" if load is None else f", load {load:.1f} at the end"
+    return (
+        f"{about['date']}, {width} × {height} pixels, Blender {about['blender']}, {about['device']}, "
+        f"{about['cpu']}{busy}. Reference: Cycles with all bounces, 2 × {about['reference_samples']} samples."
+    )
+
+
+def image(path: Path) -> str:
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+
+
+def make_page(results: Results, grown: list[dict], folder: Path) -> Path:
+    """Write index.html and its pictures into the folder."""
+    plots.overview(results, folder / "overview.png")
+    scenes = []
+    for scene in results.scenes:
+        if not results.paths(scene):
+            continue
+        plots.scene_figure(results, scene, folder / f"{scene}.png")
+        table = as_html(pass_times(results, scene))
+        scenes.append(
+            f"<h2>{scene.replace('_', ' ')}</h2><img src='{image(folder / f'{scene}.png')}' alt='{scene}'>"
+            f"<details><summary>Passes at {MIDDLE} samples</summary>{table}</details>"
+        )
+    growth = ""
+    if grown:
+        plots.growth(grown, folder / "growth.png")
+        growth = (
+            "<h2>Growth of cost</h2><p>Each dial of the procedural scenes from small to large; the dashed line grows "
+            f"in proportion.</p><img src='{image(folder / 'growth.png')}' alt='Growth of cost'>"
+        )
+    left_out = ""
+    if results.left_out:
+        rows = "".join(f"<li>{html.escape(name)}</li>" for name in results.left_out)
+        count = f"{len(results.left_out)} of the cells that were asked for"
+        left_out = f"<h2>Not measured</h2><details><summary>{count}</summary><ul>{rows}</ul></details>"
+    said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in claims(results))
+    tables = (
+        f"<h2>Candela against the others</h2><p>Speed-up: at equal error, the least that both reach. Error ratio: the "
+        f"other's error over Candela's at equal time. More than 1 is in favour of Candela.</p>{said}"
+        f"{as_html(summary(results))}<h2>What is left, and where</h2>{as_html(faults(results))}"
+    )
+    page = folder / "index.html"
+    page.write_text(
+        PAGE.substitute(
+            facts=html.escape(facts(results)), reading=html.escape(READING), overview=image(folder / "overview.png"),
+            tables=tables, scenes="".join(scenes), growth=growth, left_out=left_out,
+        ),
+        encoding="utf-8",
+    )  # fmt: skip
+    return page
+
+
+def generated_part(results: Results) -> str:
+    """The part of docs/performance.md that this command writes."""
+    ratios = (
+        "Speed-up: at equal error, the least that both reach, the other's time over Candela's. Error ratio: at equal "
+        "time, the other's error over Candela's. More than 1 is in favour of Candela."
+    )
+    rest = (
+        f"Candela's own error against the reference: at {MIDDLE} samples, at the most samples, and the light path that "
+        "adds most to it."
+    )
+    picture = "![Time against error of every scene](images/bench.png)"
+    parts = [facts(results), picture, READING, *claims(results), ratios, markdown(summary(results)), rest]
+    return "\n\n".join([*parts, markdown(faults(results))])
+
+
+def put_between(text: str, part: str) -> str:
+    """The text with what stands between its two marks replaced. ValueError when it has none."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"{PERFORMANCE.name} lacks the marks '{BEGIN}' and '{END}'.")
+    return f"{before}{BEGIN}\n\n{part}\n\n{END}{after}"
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
+    parser.add_argument("--output", default=OUT / "page", type=Path, metavar="FOLDER")
+    parser.add_argument("--no-docs", action="store_true", help="leave docs/performance.md and its picture as they are")
+
+
+def command(options: argparse.Namespace) -> int:
+    results = load(options.results)
+    beside = options.results.with_name("growth.json")
+    grown = json.loads(beside.read_text(encoding="utf-8"))["rows"] if beside.exists() else []
+    page = make_page(results, grown, options.output)
+    print(page)
+    if not options.no_docs:
+        plots.overview(results, PICTURE)
+        text = PERFORMANCE.read_text(encoding="utf-8")
+        PERFORMANCE.write_text(put_between(text, generated_part(results)), encoding="utf-8")
+        print(PERFORMANCE)
+    return 0

@@ -1,0 +1,106 @@
+"""Figures of the benchmark, from invented curves whose answers are known."""
+
+import json
+
+import pytest
+
+from bench import figures, page, plots
+from bench.figures import Point, Results, against, bias_floor, error_after, seconds_for, staircase
+
+
+def curve(error, seconds=lambda n: 0.1 * n, samples=(1, 2, 4, 8, 16, 32, 64)):
+    return [Point(n, seconds(n), error(n)) for n in samples]
+
+
+OWN = curve(lambda n: 0.1 / n)
+SLOWER = curve(lambda n: 0.1 / n, lambda n: 1.0 * n)
+
+
+def test_staircase_holds_what_nothing_beats():
+    points = [Point(1, 1.0, 0.5), Point(2, 2.0, 0.6), Point(4, 3.0, 0.1), Point(8, 2.5, 0.1)]
+    assert staircase(points) == [points[0], points[3]]
+
+
+def test_between_points_time_and_error_follow_the_power_law():
+    assert seconds_for(OWN, 0.1 / 3) == pytest.approx(0.3)
+    assert error_after(OWN, 0.3) == pytest.approx(0.1 / 3)
+    assert seconds_for(OWN, 1e-6) is None
+    assert error_after(OWN, 0.01) is None
+    assert seconds_for(OWN, 5.0) == OWN[0].seconds
+
+
+def test_ten_times_slower_is_a_speed_up_of_ten_at_every_error():
+    found = against(OWN, SLOWER, "peer")
+    assert found.speed_up == pytest.approx(10)
+    assert found.seconds == pytest.approx(1.6)
+    assert found.gain == pytest.approx(10)
+    assert against(SLOWER, OWN, "own").speed_up == pytest.approx(0.1)
+
+
+def test_curves_that_cannot_be_compared_give_no_figure():
+    assert against(OWN, [], "none").speed_up is None
+
+
+def test_a_bias_is_found_and_a_falling_curve_has_none():
+    assert bias_floor(curve(lambda n: 0.02 + 0.1 / n), 1e-4) == pytest.approx(0.02)
+    assert bias_floor(curve(lambda n: 0.1 / n), 1e-4) is None
+    assert bias_floor(curve(lambda n: max(0.1 / n, 0.01)), 0.01) is None  # that floor is the reference's noise
+
+
+def results():
+    """One scene, two series."""
+    share = {"combined": 1.0, "diffuse_direct": 0.8, "diffuse_indirect": 0.2}
+    floors = {name: {"relmse": 1e-4, "bias": 1e-4} for name in share}
+    cells = []
+    for label, points in (("Candela", OWN), ("EEVEE, ray traced", SLOWER), ("Cycles, denoised", SLOWER)):
+        for point in points:
+            error = {"relmse": point.error, "bias": 1.01}
+            cells.append({
+                "scene": "room", "series": {"label": label}, "samples": point.samples, "times": [point.seconds],
+                "errors": {"combined": error, "diffuse_direct": error, "diffuse_indirect": error},
+                "techniques": [{"label": "Film", "ms": 2.0, "counters": {"passes": 3}}],
+            })  # fmt: skip
+    about = {"date": "today", "size": [64, 48], "blender": "5", "device": "none", "cpu": "one", "reference_samples": 8}
+    return Results(about, {"room": {"share": share, "floors": floors}}, cells, ["room, Cycles, 256"])
+
+
+def test_error_below_the_noise_is_quoted_as_the_noise():
+    found = results()
+    found.references["room"]["floors"]["combined"]["relmse"] = 0.05
+    assert min(point.error for point in found.curve("room", "Candela")) == 0.05
+
+
+def test_path_at_fault_weighs_error_by_the_square_of_its_light():
+    assert figures.at_fault(results(), "room")[0] == ("diffuse_direct", pytest.approx(0.64 / 0.68))
+
+
+def test_page_and_table_say_what_was_found(tmp_path):
+    data = results()
+    text = page.make_page(data, [], tmp_path).read_text(encoding="utf-8")
+    assert "room" in text and "10 ×" in text and "room, Cycles, 256" in text
+    table = page.markdown(page.summary(data)).splitlines()
+    assert len(table) == 4 and "| 10 × | 10 × |" in table[2]
+    assert "1 of 1 scenes" in page.claims(data)[0]
+
+
+def test_generated_part_replaces_only_what_stands_between_the_marks():
+    text = f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n"
+    assert page.put_between(text, "new") == f"before\n{page.BEGIN}\n\nnew\n\n{page.END}\nafter\n"
+    with pytest.raises(ValueError, match="lacks the marks"):
+        page.put_between("nothing", "new")
+
+
+def test_growth_is_drawn(tmp_path):
+    rows = [{"dial": "lights", "value": n, "seconds": 0.1 * n, "techniques": {"Film": 10.0 * n}} for n in (1, 4, 16)]
+    plots.growth(rows, tmp_path / "growth.png")
+    assert (tmp_path / "growth.png").stat().st_size > 1000
+
+
+def test_results_are_read_as_they_are_written(tmp_path):
+    from bench.run import write_results
+
+    data = results()
+    path = tmp_path / "bench.json"
+    write_results(path, data.about, data.references, data.cells, data.left_out)
+    assert figures.load(path) == data
+    assert json.loads(path.read_text(encoding="utf-8"), parse_constant=pytest.fail)

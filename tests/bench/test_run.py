@@ -1,0 +1,91 @@
+"""The benchmark's cells, their keys, what a budget leaves out, and the file that keeps what was measured."""
+
+from dataclasses import replace
+
+import pytest
+
+from bench import cells, run
+from bench.cells import PEERS, Cell, Scene, Series, Store, in_turns
+
+OWN = Series("Candela", "CANDELA", (1, 4), main=True)
+EEVEE, CYCLES = PEERS[0], PEERS[2]
+ROOM, HALL = Scene("cornell_box"), Scene("colonnade_hall")
+
+
+def cell(series=OWN, samples=1, scene=ROOM, size=(64, 48)):
+    return Cell(scene, series, samples, size, 16)
+
+
+def test_engines_take_turns_and_scenes_do_not():
+    order = in_turns([cell(s, n, scene) for scene in (ROOM, HALL) for s in (OWN, CYCLES) for n in (1, 4)])
+    assert [c.scene for c in order] == [ROOM] * 4 + [HALL] * 4
+    assert [(c.series.label, c.samples) for c in order[:4]] == [
+        ("Candela", 1), ("Cycles", 1), ("Candela", 4), ("Cycles", 4)
+    ]  # fmt: skip
+
+
+def test_key_changes_with_whatever_the_figures_depend_on(monkeypatch):
+    monkeypatch.setattr(cells, "sources", lambda: "before")
+    first = cell()
+    others = [
+        cell(samples=4),
+        cell(scene=HALL),
+        cell(size=(64, 64)),
+        cell(replace(OWN, bounces=0)),
+        replace(first, reference_samples=32),
+    ]
+    keys = {one.key("machine") for one in [first, *others]} | {first.key("another machine")}
+    assert len(keys) == 7
+    peer = cell(CYCLES).key("machine")
+    monkeypatch.setattr(cells, "sources", lambda: "after")
+    assert cell().key("machine") not in keys
+    assert cell(CYCLES).key("machine") == peer
+
+
+def test_key_does_not_depend_on_what_else_is_measured():
+    assert cell(replace(OWN, samples=(1, 2, 64), main=False)).key("m") == cell(OWN).key("m")
+
+
+def test_store_keeps_each_cell_at_once_and_survives_half_a_line(tmp_path):
+    path = tmp_path / "cells.jsonl"
+    Store(path).add("a", {"wall": 1.0})
+    with path.open("a") as file:
+        file.write('{"key": "b", "wa')
+    assert Store(path).found == {"a": {"key": "a", "wall": 1.0}}
+
+
+def test_dearest_cells_are_left_out_and_main_ones_last():
+    own, eevee, other = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 256)
+    costs = {own: 1.0, eevee: 20.0, other: 10.0}
+    assert run.that_fit([own, eevee, other], costs.get, 31.0) == [own, eevee, other]
+    assert run.that_fit([own, eevee, other], costs.get, 30.0) == [own, eevee]
+    assert run.that_fit([own, eevee, other], costs.get, 5.0) == [own]
+    assert run.that_fit([own, eevee, other], costs.get, 0.0) == []
+
+
+def test_time_is_predicted_from_the_nearest_cell_of_the_series():
+    known = {(ROOM, OWN, 4): 2.0, (ROOM, OWN, 16): 6.0}
+    fixed, each = run.GUESS["CANDELA"]
+    assert run.predicted(cell(OWN, 32), known) == pytest.approx(6.0 * (fixed + 32 * each) / (fixed + 16 * each))
+    assert run.predicted(cell(OWN, 4), known) == 2.0
+    assert run.predicted(cell(EEVEE, 16), known) > run.GUESS["BLENDER_EEVEE"][0]
+
+
+def test_choice_of_techniques_comes_from_the_registry():
+    class One:
+        slot, name, label = "shadow", "one", "One"
+
+    class Two(One):
+        name, label = "two", "Two"
+
+    class Alone(One):
+        slot, name, label = "indirect", "alone", "Alone"
+
+    labels = [series.label for series in cells.own_series([One, Two, Alone])]
+    assert labels == ["Candela", "Candela, no bounces", "Candela, one", "Candela, two"]
+
+
+def test_results_hold_five_digits_and_one_cell_per_line():
+    text = run.one_row_per_line({"about": {"load": 1.23456789}, "cells": [{"a": [0.000123456789]}, {"a": None}]})
+    assert '{"a": [0.00012346]},\n{"a": null}' in text
+    assert "1.2346" in text
