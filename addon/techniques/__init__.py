@@ -10,6 +10,7 @@ from .environment_light import EnvironmentLight
 from .film import Film
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
+from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
 from .vssm import VarianceSoftShadows
@@ -24,6 +25,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     EnvironmentLight,
     TracedGlossy,
     InstantRadiosity,
+    ScreenSpaceBounce,
     Film,
 )
 

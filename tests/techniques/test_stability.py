@@ -289,6 +289,22 @@ def test_every_pixel_is_finite_and_not_negative(room, case):
     assert images["combined"][..., 3].max() <= 1.0
 
 
+# What else may fill a slot, on the cases that its arithmetic depends on: screen-space walks on geometry and cameras.
+CHOICES = {
+    f"{technique}, {name}": (slot, technique, name)
+    for slot, technique, groups in (("indirect", "ssdo", ("geometry", "camera")),)
+    for name in CORPUS
+    if name.startswith((*groups, f"parameter: {technique}."))
+}
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_every_pixel_is_finite_and_not_negative_by_choice(room, choice):
+    slot, technique, case = CHOICES[choice]
+    setattr(room.scene.candela, f"slot_{slot}", technique)
+    test_every_pixel_is_finite_and_not_negative(room, case)
+
+
 @pytest.mark.parametrize("kind", ["POINT", "SPOT", "SUN", "AREA"])
 def test_a_light_of_negative_power_subtracts_what_it_would_give(room, kind):
     for light in room.lights.values():

@@ -1,0 +1,25 @@
+// The radiance with which each pixel's surface lights others, the same to all sides.
+#include "lib/gbuffer.glsl"
+#include "lib/brdf.glsl"
+#include "indirect/albedo.glsl"
+
+void main()
+{
+  out_senders = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+  vec3 viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  vec3 whole = surface_albedo(s, max(dot(s.geometric_normal, viewer), 0.0));
+#ifdef FROM_SUMS
+  // Sums over the samples; their difference is what this sample brought. Glossy reflection is added as even.
+  vec3 reflected = texelFetch(sum_now, pixel, 0).rgb - texelFetch(sum_before, pixel, 0).rgb;
+  float diffuse = luminance(s.diffuse);
+  bool microfacets = s.kind <= FRESNEL_F82;
+  out_senders.rgb = reflected * ((microfacets && diffuse > 0.0) ? luminance(whole) / diffuse : 1.0);
+#else
+  out_senders.rgb = texelFetch(arriving, pixel, 0).rgb * whole;
+#endif
+}

@@ -1,0 +1,136 @@
+"""Light between the surfaces that the picture shows, against form factors in closed form."""
+
+import numpy as np
+import pytest
+
+from addon.compare.passes import light_paths
+from addon.compare.reference import render_passes
+from addon.frame import ledger
+from tests.techniques.test_instant_radiosity import corner, wall_irradiance
+
+
+@pytest.fixture
+def render(stage):
+    """Radiance of diffuse indirect light, by a number of bounces; further arguments are the technique's parameters."""
+
+    def render(bounces=1, samples=8, size=(48, 48), **params):
+        settings = stage.scene.candela
+        settings.slot_indirect = "ssdo"
+        for name, value in params.items():
+            setattr(settings, f"ssdo_{name}", value)
+        images = render_passes(stage.scene, "CANDELA", samples, 0, size=size, bounces=bounces).images
+        assert ledger.latest().bad_pixels == 0
+        return light_paths(images)["diffuse_indirect"].astype(float)
+
+    return render
+
+
+def wall_and_floor(stage, elevation):
+    """Unit squares that share an edge, lit from straight above: the floor's radiosity is 8."""
+    stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
+    stage.mesh([(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    place = (5 * np.cos(elevation), 0.5, 5 * np.sin(elevation))
+    camera = stage.camera(place, (np.pi / 2 - elevation, 0, np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
+
+
+def heights(rows, elevation):
+    """Of the wall's points in the middle of rows of a picture, 48 pixels for 2 metres."""
+    return ((rows + 0.5) / 48 - 0.5) * 2 / np.cos(elevation)
+
+
+@pytest.mark.parametrize("elevation", [30, 45, 60])
+def test_a_wall_gets_light_from_the_floor_by_their_form_factor(stage, render, elevation):
+    elevation = np.radians(elevation)
+    wall_and_floor(stage, elevation)
+    light = render(samples=16, steps=48, radius=100.0)[:, 21:27].mean(axis=(1, 2)) * np.pi
+    rows = np.arange(26, 24 + int(24 * np.cos(elevation)) - 1)
+    expected = wall_irradiance(heights(rows, elevation))
+    np.testing.assert_allclose(light[rows], expected, rtol=0.15)
+    assert light[rows].mean() == pytest.approx(expected.mean(), rel=0.03)
+
+
+def test_a_surface_alone_gets_no_light_from_itself(stage, render):
+    """From any side: pixels of one plane see each other edge on."""
+    stage.floor(5)
+    stage.light("POINT", (0, 0, 2))
+    for tilt in (0.0, 0.7, 1.4):
+        stage.camera((0, -5 * np.sin(tilt), 5 * np.cos(tilt)), (tilt, 0, 0))
+        assert render(3).max() < 1e-3
+
+
+def test_surfaces_that_face_away_hide_light_and_send_none(stage, render):
+    """A board between floor and wall, whose lit side the camera sees: the wall sees its dark side."""
+    wall_and_floor(stage, np.radians(45))
+    open_light = render(samples=16, radius=100.0)
+    board = stage.mesh([(0.4, 0, 0), (0.4, 1, 0), (0.4, 1, 0.3), (0.4, 0, 0.3)], [(0, 1, 2, 3)])
+    board.data.materials.append(stage.diffuse(0.8))
+    hidden = render(samples=16, radius=100.0)
+    low_on_the_wall = slice(26, 30), slice(20, 28)
+    assert hidden[low_on_the_wall].mean() < open_light[low_on_the_wall].mean()
+    assert (hidden <= 1.3 * open_light.max()).all()
+
+
+def test_light_is_linear(stage, render):
+    corner(stage)
+    once = render(3)
+    stage.clear()
+    corner(stage, energy=120.0)
+    np.testing.assert_allclose(render(3), 2 * once, rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e4])
+def test_light_does_not_depend_on_the_scale_of_the_scene(stage, render, scale):
+    corner(stage)
+    unit = render(2)
+    stage.clear()
+    corner(stage, energy=60.0 * scale**2)
+    for placed in stage.scene.objects:
+        placed.location *= scale
+        if placed.type == "LIGHT":
+            placed.data.shadow_soft_size *= scale
+        elif placed.type == "MESH":
+            placed.scale *= scale
+        else:
+            placed.data.clip_start, placed.data.clip_end = 0.01 * scale, 100 * scale
+    assert render(2).mean() == pytest.approx(unit.mean(), rel=0.02)
+
+
+def test_bounces_add_up_like_powers_of_the_albedo(stage, render):
+    """Each bounce brings the one before once more through the same form factors: less than the albedo of it."""
+    corner(stage, albedo=0.5)
+    stage.scene.candela.ssdo_bounces = 8
+    light = [render(n, samples=16).mean() for n in (1, 2, 3, 4)]
+    steps = np.diff([0.0, *light])
+    assert (steps > 0).all()
+    assert (steps[1:] < 0.5 * steps[:-1]).all()
+    np.testing.assert_allclose(steps[2] / steps[1], steps[3] / steps[2], rtol=0.05)
+
+
+def test_a_sample_that_is_shown_alone_is_filtered_and_others_are_not(stage, render):
+    corner(stage)
+    one, row = render(1, samples=1), ledger.latest().row("ssdo")
+    assert row.counters["filtered samples"] == 1
+    many, row = render(1, samples=32), ledger.latest().row("ssdo")
+    assert "filtered samples" not in row.counters
+    assert one.mean() == pytest.approx(many.mean(), rel=0.03)
+
+
+def test_where_nothing_can_be_lit_nothing_runs(stage, render):
+    corner(stage)
+    render(0)
+    row = ledger.latest().row("ssdo")
+    assert (row.state, row.reason) == ("skipped", "the scene's bounces are set to 0")
+    stage.clear()
+    stage.light("POINT")
+    stage.camera_above()
+    render(4)
+    assert ledger.latest().row("ssdo").reason == "the scene has no surface"
+    stage.clear()
+    corner(stage)
+    for placed in stage.scene.objects:
+        if placed.type == "MESH":
+            placed.data.materials[0] = stage.material("ShaderNodeEmission")
+    render(4)
+    assert ledger.latest().row("ssdo").reason == "no material reflects light"
