@@ -3,8 +3,9 @@
 Blender calls `view_update` in the middle of its dependency-graph evaluation, where nothing may be drawn: `changed`
 only records. All work is done by `draw`, which Blender calls whenever the region is drawn. One call works for a short
 time, shows what there is and asks to be called again until the picture is complete, so that Blender keeps answering.
-While the view moves a call draws a whole sample, in pixels coarse enough for that; at rest a sample in full resolution
-may take several calls, technique by technique, and the last whole one stays in view.
+While the view moves a call draws a whole sample: a draft, in pixels coarse enough for that. At rest a sample in full
+resolution takes as many calls as it needs, technique by technique and long passes in bands (frame/bands.py), and the
+last whole one stays in view.
 
 Engine instances come and go with the shading mode and with each frame of an animation. What they share lives in
 `_viewports`, one `Viewport` for each region and scene, and is freed a moment after the last instance has gone: not by
@@ -25,6 +26,7 @@ import gpu
 import numpy as np
 
 from . import techniques
+from .frame.bands import Bands
 from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import context as gpu_context
@@ -38,7 +40,7 @@ from .ui.properties import settings_of
 STEP_S = 0.1  # what a sample may take while the picture changes: coarser pixels are drawn to stay below it
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 REST_S = 0.25  # without a change for so long, the picture is drawn in full resolution
-SCALES = (1, 2, 4, 8)  # screen pixels per side of a drawn pixel
+SCALES = (1, 2, 4, 8, 16)  # screen pixels per side of a drawn pixel; all but the first are drafts
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
 
 TURN_WAIT_S = 0.02  # for the GPU, while a final render draws a sample
@@ -56,16 +58,20 @@ class Pace:
         self.cost[scale] = 0.5 * (known + seconds)
 
     def expected(self, scale: int) -> float | None:
-        """Seconds of a sample: measured, and never more than a finer one took. None if nothing is known yet."""
+        """Seconds of a sample: measured, and never more than a finer one took. None if nothing is known yet.
+
+        Drafts do less for a pixel than full resolution, so they tell nothing about it.
+        """
         guesses = [self.cost[finer] for finer in SCALES if finer <= scale and finer in self.cost]
-        guesses += [seconds / (scale / finer) ** 2 for finer, seconds in self.cost.items() if scale not in self.cost]
+        if scale > 1 and scale not in self.cost:
+            guesses += [seconds / (scale / other) ** 2 for other, seconds in self.cost.items()]
         return min(guesses, default=None)
 
     def scale(self) -> int:
         """The finest scale that is fast enough; the last but one for a scene never drawn."""
         if not self.cost:
             return SCALES[-2]
-        return next((scale for scale in SCALES if self.expected(scale) <= STEP_S), SCALES[-1])
+        return next((scale for scale in SCALES if (self.expected(scale) or np.inf) <= STEP_S), SCALES[-1])
 
 
 class Viewport:
@@ -75,6 +81,7 @@ class Viewport:
         self.renderer = Renderer(techniques.make_registry)
         self.cache = SnapshotCache()
         self.pace = Pace()
+        self.bands = Bands()
         self.dirty = True  # the scene may have changed since the snapshot
         self.frame: Frame | None = None
         self.scale = SCALES[-2]
@@ -166,6 +173,7 @@ class Viewport:
         whole = next(self._sample, end) is end
         frame.profiler.finish()
         spent = clock() - before
+        self.bands.learn(spent, BUDGET_S / 2)
         self._sample_seconds += spent
         if whole:
             self._sample = None
@@ -197,7 +205,7 @@ class Viewport:
 
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Bring `self.frame` to what is asked: kept if nothing changed, else begun anew at a fitting scale."""
-        asked = (_view_key(camera), size, border, settings)
+        asked = (_view_key(camera), size, border, replace(settings, samples=0))
         moved = asked != self._asked
         if self.dirty:
             self._snapshot = source(camera, *size)
@@ -207,6 +215,8 @@ class Viewport:
                 if self._begin(camera, size, border, settings, self.scale) is before:
                     return
                 moved = True
+        if not moved and settings.samples != self.frame.settings.samples:  # more or less of the same picture
+            self._begin(camera, size, border, settings, self.scale)
         if moved:
             self._asked = asked
             self._changed_at = clock()
@@ -222,7 +232,10 @@ class Viewport:
         x, y = width / size[0], height / size[1]
         border = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
         film = replace(self._snapshot.film, width=width, height=height, border=border)
+        if scale > 1:
+            settings = settings.as_draft()
         frame = self.renderer.begin(replace(self._snapshot, camera=camera, film=film), settings)
+        frame.shared_out = self.bands if scale == 1 else None
         if frame is not self.frame:
             if size != self._size:
                 images.pool.trim()  # nobody will ask for the images of the old size again

@@ -12,6 +12,7 @@ from mathutils import Matrix
 
 from addon import engine, viewport
 from addon.frame import ledger
+from addon.frame.bands import Bands
 from addon.gfx import context, images
 from addon.snapshot import camera_of_scene, camera_of_view, take
 from addon.ui import ENGINE
@@ -161,13 +162,14 @@ def test_fast_scene_is_never_coarse_once_that_is_known(region):
 @pytest.mark.parametrize(
     ("cost", "scale"),
     [
-        ({}, 4),  # unknown: careful
+        ({}, 8),  # unknown: careful
         ({1: 0.05}, 1),
         ({1: 0.3}, 2),  # a quarter of the pixels is expected to take a quarter of the time
         ({1: 0.3, 2: 0.2}, 4),
-        ({1: 5.0, 2: 4.0, 4: 3.0, 8: 2.0}, 8),  # nothing helps: the coarsest
+        ({1: 5.0, 2: 4.0, 4: 3.0, 8: 2.0, 16: 1.0}, 16),  # nothing helps: the coarsest
         ({1: 0.05, 2: 0.3}, 1),  # an old measure of a heavier scene
         ({4: 0.02}, 2),
+        ({4: 0.001}, 2),  # what a draft takes tells nothing about full resolution
     ],
 )
 def test_pace_takes_the_finest_scale_that_is_fast_enough(cost, scale):
@@ -199,6 +201,22 @@ def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_i
             assert np.array_equal(images.read(picture), coarse)
     assert redraws > 3
     assert region.viewport.picture.size == SIZE
+
+
+def test_bands_change_no_pixel(region):
+    class Thin(Bands):
+        def learn(self, seconds, wanted):
+            self._rows = dict.fromkeys(("direct_light", "environment_light", "instant_radiosity"), 5)
+
+    class Whole(Bands):
+        def split(self, name, height):
+            yield 0, height
+
+    region.viewport.bands = Whole()
+    whole = region.rest()
+    region.viewport.bands = Thin()
+    region.draw(region.moved(0.1))
+    assert np.array_equal(region.rest(), whole)
 
 
 def test_sample_that_was_left_unfinished_is_not_continued_from(scene, region):

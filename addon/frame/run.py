@@ -14,6 +14,7 @@ from ..gfx.timing import Profiler
 from ..snapshot.scene import Snapshot
 from . import ledger as ledger_module
 from .acceleration import Hierarchy, HierarchyCache
+from .bands import Bands
 from .depth_maps import Receivers
 from .environment import Environment
 from .geometry import SceneGeometry
@@ -50,6 +51,7 @@ class Frame:
     receivers: Receivers | None = None
     services: dict[str, object] = field(default_factory=dict)  # what one technique offers to others, by slot
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
+    shared_out: Bands | None = None  # for a picture that is drawn between other work
     rates: dict[str, Rate] = field(default_factory=dict)  # of lights by key, where not one point per sample
 
     @property
@@ -81,6 +83,11 @@ class Frame:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
+
+    def bands(self, technique: Technique) -> Iterator[tuple[int, int]]:
+        """Rows (from, to) of the picture: a long pass draws them one after the other, with a `yield` after each."""
+        height = self.size[1]
+        return iter([(0, height)]) if self.shared_out is None else self.shared_out.split(technique.name, height)
 
     def target(self, *names: str, depth: str = "") -> images.Target:
         """A render target over named images; kept with the frame."""
@@ -283,7 +290,7 @@ class Renderer:
         return (
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-            settings.seed, settings.bounces, settings.whole and settings.samples,
+            settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
             tuple(t.name for t in plan.techniques),
         )  # fmt: skip

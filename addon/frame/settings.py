@@ -13,6 +13,7 @@ BOUNCES = Param(
     "bounces", "Bounces", 16,
     "How often light is reflected by surfaces on its way to the surface that is seen; 0: direct light only", 0, 64,
 )  # fmt: skip
+DRAFT_BOUNCES = 4
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES)
 AUTO = "AUTO"
 
@@ -28,14 +29,20 @@ class Settings:
     values: dict[tuple[str, str], object] = field(default_factory=dict)
     passes: tuple[str, ...] | None = None  # names of the techniques of a pass tree, in its order; None: all, by slot
     whole: bool = False  # only the mean of all samples is shown, so that a sample may leave out what others bring
+    draft: bool = False  # a picture of a moment, in coarse pixels: parameters are at most what they declare for it
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):
         """Value of a technique's parameter; KeyError if it is not declared."""
         for param in technique.params:
             if param.name == name:
-                return self.values.get((technique.name, name), param.default)
+                value = self.values.get((technique.name, name), param.default)
+                return min(value, param.draft) if self.draft and param.draft is not None else value
         raise KeyError(f"Technique {technique.name} declares no parameter '{name}'.")
+
+    def as_draft(self) -> Settings:
+        """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""
+        return replace(self, draft=True, bounces=min(self.bounces, DRAFT_BOUNCES))
 
     def of(self, technique: Technique) -> tuple:
         """All of a technique's values, for its key."""

@@ -28,6 +28,7 @@ class Param:
     unit: str = ""  # Blender property unit: PIXEL, FACTOR, …
     items: tuple[tuple[str, str, int], ...] = ()
     subtype: str = field(default="NONE")
+    draft: bool | int | float | None = None  # its most in a draft: a picture of a moment, as of a view that moves
 
     def check(self, value):
         """`value` in this parameter's type and range, or ValueError with a sentence."""

@@ -27,10 +27,10 @@ def fullscreen_program(name: str, fragment: str, **declared) -> Program:
     )  # fmt: skip
 
 
-def fullscreen(program: Program, target: Target, *, blend: str = "NONE", **bindings) -> None:
-    """Run a full-screen program over the whole target. `bindings` as in Shader.bind."""
+def fullscreen(program: Program, target: Target, *, blend: str = "NONE", rows=None, **bindings) -> None:
+    """Run a full-screen program over the target, or its `rows` (from, to). `bindings` as in Shader.bind."""
     shader = get(program)
-    with _state(target, blend=blend, depth_test="NONE", depth_write=False):
+    with _state(target, blend=blend, depth_test="NONE", depth_write=False, rows=rows):
         shader.bind(**bindings)
         _fullscreen_batch().draw(shader.handle)
     gpu.shader.unbind()
@@ -64,7 +64,7 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 
 
 @contextmanager
-def _state(target: Target, viewport=None, blend="NONE", depth_test="NONE", depth_write=False, cull="NONE"):
+def _state(target: Target, viewport=None, blend="NONE", depth_test="NONE", depth_write=False, cull="NONE", rows=None):
     with target.framebuffer.bind():
         # Of the bound framebuffer. GPUFrameBuffer.viewport_set says the same but takes no arguments before Blender 5.2.
         gpu.state.viewport_set(*(viewport or (0, 0, *target.size)))
@@ -73,9 +73,14 @@ def _state(target: Target, viewport=None, blend="NONE", depth_test="NONE", depth
         gpu.state.depth_mask_set(depth_write)
         gpu.state.face_culling_set(cull)
         gpu.state.color_mask_set(True, True, True, True)
+        if rows:
+            gpu.state.scissor_test_set(True)
+            gpu.state.scissor_set(0, rows[0], target.size[0], rows[1] - rows[0])
         try:
             yield
         finally:
+            if rows:
+                gpu.state.scissor_test_set(False)
             gpu.state.blend_set("NONE")
             gpu.state.depth_test_set("NONE")
             gpu.state.depth_mask_set(False)

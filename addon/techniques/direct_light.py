@@ -66,20 +66,26 @@ DIRECT_WRITES = (
 )
 
 
-def shade(frame: Frame, technique: Technique, rows: list[np.ndarray], sources: lights.Sources, maps: Maps) -> None:
-    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images."""
-    textures = {"depth_maps": maps.atlas, "energy_table": frame.materials.energy_table, **maps.textures}
-    passes.fullscreen(
-        lighting(maps.lookup, frame.materials.soft),
-        frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
-        blend="ADDITIVE_PREMULT",
-        textures={**surface_bindings(frame), **textures},
-        blocks={"film_view": frame.view_block, "sources": sources.set(rows, maps.views)},
-        constants={
+def shade(
+    frame: Frame, technique: Technique, rows: list[np.ndarray], sources: lights.Sources, maps: Maps
+) -> Iterator[None]:
+    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images, in parts."""
+    bindings = {
+        "textures": {
+            **surface_bindings(frame), "depth_maps": maps.atlas, "energy_table": frame.materials.energy_table,
+            **maps.textures,
+        },
+        "blocks": {"film_view": frame.view_block, "sources": sources.set(rows, maps.views)},
+        "constants": {
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
             **maps.constants,
         },
-    )  # fmt: skip
+    }  # fmt: skip
+    program = lighting(maps.lookup, frame.materials.soft)
+    target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct")
+    for band in frame.bands(technique):
+        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
+        yield
     frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
 
@@ -135,8 +141,7 @@ class DirectLight(Technique):
         for rows, views in rounds(items, resolution):
             maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
             yield
-            shade(frame, self, rows, self._sources, maps)
-            yield
+            yield from shade(frame, self, rows, self._sources, maps)
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
         """Lights of this sample with the inverse of their chance."""

@@ -17,6 +17,8 @@ Fails: emission from a texture is taken at its mean over the material; very many
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..frame import depth_maps, lights
@@ -92,7 +94,7 @@ class EmissiveLight(Technique):
             return "no material emits light"
         return None
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         if frame.sample == 0:
@@ -115,7 +117,9 @@ class EmissiveLight(Technique):
             )
             items.append((row, views))
         for rows, views in rounds(items, resolution):
-            shade(frame, self, rows, self._sources, self.service.draw(frame, self, views, resolution))
+            maps = self.service.draw(frame, self, views, resolution)
+            yield
+            yield from shade(frame, self, rows, self._sources, maps)
 
     def release(self) -> None:
         self.service.release()

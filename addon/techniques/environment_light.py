@@ -19,6 +19,8 @@ Few samples under an even sky show faint overlapping hard shadows.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..frame import depth_maps, lights
@@ -74,7 +76,7 @@ class EnvironmentLight(Technique):
             return "the scene has no surface"
         return None
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         seen = frame.snapshot.world.visibility
@@ -99,7 +101,9 @@ class EnvironmentLight(Technique):
             row = lights.direction_row(direction, radiance / density, density, flags, 0, len(views), rate.per_sample)
             items.append((row, views))
         for rows, views in rounds(items, resolution):
-            shade(frame, self, rows, self._sources, self.service.draw(frame, self, views, resolution))
+            maps = self.service.draw(frame, self, views, resolution)
+            yield
+            yield from shade(frame, self, rows, self._sources, maps)
 
     def release(self) -> None:
         self.service.release()

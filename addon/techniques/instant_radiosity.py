@@ -29,6 +29,8 @@ corner several times, the last bounces before the limit may be counted once more
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..frame import acceleration
@@ -80,9 +82,12 @@ class InstantRadiosity(Technique):
     label = "Instant radiosity"
     slot = "indirect"
     params = (
-        Param("virtual_lights", "Virtual lights", 128, "Points of surfaces that light the picture in a sample", 1, 128),
-        Param("rays", "Rays", 4, "How many of the virtual lights each pixel traces in a sample", 1, 64),
-    )
+        Param(
+            "virtual_lights", "Virtual lights", 128, "Points of surfaces that light the picture in a sample", 1, 128,
+            draft=32,
+        ),
+        Param("rays", "Rays", 4, "How many of the virtual lights each pixel traces in a sample", 1, 64, draft=1),
+    )  # fmt: skip
     reads = SURFACES
     writes = INDIRECT_WRITES
 
@@ -92,7 +97,7 @@ class InstantRadiosity(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
@@ -102,12 +107,11 @@ class InstantRadiosity(Technique):
             "virtual_count": len(lights), "rays": frame.settings.get(self, "rays"),
             "near_radius": near_radius(frame),
         }  # fmt: skip
-        passes.fullscreen(
-            GATHER,
-            frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect"),
-            blend="ADDITIVE_PREMULT",
-            **bindings,
-        )
+        yield
+        target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
+        for rows in frame.bands(self):
+            passes.fullscreen(GATHER, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            yield
         frame.count(self, "passes")
 
     def release(self) -> None:

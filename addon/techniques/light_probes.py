@@ -61,7 +61,10 @@ class LightProbes(Technique):
     name = "light_probes"
     label = "Light probes"
     params = (
-        Param("guiding", "Guiding", True, "Draw more directions of the world from where light reaches the picture"),
+        Param(
+            "guiding", "Guiding", True, "Draw more directions of the world from where light reaches the picture",
+            draft=False,
+        ),
         Param(
             "maps", "Maps per sample", 6.0,
             "Depth maps that a sample of a final picture shares out among lights and world, by the error of each; "

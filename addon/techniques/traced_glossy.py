@@ -25,7 +25,7 @@ the material's mean opacity instead of its texture.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 
 import numpy as np
 
@@ -96,7 +96,7 @@ class TracedGlossy(Technique):
         """Tell the techniques that draw light samples, which run before this one, what share the rays take over."""
         frame.services["traced_roughness"] = frame.settings.get(self, "roughness")
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         roughness = frame.services["traced_roughness"]
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
@@ -111,26 +111,27 @@ class TracedGlossy(Technique):
         hierarchy = frame.hierarchy()
         emissive_power, emissive_points = frame.services.get("emissive", (0.0, 1.0))
         frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
-        passes.fullscreen(
-            TRACED,
-            frame.target("radiance.diffuse_direct", "radiance.glossy_direct"),
-            blend="ADDITIVE_PREMULT",
-            textures={
+        bindings = {
+            "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
             },
-            blocks={
+            "blocks": {
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
-            constants={
+            "constants": {
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
-        )  # fmt: skip
+        }  # fmt: skip
+        target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct")
+        for rows in frame.bands(self):
+            passes.fullscreen(TRACED, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            yield
         frame.count(self, "passes")
 
     def release(self) -> None:

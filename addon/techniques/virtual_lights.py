@@ -47,7 +47,7 @@ from .reflectance import Reflectance
 from .surfaces import SURFACE_TEXTURES, surface_bindings
 
 PROBES = (12, 8)
-RAYS = 12  # per probe
+RAYS, DRAFT_RAYS = 12, 3  # per probe
 NEAR = 0.1  # the bound of virtual lights, in median distances of what is seen
 MOST_SOURCES = 32  # points of light sources that a sample's paths look for
 FLOOR = 1.0  # share of the mean importance that every candidate keeps
@@ -122,7 +122,7 @@ class VirtualLights:
         for image in found.colors:
             images.pool.give(image)
         keep, weight = keep[density > 0], (weight[density > 0] / density[density > 0])
-        candidates = PROBES[0] * PROBES[1] * RAYS
+        candidates = PROBES[0] * PROBES[1] * _rays(frame)
         frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
         frame.count(technique, "density rays", len(density) * PROBES[0] * PROBES[1])
         intensity = radiance[keep] * weight[:, None]
@@ -211,12 +211,12 @@ class VirtualLights:
 
     def _probing(self, frame: Frame) -> dict:
         bindings = self.path_bindings(frame)
-        bindings["constants"] |= {"probes": PROBES, "rays": RAYS}
+        bindings["constants"] |= {"probes": PROBES, "rays": _rays(frame)}
         return bindings
 
     def _candidates(self, frame: Frame) -> images.Target:
         """Points, normals, radiances, and radiances of paths one bounce shorter: a row per probe."""
-        size = (RAYS, PROBES[0] * PROBES[1])
+        size = (_rays(frame), PROBES[0] * PROBES[1])
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(4)))
         passes.fullscreen(CANDIDATES, found, **self._probing(frame))
         return found
@@ -240,6 +240,11 @@ class VirtualLights:
         self.reflectance.release()
         self._sources.release()
         self._source_block = self._block = self._emissive = None
+
+
+def _rays(frame: Frame) -> int:
+    """Rays of a probe."""
+    return DRAFT_RAYS if frame.settings.draft else RAYS
 
 
 def near_radius(frame: Frame) -> float:
