@@ -228,7 +228,9 @@ def settings_for(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int
     from addon.compare import reference
 
     engine = reference.engine_identifier(scene, entrant.engine)
-    chosen = reference.render_settings(scene, layer, engine, entrant.samples, seed, None if entrant.bounces else 0, size)
+    chosen = reference.render_settings(
+        scene, layer, engine, entrant.samples, seed, None if entrant.bounces else 0, size
+    )
     own = {scene.render, scene.render.image_settings, scene.eevee, scene.candela}
     settings = [setting for setting in chosen if setting[0] in own]
     cycles = scene.cycles

@@ -1,0 +1,171 @@
+"""Where the time of a whole render goes, and what a second one saves: `python -m bench profile`.
+
+Per sample scene: a cold render (programs compile), a warm one of a changed seed, one of the unchanged scene, and one
+more under Python's profiler, which tells calls into Blender's GPU module apart from everything else. Shares are of that
+profiled render; the profiler slows Python and not the GPU, so the share of Python is an upper bound. "GPU" is drawing
+and waiting for it, "readback" is fetching pixels after the last sample, "Blender" is its own evaluation and result.
+
+Targets: Python and sync together below 15 % of a render of 16 samples; an unchanged scene at least twice as fast.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import datetime as dt
+import json
+import pstats
+import time
+from pathlib import Path
+
+from bench.cells import ROOT, Scene, Series, sample_scenes
+
+RESULTS = ROOT / "bench" / "results" / "profile.json"
+MOST_PYTHON = 0.15
+LEAST_REUSE = 2.0
+GPU_NAMES = ("gpu.", "'GPU", "gpu_extras")  # how the profiler names functions of Blender's GPU module
+SERIES = Series("Candela", "CANDELA", ())
+
+
+def is_gpu(function: tuple[str, int, str]) -> bool:
+    """Whether a function of the profile is one of Blender's GPU module: drawing, uploading, reading back."""
+    file, _, name = function
+    return file == "~" and any(part in name for part in GPU_NAMES)
+
+
+def is_compiling(function: tuple[str, int, str]) -> bool:
+    return function[0] == "~" and "create_from_info" in function[2]
+
+
+def is_blender(function: tuple[str, int, str]) -> bool:
+    """Blender's own part of the render, outside the engine."""
+    return function[0] == "~" and "_bpy" in function[2]
+
+
+def shares(stats: dict, stages: dict[str, float]) -> dict[str, float]:
+    """Shares of a profiled render by what the time was spent on. `stats` are pstats': seconds of a function alone."""
+    alone = {function: row[2] for function, row in stats.items()}
+    total = sum(alone.values())
+    compiling = sum(seconds for function, seconds in alone.items() if is_compiling(function))
+    gpu = sum(seconds for function, seconds in alone.items() if is_gpu(function)) - compiling
+    blender = sum(seconds for function, seconds in alone.items() if is_blender(function))
+    readback = min(stages.get("readback", 0.0), gpu)
+    sync = min(stages.get("sync", 0.0), total)
+    python = max(total - compiling - gpu - blender - sync, 0.0)
+    parts = {"sync": sync, "compile": compiling, "GPU": gpu - readback, "readback": readback, "Python": python}
+    return {name: value / total for name, value in {**parts, "Blender": blender}.items()}
+
+
+def dearest(stats: dict, count: int) -> list[tuple[str, float]]:
+    """Python functions by the seconds that they take alone, calls that a function makes into numpy with it."""
+    found: dict[str, float] = {}
+    for function, (_, _, seconds, _, callers) in stats.items():
+        if is_gpu(function) or is_blender(function) or is_compiling(function):
+            continue
+        if "/addon/" in function[0].replace("\\", "/"):
+            found[place(function)] = found.get(place(function), 0.0) + seconds
+            continue
+        for caller, row in callers.items():
+            if "/addon/" in caller[0].replace("\\", "/"):
+                found[place(caller)] = found.get(place(caller), 0.0) + row[2]
+    return sorted(found.items(), key=lambda item: -item[1])[:count]
+
+
+def place(function: tuple[str, int, str]) -> str:
+    """`frame/culling.py: seen`."""
+    file = function[0].replace("\\", "/").rpartition("/addon/")[2]
+    return f"{file}: {function[2]}"
+
+
+def profile(scene: Scene, samples: int, size: tuple[int, int]) -> dict:
+    """All figures of one scene."""
+    import bpy
+
+    from addon.compare import reference
+    from addon.frame import ledger
+    from bench import worker
+
+    opened = worker.open_scene(scene, size, 0)
+
+    def seconds(seed: int, profiler: cProfile.Profile | None = None) -> float:
+        with reference.overridden(worker.settings_for(opened, SERIES, samples, seed, size, False)):
+            started = time.perf_counter()
+            if profiler:
+                profiler.enable()
+            bpy.ops.render.render(scene=opened.scene.name, layer=opened.layer.name)
+            if profiler:
+                profiler.disable()
+            return time.perf_counter() - started
+
+    cold, warm, unchanged = seconds(1), seconds(2), seconds(2)
+    profiler = cProfile.Profile()
+    profiled = seconds(3, profiler)
+    stats = pstats.Stats(profiler).stats
+    return {
+        "scene": scene.name, "cold": cold, "warm": warm, "unchanged": unchanged, "profiled": profiled,
+        "shares": shares(stats, ledger.latest().times),
+        "dearest": [[name, value / profiled] for name, value in dearest(stats, 6)],
+    }  # fmt: skip
+
+
+def missed(row: dict) -> list[str]:
+    """What the scene's figures miss, as sentences."""
+    found = []
+    python = row["shares"]["Python"] + row["shares"]["sync"]
+    if python > MOST_PYTHON:
+        names = ", ".join(f"{name} {100 * share:.0f} %" for name, share in row["dearest"][:3])
+        found.append(f"{row['scene']}: Python and sync take {100 * python:.0f} % ({names}).")
+    if row["warm"] < LEAST_REUSE * row["unchanged"]:
+        found.append(f"{row['scene']}: an unchanged scene is only {row['warm'] / row['unchanged']:.1f} times faster.")
+    return found
+
+
+def table(rows: list[dict]) -> list[tuple[str, ...]]:
+    names = list(rows[0]["shares"])
+    found = [("scene", "cold s", "warm s", "unchanged s", "faster", *names)]
+    for row in rows:
+        found.append((
+            row["scene"].replace("_", " "), f"{row['cold']:.2f}", f"{row['warm']:.2f}", f"{row['unchanged']:.3f}",
+            f"{row['warm'] / row['unchanged']:.0f} ×", *(f"{100 * row['shares'][name]:.1f} %" for name in names),
+        ))  # fmt: skip
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    from bench.run import size_of
+
+    parser.add_argument("--scenes", nargs="+", metavar="NAME", help="default: all of sample_blends")
+    parser.add_argument("--samples", default=16, type=int, metavar="N", help="default 16")
+    parser.add_argument("--size", default=(128, 96), type=size_of, metavar="WxH", help="default 128x96")
+    parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
+
+
+def command(options: argparse.Namespace) -> int:
+    import bpy  # noqa: F401
+    from tqdm import tqdm
+
+    import addon
+    from addon.cli.terminal import quiet
+    from bench import worker
+    from bench.quick import table as aligned
+    from bench.run import load, rounded
+
+    addon.register()
+    scenes = [scene for scene in sample_scenes() if not options.scenes or scene.name in options.scenes]
+    with quiet() as terminal:
+        about = worker.about()
+        bar = tqdm(scenes, file=terminal, disable=not terminal.isatty(), unit="scene")
+        rows = [profile(scene, options.samples, options.size) for scene in bar]
+    about |= {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"), "load": load()}
+    about |= {"samples": options.samples, "size": list(options.size)}
+    options.results.parent.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(rounded({"about": about, "rows": rows}), indent=1, ensure_ascii=False)
+    options.results.write_text(text + "\n", encoding="utf-8")
+    print(aligned(table(rows)))
+    misses = [sentence for row in rows for sentence in missed(row)]
+    print("\n".join(misses) or "Both targets are met on every scene.")
+    print(options.results)
+    return 0
