@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
 from .direct_light import DirectLight
+from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
 from .environment_light import EnvironmentLight
 from .film import Film
@@ -23,6 +24,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     DirectLight,
     EmissiveLight,
     EnvironmentLight,
+    DirectionalOcclusion,
     TracedGlossy,
     InstantRadiosity,
     ScreenSpaceBounce,

@@ -43,6 +43,18 @@ def directions_rate(frame: Frame) -> Rate:
     return Rate(int(np.log2(asked or max(2, 6 - len(frame.snapshot.lights)))))
 
 
+def no_environment_light(snapshot: Snapshot) -> str | None:
+    """Why the world lights nothing, as a sentence; None if it does. For every technique of the slot."""
+    world = snapshot.world
+    if not np.any(world.color) or (world.image is not None and not np.any(world.image.pixels[..., :3])):
+        return "the world is black"
+    if not (world.visibility.diffuse or world.visibility.glossy):
+        return "the world is hidden from all surfaces"
+    if not snapshot.instances:
+        return "the scene has no surface"
+    return None
+
+
 class EnvironmentLight(Technique):
     name = "environment_light"
     label = "Environment light"
@@ -67,14 +79,7 @@ class EnvironmentLight(Technique):
         self._sources = lights.Sources()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        world = snapshot.world
-        if not np.any(world.color) or (world.image is not None and not np.any(world.image.pixels[..., :3])):
-            return "the world is black"
-        if not (world.visibility.diffuse or world.visibility.glossy):
-            return "the world is hidden from all surfaces"
-        if not snapshot.instances:
-            return "the scene has no surface"
-        return None
+        return no_environment_light(snapshot)
 
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):

@@ -18,7 +18,7 @@ Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque
 | cost | per sample |
 |---|---|
 | passes | 2 + 3 per bounce, over the screen |
-| fetches per pixel and bounce | `fans` x `steps` x 3 |
+| fetches per pixel and bounce | `fans` x `steps` x 3; later bounces have half the fans of the one before |
 
 Instead of instant_radiosity, never beside it: both estimate the whole integral (see there how near and far light share
 it without being doubled), and one slot holds one of them.
@@ -84,6 +84,19 @@ KEEP = passes.fullscreen_program(
 )
 
 
+def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
+    """Parameters of a technique that walks along fans, with its own defaults; lengths in median distances."""
+    return (
+        Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64),
+        Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64),
+        Param("radius", "Radius", radius, "How far surfaces matter, in median distances of what is seen", 0.01, 100.0),
+        Param(
+            "thickness", "Thickness", thickness,
+            "How far surfaces reach behind what is seen of them, in median distances of what is seen", 0.0, 10.0,
+        ),
+    )  # fmt: skip
+
+
 def shown_alone(frame: Frame) -> bool:
     """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples."""
     return frame.settings.samples == 1 or (frame.sample == 0 and not frame.settings.whole)
@@ -94,15 +107,9 @@ class ScreenSpaceBounce(Technique):
     label = "Screen-space bounce"
     slot = "indirect"
     params = (
-        Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64),
-        Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64),
-        Param("radius", "Radius", 4.0, "How far light is gathered, in median distances of what is seen", 0.01, 100.0),
-        Param(
-            "thickness", "Thickness", 0.1,
-            "How far surfaces reach behind what is seen of them, in median distances of what is seen", 0.0, 10.0,
-        ),
-        Param("bounces", "Bounces", 2, "At most so many of the scene's bounces are gathered", 1, 8),
-    )  # fmt: skip
+        *fan_params(radius=4.0, thickness=0.1),
+        Param("bounces", "Bounces", 4, "At most so many of the scene's bounces are gathered", 1, 8),
+    )
     reads = (*SURFACES, "radiance.diffuse_direct")
     writes = (
         *INDIRECT_WRITES,
@@ -125,7 +132,7 @@ class ScreenSpaceBounce(Technique):
             for bounce in range(bounces):
                 if bounce:
                     self._send(frame, SENDERS, {"arriving": arriving.colors[0]})
-                self._gather(frame, arriving)
+                self._gather(frame, arriving, max(frame.settings.get(self, "fans") >> bounce, 1))
                 reflect(frame, self, arriving.colors[0], "radiance.diffuse_indirect")
         passes.fullscreen(KEEP, frame.target("ssdo.direct"), textures={"sum_now": direct["sum_now"]})
         frame.count(self, "passes", 2 + 3 * bounces)
@@ -138,21 +145,25 @@ class ScreenSpaceBounce(Technique):
             blocks={"film_view": frame.view_block},
         )
 
-    def _gather(self, frame: Frame, arriving: images.Target) -> None:
-        distance = float(np.median(frame.receivers.distance))
-        bindings = {
-            "textures": {
-                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
-                "senders": frame.images["ssdo.senders"],
-            },
-            "blocks": {"film_view": frame.view_block},
-            "constants": {
-                "fan_count": frame.settings.get(self, "fans"), "step_count": frame.settings.get(self, "steps"),
-                "farthest": frame.settings.get(self, "radius") * distance,
-                "thickness": frame.settings.get(self, "thickness") * distance,
-            },
-        }  # fmt: skip
+    def _gather(self, frame: Frame, arriving: images.Target, fans: int) -> None:
+        bindings = fan_bindings(frame, self)
+        bindings["textures"]["senders"] = frame.images["ssdo.senders"]
+        bindings["constants"]["fan_count"] = fans
         passes.fullscreen(BOUNCE, arriving, **bindings)
+
+
+def fan_bindings(frame: Frame, technique: Technique) -> dict:
+    """What shaders/ssdo/fan.glsl needs, by the parameters of a technique that has FAN_PARAMS."""
+    distance = float(np.median(frame.receivers.distance))
+    return {
+        "textures": {**surface_bindings(frame), "energy_table": frame.materials.energy_table},
+        "blocks": {"film_view": frame.view_block},
+        "constants": {
+            "fan_count": frame.settings.get(technique, "fans"), "step_count": frame.settings.get(technique, "steps"),
+            "farthest": frame.settings.get(technique, "radius") * distance,
+            "thickness": frame.settings.get(technique, "thickness") * distance,
+        },
+    }  # fmt: skip
 
 
 def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str) -> None:

@@ -141,8 +141,8 @@ bool fan_begin(Surface s, vec2 place, vec3 direction, float rounding, out Fan fa
   float speed = length(pixels_per_metre);
   fan.course = pixels_per_metre / max(speed, 1e-30);
   vec2 room = mix(place, size - place, vec2(greaterThan(fan.course, vec2(0.0)))) / max(abs(fan.course), vec2(1e-6));
-  fan.reach = min(min(room.x, room.y) - 0.01, speed * farthest);
-  return fan.reach > 0.0;
+  fan.reach = max(min(min(room.x, room.y) - 0.01, speed * farthest), 0.0);
+  return true;
 }
 
 // Where the ray through a place meets a patch's plane; near edges and at grazing angles, beside its position. w: depth.

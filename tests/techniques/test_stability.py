@@ -292,7 +292,10 @@ def test_every_pixel_is_finite_and_not_negative(room, case):
 # What else may fill a slot, on the cases that its arithmetic depends on: screen-space walks on geometry and cameras.
 CHOICES = {
     f"{technique}, {name}": (slot, technique, name)
-    for slot, technique, groups in (("indirect", "ssdo", ("geometry", "camera")),)
+    for slot, technique, groups in (
+        ("indirect", "ssdo", ("geometry", "camera")),
+        ("environment", "directional_occlusion", ("geometry", "camera", "world")),
+    )
     for name in CORPUS
     if name.startswith((*groups, f"parameter: {technique}."))
 }

@@ -1,0 +1,58 @@
+// Light of the world that what the picture shows does not hide, as its cosine-weighted mean over the hemisphere.
+//
+// Eight sectors of a fan share one direction, in which the world is read from a map that is blurred about as far.
+#include "ssdo/fan.glsl"
+#include "lib/environment.glsl"
+
+#define GROUP 8
+
+uint fan_hidden(Fan fan, vec2 u)
+{
+  uint hidden = fan.below;
+  vec2 last = vec2(0.0, film_depth(fan.origin));
+  for (int i = 0; i < step_count && hidden != 0xFFFFFFFFu; i++) {
+    Patch found;
+    if (fan_step(fan, i, fract(u + float(i) * vec2(0.6180339887, 0.7548776662)), last, found)) {
+      hidden |= found.sectors;
+    }
+  }
+  return hidden;
+}
+
+vec3 fan_environment(Fan fan, Surface s, uint hidden, float within)
+{
+  vec3 sum = vec3(0.0);
+  for (int group = 0; group < 32 / GROUP; group++) {
+    uint open = ~(hidden >> uint(group * GROUP)) & ((1u << uint(GROUP)) - 1u);
+    if (open != 0u) {
+      vec3 direction = fan_direction(fan, (float(group) + within) * (float(GROUP) / 32.0));
+      sum += environment_radiance(direction) * diffuse_weight(s, fan.toward, direction) * float(bitCount(open));
+    }
+  }
+  return sum / 32.0;
+}
+
+void main()
+{
+  out_arriving = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+  if (max_component(s.diffuse) <= 0.0) {
+    return;
+  }
+  vec2 turn = tile_numbers(pixel, film_view.bits_x, film_view.bits_y);
+  vec2 within = tile_numbers(pixel, film_view.bits_z, film_view.bits_w);
+  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 13)));
+  for (int i = 0; i < fan_count; i++) {
+    roll = hash3(roll);
+    Fan fan;
+    vec3 direction = cosine_direction(s.normal, fan_numbers(turn, i));
+    if (fan_begin(s, gl_FragCoord.xy, direction, to_unit(roll.x), fan)) {
+      uint hidden = fan_hidden(fan, fan_numbers(within, i));
+      out_arriving.rgb += fan_environment(fan, s, hidden, to_unit(roll.y)) / float(fan_count);
+    }
+  }
+}
