@@ -3,7 +3,8 @@
 Meshes that are shown many times are drawn as instances. Meshes shown once would cost one draw call each in every
 pass, so neighbours are joined: one vertex buffer, one draw per material, and each vertex knows its instance.
 Instances, too, are drawn in groups of neighbours, so that a depth map leaves out the groups that it does not see.
-Transforms always come from the instance image, so moving an object uploads a few numbers.
+Transforms always come from the instance image, so moving an object uploads a few numbers: what few instances have that
+moved is drawn into the image, as parts of a texture cannot be uploaded through Blender. Their order is kept meanwhile.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gfx import geometry as gfx_geometry
-from ..gfx import images
+from ..gfx import images, passes
+from ..gfx.struct import Block, Struct
 from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from . import casters
@@ -22,8 +24,19 @@ from .morton import morton_codes
 
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
 TEXELS_PER_INSTANCE = 8  # layout in shaders/lib/instance.glsl
+MOST_MOVED = 32  # instances; for more the whole list is uploaded, sorted anew
 JOINED_TRIANGLES = 2000  # about so many triangles of joined meshes make one draw: enough to fill a GPU, few to cull
 GROUP_TRIANGLES = 600  # the same for groups of instances
+
+
+MOVED = Struct("MovedInstance", ("vec4", f"texel[{TEXELS_PER_INSTANCE}]"))
+MOVE = passes.fullscreen_program(
+    "moved instance",
+    "surface/moved_instance.frag.glsl",
+    blocks=((MOVED, "moved"),),
+    constants=(("INT", "first"),),
+    outputs=(("VEC4", "out_texel"),),
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +78,11 @@ class SceneGeometry:
         self.opaque_casters: list[Draw] = []  # positions only, materials ignored
         self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
         self._draw_key = None
-        self._instance_key = None
+        self.instance_rows = np.zeros((0, TEXELS_PER_INSTANCE, 4), np.float32)
+        self._order: list[int] = []  # of the snapshot's instances with triangles
+        self._kinds: tuple = ()
+        self._matrices = np.zeros((0, 4, 4))
+        self._moved: list[Block] = []
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
         self._clusters: tuple[object, list[casters.Clusters] | None] = (None, None)
@@ -83,9 +100,7 @@ class SceneGeometry:
     def update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""
         instances = [i for i in snapshot.instances if snapshot.meshes[i.mesh].triangle_count]
-        place = _neighbourhood(instances)
-        order = sorted(range(len(instances)), key=lambda k: (instances[k].mesh, instances[k].materials, place[k]))
-        instances = [instances[k] for k in order]
+        instances = self._ordered(instances)
         changed = self._update_transforms(instances, snapshot)
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
@@ -102,10 +117,20 @@ class SceneGeometry:
 
     def resting_casters(self) -> list[casters.Clusters] | None:
         """Opaque casters in world space, made when first asked for; None where there are too many."""
-        key = (self._draw_key, self._instance_key)
+        key = (self._draw_key, self.instance_rows.tobytes())
         if self._clusters[0] != key:
             self._clusters = (key, casters.clusters(*self._placed, self.origin))
         return self._clusters[1]
+
+    def _ordered(self, instances: list[Instance]) -> list[Instance]:
+        """Equal ones together, neighbours beside each other; as before while only a few have moved."""
+        kinds = tuple((i.mesh, i.materials) for i in instances)
+        matrices = np.stack([i.matrix for i in instances]) if instances else np.zeros((0, 4, 4))
+        if kinds != self._kinds or (matrices != self._matrices).any(axis=(1, 2)).sum() > MOST_MOVED:
+            place = _neighbourhood(instances)
+            self._order = sorted(range(len(instances)), key=lambda k: (*kinds[k], place[k]))
+            self._kinds, self._matrices = kinds, matrices
+        return [instances[k] for k in self._order]
 
     def _update_transforms(self, instances: list[Instance], snapshot: Snapshot) -> bool:
         if not instances:
@@ -143,13 +168,27 @@ class SceneGeometry:
             rows[:, :3] = relative
             self._mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
             rows[:, 3, 3] = np.where(self._mirrored, -1.0, 1.0)
-        key = rows.tobytes()
-        if key == self._instance_key:
-            return False
-        self._instance_key = key
-        self.instance_rows = rows
-        self.instances = images.upload_list(rows.reshape(-1, 4))
-        return True
+        before, self.instance_rows = self.instance_rows, rows
+        if rows.shape != before.shape:
+            self.instances = images.upload_list(rows.reshape(-1, 4))
+            return True
+        changed = np.flatnonzero((rows != before).any(axis=(1, 2)))
+        if len(changed) > MOST_MOVED:
+            self.instances = images.upload_list(rows.reshape(-1, 4))
+        else:
+            self._move(changed)
+        return len(changed) > 0
+
+    def _move(self, changed: np.ndarray) -> None:
+        """Draw the rows of these instances into the list."""
+        target = images.Target((self.instances,))
+        while len(self._moved) < len(changed):
+            self._moved.append(Block(MOVED, texel=np.zeros((TEXELS_PER_INSTANCE, 4))))
+        for k, block in zip(changed, self._moved):
+            block.update(texel=self.instance_rows[k])
+            y, x = divmod(int(k) * TEXELS_PER_INSTANCE, images.LIST_WIDTH)
+            viewport = (x, y, TEXELS_PER_INSTANCE, 1)
+            passes.fullscreen(MOVE, target, viewport=viewport, blocks={"moved": block}, constants={"first": x})
 
     def _make_draws(self, instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]):
         runs: list[tuple[int, int]] = []  # first, count of equal (mesh, materials)

@@ -27,10 +27,13 @@ def fullscreen_program(name: str, fragment: str, **declared) -> Program:
     )  # fmt: skip
 
 
-def fullscreen(program: Program, target: Target, *, blend: str = "NONE", rows=None, **bindings) -> None:
-    """Run a full-screen program over the target, or its `rows` (from, to). `bindings` as in Shader.bind."""
+def fullscreen(program: Program, target: Target, *, blend="NONE", rows=None, viewport=None, **bindings) -> None:
+    """Run a full-screen program over the target, or over some `rows` (from, to) of it. `bindings` as in Shader.bind.
+
+    With a `viewport` (x, y, width, height) that rectangle is the screen.
+    """
     shader = get(program)
-    with _state(target, blend=blend, depth_test="NONE", depth_write=False, rows=rows):
+    with _state(target, viewport, blend=blend, depth_test="NONE", depth_write=False, rows=rows):
         shader.bind(**bindings)
         _fullscreen_batch().draw(shader.handle)
     gpu.shader.unbind()

@@ -9,6 +9,8 @@ from ..frame.technique import Param
 from ..techniques import REGISTRY
 from .pass_tree import TREE, order_of
 
+PREVIEW_SAMPLES = 8  # of material icons, which are drafts
+
 
 def _property(param: Param, **changes):
     """A bpy property for a declared parameter."""
@@ -79,8 +81,8 @@ def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
     """The scene's Blender properties as plain settings."""
     group = scene.candela
     tree = group.pass_tree
-    samples = 8 if preview else (group.viewport_samples if viewport else group.samples)
-    return Settings(
+    samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else group.samples)
+    settings = Settings(
         samples=samples,
         whole=not viewport,
         seed=group.seed,
@@ -93,6 +95,7 @@ def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
             for param in technique.params
         },
     )
+    return settings.as_draft() if preview else settings
 
 
 def register() -> None:

@@ -40,6 +40,7 @@ def steps():
     yield from resting_camera_view()
     yield from orbit()
     yield from panels()
+    yield from same_view()
 
 
 def final_renders(scene):
@@ -108,7 +109,7 @@ def orbit():
     space = viewport_area().spaces.active
     space.region_3d.view_perspective = "PERSP"
     yield from wait_for_rest()
-    took, scales, draw = [], [], candela().draw
+    took, scales, draw, uploads = [], [], candela().draw, viewports()[0].renderer.geometry.uploads
 
     def timed(*arguments):
         started = time.perf_counter()
@@ -126,7 +127,9 @@ def orbit():
     result["moving"] = {
         "steps_per_s": len(took) / ORBIT_S,
         "median_step_s": sorted(took)[len(took) // 2] if took else 0.0,
+        "slowest_step_s": max(took, default=0.0),
         "scales": sorted(set(scales)),
+        "meshes_uploaded": viewports()[0].renderer.geometry.uploads - uploads,
     }
     started = time.monotonic()
     yield from wait_for_rest()
@@ -149,8 +152,9 @@ def panels():
     scene = window().scene
     light = next(one for one in scene.objects if one.type == "LIGHT" and one.data.type == "AREA")
     mesh = next(one for one in scene.objects if one.type == "MESH" and one.active_material)
+    result["properties"] = [right.x, window().height - right.y - right.height, right.width, right.height]
     for tab, active in (
-        ("RENDER", None), ("VIEW_LAYER", None), ("WORLD", None), ("DATA", light), ("MATERIAL", mesh),
+        ("RENDER", None), ("VIEW_LAYER", None), ("WORLD", None), ("DATA", light), ("OBJECT", mesh), ("MATERIAL", mesh),
     ):  # fmt: skip
         if active is not None:
             window().view_layer.objects.active = active
@@ -158,11 +162,46 @@ def panels():
         right.spaces.active.context = tab
         yield 1.5
         picture(f"panel_{tab.lower()}.png")
+        if tab == "RENDER":
+            with bpy.context.temp_override(window=window(), area=right, region=main_region(right)):
+                bpy.ops.view2d.scroll_down(deltay=560)
+            yield 0.5
+            picture("panel_frame.png")
     material = mesh.active_material
+    yield from no_icon_is_drawn()
     material.asset_generate_preview()
-    yield 4.0
+    yield from no_icon_is_drawn()
     preview = material.preview.image_pixels_float[:]
     result["preview"] = [min(preview, default=0.0), max(preview, default=0.0)]
+
+
+def no_icon_is_drawn():
+    """Until the jobs that draw icons have ended. A script that ends one waits for a thread that waits for Python."""
+    yield 1.0
+    while bpy.app.is_job_running("RENDER_PREVIEW"):
+        yield 0.2
+
+
+def same_view():
+    """The view of a viewport in a file with a camera that sees the same, for a render of it in the background."""
+    area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
+    space, region, scene = area.spaces.active, main_region(area), window().scene
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.show_region_header = space.show_region_tool_header = space.show_region_toolbar = False
+    space.region_3d.view_perspective = "PERSP"
+    scene.candela.bounces, scene.candela.light_probes_maps = 2, 0.0  # one point per light and sample, as viewports have
+    yield from wait_for_rest()
+    picture("view.png")
+    result["view"] = [region.x, window().height - region.y - region.height, region.width, region.height]
+    camera = bpy.data.cameras.new("View")
+    camera.sensor_fit = "HORIZONTAL"
+    camera.lens = space.region_3d.window_matrix[0][0] * camera.sensor_width / 2
+    camera.clip_start, camera.clip_end = space.clip_start, space.clip_end
+    scene.camera = bpy.data.objects.new("View", camera)
+    scene.collection.objects.link(scene.camera)
+    scene.camera.matrix_world = space.region_3d.view_matrix.inverted()
+    scene.render.resolution_x, scene.render.resolution_y = region.width, region.height
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "view.blend"), copy=True)
 
 
 run(steps)

@@ -6,11 +6,13 @@
 What comes out stands in build/window/: the pictures, and what Blender printed.
 """
 
+import itertools
 import json
 import os
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +62,7 @@ def run_script(backend, script, *arguments, _done={}):  # noqa: B006 - a cache: 
     if (backend, script) not in _done:
         folder = OUTPUT / f"{script}-{backend}"
         folder.mkdir()
-        display = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800")
+        display = ("--gpu-backend", backend, "--enable-event-simulate", "--window-geometry", "0", "0", "1280", "800")
         path = Path(__file__).with_name(f"{script}.py")
         blender(
             *display, SAMPLE, "--python", path, "--", *arguments, folder, log=folder / "blender.log", timeout_s=1800
@@ -149,6 +151,14 @@ def test_viewport_follows_a_turning_view(driven):
     assert np.abs(moving - moved).mean() < 40  # the same view, coarse and fine
 
 
+def test_viewport_at_rest_is_the_background_render_of_the_same_view(driven):
+    folder, result = driven
+    render = ("-m", "addon", "render", folder / "view.blend", "--output", folder / "view_render.png")
+    subprocess.run([sys.executable, *map(str, render)], cwd=ROOT, check=True, timeout=900)
+    difference = np.abs(pixels(folder / "view.png", result["view"]) - pixels(folder / "view_render.png")).max(axis=2)
+    assert (difference <= 2).mean() >= 0.99, (difference <= 2).mean()
+
+
 def test_material_icon_is_drawn(driven):
     _, result = driven
     low, high = result["preview"]
@@ -224,6 +234,29 @@ def test_pass_tree_is_made_run_and_compared_in_the_window(passed):
     assert any(line.startswith("combined: ") for line in result["errors"])
     assert result["links_fine_after_undo"]
     assert result["viewport"].startswith("Sample 4 of 4")
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def toured(request, installed):
+    """What a new user tries."""
+    return run_script(request.param, "tour")
+
+
+def test_first_steps_of_a_new_user(toured):
+    folder, result = toured
+    assert result.get("error") is None
+    assert not complaints(folder)
+    pictures = [pixels(folder / f"tour_{name}.png") for name in ("engine", "light", "material", "shadow")]
+    for before, after in itertools.pairwise(pictures):
+        assert np.abs(before - after).max() > 30
+
+
+def test_comparison_in_the_image_editor_swaps_and_is_cancelled(toured):
+    _, result = toured
+    assert result["compare"] == ["RUNNING_MODAL"]
+    assert {"Combined", "Diffuse direct"} <= set(result["paths"])
+    assert result["swap"] == ["FINISHED"] and result["swapped"] == "CYCLES"
+    assert result["running_before_esc"] and not result["running_after_esc"]
 
 
 @pytest.fixture(scope="module", params=BACKENDS)

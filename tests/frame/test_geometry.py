@@ -1,0 +1,108 @@
+"""The list of instances on the GPU: what a move uploads, and that it says the same as a list that is uploaded anew."""
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.frame import geometry
+from addon.frame.geometry import MOST_MOVED, SceneGeometry
+from addon.frame.materials import MaterialSet
+from addon.gfx import images
+from addon.snapshot import SnapshotCache, take
+
+COUNT = 300  # more than a row of the list holds
+
+
+@pytest.fixture
+def snapshot(gpu_context, empty_scene):
+    """A field of cubes that share a mesh, and one that does not."""
+    bpy.ops.object.camera_add(location=(0, -50, 10), rotation=(1.2, 0, 0))
+    bpy.context.scene.camera = bpy.context.object
+    bpy.ops.mesh.primitive_cube_add(size=0.5)
+    mesh = bpy.context.object.data
+    for k in range(COUNT):
+        cube = bpy.data.objects.new(f"Cube {k}", mesh)
+        cube.location = k % 20, k // 20, 0.0
+        bpy.context.collection.objects.link(cube)
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(5, 5, 2))
+    return take(bpy.context.evaluated_depsgraph_get(), SnapshotCache(), 64, 36)
+
+
+def moved(snapshot, numbers, distance):
+    """The snapshot with some of its instances elsewhere."""
+    instances = list(snapshot.instances)
+    for number in numbers:
+        matrix = instances[number].matrix.copy()
+        matrix[0, 3] += distance
+        instances[number] = replace(instances[number], matrix=matrix)
+    return replace(snapshot, instances=tuple(instances))
+
+
+@pytest.fixture
+def uploaded(monkeypatch):
+    """Sizes of the lists that are uploaded from now on."""
+    sizes = []
+    upload = images.upload_list
+
+    def counted(rows):
+        sizes.append(len(rows))
+        return upload(rows)
+
+    monkeypatch.setattr(geometry.images, "upload_list", counted)
+    return sizes
+
+
+def content(made):
+    return images.read(made.instances).reshape(-1, 4)[: made.instance_rows.shape[0] * geometry.TEXELS_PER_INSTANCE]
+
+
+def updated(made, snapshot):
+    materials = MaterialSet()
+    materials.update(snapshot)
+    return made.update(snapshot, materials.compiled)
+
+
+@pytest.mark.parametrize("count", [1, 5, MOST_MOVED])
+def test_moved_instances_are_drawn_into_the_list(snapshot, uploaded, count):
+    made = SceneGeometry()
+    assert updated(made, snapshot)
+    uploaded.clear()
+    uploads = made.uploads
+    assert updated(made, moved(snapshot, range(290 - count, 290), 3.0))
+    assert uploaded == [] and made.uploads == uploads
+    np.testing.assert_array_equal(content(made), made.instance_rows.reshape(-1, 4))
+
+
+def test_list_of_many_moved_instances_is_uploaded(snapshot, uploaded):
+    made = SceneGeometry()
+    updated(made, snapshot)
+    uploaded.clear()
+    assert updated(made, moved(snapshot, range(COUNT), 3.0))
+    assert len(uploaded) == 1
+    np.testing.assert_array_equal(content(made), made.instance_rows.reshape(-1, 4))
+
+
+def test_instances_at_rest_upload_nothing(snapshot, uploaded):
+    made = SceneGeometry()
+    updated(made, snapshot)
+    uploaded.clear()
+    assert not updated(made, snapshot)
+    assert uploaded == []
+
+
+def test_many_small_moves_end_in_the_same_list_as_one(snapshot):
+    """Instances keep their order over single moves; each still stands where it should."""
+    made, anew = SceneGeometry(), SceneGeometry()
+    updated(made, snapshot)
+    for number in range(0, 100, 7):
+        snapshot = moved(snapshot, [number], 0.5 * number)
+        updated(made, snapshot)
+    updated(anew, snapshot)
+
+    def sorted_rows(one):
+        rows = content(one).reshape(-1, geometry.TEXELS_PER_INSTANCE * 4)
+        return rows[np.lexsort(rows.T)]
+
+    np.testing.assert_array_equal(sorted_rows(made), sorted_rows(anew))
