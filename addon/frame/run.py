@@ -53,6 +53,7 @@ class Frame:
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     rates: dict[str, Rate] = field(default_factory=dict)  # of lights by key, where not one point per sample
+    _hierarchies: dict[str, Hierarchy | None] = field(default_factory=dict)  # by path, of this frame
 
     @property
     def size(self) -> tuple[int, int]:
@@ -77,7 +78,11 @@ class Frame:
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
-        return self.hierarchies.get(self.snapshot, self.materials.compiled, self.geometry.origin, path)
+        if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
+            self._hierarchies[path] = self.hierarchies.get(
+                self.snapshot, self.materials.compiled, self.geometry.origin, path
+            )
+        return self._hierarchies[path]
 
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
