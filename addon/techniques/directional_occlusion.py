@@ -35,18 +35,22 @@ from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES
 from .environment_light import no_environment_light
-from .ssdo import FAN_CONSTANTS, FAN_TEXTURES, fan_bindings, fan_params, reflect
+from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, POINTS, fan_bindings, fan_params, reflect
 from .surfaces import SURFACES
 
 CELLS = (32, 64)
-OCCLUSION = passes.fullscreen_program(
-    "directional occlusion",
-    "ssdo/occlusion.frag.glsl",
-    textures=(*FAN_TEXTURES, ("FLOAT_2D", "environment_map"), ("FLOAT_2D", "environment_density_map")),
-    blocks=((VIEW, "film_view"), (WORLD, "world_light")),
-    constants=FAN_CONSTANTS,
-    outputs=(("VEC4", "out_arriving"),),
+OCCLUSION_BITS, OCCLUSION_POINTS = (
+    passes.fullscreen_program(
+        f"directional occlusion, {kind}",
+        f"ssdo/{file}.frag.glsl",
+        textures=(*FAN_TEXTURES, ("FLOAT_2D", "environment_map"), ("FLOAT_2D", "environment_density_map")),
+        blocks=((VIEW, "film_view"), (WORLD, "world_light")),
+        constants=FAN_CONSTANTS,
+        outputs=(("VEC4", "out_arriving"),),
+    )
+    for kind, file in (("bits", "occlusion"), ("points", "occlusion_points"))
 )
+OCCLUSION = {BITS: OCCLUSION_BITS, POINTS: OCCLUSION_POINTS}
 
 
 class DirectionalOcclusion(Technique):
@@ -75,7 +79,7 @@ class DirectionalOcclusion(Technique):
         bindings["textures"]["environment_density_map"] = frame.environment.density_map
         bindings["blocks"]["world_light"] = frame.environment.block
         with images.borrowed(*frame.size, "RGBA32F") as arriving:
-            passes.fullscreen(OCCLUSION, arriving, **bindings)
+            passes.fullscreen(OCCLUSION[frame.settings.get(self, "visibility")], arriving, **bindings)
             reflect(frame, self, arriving.colors[0], "radiance.diffuse_direct")
         frame.count(self, "passes", 2)
 

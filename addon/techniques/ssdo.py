@@ -13,6 +13,10 @@ light passes behind posts.
 L is the direct diffuse light of this very sample (the difference of two sums), with glossy reflection counted as
 diffuse; the next bounce sends what the one before brought. The mean over the samples has no lag: what is left is bias.
 
+`visibility` POINTS is the thesis's own way for comparison: as many points as bits have steps, in a half ball of the
+radius; those below what is seen are solid, and each sends as a patch of pi r^2 / N, bounded by the directions that it
+stands for. A blocker at distance t is met with the chance 1 - t / r, so it fits small radii only.
+
 Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque and Gilet 2023 (bits for sectors).
 
 | cost | per sample |
@@ -44,14 +48,19 @@ from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 FAN_TEXTURES = (*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"))
 FAN_CONSTANTS = (("INT", "fan_count"), ("INT", "step_count"), ("FLOAT", "farthest"), ("FLOAT", "thickness"))
-BOUNCE = passes.fullscreen_program(
-    "screen-space bounce",
-    "ssdo/bounce.frag.glsl",
-    textures=(*FAN_TEXTURES, ("FLOAT_2D", "senders")),
-    blocks=((VIEW, "film_view"),),
-    constants=FAN_CONSTANTS,
-    outputs=(("VEC4", "out_arriving"),),
+BITS, POINTS = "BITS", "POINTS"
+BOUNCE_BITS, BOUNCE_POINTS = (
+    passes.fullscreen_program(
+        f"screen-space bounce, {kind}",
+        f"ssdo/{file}.frag.glsl",
+        textures=(*FAN_TEXTURES, ("FLOAT_2D", "senders")),
+        blocks=((VIEW, "film_view"),),
+        constants=FAN_CONSTANTS,
+        outputs=(("VEC4", "out_arriving"),),
+    )
+    for kind, file in (("bits", "bounce"), ("points", "bounce_points"))
 )
+BOUNCE = {BITS: BOUNCE_BITS, POINTS: BOUNCE_POINTS}
 SENDERS_OF_SUMS, SENDERS = (
     passes.fullscreen_program(
         name,
@@ -87,8 +96,13 @@ KEEP = passes.fullscreen_program(
 def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
     """Parameters of a technique that walks along fans, with its own defaults; lengths in median distances."""
     return (
-        Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64),
-        Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64),
+        Param(
+            "visibility", "Visibility", BITS,
+            "How surfaces hide each other: bits for sectors of half planes, or points in a half ball of a small radius",
+            items=((BITS, "Bits", 0), (POINTS, "Points", 1)),
+        ),
+        Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64, draft=2),
+        Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64, draft=12),
         Param("radius", "Radius", radius, "How far surfaces matter, in median distances of what is seen", 0.01, 100.0),
         Param(
             "thickness", "Thickness", thickness,
@@ -108,7 +122,7 @@ class ScreenSpaceBounce(Technique):
     slot = "indirect"
     params = (
         *fan_params(radius=4.0, thickness=0.1),
-        Param("bounces", "Bounces", 4, "At most so many of the scene's bounces are gathered", 1, 8),
+        Param("bounces", "Bounces", 4, "At most so many of the scene's bounces are gathered", 1, 8, draft=2),
     )
     reads = (*SURFACES, "radiance.diffuse_direct")
     writes = (
@@ -149,7 +163,7 @@ class ScreenSpaceBounce(Technique):
         bindings = fan_bindings(frame, self)
         bindings["textures"]["senders"] = frame.images["ssdo.senders"]
         bindings["constants"]["fan_count"] = fans
-        passes.fullscreen(BOUNCE, arriving, **bindings)
+        passes.fullscreen(BOUNCE[frame.settings.get(self, "visibility")], arriving, **bindings)
 
 
 def fan_bindings(frame: Frame, technique: Technique) -> dict:

@@ -31,12 +31,13 @@ def ball(stage, radius=0.5, rings=24):
     bpy.context.object.data.materials.append(stage.diffuse(1.0))
 
 
+@pytest.mark.parametrize("visibility", ["BITS", "POINTS"])
 @pytest.mark.parametrize("tilt", [0.0, 0.7, 1.3])
-def test_an_open_plane_has_all_the_light_of_the_sky_at_every_tilt_and_in_every_sample(stage, render, tilt):
+def test_an_open_plane_has_all_the_light_of_the_sky_at_every_tilt_and_in_every_sample(stage, render, tilt, visibility):
     stage.floor(200)
     stage.world((0.2, 0.5, 1.0), strength=3.0)
     stage.camera((0, -5 * np.sin(tilt), 5 * np.cos(tilt)), (tilt, 0, 0))
-    light = render(samples=1)
+    light = render(samples=1, visibility=visibility)
     floor = light[light[..., 2] > 0]
     np.testing.assert_allclose(floor, np.broadcast_to([0.6, 1.5, 3.0], floor.shape), rtol=1e-3)
 
@@ -57,6 +58,22 @@ def test_a_wall_hides_its_form_factor_of_the_sky(stage, render, elevation):
     expected = 0.5 + 0.5 * distance[floor] / np.hypot(1.0, distance[floor])
     np.testing.assert_allclose(light[floor], expected, rtol=0.05)
     assert light[floor].mean() == pytest.approx(expected.mean(), rel=0.02)
+
+
+def test_points_miss_a_wall_with_the_chance_that_the_thesis_gives_them(stage, render):
+    """A blocker at the share t of the radius is met by 1 - t of the points: 0.69 and 0.95 are left at 0.1 and 0.5."""
+    stage.world()
+    stage.rectangle((0, -20), (20, 20), material=stage.diffuse(1.0))
+    stage.mesh([(0, -20, 0), (0, 20, 0), (0, 20, 20), (0, -20, 20)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    camera = stage.camera((14, 0, 14), (np.pi / 4, 0, np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0
+    light = render(visibility="POINTS", radius=0.6 / 19)[:, 16:32].mean(axis=(1, 2))
+    distance = -((np.arange(SIZE[1]) + 0.5) / SIZE[1] - 0.5) * 4 / np.sin(np.pi / 4) / 0.6
+    share, left = [0.02, 0.1, 0.25, 0.5, 0.75], [0.559, 0.691, 0.832, 0.948, 0.992]
+    floor = (distance > 0.02) & (distance < 0.75)
+    ahead = light[floor] - np.interp(distance[floor], share, left)
+    assert (ahead > -0.03).all()
+    assert (ahead < 0.15).all(), "what is near the border of the half ball fades"
 
 
 def test_a_sphere_hides_the_sky_above_the_floor_it_lies_on(stage, render):

@@ -51,13 +51,22 @@ def test_a_wall_gets_light_from_the_floor_by_their_form_factor(stage, render, el
     assert light[rows].mean() == pytest.approx(expected.mean(), rel=0.03)
 
 
-def test_a_surface_alone_gets_no_light_from_itself(stage, render):
+@pytest.mark.parametrize("visibility", ["BITS", "POINTS"])
+def test_a_surface_alone_gets_no_light_from_itself(stage, render, visibility):
     """From any side: pixels of one plane see each other edge on."""
     stage.floor(5)
     stage.light("POINT", (0, 0, 2))
     for tilt in (0.0, 0.7, 1.4):
         stage.camera((0, -5 * np.sin(tilt), 5 * np.cos(tilt)), (tilt, 0, 0))
-        assert render(3).max() < 1e-3
+        assert render(3, visibility=visibility).max() < 1e-3
+
+
+def test_points_never_send_more_than_the_directions_that_they_stand_for(stage, render):
+    """The thesis's patches of pi r^2 / N beside a floor of radiance 8 / pi."""
+    wall_and_floor(stage, np.radians(45))
+    light = render(samples=16, visibility="POINTS", radius=0.1)
+    assert light[24:26, 21:27].mean() > 0
+    assert light.max() < 8 / np.pi
 
 
 def test_surfaces_that_face_away_hide_light_and_send_none(stage, render):

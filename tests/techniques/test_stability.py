@@ -262,7 +262,7 @@ PARAMETERS = {
     )
     for technique in REGISTRY
     for param in technique.params
-    for value in {param.minimum, param.maximum} - {None}
+    for value in {param.minimum, param.maximum, *(item[0] for item in param.items)} - {None}
 }
 CORPUS = {
     f"{group}: {name}": case
