@@ -6,13 +6,13 @@ import argparse
 import os
 import sys
 
-from bench import growth, page, profile, run
+from bench import costs, growth, page, profile, run
 
 
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    commands = parser.add_subparsers(metavar="run|growth|profile|page", required=True)
-    for name, module in (("run", run), ("growth", growth), ("profile", profile), ("page", page)):
+    commands = parser.add_subparsers(metavar="run|growth|profile|costs|page", required=True)
+    for name, module in (("run", run), ("growth", growth), ("profile", profile), ("costs", costs), ("page", page)):
         about = module.__doc__.split("\n\n")[0]
         one = commands.add_parser(name, help=about.split(": `")[0], description=module.__doc__)
         module.add_options(one)

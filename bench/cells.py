@@ -2,8 +2,8 @@
 
 A cell is one engine with one set of settings at one number of samples on one scene. Its key is a hash of all that its
 figures depend on: the scene's file (or the source of its family), the settings, the size, Blender's version and device,
-and, for Candela, every source file of the add-on. A run that is interrupted, or started again after a change, measures
-only the cells whose keys it does not find.
+and, for Candela, every source file of the add-on and what Auto chooses by. A run that is interrupted, or started again
+after a change, measures only the cells whose keys it does not find.
 """
 
 from __future__ import annotations
@@ -61,20 +61,32 @@ PEERS = (
 )
 
 
-def own_series(registry: Iterable) -> tuple[Series, ...]:
-    """Candela as it comes, without bounces, and with each technique of a slot that has several to choose from."""
-    found = [Series("Candela", "CANDELA", SWEEP, main=True)]
-    found.append(Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0))
-    by_slot: dict[str, list] = {}
+FIRST = "Candela, first techniques"
+
+
+def choices(registry: Iterable) -> dict[str, list]:
+    """Techniques by slot, in the registry's order, of slots that have several."""
+    found: dict[str, list] = {}
     for technique in registry:
         if technique.slot:
-            by_slot.setdefault(technique.slot, []).append(technique)
-    for slot, techniques in by_slot.items():
-        if len(techniques) > 1:
-            found += [
-                Series(f"Candela, {one.label.lower()}", "CANDELA", SWEEP, slots=((slot, one.name),))
-                for one in techniques
-            ]
+            found.setdefault(technique.slot, []).append(technique)
+    return {slot: techniques for slot, techniques in found.items() if len(techniques) > 1}
+
+
+def own_series(registry: Iterable) -> tuple[Series, ...]:
+    """Candela as it comes, without bounces, with the first technique of every slot, and with each other one instead.
+
+    What is set by hand is set in every slot that has a choice, so that those series do not depend on what Auto knows.
+    """
+    found = [Series("Candela", "CANDELA", SWEEP, main=True), Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
+    slots = choices(registry)
+    first = {slot: techniques[0].name for slot, techniques in slots.items()}
+    if first:
+        found.append(Series(FIRST, "CANDELA", SWEEP, slots=tuple(first.items())))
+    for slot, techniques in slots.items():
+        for one in techniques[1:]:
+            chosen = tuple({**first, slot: one.name}.items())
+            found.append(Series(f"Candela, {one.label.lower()}", "CANDELA", SWEEP, slots=chosen))
     return tuple(found)
 
 
@@ -125,6 +137,7 @@ class Cell:
             "reference": self.reference_samples,
             "machine": machine,
             "sources": sources() if self.series.own else "",
+            "auto": auto() if self.series.own and not self.series.slots else "",
         }
         return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
 
@@ -138,6 +151,11 @@ def sources() -> str:
             if path.suffix in (".py", ".glsl", ".npz"):
                 digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()
+
+
+def auto() -> dict:
+    """What Auto chooses by."""
+    return json.loads((ROOT / "addon" / "frame" / "costs.json").read_text(encoding="utf-8"))["slots"]
 
 
 def in_turns(cells: Iterable[Cell]) -> list[Cell]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..snapshot.scene import Snapshot
+from . import costs
 from .ledger import SKIPPED, Row
 from .settings import AUTO, Settings
 from .technique import Technique
@@ -37,13 +38,15 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
     if tree is not None:  # its techniques first, in its order; of those that fill a slot the first one does
         place = {name: number for number, name in enumerate(tree)}
         registry = sorted(registry, key=lambda technique: place.get(technique.name, len(place)))
-    for technique in registry:
-        reason = technique.skip(snapshot, settings)
+    reasons = {technique: technique.skip(snapshot, settings) for technique in registry}
+    wishes = {} if tree is not None else _wishes(reasons, settings)
+    for technique, reason in reasons.items():
         if tree is not None and technique.name not in tree:
             reason = "it is not in the pass tree"
-        wish = settings.slots.get(technique.slot, AUTO) if technique.slot and tree is None else AUTO
+        wish = wishes.get(technique.slot, AUTO)
         if not reason and wish not in (AUTO, technique.name):
-            reason = f"the {technique.slot} slot is set to {wish}"
+            asked = settings.slots.get(technique.slot, AUTO) != AUTO
+            reason = f"the {technique.slot} slot is {'set to' if asked else 'filled by'} {wish}"
         if not reason and technique.slot in filled:
             reason = f"the {technique.slot} slot is filled by {filled[technique.slot]}"
         if reason:
@@ -53,6 +56,16 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
             filled[technique.slot] = technique.name
         chosen.append(technique)
     return Plan(_ordered(chosen, skipped), tuple(skipped))
+
+
+def _wishes(reasons: dict[Technique, str | None], settings: Settings) -> dict[str, str]:
+    """Technique by slot: the one that is set, or, where that is Auto, the one that the measurements favour."""
+    able: dict[str, list[str]] = {}
+    for technique, reason in reasons.items():
+        if technique.slot and not reason:
+            able.setdefault(technique.slot, []).append(technique.name)
+    found = {slot: costs.preferred(costs.known(), slot, names, settings.samples) for slot, names in able.items()}
+    return found | {slot: wish for slot, wish in settings.slots.items() if wish != AUTO}
 
 
 def _ordered(techniques: list[Technique], skipped: list[Row]) -> tuple[Technique, ...]:

@@ -81,8 +81,19 @@ def test_choice_of_techniques_comes_from_the_registry():
     class Alone(One):
         slot, name, label = "indirect", "alone", "Alone"
 
-    labels = [series.label for series in cells.own_series([One, Two, Alone])]
-    assert labels == ["Candela", "Candela, no bounces", "Candela, one", "Candela, two"]
+    series = cells.own_series([One, Two, Alone])
+    assert [(one.label, one.slots) for one in series] == [
+        ("Candela", ()), ("Candela, no bounces", ()), (cells.FIRST, (("shadow", "one"),)),
+        ("Candela, two", (("shadow", "two"),)),
+    ]  # fmt: skip
+
+
+def test_what_auto_knows_is_part_of_the_key_only_where_auto_chooses(monkeypatch):
+    pinned = cell(replace(OWN, slots=(("shadow", "one"),)))
+    before = cell().key("m"), pinned.key("m")
+    monkeypatch.setattr(cells, "auto", lambda: {"shadow": {}})
+    assert cell().key("m") != before[0]
+    assert pinned.key("m") == before[1]
 
 
 def test_results_hold_five_digits_and_one_cell_per_line():

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.frame import costs
+from addon.frame.costs import Cost
 from addon.frame.ledger import SKIPPED
 from addon.frame.plan import PlanError, make_plan
 from addon.frame.settings import Settings
@@ -88,6 +90,18 @@ def test_a_chosen_technique_that_is_not_needed_leaves_the_slot_empty_and_says_so
         "maps": "the shadow slot is set to volumes",
         "volumes": "no light casts a shadow",
     }
+
+
+def test_auto_takes_what_the_measurements_favour_at_this_many_samples(monkeypatch):
+    table = {"shadow": {"maps": {1: Cost(1, 1), 64: Cost(1, 1)}, "volumes": {1: Cost(0.4, 1), 64: Cost(3, 1)}}}
+    monkeypatch.setattr(costs, "known", lambda: table)
+    registry = [technique("maps", slot="shadow"), technique("volumes", slot="shadow")]
+    few = make_plan(registry, None, Settings(samples=1))
+    assert names(few) == ["volumes"]
+    assert few.skipped[0].reason == "the shadow slot is filled by volumes"
+    assert names(make_plan(registry, None, Settings(samples=64))) == ["maps"]
+    assert names(make_plan(registry, None, Settings(samples=1, slots={"shadow": "maps"}))) == ["maps"]
+    assert names(make_plan(registry[:1], None, Settings(samples=1))) == ["maps"]
 
 
 def test_a_technique_that_skips_leaves_its_slot_to_the_next():
