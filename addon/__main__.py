@@ -1,4 +1,4 @@
-"""`python -m addon render | compare | plan FILE.blend …`, where Blender is installed as a Python module."""
+"""`python -m addon render | compare | plan | tune FILE.blend …`, where Blender is installed as a Python module."""
 
 import importlib
 import os

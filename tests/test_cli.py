@@ -211,3 +211,32 @@ def test_compare_writes_a_page_and_prints_every_light_path(tmp_path, option, bou
     assert ("was rendered without bounces" in page) == (option == "--direct-only")
     again = candela("compare", CORNELL, *TINY, *options, folder=tmp_path)
     assert again.returncode == 0 and "from the cache" in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), ("--milliseconds",)),
+        (("--milliseconds", "0"), ("'0' is not a time",)),
+        (("--milliseconds", "soon"), ("'soon' is not a time",)),
+        (("--milliseconds", "50", "--apply", "--output", "new.png"), (".blend", "new.png")),
+    ],
+)
+def test_tune_without_a_time_or_a_file_to_write_is_refused(arguments, words, tmp_path):
+    assert_refused(candela("tune", CORNELL, *arguments, folder=tmp_path), 2, *words)
+
+
+@pytest.mark.slow
+def test_tune_proposes_settings_and_writes_them_only_when_asked(tmp_path):
+    size = ("--size", "32x24", "--reference-samples", "4", "--budget", "4", "--milliseconds", "400")
+    before = CORNELL.read_bytes()
+    done = candela("tune", CORNELL, *size, "--apply", "--output", "tuned.blend", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "relMSE" in done.stdout and "→" in done.stdout
+    samples = next(
+        word for line in done.stdout.splitlines() if line.startswith("Proposed") for word in line.split()
+        if word.startswith("samples=")
+    )  # fmt: skip
+    assert CORNELL.read_bytes() == before
+    again = candela("plan", tmp_path / "tuned.blend", folder=tmp_path)
+    assert f"512 × 384, {samples.partition('=')[2]} sample" in again.stdout

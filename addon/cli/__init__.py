@@ -1,4 +1,4 @@
-"""`blender --command candela render | compare | plan FILE.blend …`, and the same as `python -m addon …`.
+"""`blender --command candela render | compare | plan | tune FILE.blend …`, and the same as `python -m addon …`.
 
 What a person may get wrong ends in one sentence on standard error: exit code 2 when the command line cannot be meant
 as it stands, 1 when the file, the scene or the output will not do. Results are written beside their final place and
@@ -18,7 +18,7 @@ import bpy
 
 from ..frame.settings import SAMPLES
 from ..techniques import REGISTRY
-from . import verbs
+from . import tuning, verbs
 from .refused import FAILURE, USAGE, Refused
 from .terminal import STDOUT
 
@@ -81,7 +81,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     shared.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
 
     parser = _Parser(prog=program, description="Candela, a render engine for Blender.", allow_abbrev=False)
-    commands = parser.add_subparsers(metavar="render|compare|plan", required=True)
+    commands = parser.add_subparsers(metavar="render|compare|plan|tune", required=True)
     add = {"parents": [shared], "allow_abbrev": False}
     render = commands.add_parser("render", help="render a picture", **add)
     render.add_argument("--output", metavar="PATH", type=Path, help=".png, or .exr with all passes of the file")
@@ -104,6 +104,17 @@ def _parser(program: str) -> argparse.ArgumentParser:
     against.set_defaults(verb=verbs.compare)
     plan = commands.add_parser("plan", help="print what would run and why the rest is skipped", **add)
     plan.set_defaults(verb=verbs.plan)
+    tune = commands.add_parser("tune", help="find the settings with the least error within a time", **add)
+    tune.add_argument(
+        "--milliseconds", metavar="N", type=_positive, required=True, help="that a picture may take on this machine"
+    )
+    tune.add_argument("--budget", metavar="SECONDS", type=_positive, default=120.0, help="to measure in (default 120)")
+    tune.add_argument(
+        "--reference-samples", metavar="N", type=_count, default=128, help="of Cycles, each of two (default 128)"
+    )
+    tune.add_argument("--apply", action="store_true", help="write what was found into the file, or into --output")
+    tune.add_argument("--output", metavar="PATH.blend", type=Path, help="with --apply: leave FILE as it is")
+    tune.set_defaults(verb=tuning.tune_scene)
     return parser
 
 
@@ -132,6 +143,15 @@ def _frame(text: str) -> int:
     except ValueError:
         pass
     raise argparse.ArgumentTypeError(f"'{text}' is not a frame: whole numbers from {FRAMES[0]} to {FRAMES[-1]} are")
+
+
+def _positive(text: str) -> float:
+    try:
+        if 0 < float(text) < float("inf"):
+            return float(text)
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"'{text}' is not a time: a number above 0 is")
 
 
 def _count(text: str) -> int:

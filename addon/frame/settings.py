@@ -51,8 +51,13 @@ class Settings:
     def override(self, techniques: Iterable[Technique], assignments: Iterable[str]) -> Settings:
         """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown."""
         settings = self
+        techniques = list(techniques)
         own = {param.name: param for param in SCENE_PARAMS}
         table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
+        slots: dict[str, list[str]] = {}
+        for technique in techniques:
+            if technique.slot:
+                slots.setdefault(f"slot.{technique.slot}", [AUTO]).append(technique.name)
         for text in assignments:
             name, equals, value = text.partition("=")
             if not equals:
@@ -60,12 +65,16 @@ class Settings:
             if name in own:
                 param = own[name]
                 settings = replace(settings, **{name: param.check(value)})
+            elif name in slots:
+                if value not in slots[name]:
+                    raise ValueError(f"'{name}' must be one of {', '.join(slots[name])}, not '{value}'.")
+                settings = replace(settings, slots={**settings.slots, name.removeprefix("slot."): value})
             elif name in table:
                 technique, param = table[name]
                 settings = replace(
                     settings, values={**settings.values, (technique.name, param.name): param.check(value)}
                 )
             else:
-                known = ", ".join([*own, *table])
+                known = ", ".join([*own, *slots, *table])
                 raise ValueError(f"There is no setting '{name}'. Known settings: {known}.")
         return settings

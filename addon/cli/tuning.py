@@ -1,0 +1,116 @@
+"""The verb `tune`: measures settings on the scene of a file and proposes those with the least error under a time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+
+from ..compare import metrics, reference, tune
+from ..frame import ledger as ledgers
+from ..gfx import context
+from ..techniques import REGISTRY
+from ..ui.properties import identifier, settings_of
+from .files import output
+from .refused import USAGE, Refused, reason
+from .terminal import progress, quiet
+from .verbs import Job
+
+SEED = 11  # of timed renders; programs are compiled by a render of another one
+
+
+def tune_scene(job: Job) -> None:
+    """Measure, print the curve and the proposal; with --apply, write it into the file."""
+    options = job.options
+    layer = job.layer or reference.active_view_layer(job.scene)
+    path = output(options.output or options.file, folder=False) if options.apply else None
+    if path is not None and path.suffix.lower() != ".blend":
+        raise Refused(f"The output of tune must end in .blend, and {path.name} does not.", USAGE)
+    if job.scene.candela.pass_tree is not None:
+        raise Refused("The scene renders by a pass tree, whose nodes decide; tune needs a scene without one.")
+    seconds = options.milliseconds / 1000
+    try:
+        with quiet(options.verbose) as terminal:
+            context.ensure()
+            progress(terminal, f"Cycles renders the reference, 2 × {options.reference_samples} samples")
+            truth = reference.reference(job.scene, options.reference_samples, False, None, layer)
+            deadline = time.monotonic() + options.budget
+            render = _renders(job, layer, truth, deadline, seconds, terminal)
+            values = settings_of(job.scene, viewport=False).values
+            trials = tune.search(choices(job.scene), REGISTRY, values, render, seconds)
+            progress(terminal, "")
+    except reference.RenderFailed as error:
+        raise Refused(f"{options.file} could not be tuned: {reason(error.__cause__ or error)}.") from None
+    except RuntimeError as error:
+        raise Refused(str(error)) from None
+    if not trials:
+        raise Refused(f"Not one render was done within {options.budget:g} seconds; give tune a larger --budget.")
+    best = tune.proposal(trials, seconds)
+    print(job.title)
+    print(f"{len(trials)} settings against Cycles, 2 × {options.reference_samples} samples; those that nothing beats:")
+    print(tune.table(trials, best))
+    if best.seconds > seconds:
+        print(f"Nothing took less than {options.milliseconds:g} ms; the fastest is marked.")
+    if path is not None:
+        save(options.file, job.scene.name, best.candidate, path)
+        print(path)
+
+
+def choices(scene) -> dict[str, list[str]]:
+    """Techniques to try by slot, the one that is set first; slots without a choice stay away."""
+    found: dict[str, list[str]] = {}
+    for technique in REGISTRY:
+        if technique.slot:
+            found.setdefault(technique.slot, []).append(technique.name)
+    chosen = {slot: getattr(scene.candela, f"slot_{slot}") for slot in found}
+    return {
+        slot: sorted(names, key=lambda name: name != chosen[slot]) for slot, names in found.items() if len(names) > 1
+    }
+
+
+def properties(candidate: tune.Candidate) -> list[tuple[str, object]]:
+    """The candidate as properties of scene.candela."""
+    own: list[tuple[str, object]] = [("samples", candidate.samples)]
+    own += [(f"slot_{slot}", name) for slot, name in candidate.slots]
+    return own + [(identifier(*name), value) for name, value in candidate.values]
+
+
+def _renders(job: Job, layer, truth, deadline: float, seconds: float, terminal):
+    """What renders a candidate for `tune.search`: warm, with its error; raises Spent after the deadline."""
+    warm: set[tuple] = set()
+    scene = job.scene
+    half = truth.half["combined"]
+    noise = metrics.compare_radiance("", truth.images["combined"], truth.images["combined"], half).floor
+
+    def passes(candidate: tune.Candidate, seed: int):
+        settings = [(scene.candela, name, value) for name, value in properties(candidate)]
+        with reference.overridden(settings):
+            return reference.render_passes(scene, "CANDELA", candidate.samples, seed, view_layer=layer)
+
+    def render(candidate: tune.Candidate) -> tune.Picture:
+        if time.monotonic() > deadline:
+            raise tune.Spent
+        progress(terminal, f"{deadline - time.monotonic():.0f} s left: {candidate.text()}")
+        if candidate.slots not in warm:
+            passes(replace(candidate, samples=1), SEED + 1)
+            warm.add(candidate.slots)
+        made = passes(candidate, SEED)
+        error = metrics.compare_radiance("", made.images["combined"], truth.images["combined"]).relmse
+        ran = tuple(row.name for row in ledgers.latest().rows if row.state == ledgers.RAN)
+        return tune.Picture(made.seconds, max(error - noise, 1e-12), ran)
+
+    return render
+
+
+def save(file: Path, scene: str, candidate: tune.Candidate, path: Path) -> None:
+    """Open the file anew, change nothing but Candela's settings of the scene, and write it. Raises Refused."""
+    try:
+        with quiet():
+            bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
+            for name, value in properties(candidate):
+                setattr(bpy.data.scenes[scene].candela, name, value)
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)
+    except RuntimeError as error:
+        raise Refused(f"{path} could not be written: {reason(error)}.") from None

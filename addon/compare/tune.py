@@ -1,0 +1,189 @@
+"""Tuning: which settings bring the least error on this scene and machine, within the time that a picture may take.
+
+What Auto knows comes from other scenes and another machine. Here candidates are rendered and measured on the scene
+itself, until a budget is spent:
+
+1. The scene's own techniques, and then each other choice of techniques by slot, are swept over 1, 2, 4, … samples up
+   to the asked time; a choice that is clearly behind what is already known is not swept further.
+2. The best choice is rendered at the number of samples that just fits.
+3. Its techniques' numeric parameters are doubled and halved, one by one, the samples refitted to the time; what lowers
+   the error stays, and is the start for the next.
+
+Error is relMSE against a reference of the same scene, less the reference's own noise. Time is that of a whole render
+with compiled programs. A trial's figures are those of one seed: differences of a few per cent are chance, so a
+step must win by more than that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from ..frame.technique import Technique
+
+BEHIND = 2.0  # a choice whose error is so many times the best known one at its time is not swept further
+WINS = 0.95  # a changed parameter must bring the error below this share of what it was
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Settings to try: samples, technique by slot, and values of parameters by (technique, parameter)."""
+
+    samples: int
+    slots: tuple[tuple[str, str], ...] = ()
+    values: tuple[tuple[tuple[str, str], float], ...] = ()
+
+    def text(self) -> str:
+        """As on the command line: `samples=16 slot.shadow=vssm instant_radiosity.rays=8`."""
+        words = [f"samples={self.samples}", *(f"slot.{slot}={name}" for slot, name in self.slots)]
+        return " ".join([*words, *(f"{'.'.join(name)}={value:g}" for name, value in self.values)])
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a render of a candidate gave: seconds, relMSE, and the names of the techniques that ran."""
+
+    seconds: float
+    error: float
+    ran: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Trial:
+    candidate: Candidate
+    picture: Picture
+
+    @property
+    def seconds(self) -> float:
+        return self.picture.seconds
+
+    @property
+    def error(self) -> float:
+        return self.picture.error
+
+
+class Spent(Exception):
+    """The budget is used up: what was measured so far is the result."""
+
+
+def search(
+    slots: dict[str, Sequence[str]],
+    techniques: Iterable[type[Technique]],
+    values: dict[tuple[str, str], object],
+    render: Callable[[Candidate], Picture],
+    seconds: float,
+    most_samples: int = 4096,
+) -> list[Trial]:
+    """All trials in the order in which they were made. `render` raises Spent when the budget is used up.
+
+    `slots` names the techniques to choose from by slot, the scene's own choice first; `values` are the scene's own
+    parameters; `seconds` is the time that a picture may take.
+    """
+    trials: list[Trial] = []
+
+    def tried(candidate: Candidate) -> Trial:
+        for trial in trials:
+            if trial.candidate == candidate:
+                return trial
+        trials.append(Trial(candidate, render(candidate)))
+        return trials[-1]
+
+    try:
+        for choice in _choices(slots):
+            _sweep(tried, trials, Candidate(1, choice), seconds, most_samples)
+        best = proposal(trials, seconds)
+        best = max(best, _fitted(tried, best, seconds, most_samples), key=lambda trial: _worth(trial, seconds))
+        _step_parameters(tried, best, techniques, values, seconds, most_samples)
+    except Spent:
+        pass
+    return trials
+
+
+def _choices(slots: dict[str, Sequence[str]]) -> list[tuple[tuple[str, str], ...]]:
+    """The scene's own choice, then each other technique in one slot."""
+    own = {slot: names[0] for slot, names in slots.items()}
+    found = [tuple(own.items())]
+    for slot, names in slots.items():
+        found += [tuple({**own, slot: name}.items()) for name in names[1:]]
+    return found
+
+
+def _sweep(tried, trials: list[Trial], start: Candidate, seconds: float, most: int) -> None:
+    """1, 2, 4, … samples, as long as the next is likely to fit and the choice keeps up with the others."""
+    samples = 1
+    while samples <= most:
+        trial = tried(replace(start, samples=samples))
+        if any(one.candidate.slots != start.slots and one.picture.ran == trial.picture.ran for one in trials):
+            return  # the choice makes no difference in this scene
+        others = [one.error for one in trials if one.candidate.slots != start.slots and one.seconds <= trial.seconds]
+        if trial.seconds * 1.5 > seconds or (others and trial.error > BEHIND * min(others)):
+            return
+        samples *= 2
+
+
+def _fitted(tried, trial: Trial, seconds: float, most: int) -> Trial:
+    """The same settings with as many samples as fit into the time, taking time to be in proportion to them."""
+    samples = max(1, min(most, math.floor(trial.candidate.samples * seconds / trial.seconds)))
+    return tried(replace(trial.candidate, samples=samples)) if samples != trial.candidate.samples else trial
+
+
+def _step_parameters(tried, best: Trial, techniques, own: dict, seconds: float, most: int) -> None:
+    """Double and halve each numeric parameter of the techniques that ran; what wins is kept."""
+    for technique in techniques:
+        if technique.name not in best.picture.ran:
+            continue
+        for param in technique.params:
+            if isinstance(param.default, bool | str):
+                continue
+            for factor in (2.0, 0.5):
+                values = dict(best.candidate.values)
+                name = (technique.name, param.name)
+                value = _stepped(param, values.get(name, own[name]), factor)
+                if value is None:
+                    continue
+                changed = replace(best.candidate, values=tuple({**values, name: value}.items()))
+                trial = _fitted(tried, tried(changed), seconds, most)
+                if trial.seconds <= seconds and trial.error < WINS * best.error:
+                    best = trial
+                    break
+
+
+def _stepped(param, value: float, factor: float) -> float | None:
+    """The value times the factor within the parameter's range; None where it would not change."""
+    new = type(param.default)(value * factor)
+    new = max(new, param.minimum) if param.minimum is not None else new
+    new = min(new, param.maximum) if param.maximum is not None else new
+    return None if new == value else new
+
+
+def _worth(trial: Trial, seconds: float) -> float:
+    """Larger is better: least error among those that fit, else least time."""
+    return -trial.error if trial.seconds <= seconds else -1e30 - trial.seconds
+
+
+def proposal(trials: list[Trial], seconds: float) -> Trial:
+    """The trial with the least error within the time; where none fits, the fastest."""
+    return max(trials, key=lambda trial: _worth(trial, seconds))
+
+
+def front(trials: list[Trial]) -> list[Trial]:
+    """Trials that no other beats in time and error at once, by rising time: the curve that tuning found."""
+    found: list[Trial] = []
+    for trial in sorted(trials, key=lambda trial: (trial.seconds, trial.error)):
+        if not found or trial.error < found[-1].error:
+            found.append(trial)
+    return found
+
+
+def table(trials: list[Trial], chosen: Trial) -> str:
+    """The curve as lines for a terminal; an arrow marks the proposal, which is written out below."""
+    shown = [(trial, trial.candidate.text().split()) for trial in front(trials)]
+    common = set.intersection(*(set(words) for _, words in shown)) if len(shown) > 1 else set()
+    rows = [("", "ms", "relMSE", "settings")]
+    for trial, words in shown:
+        told = " ".join(word for word in words if word not in common)
+        rows.append(("→" if trial is chosen else "", f"{1000 * trial.seconds:.0f}", f"{trial.error:.2e}", told))
+    widths = [max(len(row[k]) for row in rows) for k in range(3)]
+    lines = [f"{a:<{widths[0]}} {b:>{widths[1]}}  {c:>{widths[2]}}  {d}".rstrip() for a, b, c, d in rows]
+    return "\n".join([*lines, f"Proposed: {chosen.candidate.text()}"])
