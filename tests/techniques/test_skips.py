@@ -1,0 +1,135 @@
+"""Skip, then reuse, for every technique of the registry: a new one without a scene here fails.
+
+What a technique costs where it is not needed is found by leaving it out: the renderer with it and the one without it
+must bind the same programs in the same order, hold the same images and compile nothing more.
+"""
+
+import numpy as np
+import pytest
+
+from addon import engine
+from addon.frame.ledger import RAN, REUSED, SKIPPED
+from addon.gfx import images, library
+from addon.techniques import REGISTRY, make_registry
+
+ALWAYS = {"surfaces", "film"}  # depth, normals and the picture itself are wanted of every scene
+RESOLVE = "film resolve"  # the sums' mean, drawn whenever pixels are asked for
+
+
+def no_light(stage):
+    stage.remove_lamps()
+
+
+def no_shadow(stage):
+    for lamp in stage.lamps:
+        lamp.data.use_shadow = False
+
+
+def no_emission(stage):
+    stage.remove(stage.paper)
+
+
+def no_world(stage):
+    stage.scene.world = None
+
+
+def no_gloss(stage):
+    for thing in stage.scene.objects:
+        if thing.type == "MESH" and thing is not stage.paper:
+            thing.data.materials[0] = stage.diffuse(0.5)
+
+
+def no_bounces(stage):
+    stage.bounces = 0
+
+
+def nothing_lit(stage):
+    no_light(stage)
+    no_world(stage)
+
+
+# For each technique, what to take from the full scene so that it is not needed any more.
+WITHOUT = {
+    "light_probes": nothing_lit,
+    "accumulated_maps": no_shadow,
+    "vssm": no_shadow,
+    "direct_light": no_light,
+    "emissive_light": no_emission,
+    "environment_light": no_world,
+    "directional_occlusion": no_world,
+    "traced_glossy": no_gloss,
+    "instant_radiosity": no_bounces,
+    "ssdo": no_bounces,
+}
+
+
+@pytest.fixture
+def room(stage):
+    """A scene that needs every technique: a floor with gloss, a box, lamps, a paper lamp that shines, a world."""
+    stage.floor(material=stage.principled(Roughness=0.3))
+    stage.rectangle((-1, -0.3), (0.4, 0.3), 0.5, material=stage.diffuse(0.5))
+    stage.paper = stage.rectangle(
+        (0.6, -0.4), (1.0, 0.4), 0.8, material=stage.material("ShaderNodeEmission", Strength=2.0)
+    )
+    stage.lamps = [stage.light("AREA", (0.5, 0.7, 2), size=1.0), stage.light("SUN", turn=(0.3, 0, 0))]
+    stage.remove_lamps = lambda: [setattr(lamp, "hide_render", True) for lamp in stage.lamps]
+    stage.world((0.2, 0.3, 0.4))
+    stage.camera_above(4.0)
+    stage.bounces = 2
+    return stage
+
+
+@pytest.fixture
+def bound(monkeypatch):
+    """Names of the programs that are bound, in order."""
+    names = []
+    bind = library.Shader.bind
+
+    def told(shader, *arguments, **keywords):
+        names.append(shader.program.name)
+        bind(shader, *arguments, **keywords)
+
+    monkeypatch.setattr(library.Shader, "bind", told)
+    return names
+
+
+def choose(stage, technique):
+    if technique.slot:
+        setattr(stage.scene.candela, f"slot_{technique.slot}", technique.name)
+
+
+@pytest.mark.parametrize("technique", [t for t in REGISTRY if t.name not in ALWAYS], ids=lambda t: t.name)
+def test_a_scene_without_the_need_plans_allocates_compiles_and_draws_nothing_of_it(room, bound, monkeypatch, technique):
+    assert technique.name in WITHOUT, f"Give {technique.name} a scene that does not need it."
+    choose(room, technique)
+    WITHOUT[technique.name](room)
+
+    def render():
+        engine.free_sessions()
+        bound.clear()
+        picture = room.render(2, bounces=room.bounces)
+        return picture["combined"], list(bound), images.pool.allocated_bytes
+
+    with monkeypatch.context() as patch:
+        patch.setattr(engine, "make_registry", lambda: [t for t in make_registry() if t.name != technique.name])
+        expected = render()
+    assert RESOLVE in expected[1]
+    compiled = library.compile_count
+    found = render()
+    row = room.ledger.row(technique.name)
+    assert (row.state, row.counters) == (SKIPPED, {})
+    assert row.reason
+    np.testing.assert_array_equal(found[0], expected[0])
+    assert found[1:] == expected[1:]
+    assert library.compile_count == compiled
+
+
+@pytest.mark.parametrize("technique", REGISTRY, ids=lambda t: t.name)
+def test_an_unchanged_frame_redoes_nothing_of_it(room, bound, technique):
+    choose(room, technique)
+    room.render(2, bounces=room.bounces)
+    assert room.ledger.row(technique.name).state == RAN
+    bound.clear()
+    room.render(2, bounces=room.bounces)
+    assert room.ledger.row(technique.name).state == REUSED
+    assert set(bound) <= {RESOLVE}
