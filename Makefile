@@ -10,7 +10,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check package test-window window-walk nodes bench bench-quick clean
+.PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-quick bench-viewport clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
@@ -49,6 +49,10 @@ stress: environment ## random scenes against what must be true of every picture 
 test-window: package ## the packaged extension in a real Blender with a window (REAL_BLENDER=command)
 	$(PYTHON) -m pytest -m window tests/window
 
+screenshots: package ## the manual's pictures, taken in a real Blender with a window
+	$(PYTHON) -m pytest -m window tests/window -k "opengl and (nothing_failed or pass_tree or first_steps)"
+	$(PYTHON) tools/screenshots.py
+
 window-walk: package ## ten minutes of random edits in a real Blender with a window
 	STROLL_SECONDS=600 $(PYTHON) -m pytest -m window tests/window -k random_walk
 
@@ -61,6 +65,9 @@ bench: environment ## run time against error of every technique, EEVEE and Cycle
 
 bench-quick: environment ## time against error, beside EEVEE and Cycles
 	$(PYTHON) -m bench.quick
+
+bench-viewport: environment ## what edits cost in the viewport: times and uploads
+	$(PYTHON) -m bench.viewport
 
 clean: ## what was made here, except the environments
 	rm -rf build out .pytest_cache .hypothesis .ruff_cache

@@ -10,6 +10,7 @@ import textwrap
 import bpy
 
 from ..frame import ledger as ledgers
+from ..frame.settings import AUTO
 from ..techniques import REGISTRY
 from . import ENGINE, blender_panels, notes
 from .passes import PASSES
@@ -65,8 +66,24 @@ class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
         column.prop(context.scene.candela, "pass_tree")
 
 
+class CANDELA_RENDER_PT_parameters(_CandelaPanel, bpy.types.Panel):
+    """What the techniques may be told; the presets of Sampling set all of it"""
+
+    bl_label = "Parameters"
+    bl_parent_id = "CANDELA_RENDER_PT_techniques"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        pass
+
+
 def _technique_panel(technique) -> type:
-    """The sub-panel with a technique's parameters."""
+    """The sub-panel with a technique's parameters; it is gone while its slot holds another technique."""
+
+    @classmethod
+    def poll(cls, context):
+        chosen = getattr(context.scene.candela, f"slot_{technique.slot}") if technique.slot else technique.name
+        return _CandelaPanel.poll.__func__(cls, context) and chosen in (AUTO, technique.name)
 
     def draw(self, context):
         column = _columns(self)
@@ -77,8 +94,9 @@ def _technique_panel(technique) -> type:
         "__doc__": f"Parameters of {technique.label}",
         "__module__": __name__,
         "bl_label": technique.label,
-        "bl_parent_id": "CANDELA_RENDER_PT_techniques",
+        "bl_parent_id": "CANDELA_RENDER_PT_parameters",
         "bl_options": {"DEFAULT_CLOSED"},
+        "poll": poll,
         "draw": draw,
     }
     return type(f"CANDELA_RENDER_PT_{technique.name}", (_CandelaPanel, bpy.types.Panel), body)
@@ -280,6 +298,7 @@ _CLASSES = (
     CANDELA_OT_select_culprit,
     CANDELA_RENDER_PT_sampling,
     CANDELA_RENDER_PT_techniques,
+    CANDELA_RENDER_PT_parameters,
     *(_technique_panel(technique) for technique in REGISTRY if technique.params),
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_frame,

@@ -85,6 +85,19 @@ def test_every_slot_and_parameter_has_a_place(scene):
     )
 
 
+def test_parameters_are_those_of_the_techniques_in_question(scene):
+    """With Auto, of all; with a technique in the slot, of none of its rivals."""
+
+    def shown():
+        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params}
+        return {technique for technique, panel in made.items() if panel.poll(Context())}
+
+    assert shown() == {technique for technique in REGISTRY if technique.params}
+    scene.candela.slot_shadow = "vssm"
+    assert all(technique.name == "vssm" for technique in shown() if technique.slot == "shadow")
+    assert {technique for technique in REGISTRY if technique.params and technique.slot != "shadow"} <= shown()
+
+
 def test_all_passes_can_be_chosen_and_are_wanted_then(scene):
     layer = bpy.context.view_layer
     assert drawn(panels.CANDELA_VIEWLAYER_PT_passes) == [render_pass.switch for render_pass in PASSES]
