@@ -39,6 +39,7 @@ from .ui.properties import settings_of
 
 STEP_S = 0.1  # what a sample may take while the picture changes: coarser pixels are drawn to stay below it
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
+MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
 REST_S = 0.25  # without a change for so long, the picture is drawn in full resolution
 SCALES = (1, 2, 4, 8, 16)  # screen pixels per side of a drawn pixel; all but the first are drafts
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
@@ -98,6 +99,7 @@ class Viewport:
         self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
         self._sample: Iterator | None = None  # what is left of a sample that was begun
         self._sample_seconds = 0.0
+        self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
         self._compiled = -1  # programs made so far, when the sample was begun
         self.local_view = False
         self.news = False  # a ledger that the panels do not show yet
@@ -144,18 +146,21 @@ class Viewport:
         reads the scene and is asked only when it may have changed. `border`: pixels (x0, y0, x1, y1) that are drawn,
         by default all. Whatever the renderer raises goes through.
         """
+        elsewhere = clock() - self._left_at if self._left_at is not None else 0.0
         self._prepare(source, camera, size, border or (0, 0, *size), settings, clock)
         frame, started = self.frame, clock()
+        budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
         drawn = False
         while frame.samples_done < settings.samples:
-            spent = self._work(frame, clock)
+            spent = self._work(frame, clock, budget)
             drawn |= self._sample is None
             # Only a picture of this very view and scene may wait for its next sample.
-            if (self._waits or frame.samples_done) and clock() - started + spent > BUDGET_S:
+            if (self._waits or frame.samples_done) and clock() - started + spent > budget:
                 break
         if drawn:
             self._resolve(frame)
         self.seconds += clock() - started
+        self._left_at = None if self.done else clock()
         if self.scale == 1 and frame.samples_done >= settings.samples and not self._finished:
             self._finished = True
             self.renderer.finish(frame, ())  # publishes the ledger
@@ -164,7 +169,7 @@ class Viewport:
             self.news = True
         return self.picture
 
-    def _work(self, frame: Frame, clock) -> float:
+    def _work(self, frame: Frame, clock, budget: float) -> float:
         """One part of a sample; the seconds that it took. `_sample` is None afterwards if the sample is whole."""
         if self._sample is None:
             self._sample, self._sample_seconds = self.renderer.steps(frame), 0.0
@@ -173,7 +178,7 @@ class Viewport:
         whole = next(self._sample, end) is end
         frame.profiler.finish()
         spent = clock() - before
-        self.bands.learn(spent, BUDGET_S / 2)
+        self.bands.learn(spent, budget / 2)
         self._sample_seconds += spent
         if whole:
             self._sample = None

@@ -185,6 +185,27 @@ def test_one_redraw_ends_when_its_time_is_spent(region):
     assert region.viewport.frame.samples_done == 4
 
 
+def test_redraws_at_rest_work_as_long_as_blender_draws_its_window(region):
+    """Up to a limit: with a software GPU, most of the time would be spent on the window otherwise."""
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    region.rest()
+    bpy.context.scene.candela.seed, bpy.context.scene.candela.viewport_samples = 3, 16
+    region.clock.tick = viewport.BUDGET_S / 4
+    region.draw()
+    region.clock.now += 2 * viewport.REST_S
+
+    def redraw(elsewhere):
+        region.clock.now += elsewhere
+        before = region.clock.now
+        region.draw()
+        return region.clock.now - before
+
+    region.draw()
+    short, long = redraw(0.0), redraw(0.2)
+    assert short < 2.5 * viewport.BUDGET_S
+    assert 0.15 < long < 2 * viewport.MOST_BUDGET_S
+
+
 def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_is_whole(region):
     """Each redraw ends after a part; while samples of full resolution are being made, the moved view stays shown."""
     region.rest()

@@ -13,10 +13,11 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parent.parent
 BACKEND = "opengl"
-LEFT = (0, 26, 1058, 720)  # the large area of the Layout workspace
+LEFT = (0, 26, 1058, 694)  # the large area of the Layout workspace
+HALF = (0, 26, 636, 694)
 # Picture in docs/images, script, picture of the window, what is cut out: a box or a name in the script's result.
 PICTURES = (
-    ("viewport_rest", "drive", "viewport_rest", LEFT),
+    ("viewport_rest", "tour", "tour_engine", HALF),
     ("viewport_moving", "drive", "viewport_moving", LEFT),
     ("panel_render", "drive", "panel_render", "properties"),
     ("panel_frame", "drive", "panel_frame", "properties"),

@@ -18,7 +18,7 @@ import bpy
 
 FOLDER = Path(sys.argv[-1])
 ENGINE = "CANDELA"
-RENDER_TIMEOUT_S, REST_TIMEOUT_S = 240, 240
+RENDER_TIMEOUT_S, REST_TIMEOUT_S = 600, 600
 
 result = {}
 

@@ -33,9 +33,11 @@ def steps():
     left.spaces.active.shading.type = "RENDERED"
     yield from wait_for_rest()
     picture("tour_engine.png")
+    bounces, scene.candela.bounces = scene.candela.bounces, 0  # indirect light takes its time without a GPU
     yield from edits(left, right, scene)
     yield from shadow(right, scene)
-    yield from comparison(left, scene)
+    scene.candela.bounces = bounces
+    yield from comparison(left)
     yield from mistakes(left, scene)
 
 
@@ -77,7 +79,7 @@ def shadow(right, scene):
     picture("tour_shadow.png")
 
 
-def comparison(left, scene):
+def comparison(left):
     """In place of the viewport, as a user would do it: the sidebar's Candela tab, its button, a path, and the swap."""
     left.type = "IMAGE_EDITOR"
     left.spaces.active.show_region_ui = True
