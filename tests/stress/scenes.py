@@ -65,6 +65,7 @@ class Scene:
     unit: float = 1.0  # metres to one unit of everything above
     transparent: bool = False
     slots: tuple[tuple[str, str], ...] = ()  # technique by slot, where not Auto
+    bounces: int = 0
 
 
 def _box():

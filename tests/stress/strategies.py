@@ -100,4 +100,5 @@ def scenes(slots: dict[str, list[str]]) -> st.SearchStrategy[Scene]:
         unit=_one_of(1.0, 1.0, 1.0, 1e-3, 1e3),
         transparent=st.booleans(),
         slots=chosen.map(lambda names: tuple(sorted(names.items()))),
+        bounces=_one_of(0, 1, 3),
     )

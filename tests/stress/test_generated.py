@@ -67,10 +67,10 @@ def sound(images: dict[str, np.ndarray]) -> None:
 @given(scene=scenes(SLOTS))
 def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, scene):
     with kept(kept_stage, scene, "finite_and_same"):
-        first = kept_stage.render(SAMPLES, SIZE)
+        first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
         sound(first)
         engine.free_sessions()
-        again = kept_stage.render(SAMPLES, SIZE)
+        again = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
         for name in first:
             np.testing.assert_array_equal(first[name], again[name], err_msg=name)
 
@@ -82,9 +82,9 @@ def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, scene):
     """A power of two, so that nothing is rounded. Colour, depth and normals stay."""
     with kept(kept_stage, scene, "linear"):
         assume(all(lamp.energy < 1e9 for lamp in scene.lamps) and (scene.world is None or scene.world[3] < 1e6))
-        once = kept_stage.render(SAMPLES, SIZE)
+        once = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
         build(kept_stage, brighter(scene, 8.0))
-        eight_times = kept_stage.render(SAMPLES, SIZE)
+        eight_times = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
         for name in once:
             factor = 8.0 if name.endswith(("direct", "indirect", "emission", "environment")) else 1.0
             expected = once[name] * factor
@@ -116,11 +116,11 @@ def brighter(scene: Scene, factor: float) -> Scene:
 @given(scene=scenes(SLOTS))
 def test_order_and_names_of_objects_change_nothing(kept_stage, scene):
     with kept(kept_stage, scene, "order"):
-        first = kept_stage.render(SAMPLES, SIZE)["combined"]
+        first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
         build(kept_stage, replace(scene, shapes=scene.shapes[::-1], lamps=scene.lamps[::-1]))
         for k, thing in enumerate(kept_stage.scene.objects):
             thing.name = f"{997 * k % 1009:04d}"
-        second = kept_stage.render(SAMPLES, SIZE)["combined"]
+        second = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
         assume(not coplanar(scene))
         # Stochastic transparency and sums depend on the order in the last digits.
         close = np.isclose(first, second, rtol=1e-3, atol=1e-4 * float(first.max(initial=0.0)))
@@ -142,11 +142,11 @@ def coplanar(scene: Scene) -> bool:
 def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, scene):
     with kept(kept_stage, scene, "halves"):
         assume(scene.lamps)
-        whole = kept_stage.render(SAMPLES, SIZE)["combined"]
+        whole = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
         halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
         build(kept_stage, replace(scene, lamps=halves))
         np.testing.assert_allclose(
-            kept_stage.render(SAMPLES, SIZE)["combined"], whole, rtol=2e-3, atol=1e-4 * float(whole.max(initial=0.0))
+            kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"], whole, rtol=2e-3, atol=1e-4 * float(whole.max(initial=0.0))
         )
 
 
