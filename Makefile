@@ -60,8 +60,7 @@ nodes: environment ## every shader node beside Cycles: docs/nodes.md
 	$(PYTHON) -m bench.nodes
 
 bench: environment ## run time against error of every technique, EEVEE and Cycles (BUDGET=minutes): docs/performance.md
-	$(PYTHON) -m bench run $(if $(BUDGET),--budget $(BUDGET))
-	$(PYTHON) -m bench page
+	$(PYTHON) -m bench all $(if $(BUDGET),--budget $(BUDGET))
 
 bench-quick: environment ## time against error, beside EEVEE and Cycles
 	$(PYTHON) -m bench.quick

@@ -1,4 +1,4 @@
-"""`python -m bench run | page | profile | growth`: see the module of each. `make bench` runs them all."""
+"""`python -m bench run | growth | profile | costs | page | all`: see the module of each, or `--help` after it."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import argparse
 import os
 import sys
 
-from bench import costs, growth, page, profile, run
+from bench import costs, everything, growth, page, profile, run
+
+VERBS = {"run": run, "growth": growth, "profile": profile, "costs": costs, "page": page, "all": everything}
 
 
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    commands = parser.add_subparsers(metavar="run|growth|profile|costs|page", required=True)
-    for name, module in (("run", run), ("growth", growth), ("profile", profile), ("costs", costs), ("page", page)):
+    commands = parser.add_subparsers(metavar="|".join(VERBS), required=True)
+    for name, module in VERBS.items():
         about = module.__doc__.split("\n\n")[0]
-        one = commands.add_parser(name, help=about.split(": `")[0], description=module.__doc__)
+        one = commands.add_parser(name, help=about.split(": `")[0], description=about)
         module.add_options(one)
         one.set_defaults(command=module.command)
     options = parser.parse_args(arguments)

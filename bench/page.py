@@ -12,7 +12,8 @@ import json
 from pathlib import Path
 from string import Template
 
-from bench import plots
+from bench import growth as growth_of_cost
+from bench import plots, profile
 from bench.cells import ROOT
 from bench.figures import (
     MIDDLE,
@@ -63,6 +64,14 @@ READING = (
     "Seconds of a whole render to the right, relMSE of the picture upwards, both logarithmic: lower left is better. "
     "A marker is one setting, its line the staircase of settings that no other of its series beats. The grey band is "
     "the noise of the reference, below which no error is quoted; a dotted line is the error that a series tends to."
+)
+PROFILE = (
+    "A render of 16 samples: cold, with compiled programs, and again with nothing changed; shares of a render under "
+    "Python's profiler."
+)
+GROWTH = (
+    "Each dial from small to large: seconds of a whole render, and by which power of the dial they grow between its "
+    "two largest values."
 )
 
 
@@ -214,7 +223,7 @@ def image(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
 
 
-def make_page(results: Results, grown: list[dict], folder: Path) -> Path:
+def make_page(results: Results, grown: list[dict], profiled: list[dict], folder: Path) -> Path:
     """Write index.html and its pictures into the folder."""
     plots.overview(results, folder / "overview.png")
     scenes = []
@@ -228,11 +237,13 @@ def make_page(results: Results, grown: list[dict], folder: Path) -> Path:
             f"<details><summary>Passes at {MIDDLE} samples</summary>{table}</details>"
         )
     growth = ""
+    if profiled:
+        growth += f"<h2>Where a render's time goes</h2><p>{PROFILE}</p>{as_html(profile.table(profiled))}"
     if grown:
         plots.growth(grown, folder / "growth.png")
-        growth = (
-            "<h2>Growth of cost</h2><p>Each dial of the procedural scenes from small to large; the dashed line grows "
-            f"in proportion.</p><img src='{image(folder / 'growth.png')}' alt='Growth of cost'>"
+        growth += (
+            f"<h2>Growth of cost</h2><p>{GROWTH} The dashed line grows in proportion.</p>"
+            f"<img src='{image(folder / 'growth.png')}' alt='Growth of cost'>{as_html(growth_of_cost.table(grown))}"
         )
     left_out = ""
     if results.left_out:
@@ -256,7 +267,7 @@ def make_page(results: Results, grown: list[dict], folder: Path) -> Path:
     return page
 
 
-def generated_part(results: Results) -> str:
+def generated_part(results: Results, grown: list[dict], profiled: list[dict]) -> str:
     """The part of docs/performance.md that this command writes."""
     ratios = (
         "Speed-up: at equal error, the least that both reach, the other's time over Candela's. Error ratio: at equal "
@@ -268,7 +279,12 @@ def generated_part(results: Results) -> str:
     )
     picture = "![Time against error of every scene](images/bench.png)"
     parts = [facts(results), picture, READING, *claims(results), ratios, markdown(summary(results)), rest]
-    return "\n\n".join([*parts, markdown(faults(results))])
+    parts.append(markdown(faults(results)))
+    if profiled:
+        parts += ["### Where a render's time goes", PROFILE, markdown(profile.table(profiled))]
+    if grown:
+        parts += ["### Growth of cost", GROWTH, markdown(growth_of_cost.table(grown))]
+    return "\n\n".join(parts)
 
 
 def put_between(text: str, part: str) -> str:
@@ -289,15 +305,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-docs", action="store_true", help="leave docs/performance.md and its picture as they are")
 
 
+def rows_beside(path: Path, name: str) -> list[dict]:
+    """Rows of another results file in the same folder; none where it is not there."""
+    beside = path.with_name(name)
+    return json.loads(beside.read_text(encoding="utf-8"))["rows"] if beside.exists() else []
+
+
 def command(options: argparse.Namespace) -> int:
     results = load(options.results)
-    beside = options.results.with_name("growth.json")
-    grown = json.loads(beside.read_text(encoding="utf-8"))["rows"] if beside.exists() else []
-    page = make_page(results, grown, options.output)
+    grown, profiled = (rows_beside(options.results, name) for name in ("growth.json", "profile.json"))
+    page = make_page(results, grown, profiled, options.output)
     print(page)
     if not options.no_docs:
         plots.overview(results, PICTURE)
         text = PERFORMANCE.read_text(encoding="utf-8")
-        PERFORMANCE.write_text(put_between(text, generated_part(results)), encoding="utf-8")
+        PERFORMANCE.write_text(put_between(text, generated_part(results, grown, profiled)), encoding="utf-8")
         print(PERFORMANCE)
     return 0

@@ -76,7 +76,7 @@ def test_path_at_fault_weighs_error_by_the_square_of_its_light():
 
 def test_page_and_table_say_what_was_found(tmp_path):
     data = results()
-    text = page.make_page(data, [], tmp_path).read_text(encoding="utf-8")
+    text = page.make_page(data, [], [], tmp_path).read_text(encoding="utf-8")
     assert "room" in text and "10 ×" in text and "room, Cycles, 256" in text
     table = page.markdown(page.summary(data)).splitlines()
     assert len(table) == 4 and "| 10 × | 10 × |" in table[2]

@@ -146,7 +146,10 @@ def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, scene):
         halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
         build(kept_stage, replace(scene, lamps=halves))
         np.testing.assert_allclose(
-            kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"], whole, rtol=2e-3, atol=1e-4 * float(whole.max(initial=0.0))
+            kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"],
+            whole,
+            rtol=2e-3,
+            atol=1e-4 * float(whole.max(initial=0.0)),
         )
 
 
