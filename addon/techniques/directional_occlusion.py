@@ -35,7 +35,8 @@ from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES
 from .environment_light import no_environment_light
-from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, POINTS, fan_bindings, fan_params, reflect
+from .neighbours import reflect
+from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, POINTS, fan_bindings, fan_params
 from .surfaces import SURFACES
 
 CELLS = (32, 64)

@@ -20,8 +20,9 @@ comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose 
 | rays per pixel | `rays` + 1 short one, + 2 for each surface within r, + 1 to 3 for glossy surfaces |
 | arithmetic per pixel | 2 kernels per virtual light |
 
-Fails: with few samples, grain where virtual lights are partly hidden. Light that reached a diffuse surface over mirrors
-(caustics) is spread evenly from the mirror. No hierarchy for more than 4 million triangles: no indirect light then.
+Fails: with few samples, grain where virtual lights are partly hidden; a sample that is shown alone is filtered
+(neighbours.py). Light that reached a diffuse surface over mirrors (caustics) is spread evenly from the mirror.
+No hierarchy for more than 4 million triangles: no indirect light then.
 
 Bias, all in the diffuse and glossy indirect paths: what virtual_lights.py names; of light that is reflected near a
 corner several times, the last bounces before the limit may be counted once more than allowed.
@@ -40,6 +41,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import passes
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
+from .neighbours import smooth
 from .surfaces import SURFACES
 from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VIRTUAL_LIGHTS, VirtualLights, near_radius
 
@@ -112,6 +114,7 @@ class InstantRadiosity(Technique):
         for rows in frame.bands(self):
             passes.fullscreen(GATHER, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
             yield
+        smooth(frame, self, "radiance.diffuse_indirect")
         frame.count(self, "passes")
 
     def release(self) -> None:

@@ -44,6 +44,7 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import INDIRECT_WRITES, no_indirect_light
+from .neighbours import reflect
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 FAN_TEXTURES = (*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"))
@@ -75,19 +76,6 @@ SENDERS_OF_SUMS, SENDERS = (
         ("senders of a bounce", ("arriving",), ()),
     )
 )
-FILTER = passes.fullscreen_program(
-    "filter of neighbours",
-    "ssdo/filter.frag.glsl",
-    textures=(("FLOAT_2D", "surface_position"), ("FLOAT_2D", "surface_normal"), ("FLOAT_2D", "arriving")),
-    blocks=((VIEW, "film_view"),),
-    outputs=(("VEC4", "out_arriving"),),
-)
-REFLECT = passes.fullscreen_program(
-    "reflected light",
-    "ssdo/reflect.frag.glsl",
-    textures=(("FLOAT_2D", "surface_diffuse"), ("FLOAT_2D", "arriving")),
-    outputs=(("VEC4", "out_diffuse"),),
-)
 KEEP = passes.fullscreen_program(
     "sums so far", "ssdo/keep.frag.glsl", textures=(("FLOAT_2D", "sum_now"),), outputs=(("VEC4", "out_sum"),)
 )
@@ -109,11 +97,6 @@ def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
             "How far surfaces reach behind what is seen of them, in median distances of what is seen", 0.0, 10.0,
         ),
     )  # fmt: skip
-
-
-def shown_alone(frame: Frame) -> bool:
-    """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples."""
-    return frame.settings.samples == 1 or (frame.sample == 0 and not frame.settings.whole)
 
 
 class ScreenSpaceBounce(Technique):
@@ -178,19 +161,3 @@ def fan_bindings(frame: Frame, technique: Technique) -> dict:
             "thickness": frame.settings.get(technique, "thickness") * distance,
         },
     }  # fmt: skip
-
-
-def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str) -> None:
-    """Add what surfaces reflect of `arriving` to an image of radiance; filtered, if the sample is shown alone."""
-    with images.borrowed(*frame.size, "RGBA32F") as filtered:
-        if shown_alone(frame):
-            surfaces = {name: frame.images[name.replace("_", ".")] for name in ("surface_position", "surface_normal")}
-            passes.fullscreen(
-                FILTER, filtered, textures={**surfaces, "arriving": arriving}, blocks={"film_view": frame.view_block}
-            )
-            arriving = filtered.colors[0]
-            frame.count(technique, "filtered samples")
-        passes.fullscreen(
-            REFLECT, frame.target(path), blend="ADDITIVE_PREMULT",
-            textures={"surface_diffuse": frame.images["surface.diffuse"], "arriving": arriving},
-        )  # fmt: skip

@@ -1,0 +1,89 @@
+"""What neighbouring pixels lend each other where a sample is shown alone: the mean of the light that arrives there.
+
+A masked mean over 4x4 pixels, of those on the same surface (normals within 37 degrees, within two pixels of the tangent
+plane), of light without the surface's colour, so that textures stay: neighbours, whose random numbers
+shaders/ssdo/fan.glsl stratifies together. For noisier estimates a second time over pixels four apart, 16x16 in all, of
+those that differ by no more than three standard errors of both. Single samples of instant radiosity lose half to four
+fifths of their squared error.
+
+    reflected = albedo * mean over neighbours on the surface of  arriving
+
+| cost | per pass |
+|---|---|
+| fetches per pixel | 16 x 4 |
+
+Bias: light is spread over 4 (16) pixels of a surface, contact shadows first of all. Samples that are averaged are not
+filtered, so it does not stay.
+"""
+
+from __future__ import annotations
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..frame.view import VIEW
+from ..gfx import images, passes
+
+MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
+    passes.fullscreen_program(
+        f"mean of neighbours{of}",
+        "neighbours/mean.frag.glsl",
+        textures=(
+            ("FLOAT_2D", "surface_position"), ("FLOAT_2D", "surface_normal"), ("FLOAT_2D", "surface_diffuse"),
+            ("FLOAT_2D", "light_in"),
+        ),
+        blocks=((VIEW, "film_view"),),
+        constants=(("INT", "stride"),),
+        defines=defines,
+        outputs=(("VEC4", "out_arriving"),),
+    )
+    for of, defines in (
+        ("", ()),
+        (", of reflected light", (("REFLECTED", ""),)),
+        (", again", (("WITH_VARIANCE", ""),)),
+    )
+)  # fmt: skip
+REFLECT = passes.fullscreen_program(
+    "reflected light",
+    "neighbours/reflect.frag.glsl",
+    textures=(("FLOAT_2D", "surface_diffuse"), ("FLOAT_2D", "arriving")),
+    outputs=(("VEC4", "out_diffuse"),),
+)
+
+
+def shown_alone(frame: Frame) -> bool:
+    """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples."""
+    return frame.sample == 0 and (frame.settings.samples == 1 or frame.settings.draft)
+
+
+def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str) -> None:
+    """Add what surfaces reflect of `arriving` to an image of radiance; filtered, if the sample is shown alone."""
+    with images.borrowed(*frame.size, "RGBA32F") as mean:
+        if shown_alone(frame):
+            _mean(frame, MEAN, arriving, mean, 1)
+            arriving = mean.colors[0]
+            frame.count(technique, "filtered samples")
+        _reflect(frame, arriving, path, "ADDITIVE_PREMULT")
+
+
+def smooth(frame: Frame, technique: Technique, path: str) -> None:
+    """Filter an image of diffuse radiance that holds this sample alone over 16x16 pixels, if it is shown alone."""
+    if not shown_alone(frame):
+        return
+    with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
+        _mean(frame, MEAN_OF_REFLECTED, frame.images[path], near, 1)
+        _mean(frame, MEAN_AGAIN, near.colors[0], far, 4)
+        _reflect(frame, far.colors[0], path, "NONE")
+    frame.count(technique, "filtered samples")
+
+
+def _mean(frame: Frame, program, light: images.Image, target: images.Target, stride: int) -> None:
+    surfaces = {f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "normal", "diffuse")}
+    passes.fullscreen(
+        program, target, textures={**surfaces, "light_in": light}, blocks={"film_view": frame.view_block},
+        constants={"stride": stride},
+    )  # fmt: skip
+
+
+def _reflect(frame: Frame, arriving: images.Image, path: str, blend: str) -> None:
+    textures = {"surface_diffuse": frame.images["surface.diffuse"], "arriving": arriving}
+    passes.fullscreen(REFLECT, frame.target(path), blend=blend, textures=textures)

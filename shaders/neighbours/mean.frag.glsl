@@ -1,0 +1,65 @@
+// Mean of the light that arrives at 4x4 pixels `stride` apart, of those that lie on the same surface. Where there is
+// none (leaves, wires), of all that are near.
+#include "lib/gbuffer.glsl"
+
+// Light without the surface's colour, so that the mean keeps textures. The output's w is the variance of the mean's
+// luminance; where the input has it, only pixels join whose difference it explains, so that shade stays where it is.
+vec3 arriving_at(ivec2 pixel)
+{
+  vec3 light = texelFetch(light_in, pixel, 0).rgb;
+#ifdef REFLECTED
+  light /= max(texelFetch(surface_diffuse, pixel, 0).rgb, vec3(1e-6));
+#endif
+  return light;
+}
+
+void main()
+{
+  out_arriving = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 size = textureSize(light_in, 0);
+  vec4 centre = texelFetch(surface_position, pixel, 0);
+  if (centre.w == 0.0) {
+    return;
+  }
+  vec3 normal = octahedral_decode(texelFetch(surface_normal, pixel, 0).xy);
+  float depth = (film_view.eye.w > 0.5) ? 1.0 : distance(centre.xyz, film_view.eye.xyz);
+  float pixel_size = (film_view.frame.y - film_view.frame.x) / film_view.film.x * depth;
+  vec4 on_surface = vec4(0.0);
+  float squares = 0.0;
+#ifdef WITH_VARIANCE
+  vec4 own = texelFetch(light_in, pixel, 0);
+#endif
+  vec4 nearby = vec4(0.0);
+  for (int y = -2; y < 2; y++) {
+    for (int x = -2; x < 2; x++) {
+      ivec2 other = pixel + ivec2(x, y) * stride;
+      if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) {
+        continue;
+      }
+      vec4 position = texelFetch(surface_position, other, 0);
+      bool lit = position.w != 0.0 && max_component(texelFetch(surface_diffuse, other, 0).rgb) > 0.0;
+      vec3 path = position.xyz - centre.xyz;
+      if (lit) {
+        vec4 light = vec4(arriving_at(other), 1.0);
+        vec3 facing = octahedral_decode(texelFetch(surface_normal, other, 0).xy);
+        bool same = dot(normal, facing) > 0.8 && abs(dot(normal, path)) < 2.0 * pixel_size * float(stride);
+#ifdef WITH_VARIANCE
+        float noise = own.w + texelFetch(light_in, other, 0).w;
+        float difference = luminance(light.rgb - own.rgb);
+        float equal = 0.01 * luminance(own.rgb);
+        same = same && difference * difference <= 9.0 * noise + equal * equal;
+#endif
+        float bright = luminance(light.rgb);
+        on_surface += same ? light : vec4(0.0);
+        squares += same ? bright * bright : 0.0;
+        nearby += (length(path) < 8.0 * pixel_size * float(stride)) ? light : vec4(0.0);
+      }
+    }
+  }
+  bool alone = on_surface.w < 1.5;
+  vec3 mean = alone ? nearby.rgb / max(nearby.w, 1.0) : on_surface.rgb / max(on_surface.w, 1.0);
+  float bright = luminance(mean);
+  float spread = max(squares / max(on_surface.w, 1.0) - bright * bright, 0.0);
+  out_arriving = vec4(mean, alone ? bright * bright : spread / max(on_surface.w, 1.0));
+}

@@ -1,0 +1,98 @@
+"""Single samples that are shown alone: neighbours lend each other light, not colour, and not across edges."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from addon.frame.view import VIEW
+from addon.gfx import images
+from addon.gfx.struct import Block
+from addon.techniques.neighbours import smooth
+from tests.techniques.conftest import places
+from tests.techniques.test_instant_radiosity import corner
+
+SIZE = 48
+SPAN = 4.0
+
+
+@pytest.fixture
+def filtered(gpu_context):
+    """Light on a plane of two metres below an orthographic camera, (H, W), after the filter of one sample."""
+
+    def filtered(reflected, albedo=0.5, height=0.0, samples=1):
+        x, y = places((SIZE, SIZE), SPAN)
+        full = np.ones((SIZE, SIZE))
+        layers = {
+            "surface.position": [x, y, full * height, full],
+            "surface.normal": [0 * x] * 4,  # octahedral: straight up
+            "surface.diffuse": [full * albedo] * 4,
+            "light": [reflected] * 3 + [0 * x],
+        }
+        values = {name: np.zeros(4) if kind == "vec4" else 0 for name, (kind, _) in VIEW.fields.items()}
+        values |= {"eye": (0, 0, 5, 1), "frame": (-SPAN / 2, SPAN / 2) * 2, "film": (SIZE, SIZE, 0.1, 100)}
+        frame = SimpleNamespace(
+            size=(SIZE, SIZE), sample=0, settings=SimpleNamespace(samples=samples, draft=False),
+            images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
+            view_block=Block(VIEW, **values), count=lambda *counter: None,
+        )  # fmt: skip
+        frame.target = lambda name: images.Target((frame.images[name],))
+        smooth(frame, None, "light")
+        return images.read(frame.images["light"])[..., 0]
+
+    return filtered
+
+
+@pytest.fixture
+def grain():
+    return np.random.default_rng(1).exponential(1.0, (SIZE, SIZE))
+
+
+def test_grain_on_a_plane_falls_as_by_two_hundred_samples(filtered, grain):
+    inner = filtered(grain)[8:-8, 8:-8]
+    assert inner.mean() == pytest.approx(grain.mean(), rel=0.05)
+    assert inner.std() < 2 * grain.std() / 16
+
+
+def test_textures_stay_to_the_pixel(filtered, grain):
+    albedo = np.where(np.indices((SIZE, SIZE)).sum(axis=0) % 2, 0.9, 0.1)
+    even = filtered(np.ones((SIZE, SIZE)))
+    np.testing.assert_allclose(filtered(albedo, albedo), even * albedo, rtol=1e-4)
+
+
+def test_light_does_not_cross_a_step_in_depth(filtered):
+    x, _ = places((SIZE, SIZE), SPAN)
+    light = np.where(x > 0, 1.0, 0.1)
+    np.testing.assert_allclose(filtered(light, height=np.where(x > 0, 1.0, 0.0)), light, rtol=1e-4)
+
+
+def test_the_border_of_a_shade_widens_by_a_few_pixels_only(filtered):
+    x, _ = places((SIZE, SIZE), SPAN)
+    light = np.where(x > 0, 1.0, 0.1)
+    error = np.abs(filtered(light) - light)
+    assert error[np.abs(x) > 10 * SPAN / SIZE].max() < 1e-4
+    assert error.mean() < 0.03
+
+
+def test_a_lone_pixel_takes_the_light_of_what_is_near(filtered):
+    """A wire's pixel has no neighbour on its surface; what a single ray brought it stands out like a spark."""
+    light = np.ones((SIZE, SIZE))
+    light[20, 20] = 100.0
+    height = np.zeros((SIZE, SIZE))
+    height[20, 20] = 0.3
+    assert filtered(light, height=height)[20, 20] < 10
+
+
+def test_samples_that_are_averaged_are_left_alone(filtered, grain):
+    np.testing.assert_array_equal(filtered(grain, samples=2), grain.astype(np.float32))
+
+
+@pytest.mark.parametrize("technique", ["instant_radiosity", "ssdo"])
+def test_a_picture_of_one_sample_is_filtered_and_the_ledger_says_so(stage, technique):
+    corner(stage)
+    stage.scene.candela.slot_indirect = technique
+    one = stage.render(1, (24, 24), bounces=2)["diffuse_indirect"]
+    assert stage.ledger.row(technique).counters["filtered samples"] >= 1
+    many = stage.render(16, (24, 24), bounces=2)["diffuse_indirect"]
+    assert "filtered samples" not in stage.ledger.row(technique).counters
+    assert one.mean() == pytest.approx(many.mean(), rel=0.2)
