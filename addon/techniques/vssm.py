@@ -31,8 +31,9 @@ classification by bounds and the plane-relative moments are ours.
 Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the
 light's middle does not see blocks nothing; visibility multiplies the unblocked light, as if every part of the light
 counted the same for the receiver; parts of a refined light reach beyond its edge by half their width. All of it goes
-to zero with the samples. Fails: blockers so close to a wide light that the kernel is larger than the view (a lamp
-right behind muntins: half of the light is lost at one sample); kernels wider than 512 texels are cut to that.
+to zero with the samples. Parts of the light below a receiver's horizon count neither as lit nor as blocked, also where
+the map's own point is among them. Fails: blockers so close to a wide light that the kernel is larger than the view (a
+lamp right behind muntins: half of the light is lost at one sample); kernels wider than 512 texels are cut to that.
 
 Measured, RMS of the visibility behind an edge half way to the light, one map: square 0.012, rectangle 5:1 0.029, disc
 0.021, sphere 0.003, sun 0.005. Refined, 16 and 64 points: square 0.006 and 0.0015, where points alone leave 0.015 and
@@ -43,6 +44,11 @@ Measured, RMS of the visibility behind an edge half way to the light, one map: s
 | Cornell box | 0.051 (0.061) | 0.0038 (0.0042) |
 | garden of soft shadows | 0.127 (0.182) | 0.0205 (0.0171) |
 | room behind muntins | 1.08 (0.83) | 0.32 (0.23) |
+
+Most of the first column is the pixels' edges, which one sample does not smooth. RMS of the visibility of one map on the
+families of `python -m bench.soft`, against 1,024 accumulated maps (one, four and 16 of which leave 0.26, 0.098, 0.041
+in the mean): thin poles 0.031, chain fence 0.078, foliage 0.056, grid 0.056, far background 0.050, stacked plates
+0.019; with twice as many texels the grid has 0.038 and the far background 0.023.
 
 On a software rasteriser a refined sample costs about 2 to 4 times one of points alone. Hence Auto keeps accumulated
 maps.

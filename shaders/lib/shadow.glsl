@@ -75,6 +75,16 @@ bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out
   return false;
 }
 
+// Unit direction in the map in which the receiver's normal points.
+vec2 shadow_outward(ShadowReceiver r, vec3 normal)
+{
+  vec3 row_x = sources.view[r.view * VIEW_TEXELS].xyz;
+  vec3 row_y = sources.view[r.view * VIEW_TEXELS + 1].xyz;
+  vec3 row_w = sources.view[r.view * VIEW_TEXELS + 2].xyz;
+  vec2 outward = vec2(dot(row_x, normal), dot(row_y, normal)) - r.ndc * dot(row_w, normal);
+  return outward * inversesqrt(max(dot(outward, outward), 1e-30));
+}
+
 // Whether the caster in a texel of the view (from its corner) stands between light and receiver.
 bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
 {
@@ -85,12 +95,7 @@ bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
     // Only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
     // convex edge, or it overhangs a steep receiver. One texel out along the receiver's normal the edge is gone, the
     // overhang is not.
-    vec3 row_x = sources.view[r.view * VIEW_TEXELS].xyz;
-    vec3 row_y = sources.view[r.view * VIEW_TEXELS + 1].xyz;
-    vec3 row_w = sources.view[r.view * VIEW_TEXELS + 2].xyz;
-    vec2 outward = vec2(dot(row_x, normal), dot(row_y, normal)) - r.ndc * dot(row_w, normal);
-    outward *= inversesqrt(max(dot(outward, outward), 1e-30));
-    vec2 beside = clamp(floor(r.texel + outward), vec2(0.0), vec2(r.rectangle.z - 1.0));
+    vec2 beside = clamp(floor(r.texel + shadow_outward(r, normal)), vec2(0.0), vec2(r.rectangle.z - 1.0));
     caster = texelFetch(depth_maps, ivec2(r.rectangle.xy + beside), 0);
     behind = shadow_behind(caster, r.texel - beside - 0.5, r.q, r.gradient);
   }

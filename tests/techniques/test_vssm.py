@@ -164,3 +164,18 @@ def test_slats_over_a_deep_pit_behind_bars_are_lit_right_by_the_bounds_rule(floo
         errors[rule] = rms(visibility(floor, source, 1, size)[on_slats], expected[on_slats])
     assert errors["BOUNDS"] < 0.03
     assert errors["BOUNDS"] < 0.3 * errors["MEAN"]
+
+
+@pytest.mark.parametrize("x", [-0.2, 0.0, 0.2], ids=["in front", "edge-on", "behind"])
+def test_a_wall_is_lit_by_the_part_of_the_light_above_its_horizon(floor, x):
+    """The light's middle stands in front of the wall, in its plane, or behind it; the block blocks none of the rest."""
+    floor.light("AREA", (0, 0, HEIGHT), size=1.0)
+    corners = [(a, b, c) for a in (x, x + 1.0) for b in (-0.5, 0.5) for c in (0.0, 1.0)]
+    block = floor.mesh(corners, [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (1, 5, 7, 3)],
+                       material=floor.diffuse())  # fmt: skip
+    floor.camera((-3.0, 0.0, 0.5), (np.pi / 2, 0.0, -np.pi / 2), 0.25)
+    shadowed = irradiance(floor, 1, (24, 24))[8:-4, 4:-4]
+    block.visible_shadow = False
+    free = irradiance(floor, 1, (24, 24))[8:-4, 4:-4]
+    assert (free > 0).all()
+    assert shadowed == pytest.approx(free, rel=0.02)
