@@ -3,7 +3,8 @@
 The viewport is driven without a window, at 640 x 360 pixels, as Blender's redraws drive it: `draw_frame` again and
 again. Blender's own part of a redraw is not in the figures; `make test-window` notes those of a real window.
 
-An edit is made, then redrawn until the picture rests. Uploads are counted where Candela hands data to Blender's `gpu`
+An edit is made several times, as by a drag, and each followed by a redraw; what is told is the last. After turning the
+view the picture comes to rest. Uploads are counted where Candela hands data to Blender's `gpu`
 module: images, uniform blocks and vertex buffers. Processor seconds (of all threads) stand beside wall time, because
 they are steadier on a busy machine; on a software GPU that has two cores to itself a step takes somewhat more than half
 of them.
@@ -54,18 +55,25 @@ class Traffic:
 
 @dataclass
 class Edit:
-    """Figures of one edit: seconds of wall time and of all processors, pixels a side, bytes."""
+    """Figures of one edit."""
 
     name: str
-    first: float
-    first_cpu: float
-    scale: int
-    rest: float
-    rest_cpu: float
-    uploaded: dict[str, int]
-    meshes: int
-    read: bool
-    slowest: float  # redraw at rest, s
+    seconds: float  # of the redraw
+    cpu: float  # the same, of all processors
+    scale: int  # screen pixels per side of a drawn pixel
+    read: bool  # whether the scene was read
+    meshes: int  # uploaded
+    uploaded: dict[str, int]  # bytes by kind
+
+
+@dataclass
+class Rest:
+    """Figures of a picture that comes to rest."""
+
+    seconds: float
+    cpu: float
+    redraws: int
+    slowest: float  # redraw, s
 
 
 class Driver:
@@ -95,13 +103,14 @@ class Driver:
         self.viewport.draw_frame(self.read, self.camera, SIZE, settings_of(self.scene, viewport=True))
         return time.perf_counter() - before
 
-    def rest(self) -> float:
-        """Redraw until nothing is left; the slowest redraw."""
+    def rest(self) -> Rest:
+        """Redraw until nothing is left to be done."""
         time.sleep(viewport.REST_S)
-        slowest = 0.0
+        cpu, wall, redraws = time.process_time(), time.perf_counter(), []
         while not self.viewport.done:
-            slowest = max(slowest, self.draw())
-        return slowest
+            redraws.append(self.draw())
+        seconds, cpu = time.perf_counter() - wall, time.process_time() - cpu
+        return Rest(seconds, cpu, len(redraws), max(redraws, default=0.0))
 
     def turn(self) -> None:
         """The view moves by a little."""
@@ -110,23 +119,19 @@ class Driver:
         self.camera = replace(self.camera, matrix=matrix)
 
     def edit(self, name: str, change: Callable[[], None], scene: bool = True) -> Edit:
-        """Make the change, and wait for the first picture and for rest. The change is made MOVES times, as by a drag;
-        what is told is the last, when the viewport knows how coarse it has to be."""
+        """Make the change and redraw, MOVES times: then the viewport knows how coarse it has to be."""
         for _ in range(MOVES):
             change()
             if scene:
                 self.viewport.cache.invalidate(self.graph.updates)
                 self.viewport.dirty = True
             self.traffic.bytes.clear()
-            uploads, reads = self.viewport.renderer.geometry.uploads, self.reads
-            cpu, wall = time.process_time(), time.perf_counter()
-            self.draw()
-            first, first_cpu = time.perf_counter() - wall, time.process_time() - cpu
-        uploaded, scale = dict(self.traffic.bytes), self.viewport.scale
-        meshes, read = self.viewport.renderer.geometry.uploads - uploads, self.reads > reads
-        slowest = self.rest()
-        rest, rest_cpu = time.perf_counter() - wall, time.process_time() - cpu
-        return Edit(name, first, first_cpu, scale, rest, rest_cpu, uploaded, meshes, read, slowest)
+            uploads, reads, cpu = self.viewport.renderer.geometry.uploads, self.reads, time.process_time()
+            seconds = self.draw()
+        return Edit(
+            name, seconds, time.process_time() - cpu, self.viewport.scale, self.reads > reads,
+            self.viewport.renderer.geometry.uploads - uploads, dict(self.traffic.bytes),
+        )  # fmt: skip
 
 
 def field_of_objects() -> None:
@@ -166,7 +171,6 @@ def edits(driver: Driver) -> list[Edit]:
         mesh.select_set(not mesh.select_get())
 
     return [
-        driver.edit("turn the view", driver.turn, scene=False),
         driver.edit("move an object", move),
         driver.edit("a light's power", brighten),
         driver.edit("a material's slider", slide),
@@ -174,43 +178,45 @@ def edits(driver: Driver) -> list[Edit]:
     ]
 
 
-def measure(name: str, samples: int) -> list[tuple[str, ...]]:
+def measure(name: str, samples: int, bounces: int) -> list[tuple[str, ...]]:
     """Rows of the table for a sample scene, or for the field of objects."""
     if name == "field":
         field_of_objects()
     else:
         bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
     bpy.context.scene.render.engine = "CANDELA"
+    bpy.context.scene.candela.bounces = bounces
     driver = Driver(samples)
     compiled, started = library.compile_count, time.perf_counter()
     driver.draw()
-    print(f"{name}: first picture after {time.perf_counter() - started:.1f} s, "
-          f"{library.compile_count - compiled} programs compiled")  # fmt: skip
-    driver.rest()
-    rows = []
-    for one in edits(driver):
-        rows.append((
-            name, one.name, f"{1000 * one.first:.0f}", f"{1000 * one.first_cpu:.0f}", f"1/{one.scale}",
-            f"{one.rest:.1f}", f"{one.rest_cpu:.1f}", f"{1000 * one.slowest:.0f}", "yes" if one.read else "no",
-            str(one.meshes), str(one.uploaded.get("blocks", 0)), str(one.uploaded.get("images", 0)),
-        ))  # fmt: skip
+    seconds, programs = time.perf_counter() - started, library.compile_count - compiled
+    print(f"{name}: the first redraw took {seconds:.1f} s and compiled {programs} programs")
+    found = [driver.edit("turn the view", driver.turn, scene=False)]
+    rest = driver.rest()
+    print(f"{name}: at rest {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) later, after {rest.redraws} redraws, of which "
+          f"the slowest took {1000 * rest.slowest:.0f} ms")  # fmt: skip
+    found += edits(driver)
     driver.viewport.release()
-    return rows
+    return [
+        (
+            name, one.name, f"{1000 * one.seconds:.0f}", f"{1000 * one.cpu:.0f}", f"1/{one.scale}",
+            "yes" if one.read else "no", str(one.meshes), str(one.uploaded.get("blocks", 0)),
+            str(one.uploaded.get("images", 0)),
+        )
+        for one in found
+    ]  # fmt: skip
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("scenes", nargs="*", default=["soft_shadow_garden", "window_interior", "field"])
     parser.add_argument("--samples", type=int, default=4, help="samples until the picture rests")
+    parser.add_argument("--bounces", type=int, default=16)
     options = parser.parse_args()
     register()
     context.ensure()
-    head = (
-        "scene", "edit", "first ms", "CPU ms", "pixels", "rest s", "CPU s", "slowest ms", "scene read", "meshes",
-        "block bytes", "image bytes",
-    )  # fmt: skip
-    rows = [row for name in options.scenes for row in measure(name, options.samples)]
-    print(table([head, *rows]))
+    head = "scene", "edit", "ms", "CPU ms", "pixels", "scene read", "meshes", "block bytes", "image bytes"
+    print(table([head, *(row for name in options.scenes for row in measure(name, options.samples, options.bounces))]))
 
 
 if __name__ == "__main__":
