@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -178,6 +179,7 @@ def _object_notes(owner, kind: str, notes: dict) -> None:
             notes[Note(subject, "smoke and fire are not drawn; only the domain's surface is.")] = None
 
 
+@lru_cache(maxsize=1 << 16)
 def _random_of_name(name: str) -> float:
     """0..1, Object Info > Random of an object that is no instance.
 
