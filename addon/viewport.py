@@ -176,7 +176,6 @@ class Viewport:
             self._compiled = library.compile_count
         before, end = clock(), object()
         whole = next(self._sample, end) is end
-        frame.profiler.finish()
         spent = clock() - before
         self.bands.learn(spent, budget / 2)
         self._sample_seconds += spent
@@ -237,6 +236,7 @@ class Viewport:
         x, y = width / size[0], height / size[1]
         border = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
         film = replace(self._snapshot.film, width=width, height=height, border=border)
+        settings = replace(settings, profile=True)  # a part is done when the GPU has done it
         if scale > 1:
             settings = settings.as_draft()
         frame = self.renderer.begin(replace(self._snapshot, camera=camera, film=film), settings)

@@ -17,7 +17,7 @@ from ..compare.beside import reference_steps
 from ..compare.comparison import Picture, compare_passes
 from ..compare.report import shown_pixels
 from . import shown_images
-from .jobs import Job, part
+from .jobs import Job, draw_progress, part
 from .pass_run import render_steps
 from .properties import settings_of
 
@@ -141,9 +141,10 @@ class IMAGE_PT_candela_compare(bpy.types.Panel):
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         column.prop(options, "samples")
-        column.prop(options, "reference_samples")
+        column.prop(options, "reference_samples", text="Reference")
         column.prop(options, "percentage")
         layout.operator("candela.compare", icon="PLAY")
+        draw_progress(layout)
         if not latest():
             return
         layout.row(align=True).prop(options, "view", expand=True)

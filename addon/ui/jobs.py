@@ -29,6 +29,7 @@ class Job:
     """
 
     running: Job | None = None
+    progress: tuple[float, str] = (0.0, "")  # of the one that runs: share done, and what is being done
 
     @classmethod
     def poll(cls, context):
@@ -49,7 +50,7 @@ class Job:
     def invoke(self, context, event):
         if bpy.app.background:
             return self.execute(context)
-        Job.running = self
+        Job.running, Job.progress = self, (0.0, "")
         self._work = self.work(context)
         self._timer = context.window_manager.event_timer_add(TICK_S, window=context.window)
         context.window_manager.progress_begin(0, 100)
@@ -68,6 +69,9 @@ class Job:
             share, sentence = next(self._work)
             context.window_manager.progress_update(100 * share)
             context.workspace.status_text_set(f"{self.bl_label}: {sentence} — Esc to cancel")
+            if (share, sentence) != Job.progress:
+                Job.progress = share, sentence
+                _redraw(context)
         except StopIteration:
             self._end(context)
             return {"FINISHED"}
@@ -91,7 +95,19 @@ class Job:
         manager.event_timer_remove(self._timer)
         manager.progress_end()
         context.workspace.status_text_set(None)
-        for window in manager.windows:
-            for area in window.screen.areas:
-                if area.type in ("NODE_EDITOR", "IMAGE_EDITOR", "PROPERTIES"):
-                    area.tag_redraw()
+        _redraw(context)
+
+
+def draw_progress(layout) -> None:
+    """How far the running job is, in a panel; nothing while none runs."""
+    if Job.running is not None:
+        share, sentence = Job.progress
+        layout.progress(factor=share, text=sentence or "begins")
+        layout.label(text="Esc cancels", icon="EVENT_ESC")
+
+
+def _redraw(context) -> None:
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in ("NODE_EDITOR", "IMAGE_EDITOR", "PROPERTIES"):
+                area.tag_redraw()

@@ -18,7 +18,7 @@ from ..frame.plan import PlanError, make_plan
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
 from . import ENGINE, shown_images
-from .jobs import Job, part
+from .jobs import Job, draw_progress, part
 from .pass_run import Rendered, reference_images, render_steps
 from .pass_tree import (
     TREE,
@@ -235,12 +235,13 @@ class NODE_PT_candela_passes(bpy.types.Panel):
         settings.use_property_split, settings.use_property_decorate = True, False
         settings.prop(tree, "samples")
         settings.prop(tree, "percentage")
-        settings.prop(tree, "reference_samples")
+        settings.prop(tree, "reference_samples", text="Reference")
         column = layout.column(align=True)
         column.operator("candela.passes_run", icon="PLAY")
         column.operator("candela.passes_run_to_node", icon="NODE")
         column.operator("candela.passes_compare", icon="SPLIT_HORIZONTAL")
         column.operator("candela.passes_bake", icon="IMAGE_DATA")
+        draw_progress(layout)
         row = layout.column()
         row.use_property_split, row.use_property_decorate = True, False
         if context.scene.render.engine == ENGINE:
