@@ -259,7 +259,7 @@ class Viewport:
 
 
 def _view_key(camera: Camera) -> tuple:
-    return camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end
+    return camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture
 
 
 # -------------------------------------------------------------------------------------------------- Blender's callbacks

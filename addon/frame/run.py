@@ -19,6 +19,7 @@ from .depth_maps import Receivers
 from .environment import Environment
 from .geometry import SceneGeometry
 from .ledger import RAN, REUSED, Ledger, Row
+from .lens import point_of
 from .materials import MaterialSet, compile_programs
 from .plan import Plan, make_plan
 from .rates import Rate
@@ -74,6 +75,22 @@ class Frame:
     def random_volume(self, use: str) -> tuple[float, float, float]:
         """The same with a third number."""
         return *self.random(use), third(self.sample, use, self.settings.seed)
+
+    def look(self, lens: tuple[float, float] | None = None) -> None:
+        """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
+        point of the aperture. The first sample looks through the middle of both: as in Cycles depth is taken from it,
+        and a picture that just began is sharp.
+        """
+        jitter, settings = (0.0, 0.0), self.settings
+        aperture = self.snapshot.camera.aperture
+        if self.sample > 0:
+            width = self.snapshot.film.filter_width
+            jitter = tuple(blackman_harris_offset(u, width) for u in self.random("film"))
+        if lens is None:
+            lens = point_of(aperture, *self.random("lens")) if self.sample > 0 and aperture else (0.0, 0.0)
+        values = self.view.values(self.sample, settings.seed, jitter, self.geometry.size, lens)
+        self.view_block.update(**values)
+        self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
 
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
@@ -192,13 +209,7 @@ class Renderer:
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
         frame.sample = frame.samples_done
-        width = frame.snapshot.film.filter_width
-        x, y = frame.random("film")
-        # As in Cycles, the first sample stands at the pixel's centre: depth is taken from it.
-        jitter = (0.0, 0.0) if frame.sample == 0 else tuple(blackman_harris_offset(u, width) for u in (x, y))
-        values = frame.view.values(frame.sample, frame.settings.seed, jitter, frame.geometry.size)
-        frame.view_block.update(**values)
-        frame.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
+        frame.look()
         if frame.sample == 0:
             self._clear_sums(frame)
         for technique in frame.plan.techniques:
@@ -295,7 +306,7 @@ class Renderer:
         return (
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-            settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
+            camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
             tuple(t.name for t in plan.techniques),
         )  # fmt: skip

@@ -59,14 +59,24 @@ class View:
             bottom + height * y1 / self.film.height,
         )
 
-    def values(self, sample: int, seed: int, jitter: tuple[float, float], scene_size: float) -> dict:
-        """Fields of VIEW for one sample. `jitter` in pixels; `scene_size` in metres bounds the near plane below."""
-        left, right, bottom, top = frame = self.frame()
+    def values(
+        self, sample: int, seed: int, jitter: tuple[float, float], scene_size: float, lens: tuple[float, float] = (0, 0)
+    ) -> dict:
+        """Fields of VIEW for one sample. `jitter` in pixels; `scene_size` in metres bounds the near plane below.
+
+        `lens`: the point of the aperture that is looked through, metres to the right and up. The frustum is sheared
+        so that the plane in focus stays where it is.
+        """
+        left, right, bottom, top = self.frame()
+        if any(lens):
+            x, y = lens[0] / self.camera.aperture.focus, lens[1] / self.camera.aperture.focus
+            left, right, bottom, top = left - x, right - x, bottom - y, top - y
+        frame = left, right, bottom, top
         width, height = self.size
         dx, dy = jitter[0] * (right - left) / width, jitter[1] * (top - bottom) / height
         left, right, bottom, top = left + dx, right + dx, bottom + dy, top + dy
         right_axis, up, backward, eye = (self.camera.matrix[:3, i] for i in range(4))
-        eye = eye - self.origin
+        eye = eye - self.origin + lens[0] * right_axis + lens[1] * up
 
         def affine(direction, constant=0.0):
             return np.append(direction, constant - direction @ eye)

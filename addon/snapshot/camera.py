@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .errors import UnsupportedScene
-from .scene import Camera, Note
+from .scene import Aperture, Camera, Note
 
 
 def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> Camera:
@@ -41,14 +41,15 @@ def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> C
         clip_start=data.clip_start,
         clip_end=data.clip_end,
         name=camera.name,
+        aperture=_aperture(camera),
     )
 
 
 def camera_notes(camera, render) -> tuple[Note, ...]:
     """What the camera object asks for that no technique draws; `render` is scene.render."""
     subject, notes = f"Camera '{camera.name}'", []
-    if camera.data.dof.use_dof:
-        notes.append(Note(subject, "depth of field is not drawn; all is in focus."))
+    if camera.data.dof.use_dof and camera.data.type == "ORTHO":
+        notes.append(Note(subject, "depth of field is drawn for perspective cameras only; all is in focus."))
     if render.use_motion_blur:
         notes.append(Note(subject, "motion blur is not drawn; the picture shows the frame's own moment."))
     return tuple(notes)
@@ -74,7 +75,8 @@ def camera_of_view(region_data, space=None, camera=None) -> Camera:
             near, far = lens.clip_start, lens.clip_end
         elif not np.isfinite(far):
             far = 1e7 * near  # where float32 rounds the far plane away
-        return Camera(matrix, "PERSPECTIVE", frame, float(near), float(far), name="")
+        aperture = _aperture(camera) if camera is not None else None
+        return Camera(matrix, "PERSPECTIVE", frame, float(near), float(far), name="", aperture=aperture)
     frame = tuple(float((side - window[axis, 3]) / window[axis, axis]) for axis in (0, 1) for side in (-1, 1))
     near = (window[2, 3] + 1.0) / window[2, 2]
     far = (window[2, 3] - 1.0) / window[2, 2]
@@ -103,6 +105,33 @@ def _frame(data, width: int, height: int, aspect: tuple[float, float]) -> tuple[
     middle_x, middle_y = data.shift_x * span, data.shift_y * span
     half_x, half_y = 0.5 * width * per_pixel, 0.5 * height * pixel_height * per_pixel
     return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
+
+
+def _aperture(camera) -> Aperture | None:
+    """The lens of an evaluated camera object; None where depth of field is off or would change nothing."""
+    dof = camera.data.dof
+    if not dof.use_dof or camera.data.type != "PERSP":
+        return None
+    focus = dof.focus_distance
+    if dof.focus_object is not None:
+        placed = np.array(camera.matrix_world, np.float64)
+        towards = np.array(_focus_point(dof), np.float64) - placed[:3, 3]
+        focus = abs(float(towards @ _rigid(placed)[:3, 2]))
+    radius = 0.001 * camera.data.lens / (2.0 * max(dof.aperture_fstop, 1e-5))
+    # What is in focus at the eye itself is in focus nowhere; as in Cycles the picture stays sharp then.
+    if not (np.isfinite(focus) and np.isfinite(radius) and focus > 1e-6 and radius > 0.0):
+        return None
+    return Aperture(radius, focus, dof.aperture_blades, dof.aperture_rotation, max(dof.aperture_ratio, 1e-5))
+
+
+def _focus_point(dof):
+    """Where the focus object stands, or the bone of it that is meant."""
+    target = dof.focus_object
+    if target.type == "ARMATURE" and dof.focus_subtarget:
+        bone = target.pose.bones.get(dof.focus_subtarget)
+        if bone is not None:
+            return (target.matrix_world @ bone.matrix).translation
+    return target.matrix_world.translation
 
 
 def _rigid(matrix: np.ndarray) -> np.ndarray:

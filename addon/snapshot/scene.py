@@ -138,6 +138,17 @@ class Light:
 
 
 @dataclass(frozen=True)
+class Aperture:
+    """The opening of a thin lens: a disc, or a regular polygon of `blades` corners, in the camera's own plane."""
+
+    radius: float  # metres, of the disc or to the polygon's corners
+    focus: float  # distance along the view axis that is sharp, metres
+    blades: int = 0  # below 3: a disc
+    rotation: float = 0.0  # radians from the camera's right to the middle of the first edge, counter-clockwise
+    ratio: float = 1.0  # of height to width
+
+
+@dataclass(frozen=True)
 class Camera:
     """A view. `kind` PERSPECTIVE or ORTHOGRAPHIC; the frustum is given on the plane one unit before the camera.
 
@@ -151,6 +162,7 @@ class Camera:
     clip_start: float
     clip_end: float
     name: str = ""
+    aperture: Aperture | None = None  # None: all is in focus
 
 
 @dataclass(frozen=True)

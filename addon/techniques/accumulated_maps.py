@@ -41,6 +41,7 @@ RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
     "Texels of a depth map per pixel of the picture's longer side", 0.125, 16.0,
 )  # fmt: skip
+LEAST_RESOLUTION = 256  # a texel blurs a shadow's edge: small pictures would have blurrier ones than large pictures
 MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
 CUTOFF = Param(
     "cutoff", "Shadow cutoff", 0.001,
@@ -53,7 +54,7 @@ ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in sever
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     """Side of a depth map in texels."""
     wished = max(frame.size) * texels_per_pixel
-    return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
+    return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, LEAST_RESOLUTION, MOST_RESOLUTION))
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,19 @@ price of noise that falls like 1/n. Where such layers are coloured, a second pas
 world, by the colour of each layer before it over its mean (the order does not matter), so the mean is exact by channel.
 Of several glossy lobes one is kept per sample (shaders/lib/closure.glsl).
 
-The camera is shifted within the pixel filter (Blackman-Harris, importance-sampled), the same for all pixels.
+The camera is shifted within the pixel filter (Blackman-Harris, importance-sampled) and over the lens (frame/lens.py),
+the same for all pixels.
 
 On the first sample the picture is also reduced to boxes of 16x16-pixel tiles around what is seen: the receivers, to
-which depth maps are fitted. With alpha materials both ends of the layers are drawn for it, opaque and left out.
+which depth maps are fitted. With alpha materials both ends of the layers are drawn for it, opaque and left out; with
+depth of field all that the rim of the lens sees, too.
 
 | cost | per sample |
 |---|---|
 | draws | one per material (meshes shown once are joined) and one per instanced mesh and material |
 | bytes written per pixel | 6 x 16 + 4 |
 | coloured layers | + 1 pass of their draws, blended into three of the images |
-| first sample | + 1 or 2 surface passes and one reduction, read back at 1/256 of the pixels |
+| first sample | + 1 or 2 surface passes and one reduction, read back at 1/256 of the pixels; 7 times that with depth of field |
 
 Fails: more layers than samples look dithered; light through coloured layers casts grey shadows.
 """
@@ -28,6 +30,7 @@ import numpy as np
 
 from ..frame.culling import Boxes, calls
 from ..frame.depth_maps import Receivers
+from ..frame.lens import rim
 from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
@@ -125,17 +128,20 @@ class Surfaces(Technique):
         low = np.full((tiles[1], tiles[0], 4), np.inf)
         high = np.full((tiles[1], tiles[0], 4), -np.inf)
         target = images.Target(tuple(images.pool.take(*tiles, "RGBA32F") for _ in range(2)))
-        for mode in modes:
-            self._draw(frame, mode)
-            passes.fullscreen(
-                TILE_BOUNDS,
-                target,
-                textures={"surface_position": frame.images["surface.position"]},
-                blocks={"film_view": frame.view_block},
-                constants={"tile": TILE},
-            )
-            low = np.minimum(low, images.read(target.colors[0]))
-            high = np.maximum(high, images.read(target.colors[1]))
+        aperture = frame.snapshot.camera.aperture
+        for lens in (*(rim(aperture) if aperture else ()), (0.0, 0.0)):  # the middle last: it is the first sample
+            frame.look(lens)
+            for mode in modes:
+                self._draw(frame, mode)
+                passes.fullscreen(
+                    TILE_BOUNDS,
+                    target,
+                    textures={"surface_position": frame.images["surface.position"]},
+                    blocks={"film_view": frame.view_block},
+                    constants={"tile": TILE},
+                )
+                low = np.minimum(low, images.read(target.colors[0]))
+                high = np.maximum(high, images.read(target.colors[1]))
         for image in target.colors:
             images.pool.give(image)
         low, high = low.reshape(-1, 4).astype(np.float64), high.reshape(-1, 4).astype(np.float64)

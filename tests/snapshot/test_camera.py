@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mathutils import Euler, Matrix, Vector
 
 from addon.snapshot import UnsupportedScene, camera_of_scene, camera_of_view
+from addon.snapshot.scene import Aperture
 
 
 def projection(camera):
@@ -110,8 +111,33 @@ def test_another_camera_may_be_chosen(stage):
     assert stage.take(camera=other).camera.name == "Other"
 
 
-def test_depth_of_field_and_motion_blur_are_named(stage):
-    stage.camera().data.dof.use_dof = True
+def test_the_aperture_comes_from_focal_length_and_f_stop(stage):
+    lens = stage.camera().data
+    lens.lens, dof = 80.0, lens.dof
+    assert stage.take().camera.aperture is None
+    dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 4.0, 3.0
+    dof.aperture_blades, dof.aperture_rotation, dof.aperture_ratio = 6, 0.25, 2.0
+    assert stage.take().camera.aperture == Aperture(pytest.approx(0.01), 3.0, 6, 0.25, 2.0)
+
+
+def test_the_focus_is_measured_along_the_view_axis(stage):
+    placed = stage.camera()
+    placed.location = (1, 2, 3)
+    placed.data.dof.use_dof = True
+    placed.data.dof.focus_object = stage.link("Target", None)
+    placed.data.dof.focus_object.location = (9, 9, -4)
+    assert stage.take().camera.aperture.focus == pytest.approx(7.0)
+
+
+def test_a_focus_at_the_eye_blurs_nothing(stage):
+    dof = stage.camera().data.dof
+    dof.use_dof, dof.focus_distance = True, 0.0
+    assert stage.take().camera.aperture is None
+
+
+def test_depth_of_field_without_perspective_and_motion_blur_are_named(stage):
+    lens = stage.camera().data
+    lens.type, lens.dof.use_dof = "ORTHO", True
     stage.scene.render.use_motion_blur = True
     said = [note.text for note in stage.take().notes]
     assert any("depth of field" in text for text in said)
