@@ -150,8 +150,8 @@ class HierarchyCache:
         )  # fmt: skip
         if key not in self._kept:
             triangles = world_triangles(list(snapshot.instances), snapshot.meshes, materials, origin, path)
-            # At most one for each path; the older one of another scene goes.
-            self._kept = dict([*self._kept.items()][-1:]) | {key: build(*triangles)}
+            # At most one for each path; the oldest one, of another scene, goes.
+            self._kept = dict([*self._kept.items()][-2:]) | {key: build(*triangles)}
         return self._kept[key]
 
     def release(self) -> None:

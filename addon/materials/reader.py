@@ -38,6 +38,9 @@ _BASE_SETTINGS = {prop.identifier for prop in bpy.types.Node.bl_rna.properties}
 _settings_of_type: dict[str, tuple] = {}
 
 
+WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
+
+
 @dataclass(frozen=True)
 class _Place:
     """Where a node stands: its tree and the chain of group nodes that lead there."""
@@ -70,7 +73,12 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
         socket = output.inputs.get(name)
         links[name.lower()] = None if socket is None else reading.source(place, output, socket)[0]
     reading.read_pending()
-    return Graph(reading.cut_cycles(links), **links), tuple(dict.fromkeys(reading.notes))
+    found = reading.cut_cycles(links)
+    if isinstance(owner, bpy.types.Material) and links["volume"] is not None and links["surface"] is None:
+        # A volume alone has no surface; only a tree without either is black.
+        clear = Node("No surface", owner.name, "ShaderNodeBsdfTransparent", {"Color": WHITE}, {"BSDF": "SHADER"})
+        found[clear.key], links["surface"] = clear, (clear.key, "BSDF")
+    return Graph(found, **links), tuple(dict.fromkeys(reading.notes))
 
 
 def _uses_nodes(owner) -> bool:
@@ -87,7 +95,7 @@ def _graph_without_nodes(owner) -> Graph:
         inputs = {"Color": Input("COLOR", (*owner.color, 1.0)), "Strength": Input("FLOAT", 1.0)}
         node = Node("World", owner.name, "ShaderNodeBackground", inputs, {"Background": "SHADER"})
         return Graph({node.key: node}, (node.key, "Background"))
-    inputs = {"Color": Input("COLOR", (1.0, 1.0, 1.0, 1.0)), "Strength": Input("FLOAT", 1.0)}
+    inputs = {"Color": WHITE, "Strength": Input("FLOAT", 1.0)}
     node = Node("Light", owner.name, "ShaderNodeEmission", inputs, {"Emission": "SHADER"})
     return Graph({node.key: node}, (node.key, "Emission"))
 

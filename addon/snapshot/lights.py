@@ -17,7 +17,8 @@ def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibi
 
     None when it gives no light: zero power, or an area light's portal, which in Cycles only guides sampling.
     """
-    if getattr(getattr(data, "cycles", None), "is_portal", False) and data.type == "AREA":
+    cycles = getattr(data, "cycles", None)
+    if getattr(cycles, "is_portal", False) and data.type == "AREA":
         return None
     strength = tint * np.array(data.color[:], np.float64) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
@@ -43,6 +44,7 @@ def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibi
         strength=strength,
         normalize=getattr(data, "normalize", True),
         cast_shadow=data.use_shadow,
+        bounces=getattr(cycles, "max_bounces", 1) > 0,  # other limits of single lights are not followed
         visibility=visibility,
         **own,
     )

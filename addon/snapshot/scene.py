@@ -134,6 +134,7 @@ class Light:
     spot_angle: float = np.pi  # SPOT: full cone angle, radians
     spot_blend: float = 0.0  # SPOT
     cast_shadow: bool = True
+    bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
 
 

@@ -12,7 +12,7 @@ from .images import ImageTable
 from .meshes import Wanted
 from .scene import Material, Note
 
-EMPTY_SLOT = (0.8, 0.8, 0.8)  # what Cycles draws where no material is chosen
+GREY = (0.8, 0.8, 0.8)
 
 
 def diffuse_graph(color) -> Graph:
@@ -26,11 +26,29 @@ def diffuse_graph(color) -> Graph:
     return Graph({"Diffuse": node}, surface=("Diffuse", "BSDF"))
 
 
+def empty_slot_graph() -> Graph:
+    """What Cycles draws where no material is chosen: grey, diffuse before Blender 5.0 and Principled since."""
+    if bpy.app.version < (5, 0):
+        return diffuse_graph(GREY)
+    inputs = {
+        "Base Color": Input("COLOR", (*GREY, 1.0)),
+        "Metallic": Input("FLOAT", 0.0),
+        "Roughness": Input("FLOAT", 0.5),
+        "IOR": Input("FLOAT", 1.5),
+        "Alpha": Input("FLOAT", 1.0),
+        "Normal": Input("VECTOR", (0.0, 0.0, 0.0)),
+        "Specular IOR Level": Input("FLOAT", 0.5),
+        "Specular Tint": Input("COLOR", (1.0, 1.0, 1.0, 1.0)),
+    }
+    node = Node("Principled", "Principled", "ShaderNodeBsdfPrincipled", inputs, {"BSDF": "SHADER"})
+    return Graph({"Principled": node}, surface=("Principled", "BSDF"))
+
+
 class ShadingTable:
     """Collects materials in order of first use; index 0 is the neutral default."""
 
     def __init__(self, cache: SnapshotCache, images: ImageTable):
-        self.materials: list[Material] = [Material("default", "Default", diffuse_graph(EMPTY_SLOT))]
+        self.materials: list[Material] = [Material("default", "Default", empty_slot_graph())]
         self.wanted: list[Wanted] = [Wanted()]
         self.notes: list[Note] = []
         self.graphs: set[str] = set()

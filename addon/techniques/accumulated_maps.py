@@ -19,8 +19,9 @@ is right); a receiver that no fitted view contains counts as lit.
 
 Bias: none for the diffuse path. On soft-edged point and spot lights the depth map is drawn from a point in the ball
 while light arrives from its projection onto the disc that faces the receiver (as in Cycles): the difference is of
-the order of (radius / distance)^2. Where a light brings less than `cutoff` of the picture's median light, it is left
-unshadowed: at most that share of light too much, for views and casters that a picture with many lights need not draw.
+the order of (radius / distance)^2, and direct_light traces rays instead where that is more than 1/16. Where a light
+brings less than `cutoff` of the picture's median light, it is left unshadowed: at most that share of light too much,
+for views and casters that a picture with many lights need not draw.
 """
 
 from __future__ import annotations
@@ -41,7 +42,6 @@ RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
     "Texels of a depth map per pixel of the picture's longer side", 0.125, 16.0,
 )  # fmt: skip
-LEAST_RESOLUTION = 256  # a texel blurs a shadow's edge: small pictures would have blurrier ones than large pictures
 MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
 CUTOFF = Param(
     "cutoff", "Shadow cutoff", 0.001,
@@ -54,7 +54,7 @@ ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in sever
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     """Side of a depth map in texels."""
     wished = max(frame.size) * texels_per_pixel
-    return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, LEAST_RESOLUTION, MOST_RESOLUTION))
+    return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ chance (systematic sampling); every light keeps a minimum chance.
 | passes | 1 over the screen per round of lights (a round fills the depth-map atlas) |
 | fetches per pixel | 6 surface + per light: 5 to 8 list, 4 to 6 shadow |
 
+A round light whose radius is more than a quarter of its distance to what is seen has its visibility from rays.
+
 Bias: none that remains as samples grow. A point that stands for an area a of its light gives a receiver nearer than
 sqrt(a / pi) no more than at that distance: otherwise single points beside a surface would outshine the whole light.
 """
@@ -24,11 +26,12 @@ sqrt(a / pi) no more than at that distance: otherwise single points beside a sur
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
-from ..frame import lights
+from ..frame import acceleration, lights
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -42,6 +45,17 @@ from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
 CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
+
+
+# A point of a round light is drawn in its ball; the light arrives from the ball's projection towards the receiver.
+# A map from the point shows what blocks the light as long as the ball is small beside its distance.
+NEAR = 0.25  # radius / distance from which rays are traced instead
+RAYS = Lookup(
+    "rays",
+    "light/ray_visibility.glsl",
+    textures=(("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves")),
+    constants=(("INT", "trace_levels"), ("FLOAT", "offset_size")),
+)
 
 
 @cache
@@ -59,7 +73,7 @@ def lighting(lookup: Lookup, soft_lobes: bool) -> Program:
     )
 
 
-LIGHTING = tuple(lighting(HARD, soft_lobes) for soft_lobes in (False, True))
+LIGHTING = tuple(lighting(lookup, soft_lobes) for lookup in (HARD, RAYS) for soft_lobes in (False, True))
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
     Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
@@ -120,10 +134,11 @@ class DirectLight(Technique):
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             self._emitters = [emitter for emitter in found if emitter is not None]
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
+            self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         shadow = frame.services.get("shadow")
-        items = []
+        items, near = [], []
         for emitter, weight in self._chosen(frame):
             rate = rate_of(frame, emitter.light.key)
             for number in rate.points(frame.sample):
@@ -132,16 +147,27 @@ class DirectLight(Technique):
                 whole = cell >= 1.0 and emitter.extended
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = emitter.middle() if whole else emitter.sample(*frame.random_volume_at(number, "light"))
-                views = shadow.views(frame, emitter, sample, number, cell) if shadow else []
-                row = emitter.row(sample, 0, len(views), weight, rate.per_sample, points)
+                by_rays = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
+                views = shadow.views(frame, emitter, sample, number, cell) if shadow and not by_rays else []
+                row = emitter.row(sample, 0, len(views) or by_rays, weight, rate.per_sample, points)
                 row[0, 1] += lights.WHOLE_FLAG * whole
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-                items.append((row, views))
+                (near if by_rays else items).append((row, views))
         resolution = shadow.resolution(frame) if shadow else 16
         for rows, views in rounds(items, resolution):
             maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
             yield
             yield from shade(frame, self, rows, self._sources, maps)
+        for rows, _ in rounds(near, resolution):
+            yield from shade(frame, self, rows, self._sources, self._rays(frame))
+
+    def _rays(self, frame: Frame) -> Maps:
+        hierarchy = frame.hierarchy("shadow")
+        nothing = self._unshadowed.draw(frame, self, [], 16)
+        return replace(
+            nothing, lookup=RAYS, textures={"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves},
+            constants={"trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size},
+        )  # fmt: skip
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
         """Lights of this sample with the inverse of their chance."""
@@ -160,3 +186,14 @@ class DirectLight(Technique):
         self._unshadowed.release()
         self._sources.release()
         self._emitters = []
+
+
+def _is_near(frame: Frame, emitter: lights.Emitter) -> bool:
+    """Whether a round light is so large beside its distance that its visibility needs rays (see NEAR)."""
+    receivers = frame.receivers
+    if emitter.kind not in (lights.POINT, lights.SPHERE) or not emitter.radius > 0.0 or not emitter.light.cast_shadow:
+        return False
+    if receivers is None or not len(receivers.distance) or acceleration.too_many(frame.snapshot):
+        return False
+    nearest = np.clip(emitter.centre, receivers.low, receivers.high)
+    return emitter.radius > NEAR * float(np.linalg.norm(nearest - emitter.centre, axis=1).min())

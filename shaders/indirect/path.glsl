@@ -87,9 +87,7 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
     float reach = max(length(path), 1e-30);
     return clear_path(origin, path / reach, reach * 0.9999, salt);
   }
-  bool far = light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION;
-  float reach = far ? 1e29 : length(light.centre - origin) - light.radius;
-  return (reach > 0.0) ? clear_path(origin, direction, reach, salt) : 1.0;
+  return clear_path(origin, direction, light_distance(light, origin, direction), salt);
 }
 
 // Irradiance straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they

@@ -182,6 +182,28 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
   return result;
 }
 
+// Distance from `origin` to the point of a light that light_sample found in `direction`; 1e29 for lights at infinity.
+float light_distance(Light light, vec3 origin, vec3 direction)
+{
+  if (light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION) {
+    return 1e29;
+  }
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+    return length(light.point - origin);
+  }
+  vec3 to_centre = light.centre - origin;
+  float along = dot(to_centre, direction);
+  if (light.radius <= 0.0) {
+    return length(to_centre);
+  }
+  if (light.kind == LIGHT_SPHERE) {
+    vec3 missed = to_centre - along * direction;
+    float half_chord = sqrt(max(light.radius * light.radius - dot(missed, missed), 0.0));
+    return (length(to_centre) < light.radius) ? along + half_chord : along - half_chord;
+  }
+  return dot(to_centre, to_centre) / max(along, 1e-6 * length(to_centre));  // a disc that faces the receiver
+}
+
 // What a ray sees of a light: radiance, distance (1e28 for suns, before the end of all rays) and the density that light_sample has for the
 // direction. Zero radiance = missed.
 vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance, out float density)

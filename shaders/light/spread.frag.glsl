@@ -24,9 +24,7 @@ void main()
     vec3 arriving = light_sample(light, s.position, direction, density);
     float irradiance = luminance(abs(arriving)) * max(dot(s.normal, direction), 0.0);
     if (irradiance > 0.0 && (light.flags & LIGHT_SHADOW) != 0) {
-      bool far = light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION;
-      bool flat_light = light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE;
-      float reach = far ? 1e29 : length((flat_light ? light.point : light.centre) - s.position) - light.radius;
+      float reach = light_distance(light, s.position, direction);
       ivec2 hit;
       irradiance *= (trace_until(origin, direction, reach, reach, bits.z, hit) >= reach) ? 1.0 : 0.0;
     }

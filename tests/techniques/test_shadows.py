@@ -18,8 +18,8 @@ def floor(stage):
     return stage
 
 
-def irradiance(stage, samples, size):
-    return stage.render(samples, size)["diffuse_direct"][..., 0].astype(float) * np.pi
+def irradiance(stage, samples, size, seed=0):
+    return stage.render(samples, size, seed)["diffuse_direct"][..., 0].astype(float) * np.pi
 
 
 def receivers(size):
@@ -263,3 +263,15 @@ def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, k
     as_instances = stage.render(4, (48, 48))["diffuse_direct"]
     assert (written_out < 0.5 * written_out.max()).any()
     np.testing.assert_allclose(written_out, as_instances, atol=1e-4 * float(written_out.max()))
+
+
+@pytest.mark.parametrize("soft_falloff", [True, False], ids=["disc", "sphere"])
+def test_round_light_larger_than_its_distance_does_not_shine_through_a_roof(stage, soft_falloff):
+    """The floor is as near as the ball is large: points in it are no places to draw a map from."""
+    stage.floor()
+    stage.blocker((-99, -99), (99, 99), 1.0)
+    stage.light("POINT", (0, 0, 4), shadow_soft_size=2.9, use_soft_falloff=soft_falloff)
+    stage.camera_above(SPAN)
+    images = stage.render(16, (16, 16), bounces=2)
+    assert images["diffuse_direct"].max() == 0.0
+    assert images["diffuse_indirect"].max() == 0.0

@@ -24,8 +24,8 @@ def floor(stage):
     return stage
 
 
-def visibility(stage, source, samples=1, size=(64, 4)):
-    return irradiance(stage, samples, size).ravel() / model.irradiance(source, receivers(size))
+def visibility(stage, source, samples=1, size=(64, 4), seed=0):
+    return irradiance(stage, samples, size, seed).ravel() / model.irradiance(source, receivers(size))
 
 
 def rms(found, expected):
@@ -64,9 +64,14 @@ def test_points_that_stand_for_parts_of_the_light_leave_less_error_than_points(f
     floor.light(kind, (0, 0, HEIGHT), **settings)
     floor.blocker(*EDGE)
     expected = expected_visibility(source, [EDGE])
-    parts = [rms(visibility(floor, source, n), expected) for n in (16, 64)]
+
+    def errors():
+        """With 16 and with 64 samples; the mean of three seeds."""
+        return [np.mean([rms(visibility(floor, source, n, seed=k), expected) for k in range(3)]) for n in (16, 64)]
+
+    parts = errors()
     floor.scene.candela.slot_shadow = "accumulated_maps"
-    points = [rms(visibility(floor, source, n), expected) for n in (16, 64)]
+    points = errors()
     assert parts[0] < 0.8 * points[0]
     assert parts[1] < 0.7 * points[1]
     assert parts[1] < 0.5 * parts[0]
