@@ -72,7 +72,8 @@ def test_mesh_without_slots_has_the_default_material(stage):
     snapshot = stage.take()
     assert snapshot.instances[0].materials == (0,)
     graph = snapshot.materials[0].graph
-    assert graph.nodes[graph.surface[0]].inputs["Color"].value == pytest.approx((0.8, 0.8, 0.8, 1.0))
+    color = "Color" if bpy.app.version < (5, 0) else "Base Color"  # a Diffuse BSDF then, a Principled since
+    assert graph.nodes[graph.surface[0]].inputs[color].value == pytest.approx((0.8, 0.8, 0.8, 1.0))
 
 
 def test_corner_normals_are_blenders(stage):
