@@ -22,6 +22,7 @@ from .pass_run import render_steps
 from .properties import settings_of
 
 IMAGE = "Candela Comparison"
+NAMES_SHARE = 0.46  # of the table's width
 VIEWS = (
     ("CANDELA", "Candela", "The picture by Candela", 0),
     ("CYCLES", "Cycles", "The reference by Cycles: the mean of two renders", 1),
@@ -147,18 +148,24 @@ class IMAGE_PT_candela_compare(bpy.types.Panel):
         draw_progress(layout)
         if not latest():
             return
-        layout.row(align=True).prop(options, "view", expand=True)
+        column = layout.column(align=True)
+        for pair in (("CANDELA", "CYCLES"), ("DIFFERENCE", "ERROR")):
+            row = column.row(align=True)
+            for view in pair:
+                row.prop_enum(options, "view", view)
         layout.operator("candela.compare_swap", icon="ARROW_LEFTRIGHT")
         table = layout.column(align=True)
-        head = table.row()
-        for text in ("", "relMSE", "Bias"):
-            head.label(text=text)
+        head = table.split(factor=NAMES_SHARE)
+        head.label(text="")
+        row = head.row()
+        row.label(text="relMSE")
+        row.label(text="Bias")
         for number, made in enumerate(latest()):
-            row = table.row()
-            row.operator("candela.compare_show", text=made.row.label, depress=number == options.row).row = number
+            line = table.split(factor=NAMES_SHARE, align=True)
+            line.operator("candela.compare_show", text=made.row.label, depress=number == options.row).row = number
+            row = line.row()
             if metrics.is_surface(made.error):
                 row.label(text=made.error.remark or f"{made.error.median:.1e}")
-                row.label(text="")
             else:
                 relmse, _, _, bias, _ = metrics.figures(made.error)
                 row.label(text=relmse)

@@ -81,6 +81,7 @@ def shadow(right, scene):
 
 def comparison(left):
     """In place of the viewport, as a user would do it: the sidebar's Candela tab, its button, a path, and the swap."""
+    bpy.context.preferences.system.use_region_overlap = False  # the sidebar stands beside the picture
     left.type = "IMAGE_EDITOR"
     left.spaces.active.show_region_ui = True
     options = bpy.context.window_manager.candela_comparison
@@ -126,6 +127,7 @@ def comparison(left):
 
 
 def mistakes(left, scene):
+    bpy.context.preferences.system.use_region_overlap = True
     left.type = "VIEW_3D"
     left.spaces.active.shading.type = "RENDERED"
     left.spaces.active.region_3d.view_perspective = "PERSP"
