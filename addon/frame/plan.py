@@ -40,15 +40,16 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
         registry = sorted(registry, key=lambda technique: place.get(technique.name, len(place)))
     reasons = {technique: technique.skip(snapshot, settings) for technique in registry}
     wishes = {} if tree is not None else _wishes(reasons, settings)
+    labels = {technique.name: technique.label for technique in registry}
     for technique, reason in reasons.items():
         if tree is not None and technique.name not in tree:
             reason = "it is not in the pass tree"
         wish = wishes.get(technique.slot, AUTO)
         if not reason and wish not in (AUTO, technique.name):
             asked = settings.slots.get(technique.slot, AUTO) != AUTO
-            reason = f"the {technique.slot} slot is {'set to' if asked else 'filled by'} {wish}"
+            reason = f"the {technique.slot} slot is {'set to' if asked else 'filled by'} {labels.get(wish, wish)}"
         if not reason and technique.slot in filled:
-            reason = f"the {technique.slot} slot is filled by {filled[technique.slot]}"
+            reason = f"the {technique.slot} slot is filled by {labels[filled[technique.slot]]}"
         if reason:
             skipped.append(Row(technique.name, technique.label, SKIPPED, reason, slot=technique.slot))
             continue

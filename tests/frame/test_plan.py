@@ -71,14 +71,14 @@ def test_one_technique_fills_a_slot_and_the_others_say_which():
     assert names(plan) == ["maps"]
     (row,) = plan.skipped
     assert (row.name, row.state, row.slot) == ("volumes", SKIPPED, "shadow")
-    assert row.reason == "the shadow slot is filled by maps"
+    assert row.reason == "the shadow slot is filled by Maps"
 
 
 def test_the_artists_choice_for_a_slot_wins():
     settings = Settings(slots={"shadow": "volumes"})
     plan = make_plan([technique("maps", slot="shadow"), technique("volumes", slot="shadow")], None, settings)
     assert names(plan) == ["volumes"]
-    assert plan.skipped[0].reason == "the shadow slot is set to volumes"
+    assert plan.skipped[0].reason == "the shadow slot is set to Volumes"
 
 
 def test_a_chosen_technique_that_is_not_needed_leaves_the_slot_empty_and_says_so():
@@ -87,7 +87,7 @@ def test_a_chosen_technique_that_is_not_needed_leaves_the_slot_empty_and_says_so
     plan = make_plan([technique("maps", slot="shadow"), wanted], None, settings)
     assert names(plan) == []
     assert {row.name: row.reason for row in plan.skipped} == {
-        "maps": "the shadow slot is set to volumes",
+        "maps": "the shadow slot is set to Volumes",
         "volumes": "no light casts a shadow",
     }
 
@@ -98,7 +98,7 @@ def test_auto_takes_what_the_measurements_favour_at_this_many_samples(monkeypatc
     registry = [technique("maps", slot="shadow"), technique("volumes", slot="shadow")]
     few = make_plan(registry, None, Settings(samples=1))
     assert names(few) == ["volumes"]
-    assert few.skipped[0].reason == "the shadow slot is filled by volumes"
+    assert few.skipped[0].reason == "the shadow slot is filled by Volumes"
     assert names(make_plan(registry, None, Settings(samples=64))) == ["maps"]
     assert names(make_plan(registry, None, Settings(samples=1, slots={"shadow": "maps"}))) == ["maps"]
     assert names(make_plan(registry[:1], None, Settings(samples=1))) == ["maps"]
