@@ -22,8 +22,10 @@ from .morton import morton_codes
 LARGEST = 4_000_000  # triangles
 LEAF = 4
 NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children on it
-# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity; emission r, g, b; material.
-LEAF_TEXELS = 14
+# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
+# emission r, g, b; material; shading normals of the three corners.
+LEAF_TEXELS = 17
+NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
 
 
@@ -45,10 +47,10 @@ def world_triangles(
     path: str = "glossy",
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility) can meet: corners (T, 3, 3) float32 relative to
-    `origin`, and (T, 5) opacity, mean emitted radiance and number of the material."""
+    `origin`, and (T, 8) opacity, mean emitted radiance, number of the material and packed corner normals."""
     corners, looks = [], []
     look = np.array([
-        (m.opacity if m.transparent else 1.0, *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
+        (_opacity(m), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
         for k, m in enumerate(materials)
     ])  # fmt: skip
     for instance in instances:
@@ -60,14 +62,39 @@ def world_triangles(
         world = mesh.positions @ matrix[:3, :3].T.astype(np.float32) + matrix[:3, 3].astype(np.float32)
         corners.append(world[mesh.corner_vertices[mesh.triangle_corners]])
         slots = np.asarray(instance.materials)
-        looks.append(look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]])
+        normals = _packed_normals(mesh.corner_normals @ _cofactors(matrix[:3, :3]).T)
+        shown = look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        looks.append(np.concatenate([shown, normals[mesh.triangle_corners]], axis=1))
     if not corners:
-        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 5))
+        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
     return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
 
 
+def _opacity(material: CompiledMaterial) -> float:
+    """Mean coverage for rays that pass at random; negative where rays may also be bent."""
+    opacity = material.opacity if material.transparent else 1.0
+    return -max(opacity, 1e-3) if material.glass else opacity
+
+
+def _cofactors(matrix: np.ndarray) -> np.ndarray:
+    """Takes normals to world space, outwards where the object is mirrored; also where it is flattened."""
+    a, b, c = matrix.T
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1) * (
+        -1.0 if a @ np.cross(b, c) < 0 else 1.0
+    )
+
+
+def _packed_normals(normals: np.ndarray) -> np.ndarray:
+    """(N, 3) of any length as (N,) numbers: octahedral coordinates side by side; unpacked in shaders/trace."""
+    flat = normals / np.maximum(np.abs(normals).sum(axis=1, keepdims=True), 1e-30)
+    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
+    square = np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)
+    steps = np.floor((square * 0.5 + 0.5) * NORMAL_STEPS + 0.5)
+    return np.nan_to_num(steps[:, 0] + (NORMAL_STEPS + 1) * steps[:, 1])
+
+
 def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
-    """The hierarchy of `corners` (T, 3, 3) with opacity, emission and material `look` (T, 5)."""
+    """The hierarchy of `corners` (T, 3, 3) with opacity, emission, material and normals `look` (T, 8)."""
     finite = np.isfinite(corners).all(axis=(1, 2))
     corners, look = corners[finite], look[finite]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -87,9 +114,9 @@ def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
         packed[:, axis] = first[:, axis].reshape(used, LEAF)
         packed[:, 3 + axis] = edges[:, 0, axis].reshape(used, LEAF)
         packed[:, 6 + axis] = edges[:, 1, axis].reshape(used, LEAF)
-    looks = np.zeros((used * LEAF, 5), np.float32)
+    looks = np.zeros((used * LEAF, look.shape[1]), np.float32)
     looks[:count] = look[order]
-    packed[:, 9:14] = looks.reshape(used, LEAF, 5).transpose(0, 2, 1)
+    packed[:, 9:] = looks.reshape(used, LEAF, -1).transpose(0, 2, 1)
 
     box_low = np.full((slots, 3), EMPTY, np.float32)
     box_high = np.full((slots, 3), -EMPTY, np.float32)
@@ -133,7 +160,7 @@ def _packed_boxes(low: np.ndarray, high: np.ndarray, least: float) -> np.ndarray
 class HierarchyCache:
     """The hierarchies of a renderer's scene: built when first asked for, kept until geometry or alpha changes.
 
-    Rays of glossy and of diffuse paths meet different objects only where an artist hid some from one of them.
+    Rays of glossy, diffuse and transmission paths meet different objects only where an artist hid some from one.
     """
 
     def __init__(self):
@@ -146,12 +173,12 @@ class HierarchyCache:
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials) for i in snapshot.instances
                   if getattr(i.visibility, path)),
-            tuple((m.opacity if m.transparent else 1.0, m.emissive and m.emission) for m in materials), tuple(origin),
+            tuple((_opacity(m), m.emissive and m.emission) for m in materials), tuple(origin),
         )  # fmt: skip
         if key not in self._kept:
             triangles = world_triangles(list(snapshot.instances), snapshot.meshes, materials, origin, path)
             # At most one for each path; the oldest one, of another scene, goes.
-            self._kept = dict([*self._kept.items()][-2:]) | {key: build(*triangles)}
+            self._kept = dict([*self._kept.items()][-3:]) | {key: build(*triangles)}
         return self._kept[key]
 
     def release(self) -> None:

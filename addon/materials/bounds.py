@@ -68,5 +68,10 @@ class NodeBounds:
         self._bounds, self._node, self._depth = bounds, node, depth
         self._sockets = {a.identifier: a for a in entry.arguments if isinstance(a, words.Socket)}
 
+    @property
+    def properties(self) -> dict[str, object]:
+        """The node's settings."""
+        return self._node.properties
+
     def __getitem__(self, identifier: str) -> Estimate:
         return self._bounds.socket(self._node, self._sockets[identifier], self._depth)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .estimate import Interface
+
 
 @dataclass(frozen=True)
 class Attribute:
@@ -38,4 +40,5 @@ class CompiledMaterial:
     glossy: bool  # has a glossy closure
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon
     tinted: bool  # what passes straight through may be coloured
+    glass: Interface | None  # how it bends light, on average
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated

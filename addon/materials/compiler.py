@@ -77,6 +77,7 @@ class _Compilation:
             glossy=summary.glossy,
             soft=summary.soft,
             tinted=summary.tinted,
+            glass=summary.glass,
             fallbacks=tuple(code.fallbacks),
         )
 
@@ -198,6 +199,18 @@ def may_emit(graph: Graph) -> bool:
         if node.type in EMITTERS and all(_not_black(node.inputs.get(name)) for name in EMITTERS[node.type]):
             return True
     return False
+
+
+REFRACTING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
+
+
+def may_refract(graph: Graph) -> bool:
+    """Whether some node of the graph can bend light: cheap, by its sockets alone."""
+    return any(
+        node.type in REFRACTING
+        or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Transmission Weight")))
+        for node in graph.nodes.values()
+    )
 
 
 def _not_black(socket) -> bool:

@@ -13,6 +13,7 @@ half vector h drawn from the distribution of visible normals (so that the expect
     schlick(mu, roughness)         = E_h[ (1 - view . h)^5 ]
     glass_reflection(mu, roughness, z) = E_h[ F G2 / G1 ]            what rough glass reflects at once
     glass(mu, roughness, z)        = E_h[ F G2 / G1 + (1 - F) G2' / G1 ]   and what it reflects or lets through
+    leaving, leaving_reflection    = the same for rays from inside, which meet the inverse index of refraction
 
 with G2' for the refracted direction, which must lie below the surface.
 Directions that leave below the surface count as zero in all of them. The axis z = sqrt(|ior - 1| / (ior + 1)) is
@@ -35,7 +36,7 @@ import numpy as np
 
 ENERGY_SIZE = 32  # nodes along roughness and along mu
 LAYER_SIZE = 16  # nodes along roughness, mu and z
-TEXTURE_SIZE = 64  # texels along each side of the packed texture: 4 x 4 tiles of LAYER_SIZE
+TEXTURE_SIZE = 64  # texels along each side of a third of the packed texture: 4 x 4 tiles of LAYER_SIZE
 
 SMALLEST_COSINE = 1e-4  # the node at mu = 0 stands just above the horizon, where the lobe is still defined
 SMALLEST_Z, LARGEST_Z = 1e-4, 0.99  # z = 0 has no reflection, z = 1 an infinite index of refraction
@@ -122,8 +123,8 @@ def glass_energy(mu: float, roughness: float, ior: float, grid: int = GRID // 2)
 
 def make_tables() -> dict[str, np.ndarray]:
     """All tables: energy (32, 32) [roughness, mu], energy_average (32,), dielectric (16, 16, 16) [roughness, mu, z],
-    schlick (16, 16) [roughness, mu], glass and glass_reflection like dielectric, glass_average (16, 16) [roughness, z];
-    float32."""
+    schlick (16, 16) [roughness, mu], glass and glass_reflection like dielectric, glass_average (16, 16) [roughness, z],
+    and these three as leaving… for rays from inside; float32."""
     axis = np.linspace(0.0, 1.0, ENERGY_SIZE)
     energy = np.array([[ggx_energy(max(mu, SMALLEST_COSINE), r) for mu in axis] for r in axis])
     nodes, weights = np.polynomial.legendre.leggauss(24)
@@ -133,8 +134,8 @@ def make_tables() -> dict[str, np.ndarray]:
     layer_axis = np.linspace(0.0, 1.0, LAYER_SIZE)
     dielectric = np.zeros((LAYER_SIZE,) * 3)
     schlick = np.zeros((LAYER_SIZE,) * 2)
-    glass, glass_reflection = np.zeros((2, *(LAYER_SIZE,) * 3))
-    glass_average = np.zeros((LAYER_SIZE,) * 2)
+    glass, glass_reflection, leaving, leaving_reflection = np.zeros((4, *(LAYER_SIZE,) * 3))
+    glass_average, leaving_average = np.zeros((2, *(LAYER_SIZE,) * 2))
     for i, roughness in enumerate(layer_axis):
         for j, mu in enumerate(layer_axis):
             cos_half, cos_out = visible_half_vectors(max(mu, SMALLEST_COSINE), roughness)
@@ -147,13 +148,16 @@ def make_tables() -> dict[str, np.ndarray]:
                 dielectric[i, j, k] = np.mean(np.where(lit, shape, 0.0))
                 cosine = max(mu, SMALLEST_COSINE)
                 glass[i, j, k], glass_reflection[i, j, k] = glass_energy(cosine, roughness, ior)
+                leaving[i, j, k], leaving_reflection[i, j, k] = glass_energy(cosine, roughness, 1.0 / ior)
         for k, z in enumerate(np.clip(layer_axis, SMALLEST_Z, LARGEST_Z)):
             ior = ior_from_f0(z**4)
-            means = (2.0 * w * m * glass_energy(m, roughness, ior, 96)[0] for m, w in zip(nodes, weights))
-            glass_average[i, k] = sum(means)
+            for filled, inside in ((glass_average, ior), (leaving_average, 1.0 / ior)):
+                means = (2.0 * w * m * glass_energy(m, roughness, inside, 96)[0] for m, w in zip(nodes, weights))
+                filled[i, k] = sum(means)
     tables = {
         "energy": energy, "energy_average": average, "dielectric": dielectric, "schlick": schlick,
         "glass": glass, "glass_reflection": glass_reflection, "glass_average": glass_average,
+        "leaving": leaving, "leaving_reflection": leaving_reflection, "leaving_average": leaving_average,
     }  # fmt: skip
     return {name: table.astype(np.float32) for name, table in tables.items()}
 
@@ -173,19 +177,20 @@ def sheen_tables() -> dict[str, np.ndarray]:
 
 
 def energy_texture() -> np.ndarray:
-    """The tables packed for the GPU: (64, 128, 4) float32, row first, to be bound as `energy_table`.
+    """The tables packed for the GPU: (64, 192, 4) float32, row first, to be bound as `energy_table`.
 
     R: dielectric[i, j, k] at column i + 16 (k mod 4), row j + 16 (k div 4); G: the same for k + 1, so that one fetch
     gives both ends of the interpolation along z. From column 64 on the same way, R and G: glass; B and A:
-    glass_reflection. Up to column 63, B: energy[i, j] at column i, row j; energy_average[i] at column i, row 32;
-    schlick[i, j] at column 32 + i, row j; glass_average[i, k] at column 32 + i, row 32 + k. A: the sheen's a[i, j] at
-    column i, row j; its b at column 32 + i, row j; its albedo at column i, row 32 + j. `shaders/lib/energy.glsl` reads
-    exactly this.
+    glass_reflection; from column 128 on, leaving and leaving_reflection. Up to column 63, B: energy[i, j] at column i,
+    row j; energy_average[i] at column i, row 32; schlick[i, j] at column 32 + i, row j; glass_average[i, k] at column
+    32 + i, row 32 + k, leaving_average beside it from column 48 on. A: the sheen's a[i, j] at column i, row j; its b at
+    column 32 + i, row j; its albedo at column i, row 32 + j. `shaders/lib/energy.glsl` reads exactly this.
     """
     stored = tables()
-    texture = np.zeros((TEXTURE_SIZE, 2 * TEXTURE_SIZE, 4), np.float32)
+    texture = np.zeros((TEXTURE_SIZE, 3 * TEXTURE_SIZE, 4), np.float32)
     for name, first, channel in (
         ("dielectric", 0, 0), ("glass", TEXTURE_SIZE, 0), ("glass_reflection", TEXTURE_SIZE, 2),
+        ("leaving", 2 * TEXTURE_SIZE, 0), ("leaving_reflection", 2 * TEXTURE_SIZE, 2),
     ):  # fmt: skip
         for k in range(LAYER_SIZE):
             column, row = first + LAYER_SIZE * (k % 4), LAYER_SIZE * (k // 4)
@@ -198,6 +203,7 @@ def energy_texture() -> np.ndarray:
     texture[ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, 2] = stored[
         "glass_average"
     ].T
+    texture[ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, 48 : 48 + LAYER_SIZE, 2] = stored["leaving_average"].T
     sheen = sheen_tables()
     texture[:SHEEN_SIZE, :SHEEN_SIZE, 3] = sheen["a"].T
     texture[:SHEEN_SIZE, SHEEN_SIZE : 2 * SHEEN_SIZE, 3] = sheen["b"].T

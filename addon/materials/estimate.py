@@ -7,7 +7,7 @@ is known exactly, an image by its pixels, everything else by wide bounds and a n
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,6 +80,23 @@ def unknown(mean: float = 0.5) -> Estimate:
 ZERO = constant(0.0)
 
 
+def _share(weight: Estimate) -> float:
+    return float(np.clip(weight.mean.mean(), 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Means over a material of what bends light: for rays that meet it where no shader can be run."""
+
+    color: tuple[float, float, float]  # of what passes, once
+    ior: float
+    roughness: float
+    share: float  # of the material that is such an interface, 0..1
+    fresnel: bool = True  # the rest is mirrored; False: nothing is
+    multiple: bool = True  # gives back what it scatters more than once
+    mirrors_color: bool = False  # what is mirrored has the colour, too
+
+
 @dataclass(frozen=True)
 class Summary:
     """What a shader leaf, or a whole surface, does with light."""
@@ -90,6 +107,7 @@ class Summary:
     glossy: bool = False
     soft: bool = False  # a lobe of shaders/lib/soft_lobe.glsl
     tinted: bool = False  # what passes straight through may be coloured
+    glass: Interface | None = None  # the most of such lobes
 
     def weighted(self, weight: Estimate) -> Summary:
         seen = bool(np.any(weight.high > 0.0))
@@ -100,6 +118,7 @@ class Summary:
             self.glossy and seen,
             self.soft and seen,
             self.tinted and seen,
+            replace(self.glass, share=self.glass.share * _share(weight)) if self.glass and seen else None,
         )
 
     def __add__(self, other: Summary) -> Summary:
@@ -110,6 +129,7 @@ class Summary:
             self.glossy or other.glossy,
             self.soft or other.soft,
             self.tinted or other.tinted,
+            max((self.glass, other.glass), key=lambda glass: glass.share if glass else -1.0),
         )
 
 

@@ -14,6 +14,7 @@ from .light_probes import LightProbes
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
+from .traced_refraction import TracedRefraction
 from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
@@ -26,6 +27,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     EnvironmentLight,
     DirectionalOcclusion,
     TracedGlossy,
+    TracedRefraction,
     InstantRadiosity,
     ScreenSpaceBounce,
     Film,

@@ -20,8 +20,10 @@ SUMS = (
     Write("radiance.environment", "RGBA32F", "The world seen by the camera; alpha: coverage", True),
     Write("color.diffuse", "RGBA32F", "Albedo of diffuse closures", True),
     Write("color.glossy", "RGBA32F", "Albedo of glossy closures", True),
+    Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
+PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in ("diffuse", "glossy", "transmission"))
 COLLECT = tuple(
     passes.fullscreen_program(
         "film collect",
@@ -35,7 +37,8 @@ COLLECT = tuple(
         defines=soft_defines,
         outputs=tuple(
             ("VEC4", name)
-            for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color", "out_normal")
+            for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color",
+                         "out_transmission_color", "out_normal")
         ),
     )
     for soft_defines in SOFT_DEFINES
@@ -50,10 +53,7 @@ DEPTH = passes.fullscreen_program(
 RESOLVE = passes.fullscreen_program(
     "film resolve",
     "film/resolve.frag.glsl",
-    textures=(
-        ("FLOAT_2D", "diffuse"), ("FLOAT_2D", "glossy"), ("FLOAT_2D", "diffuse_indirect"),
-        ("FLOAT_2D", "glossy_indirect"), ("FLOAT_2D", "emission"), ("FLOAT_2D", "environment"),
-    ),
+    textures=tuple(("FLOAT_2D", name) for name in (*PATHS, "emission", "environment")),
     constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
     outputs=(("VEC4", "out_combined"),),
 )  # fmt: skip
@@ -67,7 +67,7 @@ class Film(Technique):
         *SUMS,
         *(
             Write(f"radiance.{path}", "RGBA32F", "Cleared here, so that a scene without such light has it", True)
-            for path in ("diffuse_direct", "glossy_direct", "diffuse_indirect", "glossy_indirect")
+            for path in PATHS
         ),
         Write("film.depth", "RGBA32F", "Depth along the camera axis at the pixel's centre, m; 1e10 for nothing"),
         Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
@@ -123,12 +123,7 @@ def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
     passes.fullscreen(
         RESOLVE,
         target,
-        textures={
-            "diffuse": frame.images["radiance.diffuse_direct"], "glossy": frame.images["radiance.glossy_direct"],
-            "diffuse_indirect": frame.images["radiance.diffuse_indirect"],
-            "glossy_indirect": frame.images["radiance.glossy_indirect"],
-            "emission": frame.images["radiance.emission"], "environment": frame.images["radiance.environment"],
-        },
+        textures={name: frame.images[f"radiance.{name}"] for name in (*PATHS, "emission", "environment")},
         constants={
             "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
             "transparent": int(frame.snapshot.film.transparent),

@@ -82,7 +82,7 @@ class Reflectance:
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
         bindings["blocks"]["film_view"] = Block(VIEW, **_view(low, high, backward))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
-            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": OPAQUE})
+            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": OPAQUE, "refracts": 0})
             for draw in draws:
                 shader.set_constant("first_instance", draw.first)
                 passes.draw(shader, draw.batch, draw.count)

@@ -3,9 +3,10 @@
 Every material's graph runs once per visible pixel and leaves its closures in six images (`surface.*`); all lighting
 reads them. Transparency is stochastic: a layer is drawn with the probability of its opacity, numbers stratified over
 the samples per pixel and layer, so the mean over samples is exact alpha blending of any number of layers, at the
-price of noise that falls like 1/n. Where such layers are coloured, a second pass multiplies what was hit, or the
-world, by the colour of each layer before it over its mean (the order does not matter), so the mean is exact by channel.
-Of several glossy lobes one is kept per sample (shaders/lib/closure.glsl).
+price of noise that falls like 1/n. Glass bends what it lets through where a technique of the transmission slot runs
+(traced_refraction.py), and else is such a layer. Where such layers are coloured, a second pass multiplies what was
+hit, or the world, by the colour of each layer before it over its mean (the order does not matter), so the mean is exact
+by channel. Of several glossy lobes one is kept per sample (shaders/lib/closure.glsl).
 
 The camera is shifted within the pixel filter (Blackman-Harris, importance-sampled) and over the lens (frame/lens.py),
 the same for all pixels.
@@ -79,51 +80,27 @@ class Surfaces(Technique):
     )
 
     def run(self, frame: Frame) -> None:
+        refracts = any(technique.slot == "transmission" for technique in frame.plan.techniques)
+        target = frame.target(*SURFACES, depth="surface.depth_buffer")
         if frame.sample == 0:
             modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
-            frame.receivers = self._receivers(frame, modes)
+            frame.receivers = self._receivers(frame, target, modes, refracts)
             if modes == (STOCHASTIC,):
                 return  # what was drawn for the receivers is the first sample
-        self._draw(frame, STOCHASTIC)
+        draw_surfaces(frame, self, target, STOCHASTIC, refracts)
         if any(material.tinted for material in frame.materials.compiled):
-            self._tint(frame)
+            self._tint(frame, refracts)
 
-    def _draw(self, frame: Frame, mode: int) -> None:
-        target = frame.target(*SURFACES, depth="surface.depth_buffer")
-        target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-        frame.target("surface.emission").clear((1.0, 1.0, 1.0, 0.0))  # what reaches the eye where nothing is hit
-        with passes.drawing(target):
-            self._submit(frame, frame.materials.surface_program, None, {"transparent_mode": mode})
-        frame.count(self, "passes")
-
-    def _tint(self, frame: Frame) -> None:
+    def _tint(self, frame: Frame, refracts: bool) -> None:
         """Multiply what was hit by the colour of the layers before it that let this sample pass."""
         tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
         target = frame.target("surface.diffuse", "surface.tint", "surface.emission")
         position = {"surface_position": frame.images["surface.position"]}
         with passes.drawing(target, blend="MULTIPLY", depth_test="NONE", depth_write=False):
-            self._submit(frame, frame.materials.tint_program, tinted, {}, position)
+            _submit(frame, self, frame.materials.tint_program, tinted, {"refracts": int(refracts)}, position)
         frame.count(self, "passes")
 
-    def _submit(self, frame: Frame, program_of, materials: set[int] | None, constants: dict, textures=None) -> None:
-        """Draw what the camera may see of `materials` (None: of all), each with its own program."""
-        seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
-        material = None
-        for call in calls(frame.geometry.draws, seen):
-            if materials is not None and call.draw.material not in materials:
-                continue
-            if call.draw.material != material:
-                material = call.draw.material
-                shader = passes.get(program_of(material))
-                bindings = frame.materials.bindings(material, frame.geometry.instances)
-                bindings["blocks"]["film_view"] = frame.view_block
-                bindings["textures"] |= textures or {}
-                shader.bind(**bindings, constants={"first_instance": call.first, **constants})
-            shader.set_constant("first_instance", call.first)
-            passes.draw(shader, call.draw.batch, call.count)
-            frame.count(self, "triangles", call.triangles)
-
-    def _receivers(self, frame: Frame, modes: tuple[int, ...]) -> Receivers:
+    def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...], refracts: bool) -> Receivers:
         width, height = frame.size
         tiles = -(-width // TILE), -(-height // TILE)
         low = np.full((tiles[1], tiles[0], 4), np.inf)
@@ -133,7 +110,7 @@ class Surfaces(Technique):
         for lens in (*(rim(aperture) if aperture else ()), (0.0, 0.0)):  # the middle last: it is the first sample
             frame.look(lens)
             for mode in modes:
-                self._draw(frame, mode)
+                draw_surfaces(frame, self, surfaces, mode, refracts)
                 passes.fullscreen(
                     TILE_BOUNDS,
                     target,
@@ -151,3 +128,36 @@ class Surfaces(Technique):
         order = np.argsort(low[seen, 3], kind="stable")
         low, high = low[seen][order], high[seen][order]
         return Receivers(low[:, :3], high[:, :3], low[:, 3])
+
+
+def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, refracts: bool) -> None:
+    """Draw what the camera sees into six surface images with a depth buffer. `mode`: STOCHASTIC, OPAQUE or LEFT_OUT
+    says what becomes of transparent layers; `refracts`: glass is no such layer."""
+    target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+    # What reaches the eye where nothing is hit:
+    images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
+    constants = {"transparent_mode": mode, "refracts": int(refracts)}
+    with passes.drawing(target):
+        _submit(frame, technique, frame.materials.surface_program, None, constants)
+    frame.count(technique, "passes")
+
+
+def _submit(
+    frame: Frame, technique: Technique, program_of, materials: set[int] | None, constants: dict, textures=None
+) -> None:
+    """Draw what the camera may see of `materials` (None: of all), each with its own program."""
+    seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
+    material = None
+    for call in calls(frame.geometry.draws, seen):
+        if materials is not None and call.draw.material not in materials:
+            continue
+        if call.draw.material != material:
+            material = call.draw.material
+            shader = passes.get(program_of(material))
+            bindings = frame.materials.bindings(material, frame.geometry.instances)
+            bindings["blocks"]["film_view"] = frame.view_block
+            bindings["textures"] |= textures or {}
+            shader.bind(**bindings, constants={"first_instance": call.first, **constants})
+        shader.set_constant("first_instance", call.first)
+        passes.draw(shader, call.draw.batch, call.count)
+        frame.count(technique, "triangles", call.triangles)

@@ -48,6 +48,17 @@ _TABLE = (
         "radiance.glossy_indirect / color.glossy",
     ),
     ("use_pass_glossy_color", "Glossy Color", "GlossCol", "RGB", "COLOR", "color.glossy"),
+    (
+        "use_pass_transmission_direct", "Transmission Direct", "TransDir", "RGB", "COLOR",
+        "radiance.transmission_direct / color.transmission",
+    ),
+    (
+        "use_pass_transmission_indirect", "Transmission Indirect", "TransInd", "RGB", "COLOR",
+        "radiance.transmission_indirect / color.transmission",
+    ),
+    (
+        "use_pass_transmission_color", "Transmission Color", "TransCol", "RGB", "COLOR", "color.transmission",
+    ),
     ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
     ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),
 )  # fmt: skip

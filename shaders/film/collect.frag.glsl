@@ -16,6 +16,7 @@ void main()
   out_environment = vec4(0.0);
   out_diffuse_color = vec4(0.0);
   out_glossy_color = vec4(0.0);
+  out_transmission_color = vec4(0.0);
   out_normal = vec4(0.0);
   vec3 direction = view_direction(gl_FragCoord.xy);
   vec3 origin = film_view.eye.xyz;
@@ -40,6 +41,15 @@ void main()
       microfacets = false;
     }
 #endif
+    if (microfacets && s.kind == LOBE_REFRACTION) {
+      float mu = max(dot(s.glossy_normal, -direction), 0.0);
+      vec3 share = vec3(1.0);
+      if (s.glossy_edge.x > 0.5) {
+        share = glass_passing(s.glossy_tint, mu, s.glossy_roughness, s.glossy_ior);
+      }
+      out_transmission_color.rgb = s.glossy_weight * share;
+      microfacets = false;
+    }
     if (microfacets) {
       vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
       float mu = max(dot(s.glossy_normal, -direction), 0.0);

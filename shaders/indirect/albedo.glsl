@@ -4,10 +4,10 @@
 vec3 surface_albedo(Surface s, float mu)
 {
   vec3 albedo = s.diffuse;
-  if (s.kind > FRESNEL_F82) {
+  if (s.kind > LOBE_REFRACTION) {
     albedo += s.glossy_weight;  // sheen, translucent, toon: the weight is their albedo
   }
-  else if (max_component(s.glossy_weight) > 0.0) {
+  else if (s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0) {
     vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
     albedo += s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior,
                                               sqrt(sqrt(alpha.x * alpha.y)), mu);

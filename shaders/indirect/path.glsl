@@ -20,31 +20,53 @@ vec3 ray_origin(vec3 position, vec3 normal)
   return position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
 }
 
+// Pixel of the picture in which a point of a surface lies that faces the camera; false if there is none. What the pixel
+// shows is this point if it is nearer than `footprint`, m; `slant` is the cosine between its normal and the viewer.
+bool pixel_of(vec3 position, vec3 normal, out ivec2 pixel, out float slant, out float footprint)
+{
+  pixel = ivec2(0);
+  slant = footprint = 0.0;
+  vec4 p = vec4(position, 1.0);
+  float w = dot(film_view.row_w, p);
+  if (w <= 0.0) {
+    return false;
+  }
+  vec2 size = vec2(textureSize(surface_position, 0));
+  vec2 place = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * size;
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
+    return false;
+  }
+  pixel = ivec2(place);
+  vec3 to_eye = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - position);
+  slant = max(dot(normal, to_eye), 0.0);
+  // The pixel's own point lies within its footprint, stretched where the surface is seen from the side.
+  footprint = 1.5 * (film_view.frame.y - film_view.frame.x) / film_view.film.x * w / max(slant, 0.1);
+  return slant > 0.0;
+}
+
+// Mean reflectance of the material of a triangle that a ray has met.
+vec3 mean_albedo(ivec2 hit)
+{
+  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  return texelFetch(reflectance, ivec2(material & 15, material >> 4), 0).rgb;
+}
+
 // What a point reflects: exactly where the camera sees it, else the mean of its material.
 vec3 albedo_at(ivec2 hit, vec3 position, vec3 normal)
 {
-  vec4 p = vec4(position, 1.0);
-  float w = dot(film_view.row_w, p);
-  if (w > 0.0) {
-    vec2 size = vec2(textureSize(surface_position, 0));
-    vec2 place = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * size;
-    if (all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size))) {
-      ivec2 pixel = ivec2(place);
-      vec4 seen = texelFetch(surface_position, pixel, 0);
-      // The pixel's own point lies within its footprint, stretched where the surface is seen from the side.
-      vec3 to_eye = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - position);
-      float slant = max(dot(normal, to_eye), 0.0);
-      float footprint = (film_view.frame.y - film_view.frame.x) / film_view.film.x * w / max(slant, 0.1);
-      if (seen.w != 0.0 && slant > 0.0 && distance(seen.xyz, position) < 1.5 * footprint) {
-        Surface s = SURFACE_READ(pixel);
-        if (dot(s.geometric_normal, normal) > 0.9) {
-          return surface_albedo(s, slant);
-        }
+  ivec2 pixel;
+  float slant;
+  float footprint;
+  if (pixel_of(position, normal, pixel, slant, footprint)) {
+    vec4 seen = texelFetch(surface_position, pixel, 0);
+    if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
+      Surface s = SURFACE_READ(pixel);
+      if (dot(s.geometric_normal, normal) > 0.9) {
+        return surface_albedo(s, slant);
       }
     }
   }
-  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
-  return texelFetch(reflectance, ivec2(material & 15, material >> 4), 0).rgb;
+  return mean_albedo(hit);
 }
 
 // The surface that a ray meets before `limit`; false if none.
@@ -78,16 +100,24 @@ vec3 unblocked_irradiance(Light light, vec3 position, vec3 normal, out vec3 dire
   return ((light.flags & LIGHT_DIFFUSE) != 0) ? arriving * max(dot(normal, direction), 0.0) : vec3(0.0);
 }
 
+// How far a ray along `direction` may go before it meets this sample's point of a light. Points that have a place are
+// aimed at anew: from the ray's origin, which is beside the surface, it would meet an emissive triangle a little too soon.
+float light_reach(Light light, vec3 origin, inout vec3 direction)
+{
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+    vec3 path = light.point - origin;
+    float reach = max(length(path), 1e-30);
+    direction = path / reach;
+    return reach * 0.9999;
+  }
+  return light_distance(light, origin, direction);
+}
+
 // Whether this sample's point of a light is seen along `direction`.
 float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
 {
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
-    // Aimed anew from the ray's origin: beside the surface it would meet an emissive triangle a little before the point.
-    vec3 path = light.point - origin;
-    float reach = max(length(path), 1e-30);
-    return clear_path(origin, path / reach, reach * 0.9999, salt);
-  }
-  return clear_path(origin, direction, light_distance(light, origin, direction), salt);
+  float reach = light_reach(light, origin, direction);
+  return clear_path(origin, direction, reach, salt);
 }
 
 // Irradiance straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they

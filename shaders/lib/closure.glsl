@@ -1,5 +1,5 @@
 // Closures: what a surface point does with light, collected while the material graph is walked.
-// Diffuse weights add up. Of several other lobes (glossy, sheen, translucent, toon) one is kept per sample with
+// Diffuse weights add up. Of several other lobes (glossy, refraction, sheen, translucent, toon) one is kept per sample with
 // probability proportional to its weight (reservoir sampling) and carries all of their weight, so the lobes stay apart
 // and the mean is exact.
 #include "lib/math.glsl"
@@ -9,6 +9,9 @@
 #define FRESNEL_NONE 0        // reflectance = tint
 #define FRESNEL_DIELECTRIC 1  // reflectance runs from tint at normal incidence to 1, with the shape given by ior
 #define FRESNEL_F82 2         // metal: tint at normal incidence, edge at 82 degrees
+// What a rough dielectric lets through (lib/refraction.glsl): tint is what it reflects at normal incidence, ior that of
+// the far side over the near one, edge 1 with Fresnel's losses and 0 without:
+#define LOBE_REFRACTION 3
 // Lobes without microfacets, evaluated in lib/soft_lobe.glsl; all of their colour is in the weight:
 #define LOBE_SHEEN 4          // microfiber
 #define LOBE_VELVET 5         // fibres after Ashikhmin; roughness is the spread of their normals

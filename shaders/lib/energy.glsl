@@ -1,7 +1,7 @@
 // Albedos of microfacet lobes from the table `energy_table`, and what follows from them: how much a layer leaves for
 // the layer below, and how much light a lobe must gain because it scatters more than once.
 //
-// The host binds `energy_table` (sampler2D, 128 x 64 RGBA32F, filled by addon/materials/energy.py, where the layout and
+// The host binds `energy_table` (sampler2D, 192 x 64 RGBA32F, filled by addon/materials/energy.py, where the layout and
 // the sources are described) in every program that includes this file. `mu` is the cosine between the lobe's normal
 // and the viewer, `roughness` the artist's roughness (alpha = roughness^2; for anisotropic lobes (ax ay)^(1/4), which
 // is the same value).
@@ -63,12 +63,13 @@ float dielectric_layer_shape(float mu, float roughness, float ior)
   return mix(ends.x, ends.y, slice.y);
 }
 
-// Albedos of a rough dielectric that scatters once: all, and what is reflected.
+// Albedos of a rough dielectric that scatters once: all, and what is reflected. From inside, ior is below 1.
 vec2 glass_energy(float mu, float roughness, float ior)
 {
   vec2 slice = ior_slice(ior);
   int k = int(slice.x);
-  vec4 ends = energy_bilinear(ivec2(64 + 16 * (k % 4), 16 * (k / 4)), energy_cell(roughness, mu, LAYER_NODES));
+  ivec2 origin = ivec2(((ior < 1.0) ? 128 : 64) + 16 * (k % 4), 16 * (k / 4));
+  vec4 ends = energy_bilinear(origin, energy_cell(roughness, mu, LAYER_NODES));
   return mix(ends.xz, ends.yw, slice.y);
 }
 
@@ -77,12 +78,38 @@ float glass_energy_average(float roughness, float ior)
 {
   vec2 slice = ior_slice(ior);
   vec4 cell = energy_cell(roughness, 0.0, LAYER_NODES);
-  ivec2 texel = ivec2(32 + int(cell.x), 32 + int(slice.x));
+  ivec2 texel = ivec2(((ior < 1.0) ? 48 : 32) + int(cell.x), 32 + int(slice.x));
   vec2 low = vec2(texelFetch(energy_table, texel, 0).z, texelFetch(energy_table, texel + ivec2(1, 0), 0).z);
   vec2 high = vec2(texelFetch(energy_table, texel + ivec2(0, 1), 0).z,
                    texelFetch(energy_table, texel + ivec2(1, 1), 0).z);
   vec2 ends = mix(low, high, slice.y);
   return mix(ends.x, ends.y, cell.z);
+}
+
+// What a rough dielectric mirrors at once, its reflectance at normal incidence tinted to f0. Reflectance rises from f0 to
+// 1 along one curve: solved for its mean where f0 is the real one.
+vec3 glass_mirrored(vec3 f0, float mu, float roughness, float ior)
+{
+  float real_f0 = dielectric_f0(ior);
+  float unit_energy = ggx_energy(mu, roughness);
+  float rise = (glass_energy(mu, roughness, ior).y - real_f0 * unit_energy) / max(1.0 - real_f0, 1e-6);
+  return clamp(vec3(rise) + f0 * (unit_energy - rise), vec3(0.0), vec3(1.0));
+}
+
+// And what it lets through at once.
+vec3 glass_passing(vec3 f0, float mu, float roughness, float ior)
+{
+  return max(vec3(glass_energy(mu, roughness, ior).x) - glass_mirrored(f0, mu, roughness, ior), vec3(0.0));
+}
+
+// Factor on a rough dielectric that scatters once which restores what is scattered more than once, shared as the first
+// time (Turquin 2019); each further time costs the colour of what passes.
+vec3 glass_multiscatter(vec3 transmitted, float mu, float roughness, float ior)
+{
+  float energy = max(glass_energy(mu, roughness, ior).x, 1e-4);
+  float average = glass_energy_average(roughness, ior);
+  vec3 again = transmitted * average / max(vec3(1.0) - transmitted * (1.0 - average), vec3(1e-6));
+  return vec3(1.0) + again * max((1.0 - energy) / energy, 0.0);
 }
 
 // Albedo of a dielectric layer without tint.

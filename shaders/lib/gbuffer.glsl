@@ -57,7 +57,7 @@ vec3 unpack_three(float packed_value, float steps)
 // The share of a tint that is stored: of what the index of refraction gives, for dielectrics.
 vec3 stored_tint_scale(int kind, float ior)
 {
-  return vec3((kind == FRESNEL_DIELECTRIC) ? dielectric_f0(ior) : 1.0);
+  return vec3((kind == FRESNEL_DIELECTRIC || kind == LOBE_REFRACTION) ? dielectric_f0(ior) : 1.0);
 }
 
 // The lobe's weight and packed tint. Where reflectance is about weight x tint, what the tint loses in eight bits goes
@@ -66,7 +66,7 @@ vec4 tint_encode(int kind, vec3 weight, vec3 tint, float ior)
 {
   vec3 share = tint / max(stored_tint_scale(kind, ior), vec3(1e-20));
   vec3 root = floor(sqrt(clamp(share, vec3(0.0), vec3(1.0))) * 255.0 + 0.5) / 255.0;
-  if (kind != FRESNEL_DIELECTRIC) {
+  if (kind != FRESNEL_DIELECTRIC && kind != LOBE_REFRACTION) {
     weight.x *= (root.x > 0.0) ? share.x / (root.x * root.x) : 1.0;
     weight.y *= (root.y > 0.0) ? share.y / (root.y * root.y) : 1.0;
     weight.z *= (root.z > 0.0) ? share.z / (root.z * root.z) : 1.0;

@@ -21,7 +21,7 @@ struct SoftLobe {
 SoftLobe soft_lobe_begin(Surface s, vec3 view)
 {
   SoftLobe lobe;
-  lobe.exists = s.kind > FRESNEL_F82 && max_component(s.glossy_weight) > 0.0;
+  lobe.exists = s.kind > LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;
   lobe.kind = s.kind;
   lobe.glossy = s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
   lobe.weight = s.glossy_weight;

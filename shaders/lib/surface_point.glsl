@@ -11,6 +11,7 @@ struct SurfacePoint {
   vec3 incoming;          // unit, towards the viewer
   bool backfacing;
   int ray;                // RAY_*
+  bool refracts;          // glass bends what it lets through; else that passes straight on
   vec4 object_row0;       // rows of the matrix from object to world space, relative to the render origin
   vec4 object_row1;
   vec4 object_row2;

@@ -34,7 +34,7 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   bool has_diffuse = max_component(s.diffuse) > 0.0;
-  bool has_glossy = max_component(s.glossy_weight) > 0.0;
+  bool has_glossy = s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;
 #ifdef SOFT_LOBES
   SoftLobe soft = soft_lobe_begin(s, to_viewer);
   has_glossy = has_glossy && !soft.exists;

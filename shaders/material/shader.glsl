@@ -190,35 +190,35 @@ void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
   closures.holdout += vector_average(weight);
 }
 
-// Glass without refraction: mirror as a rough dielectric, the rest passes straight through, tinted. What is scattered
-// more than once is shared between both as what is scattered once (Turquin 2019); `tint` colours the reflectance at
-// normal incidence.
-void shader_thin_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 reflected, vec3 transmitted,
+// Glass: a rough dielectric that mirrors and lets through. What passes is a lobe of its own where the program draws what
+// is bent, and else goes straight on, tinted, with the same energy. `tint` colours the reflectance at normal incidence.
+void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 reflected, vec3 transmitted,
                        vec3 tint, float ior, float roughness, vec3 normal, int distribution)
 {
   vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
   float r = clamp(roughness, 0.0, 1.0);
   float mu = view_cosine(point, n);
-  float real_f0 = dielectric_f0(ior);
-  vec3 f0 = clamp(real_f0 * tint, vec3(0.0), vec3(1.0));
-  vec2 energy = glass_energy(mu, r, ior);
-  // Reflectance rises from f0 to 1 along one curve: solved for its mean where f0 is the real one.
-  float unit_energy = ggx_energy(mu, r);
-  float rise = (energy.y - real_f0 * unit_energy) / max(1.0 - real_f0, 1e-6);
-  vec3 mirrored = clamp(vec3(rise) + f0 * (unit_energy - rise), vec3(0.0), vec3(1.0));
-  vec3 through = max(vec3(energy.x) - mirrored, vec3(0.0));
+  ior = (point.refracts && point.backfacing) ? 1.0 / ior : ior;
+  vec3 f0 = clamp(dielectric_f0(ior) * tint, vec3(0.0), vec3(1.0));
+  vec3 mirrored = glass_mirrored(f0, mu, r, ior);
+  vec3 through = glass_passing(f0, mu, r, ior);
   vec3 scale = weight;
   if (distribution == DISTRIBUTION_MULTIPLE) {
-    float average = glass_energy_average(r, ior);
-    vec3 again = transmitted * average / max(vec3(1.0) - transmitted * (1.0 - average), vec3(1e-6));
-    scale *= vec3(1.0) + again * ((1.0 - energy.x) / max(energy.x, 1e-4));
+    scale *= glass_multiscatter(transmitted, mu, r, ior);
   }
   if (largest(reflected) > 0.0) {
     vec3 lobe_scale = multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
     closure_glossy(closures, scale * reflected / lobe_scale, color_luminance(mirrored), FRESNEL_DIELECTRIC, f0,
                    vec3(1.0), ior, r, 0.0, default_tangent(n), n);
   }
-  closure_transparent(closures, scale * max(transmitted, vec3(0.0)) * through);
+  vec3 color = scale * max(transmitted, vec3(0.0));
+  if (point.refracts) {
+    closure_glossy(closures, color, color_luminance(through), LOBE_REFRACTION, f0, vec3(1.0), ior, r, 0.0,
+                   default_tangent(n), n);
+  }
+  else {
+    closure_transparent(closures, color * through);
+  }
 }
 
 // A wall that is thin against its surroundings: what enters leaves again in the same direction. Of a ray that is reflected
@@ -245,8 +245,23 @@ void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3
                   vec3 normal, int distribution)
 {
   vec3 positive = max(color, vec3(0.0));
-  shader_thin_glass(closures, point, weight, positive, positive, vec3(1.0), max(ior, 1e-5), roughness, normal,
-                    distribution);
+  add_glass(closures, point, weight, positive, positive, vec3(1.0), max(ior, 1e-5), roughness, normal, distribution);
+}
+
+// What passes an interface without the losses of reflection.
+void shader_refraction(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, float ior,
+                       vec3 normal)
+{
+  vec3 passing = weight * max(color, vec3(0.0));
+  if (point.refracts) {
+    float inside = max(ior, 1e-5);
+    vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
+    closure_glossy(closures, passing, 1.0, LOBE_REFRACTION, vec3(0.0), vec3(0.0),
+                   point.backfacing ? 1.0 / inside : inside, clamp(roughness, 0.0, 1.0), 0.0, default_tangent(n), n);
+  }
+  else {
+    closure_transparent(closures, passing);
+  }
 }
 
 // Specular term of Principled: the level scales the reflectance of the index of refraction, 0.5 leaves it.
@@ -282,7 +297,7 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 }
 
 // Principled BSDF, from the top layer down: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.
-// Not drawn: thin film. Drawn simpler: transmission passes straight through, subsurface is diffuse.
+// Not drawn: thin film. Drawn simpler: light passes thin walls straight on, subsurface is diffuse.
 void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
                        float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
                        float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
@@ -326,8 +341,8 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
                        mirror_normal);
     }
     else {
-      shader_thin_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)),
-                        max(ior, 1e-5), r, mirror_normal, distribution);
+      add_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)), max(ior, 1e-5), r,
+                mirror_normal, distribution);
     }
     w *= 1.0 - through;
   }

@@ -40,6 +40,7 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
   }
   point.normal = shading_normal;
   point.ray = RAY_CAMERA;
+  point.refracts = false;
   point.object_row0 = instance.row0;
   point.object_row1 = instance.row1;
   point.object_row2 = instance.row2;

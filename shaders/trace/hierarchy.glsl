@@ -6,8 +6,10 @@
 #include "lib/random.glsl"
 
 #define NODE_TEXELS 3
-#define LEAF_TEXELS 14
+#define LEAF_TEXELS 17
+#define OPACITY_TEXEL 9  // negative: the triangle may also bend what meets it
 #define MATERIAL_TEXEL 13
+#define NORMAL_TEXEL 14
 
 vec4 node_texel(int index)
 {
@@ -98,8 +100,9 @@ uint node_meets(int node, vec3 origin, vec3 inverse, float farthest, out vec4 en
 
 // Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
 // number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
-// Triangles with an opacity below one are passed at random, the same way for the same `salt`.
-float trace_until(vec3 origin, vec3 direction, float limit, float enough, uint salt, out ivec2 hit)
+// Triangles with an opacity below one are passed at random, the same way for the same `salt`; those that may bend light
+// are met for certain where `bent`.
+float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint salt, bool bent, out ivec2 hit)
 {
   hit = ivec2(-1);
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
@@ -139,7 +142,8 @@ float trace_until(vec3 origin, vec3 direction, float limit, float enough, uint s
     vec4 t = intersect_four(node, origin, direction);
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
-      vec4 opacity = leaf_texel(node * LEAF_TEXELS + 9);
+      vec4 opacity = leaf_texel(node * LEAF_TEXELS + OPACITY_TEXEL);
+      opacity = bent ? mix(opacity, vec4(1.0), lessThan(opacity, vec4(0.0))) : abs(opacity);
       uint roll = hash3(uvec3(uint(node), salt, 77u)).x;
       vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                          to_unit(roll * 277803737u + 7u));
@@ -157,6 +161,11 @@ float trace_until(vec3 origin, vec3 direction, float limit, float enough, uint s
   return nearest;
 }
 
+float trace_until(vec3 origin, vec3 direction, float limit, float enough, uint salt, out ivec2 hit)
+{
+  return trace_layers(origin, direction, limit, enough, salt, false, hit);
+}
+
 float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ivec2 hit)
 {
   return trace_until(origin, direction, limit, 0.0, salt, hit);
@@ -171,4 +180,29 @@ vec3 triangle_emission(ivec2 hit, out vec3 normal)
   vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
   normal = safe_normalize(cross(e1, e2));
   return vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
+}
+
+vec3 unpack_normal(float packed_normal)
+{
+  float y = floor(packed_normal / 4096.0);
+  return octahedral_decode(vec2(packed_normal - 4096.0 * y, y) * (2.0 / 4095.0) - 1.0);
+}
+
+// Unit shading normal of a triangle where a ray meets it, interpolated between its corners.
+vec3 triangle_shading_normal(ivec2 hit, vec3 position)
+{
+  int base = hit.x * LEAF_TEXELS;
+  int k = hit.y;
+  vec3 corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
+  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
+  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  vec3 across = cross(e1, e2);
+  float area = max(dot(across, across), 1e-37);
+  vec3 offset = position - corner;
+  float u = dot(cross(offset, e2), across) / area;
+  float v = dot(cross(e1, offset), across) / area;
+  vec3 normal = (1.0 - u - v) * unpack_normal(leaf_texel(base + NORMAL_TEXEL)[k])
+                + u * unpack_normal(leaf_texel(base + NORMAL_TEXEL + 1)[k])
+                + v * unpack_normal(leaf_texel(base + NORMAL_TEXEL + 2)[k]);
+  return safe_normalize(normal);
 }

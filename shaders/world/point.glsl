@@ -10,6 +10,7 @@ SurfacePoint world_point(vec3 direction, int ray)
   point.incoming = -direction;
   point.backfacing = false;
   point.ray = ray;
+  point.refracts = false;
   point.object_row0 = vec4(1.0, 0.0, 0.0, 0.0);
   point.object_row1 = vec4(0.0, 1.0, 0.0, 0.0);
   point.object_row2 = vec4(0.0, 0.0, 1.0, 0.0);

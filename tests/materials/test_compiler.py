@@ -124,9 +124,7 @@ def test_an_unknown_shader_is_diffuse_of_its_own_color():
 def test_every_approximation_is_named_only_when_it_is_seen():
     plain = compiled(principled(Subsurface_Weight=0.0, Sheen_Weight=0.0), surface=("Principled", "BSDF"))
     assert plain.fallbacks == ()
-    waxy = compiled(
-        principled(Subsurface_Weight=0.5, Sheen_Weight=1.0, Transmission_Weight=1.0), surface=("Principled", "BSDF")
-    )
+    waxy = compiled(principled(Subsurface_Weight=0.5, Sheen_Weight=1.0, Thin_Wall=1.0), surface=("Principled", "BSDF"))
     assert len(waxy.fallbacks) == 2
     assert waxy.program_key == plain.program_key
 

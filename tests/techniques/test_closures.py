@@ -69,6 +69,7 @@ def single_closures(stage):
         "glass of one scattering": with_setting(
             made("ShaderNodeBsdfGlass", Color=COLOR, Roughness=0.5), distribution="GGX"
         ),
+        "refraction": made("ShaderNodeBsdfRefraction", Color=COLOR, Roughness=0.4),
         "coloured transparency": made("ShaderNodeBsdfTransparent", Color=COLOR),
         "conductor": with_setting(made("ShaderNodeBsdfMetallic", Roughness=0.3), fresnel_type="PHYSICAL_CONDUCTOR"),
         "edge tint": made("ShaderNodeBsdfMetallic", Base_Color=COLOR, Edge_Tint=(0.5, 0.6, 0.7, 1.0), Roughness=0.4),
@@ -96,7 +97,7 @@ def test_closures_in_a_white_furnace_have_cycles_albedo(stage, degrees):
         assert a == pytest.approx(b, abs=0.01 * b.max() + 1e-3), name
     # Cycles leaves out of the colour of glass what it scatters more than once. The colours of emission below layers are
     # means over few random layers; that of the conductor is its reflectance at this angle, ours a mean over the lobe.
-    for color, tolerance in (("diffuse_color", 3e-3), ("glossy_color", 2.5e-2)):
+    for color, tolerance in (("diffuse_color", 3e-3), ("glossy_color", 2.5e-2), ("transmission_color", 4e-2)):
         for name, a, b in zip(wanted, means(ours, color), means(cycles, color), strict=True):
             if name not in ("emission below layers", "conductor"):
                 assert a == pytest.approx(b, abs=tolerance), (name, color)

@@ -4,16 +4,17 @@ Principled in Cycles' order, top layer first: alpha, sheen, coat, emission, meta
 Each layer takes weight * albedo and leaves weight * (1 - largest channel of its albedo) to the next; albedos come from
 the tables of `materials/energy.py`.
 
-Light through glass, thin walls and alpha goes straight on, with the amount and colour that Cycles lets through: what
-is behind glass is seen at its place, not bent or blurred. Light that a single sheet bends from a source to the viewer
-is therefore in the passes of what stands behind it, not in Transmission Direct.
+Glass is two lobes: what it mirrors and what it lets through (Walter et al. 2007), which the technique of the
+transmission slot follows. For light that asks a caster, and where that technique does not run, what passes goes
+straight on with the amount and colour that Cycles lets through. Thin walls are drawn like that everywhere: what is
+behind them is seen at its place, not blurred.
 
 Sources: Cycles' Principled closure; Blender manual, "Principled BSDF" (4.5, 5.2).
 """
 
 from __future__ import annotations
 
-from ..estimate import Estimate, Summary, constant
+from ..estimate import Estimate, Interface, Summary, constant
 from .entry import Approximation, Choice, Entry, Expression, Socket
 
 WHITE = (1.0, 1.0, 1.0)
@@ -26,10 +27,13 @@ OTHER_DISTRIBUTIONS = (
 NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
 TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
-STRAIGHT_THROUGH = "Light passes straight through, without refraction or roughness."
 # Its albedo is then the colour itself; Cycles' random walk gives up to 7 % less seen from the front.
 SUBSURFACE = "Subsurface scattering is drawn as diffuse."
 THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
+
+
+# A dielectric at the usual indices reflects a tenth of what comes from all sides; the rest passes.
+PASSING = constant(0.9)
 
 
 def _colored(name: str):
@@ -63,9 +67,22 @@ def _transparent(sockets: dict[str, Estimate]) -> Summary:
 
 
 def _glass(sockets: dict[str, Estimate]) -> Summary:
-    # A dielectric at the usual indices reflects a tenth of what comes from all sides; the rest passes.
     color = _colored("Color")(sockets)
-    return Summary(transparency=color * constant(0.9), glossy=True, tinted=not color.grey)
+    return Summary(
+        transparency=color * PASSING, glossy=True, tinted=not color.grey,
+        glass=_interface(sockets, color, mirrors_color=True),
+    )  # fmt: skip
+
+
+def _refraction(sockets: dict[str, Estimate]) -> Summary:
+    color = _colored("Color")(sockets)
+    return Summary(transparency=color, tinted=not color.grey, glass=_interface(sockets, color, fresnel=False))
+
+
+def _interface(sockets: dict[str, Estimate], color: Estimate, share: float = 1.0, **kind) -> Interface:
+    ior, roughness = (float(sockets[name].mean[0]) for name in ("IOR", "Roughness"))
+    multiple = sockets.properties.get("distribution", "MULTI_GGX") == "MULTI_GGX"
+    return Interface(tuple(color.mean), max(ior, 1e-5), min(max(roughness, 0.0), 1.0), share, multiple=multiple, **kind)
 
 
 def _principled(sockets: dict[str, Estimate]) -> Summary:
@@ -74,12 +91,14 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
     transmission = sockets["Transmission Weight"].clipped()
     thin = bool((sockets["Thin Wall"].high > 0.0).any())
     transparency = alpha.complement()
-    tinted = False
+    tinted, glass = False, None
     if transmission.high.any():
         through = alpha * metallic.complement() * transmission
         root = _colored("Base Color")(sockets).map(lambda value: value**0.5)
-        transparency += through * root * constant(0.9)
+        transparency += through * root * PASSING
         tinted = not root.grey
+        if not thin:
+            glass = _interface(sockets, root, float(through.mean.mean()))
     emission = alpha * sockets["Emission Strength"]
     # Images are only looked at where they matter.
     if emission.high.any() or emission.low.any():
@@ -94,6 +113,7 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
             for name in (("Sheen Weight", "Subsurface Weight") if thin else ("Sheen Weight",))
         ),
         tinted=tinted,
+        glass=glass,
     )
 
 
@@ -132,7 +152,7 @@ PRINCIPLED = Entry(
     include="material/shader.glsl",
     approximations=(
         Approximation("Subsurface Weight", 0.0, SUBSURFACE),
-        Approximation("Transmission Weight", 0.0, STRAIGHT_THROUGH),
+        Approximation("Thin Wall", 0.0, "Light passes thin walls straight on, without roughness."),
         THIN_FILM,
     ),
     summary=_principled,
@@ -254,16 +274,17 @@ ENTRIES = (
             DISTRIBUTION,
         ),
         include="material/shader.glsl",
-        note=STRAIGHT_THROUGH,
+        approximations=(THIN_FILM,),
+        setting_approximations=OTHER_DISTRIBUTIONS,
         summary=_glass,
     ),
     Entry(
         "ShaderNodeBsdfRefraction",
-        "shader_transparent",
-        (Socket("Color", "COLOR", WHITE),),
+        "shader_refraction",
+        (Socket("Color", "COLOR", WHITE), Socket("Roughness", "FLOAT"), Socket("IOR", "FLOAT", 1.45), NORMAL),
         include="material/shader.glsl",
-        note=STRAIGHT_THROUGH,
-        summary=_transparent,
+        setting_approximations=OTHER_DISTRIBUTIONS,
+        summary=_refraction,
     ),
     Entry(
         "ShaderNodeBsdfRayPortal",

@@ -1,0 +1,213 @@
+"""Traced refraction: what glass lets through, bent at every interface on the way, by one walk per pixel and sample.
+
+Each walk starts with the transmission lobe of the surface that the camera sees (shaders/lib/refraction.glsl, Walter et
+al. 2007, energy of multiple scattering restored as in Cycles), and goes on through what it meets: at interfaces it is
+mirrored or bent by lot, in proportion to Fresnel's reflectance; a light, the world or an opaque surface ends it.
+
+    L_t(v) = sum over interfaces k of  T_k (light of this sample's points through k  +  what the walk finds behind k)
+
+T_k is the product of f |cos| / p up to k. Points on lights and directions of the walk find the same light at rough
+interfaces, weighted by the power heuristic (Veach 1997); at smooth ones, only the walk finds what has an extent. What
+the first interface brings is Transmission Direct of Cycles' passes, the rest Transmission Indirect. Here, glass does
+not count as a bounce: it is followed through `interfaces` of them however few bounces the scene allows.
+
+| cost | per sample |
+|---|---|
+| draws | the surface pass once more, without what is transparent |
+| rays | per pixel of glass and interface 1 for the walk, 1 for lights; 1 at the surface where it ends |
+| fetches per ray | about 6 per node and 10 per leaf visited; 15 per interface |
+
+Fails: above 4 million triangles nothing is traced, and glass lets light pass straight on (surfaces.py).
+
+Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
+its bumps. Surfaces behind glass reflect direct light only, evenly, by their albedo where they stand behind glass in the
+picture, too, and else by their material's mean. Light falls through glass in straight lines, so glass casts tinted
+shadows and no caustics. Against Cycles: within 2 % for a rough ball below a world of which Cycles draws no light
+samples; where it does, its own result for rough glass rises by up to 11 % (a world symmetric in x shows it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+import numpy as np
+
+from ..frame import acceleration, lights
+from ..frame.environment import WORLD
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique, Write
+from ..frame.view import VIEW
+from ..gfx import images, passes
+from ..materials.compiler import may_emit, may_refract
+from ..snapshot.scene import Snapshot
+from .emissive_light import EmissiveTriangles
+from .reflectance import Reflectance
+from .surfaces import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
+
+WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
+EMISSIVE_POINTS = 2
+MOST_LAMPS = lights.MOST_LIGHTS - WORLD_DIRECTIONS - EMISSIVE_POINTS
+REFRACTION = passes.fullscreen_program(
+    "traced refraction",
+    "light/refraction.frag.glsl",
+    textures=(
+        *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
+        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
+        ("FLOAT_2D", "reflectance"), ("FLOAT_2D", "interface_table"), ("FLOAT_2D", "behind_position"),
+        ("FLOAT_2D", "behind_albedo"),
+    ),
+    blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
+    constants=(
+        ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "trace_levels"), ("INT", "interfaces"),
+        ("INT", "world_transmission"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"),
+        ("FLOAT", "emissive_points"),
+    ),
+    outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
+)  # fmt: skip
+ALBEDO = passes.fullscreen_program(
+    "surface albedo",
+    "surface/albedo.frag.glsl",
+    textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table")),
+    blocks=((VIEW, "film_view"),),
+    outputs=(("VEC4", "out_position"), ("VEC4", "out_albedo")),
+)
+
+
+class TracedRefraction(Technique):
+    name = "traced_refraction"
+    label = "Traced refraction"
+    slot = "transmission"
+    params = (
+        Param(
+            "interfaces", "Interfaces", 8,
+            "How many more surfaces of glass light may cross or be mirrored at on its way to the first one", 0, 32,
+        ),
+    )  # fmt: skip
+    reads = SURFACES
+    writes = (
+        Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
+        Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
+    )
+
+    def __init__(self):
+        self._sources = lights.Sources()
+        self._reflectance = Reflectance()
+        self._interfaces: images.Image | None = None
+        self._triangles: EmissiveTriangles | None = None
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        if not any(may_refract(snapshot.materials[slot].graph) for slot in used):
+            return "no material is glass"
+        return acceleration.too_many(snapshot)
+
+    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
+        return tuple(material.graph for material in snapshot.materials)
+
+    def prepare(self, frame: Frame) -> None:
+        """Tell the shader how the materials behind the first interface bend light: two texels for each."""
+        table = np.zeros((len(frame.materials.compiled), 2, 4), np.float32)
+        for row, material in zip(table, frame.materials.compiled):
+            if material.glass:
+                glass = material.glass
+                row[0] = *glass.color, glass.ior
+                losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
+                row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
+        self._interfaces = images.upload(table)
+
+    def run(self, frame: Frame) -> None:
+        if frame.sample == 0:
+            self._begin(frame)
+        rows = self._source_rows(frame)
+        behind = self._draw_behind(frame)
+        hierarchy = frame.hierarchy("transmission")
+        passes.fullscreen(
+            REFRACTION,
+            frame.target("radiance.transmission_direct", "radiance.transmission_indirect"),
+            blend="ADDITIVE_PREMULT",
+            textures={
+                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
+                "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
+                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
+                "reflectance": self._reflectance.image, "interface_table": self._interfaces,
+                "behind_position": behind.colors[0], "behind_albedo": behind.colors[1],
+            },
+            blocks={
+                "film_view": frame.view_block, "world_light": frame.environment.block,
+                "sources": self._sources.set(rows),
+            },
+            constants={
+                "light_count": len(rows), "offset_size": 1e-6 * frame.geometry.size,
+                "trace_levels": hierarchy.levels, "interfaces": frame.settings.get(self, "interfaces"),
+                "world_transmission": int(self._world), "world_samples": float(WORLD_DIRECTIONS),
+                "emissive_power": self._triangles.power if self._triangles else 0.0,
+                "emissive_points": float(EMISSIVE_POINTS),
+            },
+        )  # fmt: skip
+        for image in behind.colors:
+            images.pool.give(image)
+        frame.count(self, "passes")
+        frame.count(self, "light samples", len(rows))
+
+    def _draw_behind(self, frame: Frame) -> images.Target:
+        """Places and reflectances of what stands behind glass in the picture. Its images go back to the pool."""
+        surfaces = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
+        depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
+        behind = images.Target(tuple(images.pool.take(*frame.size, "RGBA32F") for _ in range(2)))
+        draw_surfaces(frame, self, images.Target(tuple(surfaces), depth), LEFT_OUT, refracts=False)
+        passes.fullscreen(
+            ALBEDO,
+            behind,
+            textures={
+                **{name: image for (_, name), image in zip(SURFACE_TEXTURES, surfaces)},
+                "energy_table": frame.materials.energy_table,
+            },
+            blocks={"film_view": frame.view_block},
+        )
+        for image in (*surfaces, depth):
+            images.pool.give(image)
+        return behind
+
+    def _begin(self, frame: Frame) -> None:
+        self._reflectance.update(frame)
+        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+        self._emitters = [e for e in found if e is not None and e.light.visibility.transmission]
+        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        self._triangles = None
+        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
+            triangles = EmissiveTriangles(frame)
+            self._triangles = triangles if triangles.power > 0 else None
+        world = frame.snapshot.world
+        self._world = frame.environment.power > 0 and world.visibility.transmission
+
+    def _source_rows(self, frame: Frame) -> list[np.ndarray]:
+        """Points of this sample on lights, emissive surfaces and the world. More lamps than fit are drawn by lot, and
+        count more: both as points and where a ray meets them."""
+        rows = []
+        count = len(self._emitters)
+        chosen = np.arange(count)
+        if count > MOST_LAMPS:
+            chosen = (np.arange(MOST_LAMPS) + frame.random("refraction/choose")[0]) * count / MOST_LAMPS
+            chosen = chosen.astype(int)
+        for number in chosen:
+            emitter = self._emitters[number]
+            sample = emitter.sample(*frame.random_volume("refraction/light"))
+            row = emitter.row(sample, 0, int(emitter.light.cast_shadow), max(count / MOST_LAMPS, 1.0))
+            rows.append(row)
+        seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
+        if self._triangles is not None:
+            for k in range(EMISSIVE_POINTS):
+                point, normal, radiance, density = self._triangles.draw(*frame.random_volume(f"refraction/emissive{k}"))
+                rows.append(lights.surface_row(point, normal, radiance, density * EMISSIVE_POINTS, seen, 0, 1))
+        if self._world:
+            for k in range(WORLD_DIRECTIONS):
+                index = frame.sample * WORLD_DIRECTIONS + k
+                direction, radiance, density = frame.environment.draw(*frame.random_at(index, "refraction/world"))
+                rows.append(lights.direction_row(direction, radiance / density, density, seen, 0, 1, WORLD_DIRECTIONS))
+        return rows
+
+    def release(self) -> None:
+        self._sources.release()
+        self._reflectance.release()
+        self._interfaces = self._triangles = None

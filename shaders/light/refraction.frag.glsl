@@ -1,0 +1,191 @@
+// Light that arrives through glass: a walk over interfaces, from the pixel's own through those of solids behind it, to
+// a light, the world or a surface. At each interface the lights of this sample are asked directly (one traced), and the
+// walk goes on by the interface's lobe; what both can find is weighted by the power heuristic.
+//
+// What the first interface lets arrive is direct; all else is indirect, as in Cycles' passes.
+#include "lib/refraction.glsl"
+#include "indirect/path.glsl"
+#include "lib/environment.glsl"
+
+// Share of a technique of density `density` against another one of density `other`.
+float power_share(float density, float other)
+{
+  float ratio = other / max(density, 1e-30);
+  return 1.0 / (1.0 + ratio * ratio);
+}
+
+// Light from this sample's points through an interface; one of them is traced, drawn by what it would bring.
+vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, float choice, uint salt)
+{
+  float total = 0.0;
+  float kept_importance = 0.0;
+  int kept = -1;
+  vec3 kept_direction = vec3(0.0);
+  vec3 kept_light = vec3(0.0);
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    vec3 direction;
+    float density;
+    vec3 light_arriving = light_sample(light, position, direction, density);
+    float lobe_density;
+    light_arriving *= interface_value(surface, direction, lobe_density);
+    if (density > 0.0) {
+      light_arriving *= power_share(light.rate * density, lobe_density);
+    }
+    float importance = dot(abs(light_arriving), vec3(1.0));
+    if (importance > 0.0 && is_finite(importance)) {
+      total += importance;
+      float p = importance / total;
+      if (choice < p) {
+        choice /= p;
+        kept = i;
+        kept_importance = importance;
+        kept_direction = direction;
+        kept_light = light_arriving;
+      }
+      else {
+        choice = (choice - p) / max(1.0 - p, 1e-7);
+      }
+    }
+  }
+  if (kept < 0) {
+    return vec3(0.0);
+  }
+  Light light = light_read(kept);
+  vec3 side = (dot(kept_direction, geometric_normal) < 0.0) ? -geometric_normal : geometric_normal;
+  vec3 origin = ray_origin(position, side);
+  float reach = light_reach(light, origin, kept_direction);
+  ivec2 hit;
+  bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
+                 && trace_layers(origin, kept_direction, reach, reach, salt, true, hit) < reach;
+  return blocked ? vec3(0.0) : kept_light * (total / kept_importance);
+}
+
+// What a ray of the walk finds before `limit` in lights and world. `lobe_density` 0: only the walk can find it.
+vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit)
+{
+  vec3 sum = vec3(0.0);
+  if (limit >= 1e29 && world_transmission != 0) {
+    vec3 radiance = environment_radiance(direction);
+    if (lobe_density > 0.0) {
+      radiance *= power_share(lobe_density, world_samples * environment_density(direction));
+    }
+    sum += radiance;
+  }
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    float hit_distance;
+    float density;
+    vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
+    if (hit_distance <= limit) {
+      sum += radiance * ((lobe_density > 0.0) ? power_share(lobe_density, light.rate * density) : 1.0);
+    }
+  }
+  return sum;
+}
+
+// What a surface behind glass reflects: exactly where it stands behind the glass in the picture, too, else the mean of its
+// material. `behind` holds places and reflectances of all that is not transparent.
+vec3 albedo_behind(ivec2 hit, vec3 position, vec3 normal)
+{
+  ivec2 pixel;
+  float slant;
+  float footprint;
+  if (pixel_of(position, normal, pixel, slant, footprint)) {
+    vec4 seen = texelFetch(behind_position, pixel, 0);
+    if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
+      return texelFetch(behind_albedo, pixel, 0).rgb;
+    }
+  }
+  return mean_albedo(hit);
+}
+
+void main()
+{
+  out_direct = vec4(0.0);
+  out_indirect = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (texelFetch(surface_position, pixel, 0).w == 0.0 || max_component(texelFetch(surface_tint, pixel, 0).rgb) <= 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+  if (s.kind != LOBE_REFRACTION) {
+    return;
+  }
+  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 53u));
+  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 13)));
+  vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
+  float choice = shuffled(film_view.sample_index, salt.zx);
+  Interface surface = interface_begin(s.glossy_normal, to_viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
+                                      s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
+  vec3 position = s.position;
+  vec3 geometric_normal = s.geometric_normal;
+  vec3 throughput = vec3(1.0);
+  for (int step = 0; step <= interfaces; step++) {
+    vec3 gained = throughput * light_through(surface, position, geometric_normal, choice, roll.x);
+    vec3 weight;
+    vec3 direction = interface_sample(surface, u, (step == 0) ? 1.0 : choice, weight);
+    float lobe_density;
+    interface_value(surface, direction, lobe_density);
+    // Interpolated normals and triangle may differ on which side a direction leaves.
+    bool passes = dot(direction, surface.normal) < 0.0;
+    float side = dot(direction, geometric_normal);
+    throughput *= (passes == (side < 0.0)) ? weight : vec3(0.0);
+    float t = 1e29;
+    ivec2 hit;
+    vec3 origin = ray_origin(position, passes ? -geometric_normal : geometric_normal);
+    bool goes_on = max_component(throughput) > 1e-4;
+    vec3 normal = vec3(0.0);
+    if (goes_on) {
+      t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, hit);
+      gained += throughput * light_found(origin, direction, lobe_density, t);
+      goes_on = t < 1e29;
+    }
+    if (goes_on) {
+      vec3 emission = triangle_emission(hit, normal);
+      float light_density = luminance(abs(emission)) * t * t
+                            / max(emissive_power * abs(dot(normal, direction)), 1e-30);
+      gained += throughput * emission
+                * ((lobe_density > 0.0) ? power_share(lobe_density, emissive_points * light_density) : 1.0);
+    }
+    if (step == 0) {
+      out_direct.rgb += gained;
+    }
+    else {
+      out_indirect.rgb += gained;
+    }
+    if (!goes_on) {
+      break;
+    }
+
+    position = origin + t * direction;
+    roll = hash3(roll + uvec3(uint(step), 0u, 0u));
+    int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+    vec4 glass = texelFetch(interface_table, ivec2(0, material), 0);
+    vec4 shape = texelFetch(interface_table, ivec2(1, material), 0);
+    vec3 smooth_normal = triangle_shading_normal(hit, position);
+    normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
+    bool leaves = dot(normal, direction) > 0.0;
+    geometric_normal = leaves ? -normal : normal;
+    if (to_unit(roll.x) >= shape.y) {
+      vec3 albedo = albedo_behind(hit, position, geometric_normal);
+      vec3 irradiance = direct_irradiance(position, geometric_normal, 1, to_unit(roll.y), roll.z);
+      out_indirect.rgb += throughput * albedo * irradiance / PI;
+      break;
+    }
+    smooth_normal = leaves ? -smooth_normal : smooth_normal;
+    smooth_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : geometric_normal;
+    float ior = leaves ? 1.0 / glass.w : glass.w;
+    vec3 scale = vec3(1.0);
+    if (shape.z > 1.5) {
+      scale = glass_multiscatter(glass.rgb, -dot(smooth_normal, direction), shape.x, ior);
+    }
+    surface = interface_begin(smooth_normal, -direction, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
+                              scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
+    roll = hash3(roll);
+    u = vec2(to_unit(roll.x), to_unit(roll.y));
+    choice = to_unit(roll.z);
+    roll = hash3(roll);
+  }
+}

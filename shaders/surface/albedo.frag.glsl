@@ -1,0 +1,16 @@
+// What the surfaces of the surface images reflect, glossy reflection included, and where they are.
+#include "lib/gbuffer.glsl"
+#include "lib/brdf.glsl"
+#include "indirect/albedo.glsl"
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  out_position = texelFetch(surface_position, pixel, 0);
+  out_albedo = vec4(0.0);
+  if (out_position.w != 0.0) {
+    Surface s = SURFACE_READ(pixel);
+    vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+    out_albedo.rgb = surface_albedo(s, max(dot(s.geometric_normal, to_viewer), 0.0));
+  }
+}

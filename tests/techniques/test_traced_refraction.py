@@ -1,0 +1,164 @@
+"""Glass: how much passes one interface and where to, by Snell and Fresnel; solids against a white world and Cycles."""
+
+import numpy as np
+import pytest
+
+from .conftest import places
+
+SIZE = (24, 24)
+SLOW = pytest.mark.slow
+
+
+def fresnel(cosine, ior):
+    inside = np.sqrt(1 - (1 - cosine**2) / ior**2)
+    s = (cosine - ior * inside) / (cosine + ior * inside)
+    p = (inside - ior * cosine) / (inside + ior * cosine)
+    return (s * s + p * p) / 2
+
+
+def passing(images, order="direct"):
+    """Radiance of a transmission pass, (H, W, 3)."""
+    return images[f"transmission_{order}"][..., :3] * images["transmission_color"][..., :3]
+
+
+def glass(stage, roughness=0.0, ior=1.5, color=(1, 1, 1, 1)):
+    return stage.material("ShaderNodeBsdfGlass", Color=color, Roughness=roughness, IOR=ior)
+
+
+def tilted_camera(stage, degrees, span=4.0):
+    tilt = np.radians(degrees)
+    camera = stage.camera_above(span)
+    camera.location, camera.rotation_euler = (0, -20 * np.sin(tilt), 20 * np.cos(tilt)), (tilt, 0, 0)
+    camera.data.clip_end = 1000
+
+
+def ball(stage, material, radius=1.0, rings=24):
+    """A smooth-shaded sphere around the origin."""
+    turn = np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False)
+    heights = np.linspace(0, np.pi, rings + 1)[1:-1]
+    corners = [(radius * np.sin(h) * np.cos(t), radius * np.sin(h) * np.sin(t), radius * np.cos(h))
+               for h in heights for t in turn]  # fmt: skip
+    corners += [(0, 0, radius), (0, 0, -radius)]
+    n, faces = len(turn), []
+    for row in range(rings - 2):
+        faces += [
+            (row * n + k, (row + 1) * n + k, (row + 1) * n + (k + 1) % n, row * n + (k + 1) % n) for k in range(n)
+        ]
+    faces += [(len(corners) - 2, k, (k + 1) % n) for k in range(n)]
+    last = (rings - 2) * n
+    faces += [(len(corners) - 1, last + (k + 1) % n, last + k) for k in range(n)]
+    made = stage.mesh(corners, faces, material=material)
+    made.data.shade_smooth()
+    return made
+
+
+@pytest.mark.parametrize("degrees", [0, 60])
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_smooth_interface_passes_what_fresnel_leaves(stage, degrees, inside):
+    """From inside, beyond 41.8 degrees, nothing."""
+    stage.rectangle((-99, -99), (99, 99), material=glass(stage), turn=(np.pi * inside, 0, 0))
+    stage.world((1.0, 0.5, 0.25))
+    tilted_camera(stage, degrees)
+    found = passing(stage.render(16, SIZE)).mean(axis=(0, 1))
+    cosine = np.cos(np.radians(degrees))
+    if inside and degrees:
+        expected = 0.0
+    else:
+        expected = 1 - fresnel(cosine, 1 / 1.5 if inside else 1.5)
+    assert found == pytest.approx(expected * np.array([1.0, 0.5, 0.25]), abs=2e-3)
+
+
+def test_what_stands_behind_an_interface_is_seen_where_snell_says(stage):
+    """An emissive half plane a metre below the interface: its edge moves to y = depth * tan of the bent angle."""
+    stage.rectangle((-99, -99), (99, 99), material=glass(stage, ior=1.5))
+    light = stage.material("ShaderNodeEmission", Strength=1.0)
+    stage.rectangle((-99, 0), (99, 99), z=-1.0, material=light)
+    tilted_camera(stage, 45)
+    found = passing(stage.render(16, SIZE)).mean(axis=(1, 2))
+    _, along = places(SIZE)
+    on_glass = along[:, 0] / np.cos(np.radians(45))
+    bent = np.arcsin(np.sin(np.radians(45)) / 1.5)
+    edge = -np.tan(bent)
+    step = on_glass[1] - on_glass[0]
+    lit = found > 0.5 * found.max()
+    assert on_glass[lit].min() == pytest.approx(edge, abs=step)
+    assert lit[on_glass > edge + step].all()
+
+
+@pytest.mark.parametrize("roughness", [0.0, pytest.param(0.3, marks=SLOW)])
+def test_a_white_solid_vanishes_in_a_white_world(stage, roughness):
+    """The mean over the ball; Cycles has 0.96 for roughness 0.3, where the shared factor for multiple scattering does
+    not hold direction by direction."""
+    ball(stage, glass(stage, roughness))
+    stage.world()
+    stage.camera((0, -5, 1), (np.pi / 2 - 0.2, 0, 0), 0.4)
+    images = stage.render(32, SIZE)
+    inside = images["transmission_color"][..., 0] > 0.5
+    assert inside.sum() > 100
+    assert images["combined"][inside][:, :3].mean() == pytest.approx(1.0, abs=0.01 if roughness == 0 else 0.07)
+
+
+@pytest.mark.parametrize("roughness", [0.3, pytest.param(0.6, marks=SLOW)])
+@pytest.mark.parametrize("inside", [False, True])
+def test_rough_interfaces_bend_a_sun_as_in_cycles(stage, roughness, inside):
+    """The value of f cos itself, for one direction to the viewer."""
+    stage.rectangle((-99, -99), (99, 99), material=glass(stage, roughness), turn=(np.pi * inside, 0, 0))
+    tilted_camera(stage, 20)
+    for turn in ((np.pi - 0.1, 0.2, 0), (np.pi + 0.4, -0.3, 0)):
+        sun = stage.light("SUN", turn=turn, angle=0.02)
+        ours = stage.render(64, (4, 4))
+        cycles = stage.render(256, (4, 4), engine="CYCLES")
+        expected = passing(cycles).mean()
+        assert expected > 1e-3
+        assert passing(ours).mean() == pytest.approx(expected, rel=0.01)
+        stage.scene.collection.objects.unlink(sun)
+
+
+@pytest.mark.parametrize("kind", ["area", pytest.param("emissive", marks=SLOW)])
+def test_light_behind_rough_glass_is_as_bright_as_in_cycles(stage, kind):
+    stage.rectangle((-9, -9), (9, 9), material=glass(stage, 0.4, color=(0.9, 0.7, 0.5, 1.0)))
+    tilted_camera(stage, 25)
+    if kind == "area":
+        stage.light("AREA", (0.3, 0, -1), turn=(np.pi, 0, 0), size=1.5)
+    else:
+        stage.rectangle((-0.7, -0.7), (0.7, 0.7), z=-1.0, material=stage.material("ShaderNodeEmission", Strength=5.0))
+    ours = passing(stage.render(64, SIZE))
+    cycles = passing(stage.render(1024, SIZE, engine="CYCLES"))
+    assert ((ours - cycles) ** 2).sum() < 0.005 * (cycles**2).sum()
+
+
+@SLOW
+def test_a_ball_of_glass_shows_the_world_as_in_cycles(stage):
+    ball(stage, glass(stage, color=(0.9, 0.8, 1.0, 1.0)), rings=32)
+    stage.world((0.2, 0.4, 0.8))
+    stage.light("SUN", turn=(2.6, 0.3, 0), angle=0.6, energy=2.0)
+    stage.camera((0, -5, 1), (np.pi / 2 - 0.2, 0, 0), 0.5)
+    ours = passing(stage.render(64, SIZE), "indirect")
+    cycles = passing(stage.render(1024, SIZE, engine="CYCLES", bounces=12), "indirect")
+    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.01)
+    assert ((ours - cycles) ** 2).sum() < 0.01 * (cycles**2).sum()
+
+
+def test_surfaces_behind_glass_keep_their_texture(stage):
+    """A floor of two halves, seen through two interfaces. Light on its way to the floor passes each with the mean of a
+    dielectric, 0.9."""
+    stage.mesh([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], material=stage.diffuse(0.2))
+    stage.mesh([(0, -9, 0), (9, -9, 0), (9, 9, 0), (0, 9, 0)], [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    stage.light("SUN", turn=(0.5, 0, 0), energy=np.pi / np.cos(0.5))  # apart from its image in the panes
+    for z in (1.0, 1.2):
+        stage.rectangle((-9, -9), (9, 9), z=z, material=glass(stage))
+    stage.camera_above(4.0)
+    found = passing(stage.render(32, SIZE), "indirect").mean(axis=(0, 2))
+    # Both interfaces are entered from above, so the ray stays as it is but for what each mirrors.
+    passed = (1 - fresnel(1.0, 1.5)) ** 2 * 0.9**2
+    assert found[:10].mean() == pytest.approx(0.2 * passed, rel=0.03)
+    assert found[-10:].mean() == pytest.approx(0.8 * passed, rel=0.03)
+    assert found[:11].max() < 0.3 * passed < 0.6 * passed < found[-11:].min()
+
+
+def test_scenes_without_glass_pay_nothing(stage):
+    stage.floor(material=stage.principled())
+    stage.light("SUN")
+    stage.camera_above()
+    stage.render(1, SIZE)
+    assert stage.ledger.row("traced_refraction").reason == "no material is glass"
