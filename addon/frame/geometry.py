@@ -230,7 +230,9 @@ class SceneGeometry:
             kept[(key, attributes)] = cached
             surfaces, casters = cached
             for first, count, covered in spans:
-                self._plan += [(covered, material, batch, first, count, False) for material, batch in surfaces]
+                for material, batch in surfaces:
+                    shown = [k for k in covered if material in instances[k].materials]
+                    self._plan.append((shown or covered, material, batch, first, count, False))
                 self._plan += [(covered, -1, batch, first, count, True) for batch in casters]
         self._plan.sort(key=lambda entry: entry[1])
         self._mesh_draws = kept

@@ -20,7 +20,7 @@ from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.struct import Block
-from .surfaces import OPAQUE, SURFACE_TEXTURES
+from .surfaces import STOCHASTIC, SURFACE_TEXTURES
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
@@ -82,7 +82,7 @@ class Reflectance:
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
         bindings["blocks"]["film_view"] = Block(VIEW, **_view(low, high, backward))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
-            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": OPAQUE, "refracts": 0})
+            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": STOCHASTIC, "refracts": 0})
             for draw in draws:
                 shader.set_constant("first_instance", draw.first)
                 passes.draw(shader, draw.batch, draw.count)

@@ -147,3 +147,25 @@ def test_what_a_mirror_shows_of_lit_surfaces_is_glossy_indirect_light(stage, ren
     stage.scene.camera.location = (0, 0, -1.0)
     stage.scene.objects["Mesh"].visible_camera = False
     assert shown == pytest.approx(render(1, samples=64)["diffuse_direct"].mean(), rel=0.03)
+
+
+def light_of_a_card_out_of_sight(stage, half, alpha):
+    """Mean light that a standing card, seen edge-on, throws onto a floor of `half` width; the sun shines on both."""
+    stage.clear()
+    stage.floor(half=half, material=stage.diffuse(0.8))
+    paint = stage.principled(Base_Color=(0.8, 0.8, 0.8, 1), Alpha=alpha, Roughness=1.0, Specular_IOR_Level=0.0)
+    stage.mesh([(-1, 0.6, 0), (1, 0.6, 0), (1, 0.6, 1.5), (-1, 0.6, 1.5)], [(0, 1, 2, 3)], material=paint)
+    stage.light("SUN", turn=(0.9, 0, 0), energy=3.0)
+    stage.camera_above(3.0)
+    return float(stage.render(16, bounces=1)["diffuse_indirect"].mean())
+
+
+def test_light_of_a_small_thing_out_of_sight_does_not_depend_on_how_wide_the_scene_is(stage):
+    narrow = light_of_a_card_out_of_sight(stage, 3.0, 1.0)
+    assert narrow > 0.01
+    assert light_of_a_card_out_of_sight(stage, 40.0, 1.0) == pytest.approx(narrow, rel=0.05)
+
+
+def test_a_half_transparent_card_reflects_half_of_the_light(stage):
+    whole = light_of_a_card_out_of_sight(stage, 3.0, 1.0)
+    assert light_of_a_card_out_of_sight(stage, 3.0, 0.5) == pytest.approx(whole / 2, rel=0.05)
