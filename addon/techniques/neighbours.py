@@ -55,24 +55,29 @@ def shown_alone(frame: Frame) -> bool:
     return frame.sample == 0 and (frame.settings.samples == 1 or frame.settings.draft)
 
 
-def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str) -> None:
-    """Add what surfaces reflect of `arriving` to an image of radiance; filtered, if the sample is shown alone."""
-    with images.borrowed(*frame.size, "RGBA32F") as mean:
-        if shown_alone(frame):
-            _mean(frame, MEAN, arriving, mean, 1)
-            arriving = mean.colors[0]
-            frame.count(technique, "filtered samples")
-        _reflect(frame, arriving, path, "ADDITIVE_PREMULT")
+def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str, noisy: bool = False) -> None:
+    """Add what surfaces reflect of `arriving` to an image of radiance. If the sample is shown alone, of its mean over
+    4x4 pixels, or 16x16 where it is `noisy`.
+    """
+    blend = "ADDITIVE_PREMULT"
+    if shown_alone(frame):
+        _reflect_mean(frame, technique, MEAN, arriving, path, blend, noisy)
+    else:
+        _reflect(frame, arriving, path, blend)
 
 
 def smooth(frame: Frame, technique: Technique, path: str) -> None:
     """Filter an image of diffuse radiance that holds this sample alone over 16x16 pixels, if it is shown alone."""
-    if not shown_alone(frame):
-        return
+    if shown_alone(frame):
+        _reflect_mean(frame, technique, MEAN_OF_REFLECTED, frame.images[path], path, "NONE", True)
+
+
+def _reflect_mean(frame: Frame, technique: Technique, program, light, path: str, blend: str, noisy: bool) -> None:
     with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
-        _mean(frame, MEAN_OF_REFLECTED, frame.images[path], near, 1)
-        _mean(frame, MEAN_AGAIN, near.colors[0], far, 4)
-        _reflect(frame, far.colors[0], path, "NONE")
+        _mean(frame, program, light, near, 1)
+        if noisy:
+            _mean(frame, MEAN_AGAIN, near.colors[0], far, 4)
+        _reflect(frame, (far if noisy else near).colors[0], path, blend)
     frame.count(technique, "filtered samples")
 
 

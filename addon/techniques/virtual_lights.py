@@ -108,11 +108,7 @@ class VirtualLights:
 
     def make(self, frame: Frame, technique, count: int) -> VirtualLightSet:
         """At most `count` virtual lights for this sample. Counts rays in the technique's ledger row."""
-        if frame.sample == 0:
-            self.reflectance.update(frame)
-            self._begin(frame)
-        rows = self._source_rows(frame)
-        self._source_block, self._source_count = self._sources.set(rows), len(rows)
+        self.draw_sources(frame)
         found = self._candidates(frame)
         point, normal, radiance, shorter = (
             images.read(image).reshape(-1, 4)[:, :3].astype(np.float64) for image in found.colors
@@ -137,6 +133,14 @@ class VirtualLights:
             self._block.update(light=light)
         frame.count(technique, "virtual lights", len(keep))
         return VirtualLightSet(point[keep], normal[keep], intensity, self._block)
+
+    def draw_sources(self, frame: Frame) -> None:
+        """Points on light sources for this sample's paths, and what materials reflect: what `path_bindings` needs."""
+        if frame.sample == 0:
+            self.reflectance.update(frame)
+            self._begin(frame)
+        rows = self._source_rows(frame)
+        self._source_block, self._source_count = self._sources.set(rows), len(rows)
 
     def path_bindings(self, frame: Frame) -> dict:
         """What shaders/indirect/path.glsl needs: textures, blocks and constants of this sample."""

@@ -1,30 +1,76 @@
 // Radiance that arrives from what the picture shows, as its cosine-weighted mean over the hemisphere: the diffuse albedo
 // times this is reflected. What stands nearer on the screen hides what stands behind it.
+//
+// With RAYS the sectors from which the screen brings no light are not lost: one of those of all fans is traced.
 #include "ssdo/fan.glsl"
+#ifdef RAYS
+#include "indirect/path.glsl"
+#endif
 
-vec3 fan_light(Fan fan, Surface s, vec2 u)
+// Light of a fan, and the sectors that may hold more: all but those from which light was taken.
+vec3 fan_light(Fan fan, Surface s, vec2 u, out uint open)
 {
   uint taken = fan.below;
+  open = ~fan.below;
   vec3 sum = vec3(0.0);
   vec2 last = vec2(0.0, film_depth(fan.origin));
-  for (int i = 0; i < step_count; i++) {
+  for (int i = 0; i < step_count && taken != 0xFFFFFFFFu; i++) {
     Patch found;
     if (!fan_step(fan, i, fract(u + float(i) * vec2(0.6180339887, 0.7548776662)), last, found)) {
       continue;
     }
-    uint seen = found.sectors & ~taken;
-    taken |= seen;
+    uint seen = found.front & ~taken;
+    taken |= found.sectors;
     if (seen != 0u && found.faces) {
       vec3 direction = safe_normalize(found.position - fan.origin);
       vec3 radiance = texelFetch(senders, found.texel, 0).rgb;
       sum += radiance * diffuse_weight(s, fan.toward, direction) * float(bitCount(seen));
-    }
-    if (taken == 0xFFFFFFFFu) {
-      break;
+      open &= ~seen;
     }
   }
   return sum / 32.0;
 }
+
+#ifdef RAYS
+// A direction of one of a fan's sectors that are not taken.
+vec3 open_direction(Fan fan, uint open, float which, float within)
+{
+  int skipped = min(int(which * float(bitCount(open))), bitCount(open) - 1);
+  for (int i = 0; i < skipped; i++) {
+    open &= open - 1u;
+  }
+  float sector = float(findLSB(open));
+  float low = max(sector - fan.rounding, 0.0);
+  float high = (sector > 30.5) ? 32.0 : sector + 1.0 - fan.rounding;
+  return fan_direction(fan, mix(low, high, within) / 32.0);
+}
+
+// Radiance along a ray, with all that reaches its end in further reflections; paths go on by lot.
+vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
+{
+  vec3 sum = vec3(0.0);
+  vec3 throughput = vec3(1.0);
+  for (int bounce = 0; bounce < bounces; bounce++) {
+    Vertex vertex;
+    float t;
+    if (!trace_vertex(origin, direction, 1e29, roll.z, vertex, t)) {
+      break;
+    }
+    throughput *= vertex.albedo;
+    roll = hash3(roll);
+    sum += throughput * direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y) / PI;
+    float stay = min(max_component(throughput), 1.0);
+    if (to_unit(roll.z) >= stay) {
+      break;
+    }
+    throughput /= stay;
+    roll = hash3(roll);
+    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    origin = ray_origin(vertex.position, vertex.normal);
+  }
+  return sum;
+}
+#endif
 
 void main()
 {
@@ -40,12 +86,32 @@ void main()
   vec2 turn = tile_numbers(pixel, film_view.bits_x, film_view.bits_y);
   vec2 within = tile_numbers(pixel, film_view.bits_z, film_view.bits_w);
   uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 13)));
+#ifdef RAYS
+  float open_sectors = 0.0;
+  vec3 chosen = s.normal;
+#endif
   for (int i = 0; i < fan_count; i++) {
     roll = hash3(roll);
     Fan fan;
     vec3 direction = cosine_direction(s.normal, fan_numbers(turn, i));
     if (fan_begin(s, gl_FragCoord.xy, direction, to_unit(roll.x), fan)) {
-      out_arriving.rgb += fan_light(fan, s, fan_numbers(within, i)) / float(fan_count);
+      uint open;
+      out_arriving.rgb += fan_light(fan, s, fan_numbers(within, i), open) / float(fan_count);
+#ifdef RAYS
+      float count = float(bitCount(open));
+      open_sectors += count;
+      roll = hash3(roll);
+      if (count > 0.0 && to_unit(roll.x) * open_sectors < count) {
+        chosen = open_direction(fan, open, to_unit(roll.y), to_unit(roll.z));
+      }
+#endif
     }
   }
+#ifdef RAYS
+  if (open_sectors > 0.0 && dot(chosen, s.geometric_normal) > 0.0) {
+    vec3 found = path_radiance(ray_origin(s.position, s.geometric_normal), chosen, hash3(roll));
+    vec3 weight = diffuse_weight(s, viewer_direction(s.position), chosen);
+    out_arriving.rgb += found * weight * (open_sectors / (32.0 * float(fan_count)));
+  }
+#endif
 }

@@ -37,8 +37,9 @@ struct Patch {
   ivec2 texel;
   vec3 position;
   vec3 normal;
-  bool faces;     // the fan's origin
-  uint sectors;
+  bool faces;    // the fan's origin
+  uint sectors;  // that it hides
+  uint front;    // of these, those of the side that is seen
 };
 
 float fan_measure(Fan fan, float t)
@@ -205,8 +206,10 @@ bool fan_step(Fan fan, int index, vec2 u, inout vec2 last, out Patch found)
   bool falling = angle_from > angle_to;
   // What lies behind the patch is as thick as asked: its shadow ends at the back of its farther end.
   vec3 back = falling ? point_from + normalize(ray_from) * thickness : point_to + normalize(ray_to) * thickness;
-  float end = max(max(angle_from, angle_to), fan_angle(fan, back));
-  found.sectors = fan_sectors(fan, fan_share(fan, min(angle_from, angle_to)), fan_share(fan, end));
+  float near = fan_share(fan, min(angle_from, angle_to));
+  float end = max(angle_from, angle_to);
+  found.front = fan_sectors(fan, near, fan_share(fan, end));
+  found.sectors = fan_sectors(fan, near, fan_share(fan, max(end, fan_angle(fan, back))));
   return true;
 }
 

@@ -6,7 +6,7 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
-from tests.techniques.test_instant_radiosity import corner, wall_irradiance
+from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
 
 @pytest.fixture
@@ -44,11 +44,21 @@ def heights(rows, elevation):
 def test_a_wall_gets_light_from_the_floor_by_their_form_factor(stage, render, elevation):
     elevation = np.radians(elevation)
     wall_and_floor(stage, elevation)
-    light = render(samples=16, steps=48, radius=100.0)[:, 21:27].mean(axis=(1, 2)) * np.pi
+    light = render(samples=16, steps=48, radius=100.0, rays=False)[:, 21:27].mean(axis=(1, 2)) * np.pi
     rows = np.arange(26, 24 + int(24 * np.cos(elevation)) - 1)
     expected = wall_irradiance(heights(rows, elevation))
     np.testing.assert_allclose(light[rows], expected, rtol=0.15)
     assert light[rows].mean() == pytest.approx(expected.mean(), rel=0.03)
+
+
+@pytest.mark.parametrize("bounces", [1, 8])
+def test_rays_bring_what_the_screen_does_not_show(stage, render, bounces):
+    """A sphere lit from its centre, of which a tenth is in the picture: the series of reflections, all the same."""
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    light = render(bounces, samples=8, size=(24, 24))
+    assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
+    assert render(1, samples=8, size=(24, 24), rays=False).mean() < 0.1
 
 
 @pytest.mark.parametrize("visibility", ["BITS", "POINTS"])
@@ -72,10 +82,10 @@ def test_points_never_send_more_than_the_directions_that_they_stand_for(stage, r
 def test_surfaces_that_face_away_hide_light_and_send_none(stage, render):
     """A board between floor and wall, whose lit side the camera sees: the wall sees its dark side."""
     wall_and_floor(stage, np.radians(45))
-    open_light = render(samples=16, radius=100.0)
+    open_light = render(samples=16, radius=100.0, rays=False)
     board = stage.mesh([(0.4, 0, 0), (0.4, 1, 0), (0.4, 1, 0.3), (0.4, 0, 0.3)], [(0, 1, 2, 3)])
     board.data.materials.append(stage.diffuse(0.8))
-    hidden = render(samples=16, radius=100.0)
+    hidden = render(samples=16, radius=100.0, rays=False)
     low_on_the_wall = slice(26, 30), slice(20, 28)
     assert hidden[low_on_the_wall].mean() < open_light[low_on_the_wall].mean()
     assert (hidden <= 1.3 * open_light.max()).all()
@@ -110,7 +120,7 @@ def test_bounces_add_up_like_powers_of_the_albedo(stage, render):
     """Each bounce brings the one before once more through the same form factors: less than the albedo of it."""
     corner(stage, albedo=0.5)
     stage.scene.candela.ssdo_bounces = 8
-    light = [render(n, samples=16).mean() for n in (1, 2, 3, 4)]
+    light = [render(n, samples=16, rays=False).mean() for n in (1, 2, 3, 4)]
     steps = np.diff([0.0, *light])
     assert (steps > 0).all()
     assert (steps[1:] < 0.5 * steps[:-1]).all()
