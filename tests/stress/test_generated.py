@@ -140,6 +140,8 @@ def coplanar(scene: Scene) -> bool:
 @drawn
 @given(scene=scenes(SLOTS))
 def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, scene):
+    """Of direct light. Virtual lights share their points among lamps: in the mean only (test_instant_radiosity.py)."""
+    scene = replace(scene, bounces=0)
     with kept(kept_stage, scene, "halves"):
         assume(scene.lamps)
         whole = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]

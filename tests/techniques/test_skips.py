@@ -33,7 +33,12 @@ def no_world(stage):
     stage.scene.world = None
 
 
+def no_glass(stage):
+    stage.remove(stage.pane)
+
+
 def no_gloss(stage):
+    no_glass(stage)
     for thing in stage.scene.objects:
         if thing.type == "MESH" and thing is not stage.paper:
             thing.data.materials[0] = stage.diffuse(0.5)
@@ -58,6 +63,7 @@ WITHOUT = {
     "environment_light": no_world,
     "directional_occlusion": no_world,
     "traced_glossy": no_gloss,
+    "traced_refraction": no_glass,
     "instant_radiosity": no_bounces,
     "ssdo": no_bounces,
 }
@@ -65,12 +71,13 @@ WITHOUT = {
 
 @pytest.fixture
 def room(stage):
-    """A scene that needs every technique: a floor with gloss, a box, lamps, a paper lamp that shines, a world."""
+    """A scene that needs every technique: a floor with gloss, a box, glass, lamps, a paper that shines, a world."""
     stage.floor(material=stage.principled(Roughness=0.3))
     stage.rectangle((-1, -0.3), (0.4, 0.3), 0.5, material=stage.diffuse(0.5))
     stage.paper = stage.rectangle(
         (0.6, -0.4), (1.0, 0.4), 0.8, material=stage.material("ShaderNodeEmission", Strength=2.0)
     )
+    stage.pane = stage.rectangle((-1, 0.6), (0, 1.2), 0.4, material=stage.material("ShaderNodeBsdfGlass"))
     stage.lamps = [stage.light("AREA", (0.5, 0.7, 2), size=1.0), stage.light("SUN", turn=(0.3, 0, 0))]
     stage.remove_lamps = lambda: [setattr(lamp, "hide_render", True) for lamp in stage.lamps]
     stage.world((0.2, 0.3, 0.4))
