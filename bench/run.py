@@ -11,7 +11,9 @@ from __future__ import annotations
 import argparse
 import datetime as dt
 import json
+import math
 import os
+import statistics
 import subprocess
 import sys
 import time
@@ -23,7 +25,7 @@ from bench.cells import ROOT, Cell, Scene, Series, Store, in_turns
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
-GUESS = {"CANDELA": (0.3, 0.15), "BLENDER_EEVEE": (9.0, 0.02), "CYCLES": (0.4, 0.04)}  # seconds: fixed, per sample
+GUESS = {"CANDELA": (0.3, 0.15), "BLENDER_EEVEE": (8.0, 0.02), "CYCLES": (0.4, 0.06)}  # seconds: fixed, per sample
 OPENING = 4.0  # seconds to start a worker and open a scene
 
 
@@ -63,18 +65,29 @@ class Worker:
 
 
 def predicted(cell: Cell, known: dict[tuple[Scene, Series, int], float]) -> float:
-    """Seconds that a cell will take, from those of the same series and scene; else from those of its engine."""
-    same = {n: seconds for (scene, series, n), seconds in known.items() if (scene, series) == (cell.scene, cell.series)}
-    fixed, each = GUESS[cell.series.engine]
-    if not same:
-        engine = [
-            seconds * (fixed + each * cell.samples) / (fixed + each * n)
-            for (scene, series, n), seconds in known.items()
-            if series.engine == cell.series.engine and scene == cell.scene
+    """Seconds that a cell will take: from the same series and scene, else from its engine in this scene, else in all.
+
+    What is known of others is scaled by the guess for both; of several, the median counts.
+    """
+    for like in (
+        lambda scene, series: (scene, series) == (cell.scene, cell.series),
+        lambda scene, series: (scene, series.engine) == (cell.scene, cell.series.engine),
+        lambda scene, series: series.engine == cell.series.engine,
+    ):
+        found = [
+            (n, seconds / guess(series, n)) for (scene, series, n), seconds in known.items() if like(scene, series)
         ]
-        return max(engine, default=2.0 * (fixed + each * cell.samples))
-    nearest = min(same, key=lambda n: abs(n - cell.samples))
-    return same[nearest] * (fixed + each * cell.samples) / (fixed + each * nearest)
+        if found:
+            nearest = min(abs(math.log(n / cell.samples)) for n, _ in found)
+            ratios = [ratio for n, ratio in found if abs(math.log(n / cell.samples)) == nearest]
+            return statistics.median(ratios) * guess(cell.series, cell.samples)
+    return guess(cell.series, cell.samples)
+
+
+def guess(series: Series, samples: int) -> float:
+    """Seconds of a cell on two cores at 128x96 pixels."""
+    fixed, each = GUESS[series.engine]
+    return fixed + each * samples
 
 
 def that_fit(cells: list[Cell], cost: Callable[[Cell], float], seconds: float) -> list[Cell]:

@@ -7,6 +7,9 @@ within it the engines take turns, so that whatever else the machine does falls o
 A time is that of a whole render with Combined alone, from Blender's call to the finished picture. Light paths come from
 another render with the same seed, which is not timed (Candela hands out the passes of the frame that it has). Errors
 are against one reference with all bounces, so that what an engine leaves out shows as bias.
+
+Candela's programs compile in a render that is reported apart. EEVEE's first render counts: on a software GPU its later
+ones of a scene take longer than the first (see bench/quick.py). Cycles compiles nothing here.
 """
 
 from __future__ import annotations
@@ -188,10 +191,9 @@ def render(opened: Open, series: Series, samples: int, seed: int, size: tuple[in
 def measure(opened: Open, series: Series, samples: int, size: tuple[int, int]) -> dict:
     """Times, errors per light path and, for Candela, stages and counters of one cell."""
     figures: dict = {"cold": None}
-    kind = replace(series, label="", samples=(), main=False, denoised=False)
-    if kind not in opened.warm and series.engine != "CYCLES":
-        # Programs compile; Cycles has none here, and what it loads is loaded by the reference.
-        figures["cold"] = render(opened, series, 1 if series.engine != "CANDELA" else samples, 1000, size)["seconds"]
+    kind = replace(series, label="", samples=(), main=False)
+    if series.own and kind not in opened.warm:
+        figures["cold"] = render(opened, series, samples, 1000, size)["seconds"]
     opened.warm.add(kind)
     times, cpu, combined = [], [], []
     for run in range(RUNS):

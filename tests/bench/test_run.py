@@ -63,12 +63,14 @@ def test_dearest_cells_are_left_out_and_main_ones_last():
     assert run.that_fit([own, eevee, other], costs.get, 0.0) == []
 
 
-def test_time_is_predicted_from_the_nearest_cell_of_the_series():
-    known = {(ROOM, OWN, 4): 2.0, (ROOM, OWN, 16): 6.0}
-    fixed, each = run.GUESS["CANDELA"]
-    assert run.predicted(cell(OWN, 32), known) == pytest.approx(6.0 * (fixed + 32 * each) / (fixed + 16 * each))
+def test_time_is_predicted_from_what_is_most_alike():
+    known = {(ROOM, OWN, 4): 2.0, (ROOM, OWN, 16): 6.0, (ROOM, CYCLES, 4): 1.0}
     assert run.predicted(cell(OWN, 4), known) == 2.0
-    assert run.predicted(cell(EEVEE, 16), known) > run.GUESS["BLENDER_EEVEE"][0]
+    assert run.predicted(cell(OWN, 32), known) == pytest.approx(6.0 * run.guess(OWN, 32) / run.guess(OWN, 16))
+    assert run.predicted(cell(OWN, 4, HALL), known) == pytest.approx(2.0)
+    other = replace(CYCLES, denoised=True)
+    assert run.predicted(cell(other, 4), known) == pytest.approx(1.0)
+    assert run.predicted(cell(EEVEE, 16), known) == run.guess(EEVEE, 16)
 
 
 def test_choice_of_techniques_comes_from_the_registry():
