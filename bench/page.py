@@ -1,4 +1,4 @@
-"""The page of the benchmark, the README's picture and the table of docs/performance.md: `python -m bench page`.
+"""The page of the benchmark, and its part of the README and of docs/performance.md: `python -m bench page`.
 
 Reads bench/results/bench.json (and growth.json, profile.json beside it, where they are) and renders nothing.
 """
@@ -28,7 +28,7 @@ from bench.figures import (
 from bench.run import OUT, RESULTS
 
 PEERS = ("EEVEE", "EEVEE, ray traced", "Cycles", "Cycles, denoised")
-PERFORMANCE = ROOT / "docs" / "performance.md"
+README, PERFORMANCE = ROOT / "README.md", ROOT / "docs" / "performance.md"
 PICTURE = ROOT / "docs" / "images" / "bench.png"
 BEGIN, END = "<!-- written by `python -m bench page` -->", "<!-- end of what is written -->"
 
@@ -287,13 +287,24 @@ def generated_part(results: Results, grown: list[dict], profiled: list[dict]) ->
     return "\n\n".join(parts)
 
 
-def put_between(text: str, part: str) -> str:
-    """The text with what stands between its two marks replaced. ValueError when it has none."""
-    before, begin, rest = text.partition(BEGIN)
+def readme_part(results: Results) -> str:
+    """The part of the README: the picture, and the means of the table."""
+    means = summary(results)[-1]
+    rows = [("geometric mean over the scenes", "time for equal error", "error in equal time")]
+    for number, peer in enumerate(PEERS):
+        rows.append((f"{peer}, over Candela", means[1 + 2 * number], means[2 + 2 * number]))
+    picture = "![Time against error of every sample scene](docs/images/bench.png)"
+    more = "More than 1 is in favour of Candela; [docs/performance.md](docs/performance.md) has every scene."
+    return "\n\n".join([facts(results), picture, markdown(rows), more])
+
+
+def put_between(path: Path, part: str) -> None:
+    """Replace what stands between the two marks of a file. ValueError when it has none."""
+    before, begin, rest = path.read_text(encoding="utf-8").partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):
-        raise ValueError(f"{PERFORMANCE.name} lacks the marks '{BEGIN}' and '{END}'.")
-    return f"{before}{BEGIN}\n\n{part}\n\n{END}{after}"
+        raise ValueError(f"{path.name} lacks the marks '{BEGIN}' and '{END}'.")
+    path.write_text(f"{before}{BEGIN}\n\n{part}\n\n{END}{after}", encoding="utf-8")
 
 
 # ------------------------------------------------------------------------------------------------------------- command
@@ -302,7 +313,7 @@ def put_between(text: str, part: str) -> str:
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
     parser.add_argument("--output", default=OUT / "page", type=Path, metavar="FOLDER")
-    parser.add_argument("--no-docs", action="store_true", help="leave docs/performance.md and its picture as they are")
+    parser.add_argument("--no-docs", action="store_true", help="leave README.md, docs/performance.md and the picture")
 
 
 def rows_beside(path: Path, name: str) -> list[dict]:
@@ -318,7 +329,7 @@ def command(options: argparse.Namespace) -> int:
     print(page)
     if not options.no_docs:
         plots.overview(results, PICTURE)
-        text = PERFORMANCE.read_text(encoding="utf-8")
-        PERFORMANCE.write_text(put_between(text, generated_part(results, grown, profiled)), encoding="utf-8")
-        print(PERFORMANCE)
+        put_between(PERFORMANCE, generated_part(results, grown, profiled))
+        put_between(README, readme_part(results))
+        print(f"{PERFORMANCE}\n{README}")
     return 0

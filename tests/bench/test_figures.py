@@ -83,11 +83,26 @@ def test_page_and_table_say_what_was_found(tmp_path):
     assert "1 of 1 scenes" in page.claims(data)[0]
 
 
-def test_generated_part_replaces_only_what_stands_between_the_marks():
-    text = f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n"
-    assert page.put_between(text, "new") == f"before\n{page.BEGIN}\n\nnew\n\n{page.END}\nafter\n"
-    with pytest.raises(ValueError, match="lacks the marks"):
-        page.put_between("nothing", "new")
+def test_generated_part_replaces_only_what_stands_between_the_marks(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
+    page.put_between(path, "new")
+    assert path.read_text() == f"before\n{page.BEGIN}\n\nnew\n\n{page.END}\nafter\n"
+    path.write_text("nothing")
+    with pytest.raises(ValueError, match=r"page\.md lacks the marks"):
+        page.put_between(path, "new")
+
+
+def test_readme_shows_the_means_of_every_peer():
+    part = page.readme_part(results())
+    assert "| EEVEE, ray traced, over Candela | 10 × | 10 × |" in part
+    assert "| EEVEE, over Candela | – | – |" in part
+
+
+@pytest.mark.parametrize("path", [page.README, page.PERFORMANCE], ids=lambda path: path.name)
+def test_pages_have_the_marks(path):
+    text = path.read_text(encoding="utf-8")
+    assert text.count(page.BEGIN) == text.count(page.END) == 1
 
 
 def test_growth_is_drawn(tmp_path):
