@@ -35,6 +35,7 @@ def show():
     scene = window().scene
     scene.render.engine = ENGINE
     scene.candela.viewport_samples = SAMPLES
+    scene.candela.bounces = 0  # indirect light takes its time without a GPU
     space = viewport_area().spaces.active
     space.region_3d.view_perspective = "CAMERA"
     space.shading.type = "RENDERED"
