@@ -1,18 +1,19 @@
 """Viewport: time to the first picture and to rest, and uploads, for each edit: `python -m bench.viewport`.
 
 The viewport is driven without a window, at 640 x 360 pixels, as Blender's redraws drive it: `draw_frame` again and
-again. Blender's own part of a redraw is not in the figures; `make test-window` notes those of a real window.
+again. Blender's own part of a redraw is not in the figures; what `make test-window` noted of a real window is printed
+too.
 
 An edit is made several times, as by a drag, and each followed by a redraw; what is told is the last. After turning the
-view the picture comes to rest. Uploads are counted where Candela hands data to Blender's `gpu`
-module: images, uniform blocks and vertex buffers. Processor seconds (of all threads) stand beside wall time, because
-they are steadier on a busy machine; on a software GPU that has two cores to itself a step takes somewhat more than half
-of them.
+view the picture comes to rest. Uploads are counted where Candela hands data to Blender's `gpu` module: meshes, and
+bytes of images and of uniform blocks. Processor seconds (of all threads) stand beside wall time, because they are
+steadier on a busy machine; on a software GPU that has two cores to itself a step takes somewhat more than half of them.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,7 +30,8 @@ from addon.ui.properties import settings_of
 
 from .quick import table
 
-SCENES = Path(__file__).resolve().parent.parent / "sample_blends"
+ROOT = Path(__file__).resolve().parent.parent
+SCENES = ROOT / "sample_blends"
 SIZE = (640, 360)
 FIELD = 2000  # objects in the scene of the move
 MOVES = 6
@@ -207,6 +209,23 @@ def measure(name: str, samples: int, bounces: int) -> list[tuple[str, ...]]:
     ]  # fmt: skip
 
 
+def in_a_window() -> None:
+    """Print what the last `make test-window` noted of real windows."""
+    for path in sorted(ROOT.glob("build/window/drive-*/result.json")):
+        found = json.loads(path.read_text())
+        moving = found.get("moving")
+        if moving is None:
+            continue
+        width, height = found["viewport"][2:]
+        print(
+            f"window, {path.parent.name.removeprefix('drive-')}, {width} x {height}: first picture after "
+            f"{found['first_picture_s']:.1f} s, at rest after {found['rest_s']:.0f} s ({found['status']}); while the "
+            f"view turns {moving['steps_per_s']:.1f} steps per second, of which half take less than "
+            f"{1000 * moving['median_step_s']:.0f} ms, at 1/{', 1/'.join(map(str, moving['scales']))} resolution, and "
+            f"{moving['meshes_uploaded']} meshes are uploaded"
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("scenes", nargs="*", default=["soft_shadow_garden", "window_interior", "field"])
@@ -216,6 +235,7 @@ def main() -> None:
     register()
     context.ensure()
     head = "scene", "edit", "ms", "CPU ms", "pixels", "scene read", "meshes", "block bytes", "image bytes"
+    in_a_window()
     print(table([head, *(row for name in options.scenes for row in measure(name, options.samples, options.bounces))]))
 
 
