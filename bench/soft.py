@@ -38,7 +38,7 @@ class Entrant:
     samples: int = 1
 
 
-VSSM, POINTS = "vssm", "accumulated_maps"
+VSSM, CSSM, POINTS = "vssm", "cssm", "accumulated_maps"
 ENTRANTS = (
     Entrant("VSSM", VSSM),
     Entrant("VSSM, rule of the source", VSSM, (("rule", "MEAN"),)),
@@ -48,6 +48,14 @@ ENTRANTS = (
     Entrant("VSSM, 4 texels per pixel", VSSM, (("texels_per_pixel", 4.0),)),
     Entrant("VSSM, 4 samples", VSSM, samples=4),
     Entrant("VSSM, 16 samples", VSSM, samples=16),
+    Entrant("CSSM", CSSM),
+    Entrant("CSSM, table", CSSM, (("prefilter", "TABLE"),)),
+    Entrant("CSSM, order 4", CSSM, (("order", "4"),)),
+    Entrant("CSSM, order 16", CSSM, (("order", "16"),)),
+    Entrant("CSSM, order 16, table", CSSM, (("order", "16"), ("prefilter", "TABLE"))),
+    Entrant("CSSM, 1 cell", CSSM, (("cells", 1),)),
+    Entrant("CSSM, 5 cells", CSSM, (("cells", 5),)),
+    Entrant("CSSM, 16 samples", CSSM, samples=16),
     Entrant("maps, 1 sample", POINTS),
     Entrant("maps, 4 samples", POINTS, samples=4),
     Entrant("maps, 16 samples", POINTS, samples=16),

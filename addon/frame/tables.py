@@ -1,4 +1,4 @@
-"""Summed-area tables and min-max pyramids of images: sums and bounds over any box of texels in a few fetches.
+"""Summed-area tables and pyramids of images: sums, bounds and means over boxes of texels in a few fetches.
 
 A table holds at (x, y) the sum of its source over all texels up to and including x and y. Integer tables wrap modulo
 2^32, which is harmless: the sum over a box, a difference of four entries, is exact as long as it is itself below 2^32.
@@ -39,6 +39,7 @@ class TableSource:
     textures: tuple[tuple[str, str], ...] = ()
     blocks: tuple[tuple[Struct, str], ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
+    defines: tuple[tuple[str, str], ...] = ()
     integer: bool = False
 
     @property
@@ -57,7 +58,7 @@ def _programs(source: TableSource, axis: int, glsl: str, **bound) -> tuple[Progr
         "constants": (("IVEC2", "extent"), *bound.pop("constants", ())),
         "defines": (
             ("TABLE_VALUE", "uvec4" if source.integer else "vec4"), ("STEP", step), ("CHUNK", str(CHUNK)),
-            ("CHUNK_EXTENT", f"ivec2({chunk[0]}, {chunk[1]})"),
+            ("CHUNK_EXTENT", f"ivec2({chunk[0]}, {chunk[1]})"), *source.defines,
         ),
         "snippets": (("generated/source", glsl),),
         **bound,
@@ -114,11 +115,21 @@ def build_table(source: TableSource, table: images.Image, **bindings) -> None:
 
 @dataclass(frozen=True)
 class PyramidSource:
-    """What is bounded: GLSL with `vec2 bounds_source(ivec2 texel)` (least and largest value), and what it binds."""
+    """What is bounded: GLSL with `vec2 bounds_source(ivec2 texel)` (least and largest value), and what it binds.
+
+    With `means`: what is averaged, `vec4 means_source(ivec2 texel)`.
+    """
 
     name: str
     glsl: str
     textures: tuple[tuple[str, str], ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+    defines: tuple[tuple[str, str], ...] = ()
+    means: bool = False
+
+    @property
+    def format(self) -> str:
+        return "RGBA16F" if self.means else "RG32F"
 
 
 def pyramid_size(width: int, height: int) -> tuple[int, int]:
@@ -130,21 +141,27 @@ def level_program(source: PyramidSource) -> Program:
     """Level 1 from a source."""
     return Program(
         name=f"{source.name} pyramid",
-        compute="table/bounds.comp.glsl",
+        compute=f"table/{'means' if source.means else 'bounds'}.comp.glsl",
         textures=source.textures,
-        images=(("pyramid", "RG32F", "FLOAT_2D", "READ_WRITE"),),
-        constants=(("IVEC2", "extent"), ("INT", "source_row"), ("INT", "row")),
+        images=(("pyramid", source.format, "FLOAT_2D", "READ_WRITE"),),
+        constants=(("IVEC2", "extent"), ("INT", "source_row"), ("INT", "row"), *source.constants),
+        defines=source.defines,
         snippets=(("generated/source", source.glsl),),
     )
 
 
-_LEVELS = level_program(
-    PyramidSource("min-max", "vec2 bounds_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel).xy;\n}\n")
-)
+_LEVELS = {
+    False: level_program(
+        PyramidSource("min-max", "vec2 bounds_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel).xy;\n}\n")
+    ),
+    True: level_program(
+        PyramidSource("mean", "vec4 means_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel);\n}\n", means=True)
+    ),
+}
 
 
 def build_pyramid(source: PyramidSource, pyramid: images.Image, levels: int, **bindings) -> None:
-    """Fill levels 1 to `levels` of `pyramid` (RG32F, see `pyramid_size`).
+    """Fill levels 1 to `levels` of `pyramid` (of the source's format, see `pyramid_size`).
 
     The source's width and height are multiples of 2^levels. `bindings` as for `build_table`.
     """
@@ -153,12 +170,13 @@ def build_pyramid(source: PyramidSource, pyramid: images.Image, levels: int, **b
         raise ValueError(f"A pyramid of {levels} levels needs sides that 2^{levels} divides, not {width}x{height}.")
     for level in range(1, levels + 1):
         first = level == 1
-        program = level_program(source) if first else _LEVELS
+        program = level_program(source) if first else _LEVELS[source.means]
         extent = (width >> level, height >> level)
         passes.compute(
             program, extent, images={"pyramid": pyramid}, textures=bindings.get("textures", {}) if first else {},
             constants={
                 "extent": extent, "row": height - (height >> (level - 1)),
                 "source_row": 0 if first else height - (height >> (level - 2)),
+                **(bindings.get("constants", {}) if first else {}),
             },
         )  # fmt: skip

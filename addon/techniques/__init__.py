@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
+from .cssm import ConvolutionSoftShadows
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
@@ -22,6 +23,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     LightProbes,
     AccumulatedMaps,
     VarianceSoftShadows,
+    ConvolutionSoftShadows,
     DirectLight,
     EmissiveLight,
     EnvironmentLight,

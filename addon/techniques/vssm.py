@@ -56,35 +56,21 @@ maps.
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import replace
 
-import numpy as np
-
-from ..frame import depth_maps, lights, tables
+from ..frame import tables
 from ..frame.run import Frame
 from ..frame.technique import Param
-from ..gfx import images
-from .accumulated_maps import CUTOFF, RESOLUTION, AccumulatedMaps, Lookup, Maps, map_resolution
+from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
+from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
-# A blocker so much nearer to the light than the farthest receiver counts as if it stood there: its kernel is smaller
-# than it should be, but receivers keep 10 of the table's 15 bits.
-MOST_RANGE = 32.0
-_RANGE = {"textures": (("FLOAT_2D", "depth_bounds"), ("FLOAT_2D", "depth_limits"))}
-_CONSTANTS = (("INT", "bounds_rows"), ("INT", "top_level"))
-BOUNDS = tables.PyramidSource(
-    "depth bounds",
-    "vec2 bounds_source(ivec2 texel)\n{\n  vec4 caster = texelFetch(depth_maps, texel, 0);\n"
-    "  return (caster.w > 0.0) ? caster.xx : vec2(0.0);\n}\n",
-    textures=(("FLOAT_2D", "depth_maps"),),
-)
 MOMENTS = tables.TableSource(
     "depth moments",
     '#include "vssm/moments.glsl"\n',
-    textures=(("FLOAT_2D", "depth_maps"), *_RANGE["textures"]),
-    constants=_CONSTANTS,
+    textures=(("FLOAT_2D", "depth_maps"), *LIMIT_TEXTURES),
+    constants=LIMIT_CONSTANTS,
     integer=True,
 )
 
@@ -93,18 +79,17 @@ def _lookup(rule: str, cells: int) -> Lookup:
     return Lookup(
         f"variance soft shadows, {rule.lower()}, {cells} cells",
         "vssm/visibility.glsl",
-        textures=(*_RANGE["textures"], ("UINT_2D", "depth_table")),
-        constants=_CONSTANTS,
+        textures=(*LIMIT_TEXTURES, ("UINT_2D", "depth_table")),
+        constants=LIMIT_CONSTANTS,
         defines=(("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
     )
 
 
 LOOKUPS = tuple(lighting(_lookup(rule, 5), False) for rule, _, _ in RULES)
 MOMENT_ROWS, MOMENT_COLUMNS = tables.table_programs(MOMENTS)  # chunk sums and scan of each
-DEPTH_BOUNDS = tables.level_program(BOUNDS)
 
 
-class VarianceSoftShadows(AccumulatedMaps):
+class VarianceSoftShadows(SoftMaps):
     name = "vssm"
     label = "Variance soft shadow maps"
     slot = "shadow"
@@ -115,87 +100,13 @@ class VarianceSoftShadows(AccumulatedMaps):
         Param(
             "rule", "Rule", "BOUNDS", "What tells whether the moments of a cell can be trusted", items=RULES,
         ),
-        Param(
-            "refine", "Refine", True,
-            "With more samples, each stands for a smaller part of the light, so that the error goes to zero; else "
-            "every sample shows the whole light from its middle",
-        ),
+        REFINE,
     )  # fmt: skip
 
-    def __init__(self):
-        super().__init__()
-        self._drawn: tuple[weakref.ref, tuple, Maps] | None = None
-        self._bounds: images.Image | None = None
-        self._table: images.Image | None = None
-
-    def cell(self, frame: Frame, number: int, points: float) -> float:
-        if not frame.settings.get(self, "refine"):
-            return 1.0
-        # What is shown while it grows has `number` + 1 points up to here.
-        return float((points if frame.settings.whole else number + 1) ** -0.5)
-
-    def resolution(self, frame: Frame) -> int:
-        """A power of two, so that no entry of the pyramid lies in two views."""
-        return 1 << round(np.log2(map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))))
-
-    def jitter(self, frame: Frame, emitter: lights.Emitter, number: int) -> tuple[float, float, float, float]:
-        if not frame.settings.get(self, "refine"):
-            number = 0
-        shift_x, shift_y, turn, other = super().jitter(frame, emitter, number)
-        if emitter.has_span:
-            turn = depth_maps.turn_along(-emitter.axis, emitter.u[:3])  # boxes of texels are the light's shape
-        return shift_x, shift_y, turn, other
-
-    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
-        return [replace(view, cell=cell) for view in super().views(frame, emitter, sample, number, cell)]
-
-    def draw(self, frame: Frame, views: list) -> Maps:
-        key = tuple((view.rows.tobytes(), view.cell) for view in views)
-        compiled = frame.materials.compiled
-        varies = any(compiled[draw.material].transparent for draw in frame.geometry.draws)  # alpha is drawn by lot
-        if not varies and self._drawn is not None and self._drawn[0]() is frame and self._drawn[1] == key:
-            frame.count(self, "maps kept", len(views))
-            return self._drawn[2]
-        maps = self._prepared(frame, views, super().draw(frame, views))
-        self._drawn = (weakref.ref(frame), key, maps)
-        return maps
-
-    def _prepared(self, frame: Frame, views: list, maps: Maps) -> Maps:
-        """Pyramid and table of the part of the atlas that holds views."""
-        side = self.resolution(frame) if views else 1
-        rectangles = maps.views[:, 4] if len(maps.views) else np.zeros((1, 4))
-        width, height = (int(-(-(rectangles[:, k] + rectangles[:, 2]).max() // side)) * side for k in (0, 1))
-        width, height = max(width, 2), max(height, 2)
-        levels = max(int(np.log2(side)), 1)
-        bounds_size = tables.pyramid_size(width, height)
-        self._bounds = _grown(self._bounds, bounds_size, "RG32F")
-        self._table = _grown(self._table, (width, height), "RGBA32UI")
-        limits = np.zeros((height // max(side, 2), width // max(side, 2)), np.float32)
-        for view, (x, y, _, _) in zip(views, rectangles):
-            place = (int(y) // side, int(x) // side)
-            limits[place] = max(limits[place], 1.0 if not view.light_point[3] else MOST_RANGE * view.least_q)
-        constants = {"bounds_rows": height, "top_level": levels}
-        if views:
-            tables.build_pyramid(BOUNDS, self._bounds, levels, textures={"depth_maps": maps.atlas})
-        shared = {"depth_bounds": self._bounds, "depth_limits": images.upload(np.maximum(limits, 1e-30), "R32F")}
-        if views:
-            bound = {"depth_maps": maps.atlas, **shared}
-            tables.build_table(MOMENTS, self._table, textures=bound, constants=constants)
+    def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
+        table = self.kept("table", size, "RGBA32UI")
+        if drawn:
+            bound = {"depth_maps": maps.atlas, **maps.textures}
+            tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
         lookup = _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"))
-        return replace(maps, lookup=lookup, textures={**shared, "depth_table": self._table}, constants=constants)
-
-    def release(self) -> None:
-        super().release()
-        for image in (self._bounds, self._table):
-            if image is not None:
-                images.pool.give(image)
-        self._bounds = self._table = self._drawn = None
-
-
-def _grown(image: images.Image | None, size: tuple[int, int], image_format: str) -> images.Image:
-    """The image if it has the size, else another one of the pool."""
-    if image is not None and image.size == size:
-        return image
-    if image is not None:
-        images.pool.give(image)
-    return images.pool.take(*size, image_format)
+        return replace(maps, lookup=lookup, textures={**maps.textures, "depth_table": table})

@@ -139,3 +139,47 @@ float kernel_height(Light light, ShadowReceiver r, vec2 extent, float most_size)
   }
   return (height <= r.slack) ? 0.0 : height;
 }
+
+// What was found in a kernel or in the window where blockers are looked for.
+struct Blockers {
+  float whole;
+  float blocked;
+  float height;  // above the receiver's point, summed over what is blocked
+  vec2 extent;  // of the kernel per unit of height: what stands outside its own kernel is no blocker; 0 = do not ask
+  vec2 horizon;  // fall of the cosine per texel, relative to the light's middle; 0 = the same for all of the kernel
+};
+
+// Adds a share of a cell at `offset` texels from the receiver, blocked at `height` above the receiver's point. What
+// stands above a steep receiver's plane but not above its point lies beside all rays to the light.
+void kernel_add(inout Blockers found, vec2 offset, vec2 half_cell, float height, float weight)
+{
+  if (height <= 0.0) {
+    return;
+  }
+  if (found.extent.x > 0.0 && any(greaterThan(abs(offset) - half_cell, max(found.extent * height, vec2(0.5))))) {
+    return;
+  }
+  found.blocked += weight;
+  found.height += weight * height;
+}
+
+// `least`: height that a blocker has at least; a kernel of few texels sees tilted casters beside their texels' centres.
+void kernel_texel(inout Blockers found, ShadowReceiver r, vec3 normal, ivec2 texel, float least, float weight)
+{
+  found.whole += weight;
+  if (shadow_blocked(r, vec2(texel), normal)) {
+    float q = texelFetch(depth_maps, ivec2(r.rectangle.xy) + texel, 0).x;
+    kernel_add(found, vec2(texel) + 0.5 - r.texel, vec2(0.5), max(q - r.q, least), weight);
+  }
+}
+
+// Mean cosine, relative to that of the light's middle, over a part of the kernel.
+float kernel_cosine(Blockers found, vec2 offset, vec2 half_part)
+{
+  float cosine = 1.0 - dot(found.horizon, offset);
+  float reach = dot(abs(found.horizon), half_part);
+  if (abs(cosine) < reach) {
+    return (cosine + reach) * (cosine + reach) / (4.0 * reach);  // what lies below the horizon cut off
+  }
+  return max(cosine, 0.0);
+}

@@ -87,6 +87,25 @@ def test_a_pyramid_holds_the_bounds_of_every_block(gpu_context, size, levels):
         np.testing.assert_array_equal(part[..., 1], blocks.max(axis=(1, 3)))
 
 
+def test_a_pyramid_of_means_holds_the_mean_of_every_block(gpu_context):
+    pixels = np.random.default_rng(4).uniform(-1.0, 1.0, (32, 64, 4)).astype(np.float32)
+    source = tables.PyramidSource(
+        "colors",
+        "vec4 means_source(ivec2 texel)\n{\n  return texelFetch(colors, texel, 0);\n}\n",
+        textures=(("FLOAT_2D", "colors"),),
+        means=True,
+    )
+    pyramid = images.create(*tables.pyramid_size(64, 32), source.format)
+    tables.build_pyramid(source, pyramid, 5, textures={"colors": images.upload(pixels)})
+    found = images.read(pyramid)
+    for level in range(1, 6):
+        block = 1 << level
+        first = 32 - (32 >> (level - 1))
+        blocks = pixels.reshape(32 // block, block, 64 // block, block, 4).mean(axis=(1, 3))
+        part = found[first : first + 32 // block, : 64 // block]
+        assert part == pytest.approx(blocks, abs=level * 2.0**-11)  # half floats, rounded at each level
+
+
 def test_a_pyramid_of_sides_that_do_not_halve_is_refused(gpu_context):
     source = tables.PyramidSource("none", "vec2 bounds_source(ivec2 texel)\n{\n  return vec2(0.0);\n}\n")
     with pytest.raises(ValueError, match="needs sides that 2\\^3 divides, not 12x8"):

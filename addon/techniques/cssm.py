@@ -1,0 +1,107 @@
+"""Convolution soft shadow maps: blocker search and penumbra as filters of one depth map that was prefiltered.
+
+The comparison of depths becomes a Fourier series whose terms can be averaged beforehand (addon/frame/convolution.py).
+The blocker search asks it for the share of nearer texels and their mean depth,
+
+    z_avg = [W * f z] / [W * f],   f(d, z) = 1 where z < d,
+
+the second step for the share of blockers in the kernel that this depth gives. Both cost the same whatever the size of
+the kernel, and nothing branches: for pictures with many lights. A single important light is better served by vssm,
+whose comparison has no least distance.
+
+Ours: the kernel is cut into `cells` squared boxes, each compared with the receiver's plane at its place, so that tilted
+receivers do not shadow themselves, and blockers are asked for only above the receiver's point; kernels of a few texels
+look at texels, so contacts are closed without the source's sharpening, a power of the visibility; the part of the
+light below the receiver's horizon does not count; a min-max pyramid settles most pixels.
+
+| cost | per map of N x N texels, order M |
+|---|---|
+| basis, by table | 4 dispatches, 16 (M + 1) bytes per texel kept, as much borrowed |
+| basis, by pyramid | log2 N dispatches, 4 (M + 1) bytes per texel |
+| lookup | cells^2 boxes, each (M + 1) + M / 2 means: 4 fetches by table, 8 by pyramid |
+
+All lights of a round share atlas and basis images.
+
+Bias (direct diffuse and glossy light): as vssm. In addition blockers nearer to the receiver than twice the series'
+offset (6.4 % of the depth range with order 4, 1.6 % with 16) block in part only where the kernel is wider than a few
+texels. It goes to zero with order and samples.
+
+Source: Annen, Dong, Mertens, Bekaert, Seidel, Kautz, "Real-time, all-frequency shadows in dynamic scenes", SIGGRAPH
+2008.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..frame import tables
+from ..frame.convolution import PYRAMID, TABLE, Basis, series
+from ..frame.run import Frame
+from ..frame.technique import Param
+from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
+from .direct_light import lighting
+from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps
+
+ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
+PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
+SEARCH_OFFSET = 0.42  # of the blocker search's tapered series, over its order: 0.105 with 4 terms
+
+
+def _basis(order: int, prefilter: str) -> Basis:
+    return Basis(
+        f"convolution shadows, order {order}",
+        '#include "cssm/basis.glsl"\n',
+        order,
+        prefilter,
+        textures=(("FLOAT_2D", "depth_maps"), *LIMIT_TEXTURES),
+        constants=LIMIT_CONSTANTS,
+    )
+
+
+def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
+    scale, offset = series(order)
+    by_table = prefilter == TABLE
+    return Lookup(
+        f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells",
+        "cssm/visibility.glsl",
+        textures=(*LIMIT_TEXTURES, ("UINT_2D", "basis_table") if by_table else ("FLOAT_2D", "basis_means")),
+        constants=(*LIMIT_CONSTANTS, ("IVEC2", "base_extent"), ("INT", "tile_columns"), ("INT", "basis_rows")),
+        defines=(
+            ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
+            ("SERIES_OFFSET", f"{offset:.6f}"), ("SEARCH_OFFSET", f"{SEARCH_OFFSET / order:.6f}"),
+            *((("PREFILTER_TABLE", "1"),) if by_table else ()),
+        ),
+    )  # fmt: skip
+
+
+BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
+BASIS_ROWS, BASIS_COLUMNS = tables.table_programs(_basis(8, TABLE).source)  # chunk sums and scan of each
+LOOKUPS = tuple(lighting(_lookup(8, prefilter, 4), False) for prefilter, _, _ in PREFILTERS)
+
+
+class ConvolutionSoftShadows(SoftMaps):
+    name = "cssm"
+    label = "Convolution soft shadow maps"
+    slot = "shadow"
+    params = (
+        RESOLUTION,
+        CUTOFF,
+        Param("order", "Order", "8", "Terms of the series that compares depths", items=ORDERS),
+        Param("prefilter", "Prefilter", PYRAMID, "How means over boxes of texels are made", items=PREFILTERS),
+        Param("cells", "Cells", 4, "Boxes along each side of a kernel", 1, 6),
+        REFINE,
+    )  # fmt: skip
+
+    def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
+        order, prefilter = int(frame.settings.get(self, "order")), frame.settings.get(self, "prefilter")
+        basis = _basis(order, prefilter)
+        image = self.kept("basis", *basis.image(*size))
+        if drawn:
+            bound = {"depth_maps": maps.atlas, **maps.textures}
+            basis.build(image, size, maps.constants["top_level"], bound, maps.constants)
+        return replace(
+            maps,
+            lookup=_lookup(order, prefilter, frame.settings.get(self, "cells")),
+            textures={**maps.textures, "basis_table" if prefilter == TABLE else "basis_means": image},
+            constants={**maps.constants, **basis.constants_for(*size)},
+        )

@@ -1,0 +1,123 @@
+"""What shadow techniques share that see a light as a whole, or a part of it, from one depth map.
+
+Which part a map stands for follows from the samples: all of the light with one, a part whose extents shrink by sqrt(n)
+with n (AccumulatedMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they
+are lit or in full shadow, and the limits of its depths. A map is kept as long as nothing that it shows changes.
+
+How a kernel follows from the light and a blocker's height stands in shaders/lib/soft_kernel.glsl, the two steps
+(blocker search, penumbra) in shaders/lib/soft_visibility.glsl; a technique brings what it filters the map to, and how
+it asks a box of the filtered map for blockers.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import replace
+
+import numpy as np
+
+from ..frame import depth_maps, lights, tables
+from ..frame.run import Frame
+from ..frame.technique import Param
+from ..gfx import images
+from .accumulated_maps import AccumulatedMaps, Maps, map_resolution
+
+REFINE = Param(
+    "refine", "Refine", True,
+    "With more samples, each stands for a smaller part of the light, so that the error goes to zero; else every sample "
+    "shows the whole light from its middle",
+)  # fmt: skip
+LIMIT_TEXTURES = (("FLOAT_2D", "depth_bounds"), ("FLOAT_2D", "depth_limits"))
+LIMIT_CONSTANTS = (("INT", "bounds_rows"), ("INT", "top_level"))
+BOUNDS = tables.PyramidSource(
+    "depth bounds",
+    "vec2 bounds_source(ivec2 texel)\n{\n  vec4 caster = texelFetch(depth_maps, texel, 0);\n"
+    "  return (caster.w > 0.0) ? caster.xx : vec2(0.0);\n}\n",
+    textures=(("FLOAT_2D", "depth_maps"),),
+)
+DEPTH_BOUNDS = tables.level_program(BOUNDS)
+
+
+class SoftMaps(AccumulatedMaps):
+    """Base of the techniques; `filtered` is theirs."""
+
+    def __init__(self):
+        super().__init__()
+        self._drawn: tuple[weakref.ref, tuple, Maps] | None = None
+        self._kept: dict[str, images.Image] = {}
+
+    def cell(self, frame: Frame, number: int, points: float) -> float:
+        if not frame.settings.get(self, "refine"):
+            return 1.0
+        # What is shown while it grows has `number` + 1 points up to here.
+        return float((points if frame.settings.whole else number + 1) ** -0.5)
+
+    def resolution(self, frame: Frame) -> int:
+        """A power of two, so that no entry of the pyramid lies in two views."""
+        return 1 << round(np.log2(map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))))
+
+    def jitter(self, frame: Frame, emitter: lights.Emitter, number: int) -> tuple[float, float, float, float]:
+        if not frame.settings.get(self, "refine"):
+            number = 0
+        shift_x, shift_y, turn, other = super().jitter(frame, emitter, number)
+        if emitter.has_span:
+            turn = depth_maps.turn_along(-emitter.axis, emitter.u[:3])  # boxes of texels are the light's shape
+        return shift_x, shift_y, turn, other
+
+    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
+        return [replace(view, cell=cell) for view in super().views(frame, emitter, sample, number, cell)]
+
+    def draw(self, frame: Frame, views: list) -> Maps:
+        key = (self.resolution(frame), *((view.rows.tobytes(), view.cell) for view in views))
+        compiled = frame.materials.compiled
+        varies = any(compiled[draw.material].transparent for draw in frame.geometry.draws)  # alpha is drawn by lot
+        if not varies and self._drawn is not None and self._drawn[0]() is frame and self._drawn[1] == key:
+            frame.count(self, "maps kept", len(views))
+            return self._drawn[2]
+        maps = self._with_bounds(frame, views, super().draw(frame, views))
+        self._drawn = (weakref.ref(frame), key, maps)
+        return maps
+
+    def _with_bounds(self, frame: Frame, views: list, maps: Maps) -> Maps:
+        """Pyramid, limits and filtered maps of the part of the atlas that holds views."""
+        side = self.resolution(frame) if views else 2
+        rectangles = maps.views[:, 4] if len(maps.views) else np.zeros((1, 4))
+        width, height = (max(int(-(-(rectangles[:, k] + rectangles[:, 2]).max() // side)), 1) * side for k in (0, 1))
+        levels = max(int(np.log2(side)), 1)
+        bounds = self.kept("bounds", tables.pyramid_size(width, height), "RG32F")
+        constants = {"bounds_rows": height, "top_level": levels}
+        if views:
+            tables.build_pyramid(BOUNDS, bounds, levels, textures={"depth_maps": maps.atlas})
+        limits = images.upload(_limits(views, rectangles, (height // side, width // side), side), "RG32F")
+        shared = {"depth_bounds": bounds, "depth_limits": limits}
+        return self.filtered(frame, replace(maps, textures=shared, constants=constants), (width, height), bool(views))
+
+    def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
+        """`maps`, whose part `size` holds views, with the lookup and what it needs; without views nothing is built."""
+        raise NotImplementedError
+
+    def kept(self, name: str, size: tuple[int, int], image_format: str) -> images.Image:
+        """The technique's image of this name, another one of the pool if size or format differ."""
+        image = self._kept.get(name)
+        if image is None or image.size != size or image.format != image_format:
+            if image is not None:
+                images.pool.give(image)
+            image = self._kept[name] = images.pool.take(*size, image_format)
+        return image
+
+    def release(self) -> None:
+        super().release()
+        for image in self._kept.values():
+            images.pool.give(image)
+        self._kept.clear()
+        self._drawn = None
+
+
+def _limits(views: list, rectangles: np.ndarray, shape: tuple[int, int], side: int) -> np.ndarray:
+    """(rows, columns, 2) float32 by cell of the atlas: least q of its receivers, and 1 where views are perspective."""
+    limits = np.zeros((*shape, 2), np.float32)
+    limits[..., 0] = np.inf
+    for view, (x, y, _, _) in zip(views, rectangles):
+        place = (int(y) // side, int(x) // side)
+        limits[place] = min(limits[place][0], max(view.least_q, 0.0)), view.light_point[3]
+    return np.where(np.isfinite(limits), limits, 0.0).astype(np.float32)

@@ -1,0 +1,124 @@
+// Visibility of a light with extent, or of the part of it that a map stands for, in two steps: the mean height of the
+// blockers in the largest kernel that matters, then the share of blockers in the kernel of that height.
+//
+// The technique that includes this file last brings `kernel_cells`, which adds what it finds in a box. A texel at the
+// offset d in the kernel of height h stands for one point of the light (lib/soft_kernel.glsl). It counts by the cosine
+// of the direction to that point, which is linear in it: 1 - g d / h, g the gradient of the receiver's plane; points
+// below the horizon count neither as lit nor as blocked.
+#include "lib/soft_kernel.glsl"
+
+#define MOST_HALF_SIZE 256.0  // of a kernel, texels
+#define FEW_TEXELS 5  // up to this size of a kernel every texel is looked at
+#define EDGE_ON 1e-3  // cosine of the direction to the map's point
+
+// Blockers in the box r.texel -+ half_size. `extent` above 0: only those that stand within the kernel of their own
+// height; else texels that the box's edge cuts count in part. `horizon`: see Blockers.
+Blockers kernel_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, vec2 extent, vec2 horizon)
+{
+  Blockers found = Blockers(0.0, 0.0, 0.0, extent, horizon);
+  ivec2 first;
+  ivec2 last;
+  kernel_texels(light, r, half_size, first, last);
+  ivec2 count = last - first + 1;
+  if (max(count.x, count.y) > FEW_TEXELS) {
+    kernel_cells(found, light, r, normal, half_size, first, last);
+    return found;
+  }
+  vec2 low = max(r.texel - half_size, vec2(first));
+  vec2 high = min(r.texel + half_size, vec2(last + 1));
+  for (int y = first.y; y <= last.y; y++) {
+    for (int x = first.x; x <= last.x; x++) {
+      vec2 covered = min(vec2(x, y) + 1.0, high) - max(vec2(x, y), low);
+      vec2 place = (vec2(x, y) + 0.5 - r.texel) / half_size;
+      float weight = covered.x * covered.y * kernel_weight(light, place, 1.0 / min(half_size.x, half_size.y));
+      weight *= kernel_cosine(found, place * half_size, vec2(0.5));
+      kernel_texel(found, r, normal, ivec2(x, y), r.slack, max(weight, 1e-6));
+    }
+  }
+  return found;
+}
+
+// From the map's point of view the receiver shows its back, but a part of the light stands above its horizon: rays to
+// that part pass below the receiver's plane as the map sees it. Few pixels are such; a grid of texels is enough.
+#define BACK_TEXELS 6
+
+Blockers kernel_back(Light light, ShadowReceiver r, vec2 half_size, Blockers found)
+{
+  ivec2 first;
+  ivec2 last;
+  kernel_texels(light, r, half_size, first, last);
+  vec2 low = max(r.texel - half_size, vec2(first));
+  vec2 high = min(r.texel + half_size, vec2(last + 1));
+  vec2 step_size = (high - low) / float(BACK_TEXELS);
+  for (int k = 0; k < BACK_TEXELS * BACK_TEXELS; k++) {
+    vec2 offset = low + (vec2(float(k % BACK_TEXELS), float(k / BACK_TEXELS)) + 0.5) * step_size - r.texel;
+    vec2 texel = clamp(floor(r.texel + offset), vec2(first), vec2(last));
+    float height = kernel_entry(ivec2(r.rectangle.xy + texel), 0).y - r.q;
+    float weight = kernel_weight(light, offset / half_size, 2.0 / float(BACK_TEXELS));
+    if (found.extent.x <= 0.0) {
+      weight *= max(dot(found.horizon, offset) - 1.0, 0.0);
+    }
+    found.whole += weight;
+    if (height > r.slack && height < dot(r.gradient, texel + 0.5 - r.texel) - r.slack) {
+      kernel_add(found, offset, 0.5 * step_size, height, weight);
+    }
+  }
+  return found;
+}
+
+// Where the map was drawn from, as the receiver sees it.
+vec3 kernel_towards(Light light, vec3 position)
+{
+  if (light.kind == LIGHT_SUN) {
+    return light.point;
+  }
+  bool offset = light.kind == LIGHT_POINT || light.kind == LIGHT_SPHERE;
+  return light.point + (offset ? light.centre : vec3(0.0)) - position;
+}
+
+float light_visibility(Light light, vec3 position, vec3 normal)
+{
+  ShadowReceiver r;
+  if (!shadow_find(light.first_view, light.view_count, position, normal, r)) {
+    return 1.0;
+  }
+  if (r.rectangle.w <= 0.0) {
+    return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
+  }
+  vec2 extent = kernel_extent(light, r);
+  float most = min(0.5 * r.rectangle.z, MOST_HALF_SIZE);
+  float height = kernel_height(light, r, extent, most);
+  if (height <= 0.0) {
+    return 1.0 + height;
+  }
+  vec3 towards = safe_normalize(kernel_towards(light, position));
+  bool back = dot(normal, towards) < 0.0;
+  if (abs(dot(normal, towards)) < EDGE_ON) {
+    // Seen along its plane the receiver has no gradient: it is a wall that bounds the kernel.
+    back = false;
+    r.gradient = shadow_outward(r, normal) * (-1e3 * height);
+  }
+  vec2 within = max(extent, vec2(1e-30));
+  vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
+  Blockers search;
+  if (back) {
+    search = kernel_back(light, r, window, Blockers(0.0, 0.0, 0.0, within, vec2(0.0)));
+  }
+  else {
+    search = kernel_box(light, r, normal, window, within, vec2(0.0));
+  }
+  if (search.blocked <= 0.0) {
+    return 1.0;
+  }
+  float blocker = min(search.height / search.blocked, height);
+  vec2 horizon = r.gradient / blocker;
+  vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
+  Blockers kernel;
+  if (back) {
+    kernel = kernel_back(light, r, size, Blockers(0.0, 0.0, 0.0, vec2(0.0), horizon));
+  }
+  else {
+    kernel = kernel_box(light, r, normal, size, vec2(0.0), horizon);
+  }
+  return (kernel.whole > 0.0) ? clamp(1.0 - kernel.blocked / kernel.whole, 0.0, 1.0) : 1.0;
+}
