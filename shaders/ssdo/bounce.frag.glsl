@@ -4,7 +4,7 @@
 // With RAYS the sectors from which the screen brings no light are not lost: one of those of all fans is traced.
 #include "ssdo/fan.glsl"
 #ifdef RAYS
-#include "indirect/path.glsl"
+#include "ssdo/path.glsl"
 #endif
 
 // Light of a fan, and the sectors that may hold more: all but those from which light was taken.
@@ -43,32 +43,6 @@ vec3 open_direction(Fan fan, uint open, float which, float within)
   float low = max(sector - fan.rounding, 0.0);
   float high = (sector > 30.5) ? 32.0 : sector + 1.0 - fan.rounding;
   return fan_direction(fan, mix(low, high, within) / 32.0);
-}
-
-// Radiance along a ray, with all that reaches its end in further reflections; paths go on by lot.
-vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
-{
-  vec3 sum = vec3(0.0);
-  vec3 throughput = vec3(1.0);
-  for (int bounce = 0; bounce < bounces; bounce++) {
-    Vertex vertex;
-    float t;
-    if (!trace_vertex(origin, direction, 1e29, roll.z, vertex, t)) {
-      break;
-    }
-    throughput *= vertex.albedo;
-    roll = hash3(roll);
-    sum += throughput * direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y) / PI;
-    float stay = min(max_component(throughput), 1.0);
-    if (to_unit(roll.z) >= stay) {
-      break;
-    }
-    throughput /= stay;
-    roll = hash3(roll);
-    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    origin = ray_origin(vertex.position, vertex.normal);
-  }
-  return sum;
 }
 #endif
 

@@ -61,6 +61,21 @@ def test_rays_bring_what_the_screen_does_not_show(stage, render, bounces):
     assert render(1, samples=8, size=(24, 24), rays=False).mean() < 0.1
 
 
+def test_what_a_mirror_shows_of_lit_surfaces_is_glossy_indirect_light(stage):
+    """A mirror on the floor shows a ceiling out of the picture, whose light is known from a picture of the ceiling."""
+    mirror = stage.material("ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.0)
+    stage.rectangle((-5, -5), (5, 5), material=mirror)
+    stage.rectangle((-5, -5), (5, 5), z=2.0, material=stage.diffuse(0.6))
+    stage.light("AREA", (0, 0, 0.5), (np.pi, 0, 0), energy=50.0, size=0.5)
+    stage.camera((0, 0, 1.0), (np.pi / 4, 0, 0), angle=0.3)
+    stage.scene.candela.slot_indirect = "ssdo"
+    shown = light_paths(stage.render(64, (24, 24), bounces=1))["glossy_indirect"].mean()
+    stage.scene.camera.rotation_euler = (3 * np.pi / 4, 0, 0)
+    stage.scene.camera.location = (0, 0, -1.0)
+    stage.scene.objects["Mesh"].visible_camera = False
+    assert shown == pytest.approx(light_paths(stage.render(64, (24, 24)))["diffuse_direct"].mean(), rel=0.03)
+
+
 @pytest.mark.parametrize("visibility", ["BITS", "POINTS"])
 def test_a_surface_alone_gets_no_light_from_itself(stage, render, visibility):
     """From any side: pixels of one plane see each other edge on."""
