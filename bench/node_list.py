@@ -123,6 +123,15 @@ def _images() -> list[Case]:
             Case(f"Environment {projection.lower()}", "TexEnvironment", "Color", settings, {}, "Normal", sphere=True,
                  procedural=True)
         )  # fmt: skip
+    sun = (0.3, 0.5, 0.7)
+    for kind, settings, since in (
+        ("Preetham", {"sky_type": "PREETHAM", "sun_direction": sun, "turbidity": 3.0}, (4, 5)),
+        ("multiple scattering", {"sky_type": "MULTIPLE_SCATTERING", "sun_disc": False, "sun_rotation": 0.7}, (5, 0)),
+    ):
+        cases.append(
+            Case(f"Sky {kind}", "TexSky", "Color", settings, {}, "Normal", sphere=True, scale=0.1, procedural=True,
+                 since=since)
+        )  # fmt: skip
     cases.append(Case("Image alpha", "TexImage", "Alpha", {"image": "Picture"}, procedural=True))
     return cases
 

@@ -14,7 +14,7 @@ from .compiled import Attribute
 from .graph import Graph, Node
 from .nodes import entry as words
 from .nodes.entry import Entry
-from .nodes.image import IMAGE_FUNCTIONS, MISSING_COLOR
+from .nodes.image import FUNCTIONS, MISSING_COLOR
 from .values import ValueBlock, glsl_number, to_kind
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
@@ -53,7 +53,7 @@ class Expressions:
         self.fallbacks: dict[tuple[str, str], None] = {}
         self.values = ValueBlock()
         self.attributes: list[Attribute] = []
-        self.image_keys: list[str] = []
+        self.image_keys: dict[str, str] = {}  # in sampler order, with the file that their functions call
         self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
         self._scopes = [_Scope()]
         self._functions: list[str] = []
@@ -74,7 +74,8 @@ class Expressions:
     def text(self) -> str:
         """The whole source: includes, the images' functions, evaluate_material."""
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
-        functions = "".join("\n" + IMAGE_FUNCTIONS.format(k=k) for k in range(len(self.image_keys)))
+        sources = enumerate(self.image_keys.values())
+        functions = "".join("\n" + FUNCTIONS[source].format(k=k) for k, source in sources)
         functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
         head = "void evaluate_material(SurfacePoint point, inout Closures closures)"
@@ -142,7 +143,7 @@ class Expressions:
             return
         number = len(self._scopes[-1].done)
         names = {identifier: f"n{number}_{i}" for i, (identifier, _) in enumerate(entry.outputs)}
-        if entry.image and not self._image_index(node):
+        if entry.image and not self._image_index(node, entry):
             for identifier, kind in entry.outputs:
                 value = MISSING_COLOR if kind == "COLOR" else 1.0
                 self.lines.append(f"{GLSL_TYPES[kind]} {names[identifier]} = {glsl_number(value, kind)};")
@@ -163,10 +164,10 @@ class Expressions:
     def _function(self, node: Node, entry: Entry) -> str:
         settings = {name: str(node.properties.get(name, items[0])).lower() for name, items in entry.choices.items()}
         if entry.image:
-            settings["image"] = str(self.image_keys.index(node.image))
+            settings["image"] = str(list(self.image_keys).index(node.image))
         return entry.function.format(**settings)
 
-    def _image_index(self, node: Node) -> bool:
+    def _image_index(self, node: Node, entry: Entry) -> bool:
         """Give the node's image a sampler; False, with a sentence, where that is impossible."""
         if node.image == "" or (self.images is not None and node.image not in self.images):
             self.note(node, f"The image of '{node.label}' is missing; it is drawn pink.")
@@ -175,7 +176,7 @@ class Expressions:
             if len(self.image_keys) >= MAX_IMAGES:
                 self.note(node, f"The material reads more than {MAX_IMAGES} images; '{node.label}' is drawn pink.")
                 return False
-            self.image_keys.append(node.image)
+            self.image_keys[node.image] = entry.include
         return True
 
     def include(self, entry: Entry) -> None:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import bpy
 
 from .graph import Graph, Input, Node
+from .sky import sky_of
 from .values import to_kind
 
 Notes = tuple[tuple[str, str], ...]
-ImageKey = Callable[[object, object], str]  # (bpy Image, ImageUser or None) -> Image.key
+ImageKey = Callable[[object, object], str]  # (bpy Image or Sky, ImageUser or None) -> Image.key
 
 KINDS = {
     "VALUE": "FLOAT",
@@ -234,14 +235,15 @@ class _Reading:
                     inputs[name] = Input(_kind(socket), _default(socket))
         outputs = {socket.identifier: _kind(socket) for socket in node.outputs}
         label = node.label or node.name
-        image = getattr(node, "image", None)
+        settings = _settings(node)
+        image = sky_of(settings) if node.bl_idname == "ShaderNodeTexSky" else getattr(node, "image", None)
         return Node(
             key,
             " / ".join((*place.path, label)),
             node.bl_idname,
             inputs,
             outputs,
-            {**_settings(node), **self._surroundings(node)},
+            {**settings, **self._surroundings(node)},
             "" if image is None else self.image_key(image, getattr(node, "image_user", None)),
         )
 

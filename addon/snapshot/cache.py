@@ -62,11 +62,11 @@ class ImageEntry:
 
 @dataclass
 class GraphEntry:
-    """A node tree as it was read last, with the (image session_uid, key) pairs that it shows."""
+    """A node tree as it was read last, with the (image session_uid or Sky, key) pairs that it shows."""
 
     graph: Graph
     notes: tuple[Note, ...]
-    images: tuple[tuple[int, str], ...]
+    images: tuple[tuple[object, str], ...]
 
 
 @dataclass

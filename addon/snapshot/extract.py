@@ -15,7 +15,7 @@ from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
 from .scene import Camera, Film, Instance, Light, Mesh, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
-from .world import constant_world, read_world
+from .world import constant_world, read_world, sun_of
 
 
 def take(
@@ -53,7 +53,8 @@ def take(
     meshes, instances, mesh_notes, stats = _meshes(places, shading, cache, depsgraph)
     notes += mesh_notes
     lights = _lights(light_places, shading, notes)
-    world = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
+    world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
+    lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]
     cache.finish(meshes, images.images, shading.graphs)
     stats.update(images_read=images.read, images_reused=images.reused, seconds=time.perf_counter() - start)
@@ -205,10 +206,13 @@ def _lights(places: list[LightPlace], shading: ShadingTable, notes: list[Note]) 
     return tuple(made)
 
 
-def _world(scene, view_layer, shading: ShadingTable, images: ImageTable, notes: list[Note]) -> World:
+def _world(
+    scene, view_layer, shading: ShadingTable, images: ImageTable, notes: list[Note]
+) -> tuple[World, Light | None]:
+    """The world, and the sun of its sky as a lamp, if it has one."""
     block = getattr(view_layer, "world_override", None) or scene.world  # the override exists since Blender 5.0
     if block is None or not view_layer.use_sky:
-        return constant_world((0.0, 0.0, 0.0), Visibility())
+        return constant_world((0.0, 0.0, 0.0), Visibility()), None
     rays = getattr(block, "cycles_visibility", None)  # there while the Cycles add-on is enabled
     visibility = Visibility()
     if rays is not None:
@@ -216,9 +220,10 @@ def _world(scene, view_layer, shading: ShadingTable, images: ImageTable, notes: 
         visibility = Visibility(rays.camera, rays.diffuse, rays.glossy, rays.transmission, rays.scatter)
     key = f"world {(block.original or block).session_uid}"
     graph = shading.graph_of(block, key, f"World '{block.name}'")
+    graph, sun = sun_of(graph, visibility)
     world, remarks = read_world(graph, block.name, images.images, visibility)
     notes.extend(remarks)
-    return world
+    return world, sun
 
 
 def _film(scene, width: int, height: int, border) -> Film:

@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..materials.sky import Sky, sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
 from .scene import Image, Note
 
@@ -49,6 +50,13 @@ class ImageTable:
         self._cache.images[key] = entry
         self.images[key] = entry.image
         self.notes.extend(entry.notes)
+        return key
+
+    def key_of_sky(self, sky: Sky) -> str:
+        """Image.key of the table of a Sky Texture, which depends on its settings alone."""
+        key = sky.name
+        if key not in self.images:
+            self.images[key] = Image(key, 0, sky_pixels(sky), "LINEAR", "NONE", "Sky")
         return key
 
     def _read(self, key: str, original, old: ImageEntry | None) -> ImageEntry:

@@ -7,6 +7,7 @@ import bpy
 from ..materials.attributes import attributes_of
 from ..materials.graph import Graph, Input, Node
 from ..materials.reader import read_graph
+from ..materials.sky import Sky
 from .cache import GraphEntry, SnapshotCache
 from .images import ImageTable
 from .meshes import Wanted
@@ -87,6 +88,10 @@ class ShadingTable:
         shown: list[tuple[int, str]] = []
 
         def image_key(image, user) -> str:
+            if isinstance(image, Sky):
+                key = self._images.key_of_sky(image)
+                shown.append((image, key))
+                return key
             key = self._images.key_of(image, user)
             shown.append(((image.original or image).session_uid, key))
             return key
@@ -108,6 +113,9 @@ class ShadingTable:
         if entry.images and self._images_by_uid is None:
             self._images_by_uid = {image.session_uid: image for image in bpy.data.images}
         for uid, key in entry.images:
+            if isinstance(uid, Sky):
+                self._images.key_of_sky(uid)
+                continue
             image = self._images_by_uid.get(uid)
             if image is None or self._images.key_of(image) != key:
                 return False

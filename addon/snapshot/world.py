@@ -6,14 +6,17 @@ These two need no program. Any other tree is handed on as it is and compiled (fr
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from ..materials.graph import Graph, Node
+from ..materials.sky import disc_radiance, sky_of
 from .constants import constant_color, constant_number
-from .scene import Image, Note, Visibility, World
+from .scene import Image, Light, Note, Visibility, World
 
 IDENTITY = np.eye(3, 4)
+LARGEST_LAMP = 0.06  # radians: a sun's disc of this size covers 20 texels of the map across
 
 
 def read_world(graph: Graph, name: str, images: Mapping[str, Image], visibility: Visibility):
@@ -26,6 +29,32 @@ def read_world(graph: Graph, name: str, images: Mapping[str, Image], visibility:
         return World(np.ones(3), None, IDENTITY.copy(), graph, visibility), notes
     color, image, mapping = plain
     return World(color, image, mapping, None, visibility), notes
+
+
+def sun_of(graph: Graph, visibility: Visibility) -> tuple[Graph, Light | None]:
+    """The sun of a Sky Texture that is the whole world, as a lamp: where its disc is too small for the map of light.
+    The graph that comes back shows it to the camera alone."""
+    shader = graph.nodes.get(graph.surface[0]) if graph.surface else None
+    if shader is None or shader.type not in ("ShaderNodeBackground", "ShaderNodeEmission"):
+        return graph, None
+    strength, exact = constant_number(graph, shader, "Strength")
+    color = shader.inputs.get("Color")
+    node = graph.nodes.get(color.link[0]) if color and color.link else None
+    if not exact or node is None or node.type != "ShaderNodeTexSky":
+        return graph, None
+    vector = node.inputs.get("Vector")
+    sky = sky_of(node.properties)
+    radiance = disc_radiance(sky) * strength
+    if (vector is not None and vector.link is not None) or sky.sun_size > LARGEST_LAMP or not np.any(radiance):
+        return graph, None
+    side = np.array([np.cos(sky.sun_rotation), -np.sin(sky.sun_rotation), 0.0])
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([side, np.cross(sky.sun, side), sky.sun], axis=1)
+    disc = np.pi * np.sin(sky.sun_size / 2) ** 2
+    seen = replace(visibility, camera=False)
+    sun = Light("sun of the sky", "Sky", "SUN", matrix, radiance * disc, angle=sky.sun_size, visibility=seen)
+    shown = replace(node, properties={**node.properties, "sun_is_lamp": 1.0})
+    return replace(graph, nodes={**graph.nodes, node.key: shown}), sun
 
 
 def constant_world(color, visibility: Visibility) -> World:

@@ -79,11 +79,6 @@ void no_hit(float reach, out float hit, out float own, out float distance, out v
   normal = vec3(0.0);
 }
 
-void even_sky(out vec3 color)
-{
-  color = vec3(0.3, 0.4, 0.6);
-}
-
 void even_pattern(out float value, out float phase, out float intensity)
 {
   value = 0.5;

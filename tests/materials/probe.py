@@ -42,6 +42,7 @@ void main()
   point.incoming = texelFetch(points, ivec2(2, row), 0).xyz;
   point.backfacing = texelFetch(points, ivec2(3, row), 0).x > 0.5;
   point.ray = RAY_CAMERA;
+  point.refracts = false;
   point.object_row0 = vec4(1.0, 0.0, 0.0, 0.0);
   point.object_row1 = vec4(0.0, 1.0, 0.0, 0.0);
   point.object_row2 = vec4(0.0, 0.0, 1.0, 0.0);

@@ -109,6 +109,29 @@ void material_image{k}_mirror_ball(vec3 direction, int interpolation, float stor
 }}
 """
 
+# The lookup in the table of a Sky Texture, made by materials/sky.py.
+SKY_FUNCTIONS = """\
+void material_image{k}_sky(vec3 direction, SurfacePoint point, float sun_is_lamp, out vec3 color)
+{{
+  ivec2 size = textureSize(material_image{k}, 0) - ivec2(0, 1);
+  vec3 d = safe_normalize(direction);
+  vec3 turn = texelFetch(material_image{k}, ivec2(3, size.y), 0).rgb;
+  vec2 position = sky_place(d, turn.x) * vec2(size) - vec2(0.5);
+  vec2 lower = floor(position);
+  vec2 share = position - lower;
+  ivec4 at = sky_texels(ivec2(lower), size);
+  vec3 low = mix(texelFetch(material_image{k}, at.xy, 0).rgb, texelFetch(material_image{k}, at.zy, 0).rgb, share.x);
+  vec3 high = mix(texelFetch(material_image{k}, at.xw, 0).rgb, texelFetch(material_image{k}, at.zw, 0).rgb, share.x);
+  color = mix(low, high, share.y);
+  if (sun_is_lamp < 0.5 || point.ray == RAY_CAMERA) {{
+    color += sky_sun(d, turn, texelFetch(material_image{k}, ivec2(0, size.y), 0).rgb,
+                     texelFetch(material_image{k}, ivec2(1, size.y), 0).rgb,
+                     texelFetch(material_image{k}, ivec2(2, size.y), 0).rgb,
+                     texelFetch(material_image{k}, ivec2(4, size.y), 0).r);
+  }}
+}}
+"""
+
 MISSING_COLOR = (1.0, 0.0, 1.0)  # where an image cannot be read
 
 INTERPOLATION = Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 2, "Smart": 2})  # INTERPOLATION_*
@@ -120,6 +143,8 @@ LOOKUP = (
 )
 OUTPUTS = (("Color", "COLOR"), ("Alpha", "FLOAT"))
 SOURCE = "material/image.glsl"
+SKY_SOURCE = "material/sky.glsl"
+FUNCTIONS = {SOURCE: IMAGE_FUNCTIONS, SKY_SOURCE: SKY_FUNCTIONS}  # by the file that they call
 
 ENTRIES = (
     Entry(
@@ -152,6 +177,17 @@ ENTRIES = (
         OUTPUTS,
         SOURCE,
         choices={"projection": ("EQUIRECTANGULAR", "MIRROR_BALL")},
+        image=True,
+    ),
+    Entry(
+        "ShaderNodeTexSky",
+        "material_image{image}_sky",
+        (Socket("Vector", "VECTOR", implicit="@GENERATED"), POINT, Setting("sun_is_lamp")),
+        (("Color", "COLOR"),),
+        SKY_SOURCE,
+        setting_approximations=(
+            ("sky_type", ("HOSEK_WILKIE",), "The sky of Hosek and Wilkie is drawn by Preetham's model."),
+        ),
         image=True,
     ),
 )

@@ -48,13 +48,6 @@ ENTRIES = (
         note="Rays are not cast from materials; the node says that nothing is hit.",
     ),
     Entry(
-        "ShaderNodeTexSky",
-        "even_sky",
-        outputs=(("Color", "COLOR"),),
-        include=SOURCE,
-        note="The sky is drawn in one colour on surfaces.",
-    ),
-    Entry(
         "ShaderNodeTexGabor",
         "even_pattern",
         outputs=_floats("Value", "Phase", "Intensity"),
