@@ -169,7 +169,7 @@ def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache)
     asked = wanted.names
     named = facts.uid in cache.changed or facts.data_uid in cache.changed
     # In edit mode the evaluated mesh is a shell around the edit mesh, which changes without a new evaluation.
-    editing = mesh.is_editmode
+    editing = mesh.id_type == "MESH" and mesh.is_editmode
     known = entry is not None and entry.asked == asked and not named and not editing
     if known and mesh.session_uid and entry.evaluation == mesh.session_uid:
         return entry, False

@@ -2,7 +2,8 @@
 
 Blender hands out every instance of a collection, geometry node, particle system or vertex/face instancer here, and
 also the meshes of curves, texts, surfaces and metaballs, as instances of their own object. The iterator's objects
-are temporary, so nothing of them is kept but the mesh data-block, which lives as long as the evaluation.
+are temporary, so nothing of them is kept but the data-block of the mesh (or of hair curves or a point cloud, which
+strands.py makes a mesh), which lives as long as the evaluation.
 """
 
 from __future__ import annotations
@@ -15,11 +16,10 @@ import numpy as np
 
 from .scene import Note, Visibility
 
+_DRAWN = ("MESH", "CURVES", "POINTCLOUD")
 # Object types that Cycles draws and we do not, as an artist calls them.
 _NOT_DRAWN = {
     "VOLUME": "volume",
-    "CURVES": "hair curves",
-    "POINTCLOUD": "point cloud",
     "GREASEPENCIL": "grease pencil",
     "GPENCIL": "grease pencil",
 }
@@ -76,7 +76,7 @@ def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], lis
     for instance in depsgraph.object_instances:
         found = instance.object
         kind = found.type
-        if kind not in ("MESH", "LIGHT"):
+        if kind not in _DRAWN and kind != "LIGHT":
             if kind in _NOT_DRAWN and instance.show_self:
                 notes[_not_drawn(found, kind)] = None
             continue
@@ -105,7 +105,7 @@ def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], lis
             random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
             generated, uv = tuple(instance.orco), tuple(instance.uv)
         matrix = instance.matrix_world.copy()
-        if kind == "MESH":
+        if kind in _DRAWN:
             meshes.append(MeshPlace(facts, key, random, matrix, generated, uv))
         else:
             lights.append(LightPlace(facts, key, matrix))
@@ -169,7 +169,7 @@ def _object_notes(owner, kind: str, notes: dict) -> None:
     linking = getattr(owner, "light_linking", None)
     if linking is not None and (linking.receiver_collection or linking.blocker_collection):
         notes[Note(subject, "light linking is not followed: its light reaches and is blocked by every object.")] = None
-    if kind != "MESH":
+    if kind not in _DRAWN:
         return
     if owner.is_shadow_catcher:
         notes[Note(subject, "is a shadow catcher, which is drawn as an ordinary surface.")] = None

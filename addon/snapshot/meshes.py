@@ -1,4 +1,6 @@
-"""Evaluated meshes to arrays, in bulk: Blender's attributes are copied whole, no Python loop runs over elements.
+"""Evaluated meshes, hair curves and point clouds to arrays, in bulk.
+
+Blender's attributes are copied whole, no Python loop runs over elements.
 
 Reading and building are apart, because an unchanged mesh must be recognised (`RawMesh.digest`) before the dearer
 half, triangulation and tangents, is done again. Per million triangles reading takes some 100 ms, the triangle
@@ -14,6 +16,7 @@ import numpy as np
 
 from .cache import next_version
 from .scene import Mesh, Note
+from .strands import HAIR_RADIUS, POINT_RADIUS, spheres, tubes
 from .tangents import corner_tangents
 
 # Metres. Beyond it the squared length of a position overflows float32 on the GPU; such a vertex is as broken as NaN.
@@ -72,7 +75,9 @@ class RawMesh:
 
 
 def read_mesh(mesh, wanted: Wanted) -> RawMesh:
-    """Copy the arrays of an evaluated `bpy.types.Mesh`. It must hold mesh data, not an edit-mode wrapper."""
+    """Copy the arrays of an evaluated Mesh, Curves or PointCloud. A mesh must hold data, not an edit-mode wrapper."""
+    if mesh.id_type != "MESH":
+        return _read_strands(mesh, wanted)
     corners, faces = len(mesh.loops), len(mesh.polygons)
     positions = _attribute(mesh, "position", "vector", len(mesh.vertices), np.float32, 3)
     corner_vertices = _attribute(mesh, ".corner_vert", "value", corners, np.int32, 1)
@@ -104,6 +109,40 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
         active_color=active_color,
         generated=_read_generated(mesh) if wanted.generated else None,
     )
+
+
+def _read_strands(data, wanted: Wanted) -> RawMesh:
+    """Hair curves or a point cloud as triangles (see strands.py)."""
+    hair = data.id_type == "CURVES"
+    points = _finite(_attribute(data, "position", "vector", len(data.points), np.float32, 3))
+    radii = np.full(len(points), HAIR_RADIUS if hair else POINT_RADIUS, np.float32)
+    if "radius" in data.attributes:
+        radii = np.maximum(_finite(_attribute(data, "radius", "value", len(points), np.float32, 1)), 0.0)
+    offsets = np.zeros(1, np.int32)
+    if hair:
+        offsets = np.zeros(len(data.curves) + 1, np.int32)
+        if len(data.curves):
+            data.curve_offset_data.foreach_get("value", offsets)
+        positions, normals, triangles, source = tubes(points, radii, offsets)
+    else:
+        positions, normals, triangles, source = spheres(points, radii)
+    corners = triangles.reshape(-1)
+    colors = {}
+    for name in sorted(wanted.attributes):
+        attribute = data.attributes.get(name)
+        values = None if attribute is None else _as_rgba(attribute)
+        if values is not None:
+            if attribute.domain == "CURVE":
+                values = np.repeat(values, np.diff(offsets), axis=0)
+            colors[name] = np.ascontiguousarray(_finite(values[source[corners]]))
+    generated = None
+    if wanted.generated and len(positions):
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        generated = ((positions - low) / np.maximum(high - low, 1e-30)).astype(np.float32)
+    return RawMesh(
+        positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
+        colors=colors, generated=generated,
+    )  # fmt: skip
 
 
 def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tuple[Mesh, tuple[Note, ...]]:

@@ -1,0 +1,146 @@
+"""Hair curves as tubes and point clouds as spheres: triangles with the mean width and area of the round shape.
+
+Cycles draws hair as ribbons that face the viewer with the normals of a tube, along a Catmull-Rom spline through the
+points, and point clouds as spheres. Here both become meshes, so that every technique sees them like any other. A tube
+of four sides is a little wider than the hair (its mean width over all directions, perimeter / pi by Cauchy, is the
+hair's), a sphere of triangles a little larger (its mean shadow, area / 4, is the sphere's); normals are the round ones.
+
+Bulk numpy; the only loop runs along the points of the longest curve, for all curves at once. 10,000 hairs of 8 points
+are 1.1 million triangles and take 0.4 s.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+SIDES = 4
+STEPS = 2  # pieces per segment of the spline, as many as Cycles draws by default
+HAIR_RADIUS = 0.005  # metres, where a curve or point has none: Cycles' defaults
+POINT_RADIUS = 0.01
+MOST_TRIANGLES = 1_500_000  # of a point cloud, before its spheres become coarser
+_WIDER = np.pi / (SIDES * np.sin(np.pi / SIDES))  # circumradius of a polygon whose perimeter is the circle's
+
+
+def tubes(points: np.ndarray, radii: np.ndarray, offsets: np.ndarray):
+    """Curves as tubes.
+
+    `points` (P, 3) float32, `radii` (P,), `offsets` (C + 1,) int: curve k holds the points from offsets[k] up to
+    offsets[k + 1].
+    Returns positions (V, 3), normals (V, 3), triangles (T, 3) and the point that each vertex belongs to (V,).
+    """
+    curves = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    keep = np.diff(offsets)[curves] >= 2
+    last = offsets[curves + 1] - 1
+    number = np.arange(len(points))
+    start = number[keep & (number < last)]  # of each segment
+    first, final = offsets[curves[start]], last[start]
+    before, after = np.maximum(start - 1, first), np.minimum(start + 2, final)
+    # Rings: STEPS per segment and one at each curve's tip.
+    steps = np.arange(STEPS) / STEPS
+    shape = (len(start), STEPS)
+    places = _catmull_rom(*(points[k].astype(np.float64) for k in (before, start, start + 1, after)), steps)
+    width = radii[start][:, None] * (1 - steps) + radii[start + 1][:, None] * steps
+    nearest = np.where(steps < 0.5, start[:, None], start[:, None] + 1)
+    tips = np.unique(final)
+    order = np.argsort(np.concatenate([(start[:, None] + steps).reshape(-1), tips.astype(np.float64)]), kind="stable")
+    ring_place = np.concatenate([places.reshape(-1, 3), points[tips]])[order]
+    ring_width = np.concatenate([width.reshape(-1), radii[tips]])[order]
+    ring_point = np.concatenate([nearest.reshape(np.prod(shape)), tips])[order]
+    ring_curve = curves[ring_point]
+    if not len(ring_place):
+        return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), ring_point
+    u, v = _frames(ring_place, ring_curve)
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    normals = np.cos(angle)[None, :, None] * u[:, None] + np.sin(angle)[None, :, None] * v[:, None]
+    positions = ring_place[:, None] + normals * (_WIDER * ring_width)[:, None, None]
+    ring = np.flatnonzero(ring_curve[:-1] == ring_curve[1:])
+    side = np.arange(SIDES)
+    a, b = ring[:, None] * SIDES + side, ring[:, None] * SIDES + (side + 1) % SIDES
+    triangles = np.stack([a, b, b + SIDES, a, b + SIDES, a + SIDES], axis=-1).reshape(-1, 3)
+    return (
+        positions.reshape(-1, 3).astype(np.float32), normals.reshape(-1, 3).astype(np.float32),
+        triangles.astype(np.int32), np.repeat(ring_point, SIDES),
+    )  # fmt: skip
+
+
+def spheres(points: np.ndarray, radii: np.ndarray):
+    """Points (P, 3) of `radii` (P,) as spheres; returns what `tubes` does."""
+    level = 2
+    while level > 0 and len(points) * 20 * 4**level > MOST_TRIANGLES:
+        level -= 1
+    unit, faces = _icosphere(level)
+    edges = unit[faces[:, 1:]] - unit[faces[:, :1]]
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
+    grown = np.sqrt(4.0 * np.pi / area)
+    positions = points[:, None] + (grown * radii)[:, None, None] * unit
+    triangles = (np.arange(len(points)) * len(unit))[:, None, None] + faces
+    return (
+        positions.reshape(-1, 3).astype(np.float32), np.tile(unit, (len(points), 1)).astype(np.float32),
+        triangles.reshape(-1, 3).astype(np.int32), np.repeat(np.arange(len(points)), len(unit)),
+    )  # fmt: skip
+
+
+def _catmull_rom(before, start, end, after, t) -> np.ndarray:
+    """(S, len(t), 3) points of the uniform spline between `start` and `end`, each (S, 3)."""
+    t = t[None, :, None]
+    before, start, end, after = (p[:, None] for p in (before, start, end, after))
+    slope, bend = end - before, 2.0 * before - 5.0 * start + 4.0 * end - after
+    return start + 0.5 * t * (slope + t * (bend + t * (3.0 * (start - end) + after - before)))
+
+
+def _frames(places: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors across each ring's direction, carried along every curve without twist (parallel transport)."""
+    joined = curve[:-1] == curve[1:]
+    step = np.where(joined[:, None], np.diff(places, axis=0), 0.0)
+    along = np.zeros_like(places)
+    along[:-1] += step
+    along[1:] += step
+    along = _unit(along, (0.0, 0.0, 1.0))
+    helper = np.eye(3)[np.abs(along).argmin(axis=1)]
+    u = _unit(np.cross(along, helper), (1.0, 0.0, 0.0))
+    starts = np.concatenate([[0], np.flatnonzero(~joined) + 1])
+    lengths = np.diff(np.append(starts, len(places)))
+    for number in range(1, int(lengths.max())):
+        ring = starts[lengths > number] + number
+        carried = u[ring - 1] - along[ring] * np.einsum("ij,ij->i", u[ring - 1], along[ring])[:, None]
+        length = np.linalg.norm(carried, axis=1)
+        good = length > 1e-6
+        u[ring[good]] = carried[good] / length[good, None]
+    return u, np.cross(along, u)
+
+
+def _unit(vectors: np.ndarray, otherwise) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=1)
+    good = length > 0.0
+    return np.where(good[:, None], vectors / np.where(good, length, 1.0)[:, None], otherwise)
+
+
+@lru_cache
+def _icosphere(level: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (V, 3) and triangles (20 * 4^level, 3), counter-clockwise from outside."""
+    golden = (1.0 + 5.0**0.5) / 2.0
+    corners = [(s, t * golden, 0.0) for s in (-1, 1) for t in (-1, 1)]
+    unit = np.array([np.roll(corner, turn) for turn in range(3) for corner in corners])
+    length = np.linalg.norm(unit[:, None] - unit[None], axis=2)
+    near = np.isclose(length, 2.0)
+    faces = np.array([
+        (a, b, c) for a in range(12) for b in range(a + 1, 12) for c in range(b + 1, 12)
+        if near[a, b] and near[b, c] and near[a, c]
+    ])  # fmt: skip
+    for _ in range(level):
+        ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+        edges, which = np.unique(ends, axis=0, return_inverse=True)
+        middle = len(unit) + which.reshape(3, -1)
+        unit = np.concatenate([unit, unit[edges].sum(axis=1)])
+        a, b, c = faces.T
+        ab, bc, ca = middle
+        faces = np.concatenate([np.stack(new, axis=1) for new in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+    unit = unit / np.linalg.norm(unit, axis=1)[:, None]
+    outward = np.einsum(
+        "ij,ij->i", np.cross(unit[faces[:, 1]] - unit[faces[:, 0]], unit[faces[:, 2]] - unit[faces[:, 0]]),
+        unit[faces[:, 0]],
+    )  # fmt: skip
+    faces[outward < 0] = faces[outward < 0][:, ::-1]
+    return unit, faces

@@ -1,0 +1,89 @@
+"""Hair curves and point clouds as meshes: where they lie, how wide they look, and Cycles' picture of them."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.snapshot import SnapshotCache
+from addon.snapshot.strands import SIDES, STEPS, spheres, tubes
+
+
+def shadow_width(positions, triangles, direction):
+    """Mean over points of a silhouette: area of a closed surface projected along `direction`."""
+    corners = positions[triangles].astype(float)
+    faces = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return 0.5 * np.abs(faces @ direction).sum()
+
+
+def test_a_straight_hair_is_a_tube_of_its_radius_and_mean_width():
+    points = np.array([[0, 0, 0], [0, 0, 1], [0, 0, 3]], np.float32)
+    positions, normals, triangles, source = tubes(points, np.full(3, 0.1), np.array([0, 3]))
+    assert len(positions) == (2 * STEPS + 1) * SIDES
+    assert positions[:, 2].min() == 0.0 and positions[:, 2].max() == 3.0
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
+    np.testing.assert_allclose(normals[:, 2], 0.0, atol=1e-6)
+    turns = np.linspace(0, np.pi, 64, endpoint=False)
+    width = [shadow_width(positions, triangles, np.array([np.cos(a), np.sin(a), 0])) / 3.0 for a in turns]
+    assert np.mean(width) == pytest.approx(0.2, rel=1e-3)
+    assert sorted(set(source)) == [0, 1, 2]
+
+
+def test_a_curve_passes_through_its_points_and_does_not_reach_into_the_next():
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1, 1, (9, 3)).astype(np.float32)
+    offsets = np.array([0, 4, 5, 9])  # the second has one point: nothing to draw
+    positions, _, triangles, source = tubes(points, np.full(9, 1e-4), offsets)
+    for k in (0, 1, 2, 3, 5, 6, 7, 8):
+        assert np.linalg.norm(positions - points[k], axis=1).min() < 2e-4
+    assert 4 not in source
+    curve = np.searchsorted(offsets, source, side="right")
+    assert (np.ptp(curve[triangles], axis=1) == 0).all()
+
+
+def test_triangles_face_outwards():
+    points = np.array([[0, 0, 0], [1, 0.3, 0], [1.5, 1, 0.2]], np.float32)
+    for positions, normals, triangles, _ in (
+        tubes(points, np.full(3, 0.05), np.array([0, 3])),
+        spheres(points, np.array([0.1, 0.2, 0.3])),
+    ):
+        corners = positions[triangles]
+        faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert (np.einsum("ij,ij->i", faces, normals[triangles].mean(axis=1)) > 0).all()
+
+
+@pytest.mark.parametrize("count", [1, 10_000])
+def test_points_are_spheres_with_the_mean_shadow_of_theirs(count):
+    points = np.zeros((count, 3), np.float32)
+    positions, _, triangles, _ = spheres(points, np.full(count, 0.5))
+    corners = positions[triangles].astype(float)
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    assert area / 4 / count == pytest.approx(np.pi * 0.25, rel=1e-5)
+
+
+def test_nothing_to_draw_is_no_triangle():
+    none = np.zeros((0, 3), np.float32)
+    assert not len(tubes(none, np.zeros(0), np.zeros(1, int))[2])
+    assert not len(tubes(np.zeros((2, 3), np.float32), np.ones(2), np.array([0, 1, 2]))[2])
+    assert not len(spheres(none, np.zeros(0))[2])
+
+
+def hair(stage, curves, radius):
+    data = bpy.data.hair_curves.new("Hair")
+    data.add_curves([len(curve) for curve in curves])
+    data.attributes["position"].data.foreach_set("vector", np.concatenate(curves).astype(np.float32).ravel())
+    widths = data.attributes.get("radius") or data.attributes.new("radius", "FLOAT", "POINT")
+    widths.data.foreach_set("value", np.full(sum(map(len, curves)), radius, np.float32))
+    stage.link("Hair", data)
+    return data
+
+
+def test_hair_and_points_are_meshes_of_the_snapshot(stage):
+    hair(stage, [[(0, 0, 0), (0, 0, 1), (0, 1, 2)]], 0.02)
+    cache = SnapshotCache()
+    snapshot = stage.take(cache)
+    (mesh,) = snapshot.meshes.values()
+    assert len(mesh.triangle_corners) == 2 * STEPS * SIDES * 2
+    assert mesh.bounds_max[2] == pytest.approx(2.0, abs=0.03)
+    assert snapshot.instances[0].object_name == "Hair"
+    again = stage.take(cache)
+    assert next(iter(again.meshes.values())).version == mesh.version
