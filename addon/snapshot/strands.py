@@ -5,6 +5,8 @@ points, and point clouds as spheres. Here both become meshes, so that every tech
 of four sides is a little wider than the hair (its mean width over all directions, perimeter / pi by Cauchy, is the
 hair's), a sphere of triangles a little larger (its mean shadow, area / 4, is the sphere's); normals are the round ones.
 
+Bias: a facet that turns away from a lamp shadows a rim that a round strand would light, 1 to 2 % of a tuft's light.
+
 Bulk numpy; the only loop runs along the points of the longest curve, for all curves at once. 10,000 hairs of 8 points
 are 1.1 million triangles and take 0.4 s.
 """
