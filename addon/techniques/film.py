@@ -13,6 +13,7 @@ from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from .neighbours import shown_sum
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
 SUMS = (
@@ -120,13 +121,15 @@ def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
     if "film.combined" not in frame.images:
         raise ValueError("The pass tree holds no Film, which makes the picture: add it, or use New from Auto.")
     target = target or frame.target("film.combined")
-    passes.fullscreen(
-        RESOLVE,
-        target,
-        textures={name: frame.images[f"radiance.{name}"] for name in (*PATHS, "emission", "environment")},
-        constants={
-            "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
-            "transparent": int(frame.snapshot.film.transparent),
-        },
-    )  # fmt: skip
+    with shown_sum(frame, "diffuse_indirect") as indirect:
+        textures = {name: frame.images[f"radiance.{name}"] for name in (*PATHS, "emission", "environment")}
+        passes.fullscreen(
+            RESOLVE,
+            target,
+            textures={**textures, "diffuse_indirect": indirect},
+            constants={
+                "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
+                "transparent": int(frame.snapshot.film.transparent),
+            },
+        )  # fmt: skip
     return target.colors[0]

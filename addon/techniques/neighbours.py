@@ -12,17 +12,24 @@ fifths of their squared error.
 |---|---|
 | fetches per pixel | 16 x 4 |
 
+A viewport at rest shows its first samples in the same way: there the sums are filtered on their way to the screen, with
+the mean colours of their samples, and stay as they are.
+
 Bias: light is spread over 4 (16) pixels of a surface, contact shadows first of all. Samples that are averaged are not
 filtered, so it does not stay.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
 
+FEW = 8  # samples at rest in a viewport: up to here it shows indirect light filtered
 MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
     passes.fullscreen_program(
         f"mean of neighbours{of}",
@@ -81,8 +88,28 @@ def _reflect_mean(frame: Frame, technique: Technique, program, light, path: str,
     frame.count(technique, "filtered samples")
 
 
-def _mean(frame: Frame, program, light: images.Image, target: images.Target, stride: int) -> None:
-    surfaces = {f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "normal", "diffuse")}
+@contextmanager
+def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
+    """An image of sums of diffuse radiance as it is to be shown: filtered while a viewport has few samples.
+
+    The sums themselves stay as they are, and the picture of all samples is theirs.
+    """
+    name = f"radiance.{path}"
+    if frame.settings.whole or frame.settings.draft or frame.samples_done >= min(FEW, frame.settings.samples):
+        yield frame.images[name]
+        return
+    with ExitStack() as stack:
+        near, far, shown = (stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in range(3))
+        _mean(frame, MEAN_OF_REFLECTED, frame.images[name], near, 1, "color.diffuse")
+        _mean(frame, MEAN_AGAIN, near.colors[0], far, 4, "color.diffuse")
+        textures = {"surface_diffuse": frame.images["color.diffuse"], "arriving": far.colors[0]}
+        passes.fullscreen(REFLECT, shown, textures=textures)
+        yield shown.colors[0]
+
+
+def _mean(frame: Frame, program, light, target: images.Target, stride: int, color="surface.diffuse") -> None:
+    surfaces = {f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "normal")}
+    surfaces["surface_diffuse"] = frame.images[color]
     passes.fullscreen(
         program, target, textures={**surfaces, "light_in": light}, blocks={"film_view": frame.view_block},
         constants={"stride": stride},

@@ -36,17 +36,17 @@ over the reference's noise at 96x72, of single samples (filtered, mean of four s
 | | Cornell box | window | hall | door | courtyard | lamp |
 |---|---|---|---|---|---|---|
 | instant radiosity, 1 | 0.20 | 0.35 | 0.24 | 0.44 | 0.09 | 0.09 |
-| this, 1, in 0.5 to 1.2 of its time | 0.09 | 0.37 | 0.17 | 0.79 | 0.09 | 0.16 |
-| this without rays, 1, in 0.1 to 0.3 | 0.21 | 0.60 | 0.77 | 0.76 | 0.72 | 0.80 |
+| this, 1, in 0.5 to 1.2 of its time | 0.09 | 0.39 | 0.17 | 0.80 | 0.09 | 0.16 |
+| this without rays, 1, in 0.1 to 0.3 | 0.27 | 0.67 | 0.78 | 0.76 | 0.78 | 0.92 |
 | instant radiosity, 16 | 0.03 | 0.15 | 0.06 | 0.48 | 0.02 | 0.01 |
-| this, 16 | 0.05 | 0.42 | 0.32 | 1.7 | 0.15 | 0.10 |
+| this, 16 | 0.05 | 1.0 | 0.32 | 2.6 | 0.20 | 0.12 |
 
 Auto takes instant radiosity: its virtual lights find the light that single paths seldom meet, and its error falls to
-zero. This one is for single samples of rooms that are seen whole, where it has a third to a half of that error.
+zero. This one is for single samples of rooms that are seen whole.
 
 Bias, in diffuse indirect light, by design. Patches reach up to a step beyond their edges, and hidden sides are as
 thick as `thickness`: up to a tenth of the light where posts stand close (hall: 0.90). Without rays, surfaces off the
-screen, behind others or turned away send nothing: 0.50 of the light is left in the Cornell box, 0.04 to 0.4 in rooms
+screen, behind others or turned away send nothing: 0.51 of the light is left in the Cornell box, 0.04 to 0.4 in rooms
 that are lit from behind the camera. Metals send nothing on the screen; without rays nothing is reflected on
 glossy surfaces. The last bounces before the limit may be counted once more than allowed.
 """

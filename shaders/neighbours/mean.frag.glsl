@@ -15,12 +15,12 @@ vec3 arriving_at(ivec2 pixel)
 
 void main()
 {
-  out_arriving = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = textureSize(light_in, 0);
   vec4 centre = texelFetch(surface_position, pixel, 0);
+  out_arriving = vec4(arriving_at(pixel), 0.0);
   if (centre.w == 0.0) {
-    return;
+    return;  // sums hold samples that met a surface here where the last one met none
   }
   vec3 normal = octahedral_decode(texelFetch(surface_normal, pixel, 0).xy);
   float depth = (film_view.eye.w > 0.5) ? 1.0 : distance(centre.xyz, film_view.eye.xyz);

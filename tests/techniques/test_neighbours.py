@@ -8,7 +8,7 @@ import pytest
 from addon.frame.view import VIEW
 from addon.gfx import images
 from addon.gfx.struct import Block
-from addon.techniques.neighbours import smooth
+from addon.techniques.neighbours import FEW, shown_sum, smooth
 from tests.techniques.conftest import places
 from tests.techniques.test_instant_radiosity import corner
 
@@ -17,28 +17,41 @@ SPAN = 4.0
 
 
 @pytest.fixture
-def filtered(gpu_context):
-    """Light on a plane of two metres below an orthographic camera, (H, W), after the filter of one sample."""
+def frame_of(gpu_context):
+    """A sample of a plane two metres wide under an orthographic camera, with light on it, (H, W)."""
 
-    def filtered(reflected, albedo=0.5, height=0.0, samples=1):
+    def frame_of(reflected, albedo=0.5, height=0.0, samples=1, whole=True):
         x, y = places((SIZE, SIZE), SPAN)
         full = np.ones((SIZE, SIZE))
         layers = {
             "surface.position": [x, y, full * height, full],
             "surface.normal": [0 * x] * 4,  # octahedral: straight up
             "surface.diffuse": [full * albedo] * 4,
-            "light": [reflected] * 3 + [0 * x],
+            "color.diffuse": [full * albedo] * 4,
+            "radiance.light": [reflected] * 3 + [0 * x],
         }
         values = {name: np.zeros(4) if kind == "vec4" else 0 for name, (kind, _) in VIEW.fields.items()}
         values |= {"eye": (0, 0, 5, 1), "frame": (-SPAN / 2, SPAN / 2) * 2, "film": (SIZE, SIZE, 0.1, 100)}
         frame = SimpleNamespace(
-            size=(SIZE, SIZE), sample=0, settings=SimpleNamespace(samples=samples, draft=False),
+            size=(SIZE, SIZE), sample=0, samples_done=1,
+            settings=SimpleNamespace(samples=samples, draft=False, whole=whole),
             images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
             view_block=Block(VIEW, **values), count=lambda *counter: None,
         )  # fmt: skip
         frame.target = lambda name: images.Target((frame.images[name],))
-        smooth(frame, None, "light")
-        return images.read(frame.images["light"])[..., 0]
+        return frame
+
+    return frame_of
+
+
+@pytest.fixture
+def filtered(frame_of):
+    """The light of such a sample after the filter."""
+
+    def filtered(reflected, **options):
+        frame = frame_of(reflected, **options)
+        smooth(frame, None, "radiance.light")
+        return images.read(frame.images["radiance.light"])[..., 0]
 
     return filtered
 
@@ -57,7 +70,7 @@ def test_grain_on_a_plane_falls_as_by_two_hundred_samples(filtered, grain):
 def test_textures_stay_to_the_pixel(filtered, grain):
     albedo = np.where(np.indices((SIZE, SIZE)).sum(axis=0) % 2, 0.9, 0.1)
     even = filtered(np.ones((SIZE, SIZE)))
-    np.testing.assert_allclose(filtered(albedo, albedo), even * albedo, rtol=1e-4)
+    np.testing.assert_allclose(filtered(albedo, albedo=albedo), even * albedo, rtol=1e-4)
 
 
 def test_light_does_not_cross_a_step_in_depth(filtered):
@@ -85,6 +98,16 @@ def test_a_lone_pixel_takes_the_light_of_what_is_near(filtered):
 
 def test_samples_that_are_averaged_are_left_alone(filtered, grain):
     np.testing.assert_array_equal(filtered(grain, samples=2), grain.astype(np.float32))
+
+
+def test_a_viewport_shows_its_first_samples_filtered_and_keeps_their_sums(frame_of, filtered, grain):
+    frame = frame_of(grain, samples=16, whole=False)
+    with shown_sum(frame, "light") as shown:
+        np.testing.assert_allclose(images.read(shown)[..., 0], filtered(grain), rtol=1e-5)
+    np.testing.assert_array_equal(images.read(frame.images["radiance.light"])[..., 0], grain.astype(np.float32))
+    frame.samples_done = FEW
+    with shown_sum(frame, "light") as shown:
+        assert shown is frame.images["radiance.light"]
 
 
 @pytest.mark.parametrize("technique", ["instant_radiosity", "ssdo"])
