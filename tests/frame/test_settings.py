@@ -1,5 +1,7 @@
 """Settings from texts, as the command line gives them; every mistake is answered with a sentence."""
 
+from dataclasses import replace
+
 import pytest
 
 from addon.frame.settings import SAMPLES, Settings
@@ -97,3 +99,24 @@ def test_every_declared_default_passes_its_own_check(technique):
         assert param.description
         for limit in filter(lambda x: x is not None, (param.minimum, param.maximum)):
             assert param.check(limit) == limit
+
+
+class Drafted(Technique):
+    name, label = "drafted", "Drafted"
+    params = (
+        Param("count", "Count", 8, "Rays per pixel", 1, 64, draft=2),
+        Param("guided", "Guided", True, "Look first", draft=False),
+        Param("reach", "Reach", 0.5, "Share of the scene", 0.0, 1.0),
+    )
+
+
+@pytest.mark.parametrize(("count", "drawn"), [(8, 2), (2, 2), (1, 1)])
+def test_a_draft_takes_at_most_what_is_declared_for_it(count, drawn):
+    settings = Settings(values={("drafted", "count"): count}).as_draft()
+    assert settings.of(Drafted()) == (drawn, False, 0.5)
+    assert replace(settings, draft=False).of(Drafted()) == (count, True, 0.5)
+
+
+@pytest.mark.parametrize(("bounces", "drawn"), [(0, 0), (1, 1), (16, 4)])
+def test_a_draft_has_few_bounces(bounces, drawn):
+    assert Settings(bounces=bounces).as_draft().bounces == drawn
