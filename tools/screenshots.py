@@ -28,6 +28,7 @@ PICTURES = (
     ("panel_material", "drive", "panel_material", "properties"),
     ("pass_tree_run", "passes", "passes_run", LEFT),
     ("pass_tree", "passes", "passes_compared", LEFT),
+    ("pass_tree_nodes", "passes", "passes_nodes", LEFT),
     ("pass_tree_wrong_link", "passes", "passes_wrong_link", LEFT),
     ("compare", "tour", "tour_compared", LEFT),
     ("compare_error", "tour", "tour_error", LEFT),

@@ -220,7 +220,10 @@ class _Node:
         if shown is None:
             return
         if shown.milliseconds is not None:
-            layout.label(text=f"{shown.milliseconds:.1f} ms", icon="TIME")
+            slow = shown.milliseconds >= 10_000
+            layout.label(
+                text=f"{shown.milliseconds / 1000:.1f} s" if slow else f"{shown.milliseconds:.1f} ms", icon="TIME"
+            )
         name = f"{self.id_data.session_uid} {self.name}"
         if shown.picture is not None and _previews is not None and name in _previews:
             layout.template_icon(icon_value=_previews[name].icon_id, scale=PREVIEW_SCALE)

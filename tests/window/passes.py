@@ -21,6 +21,7 @@ def steps():
     scene.render.engine = ENGINE
     scene.candela.viewport_samples = 4
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 320, 180, 100
+    bpy.context.preferences.system.use_region_overlap = False  # the sidebar stands beside the nodes
     area = viewport_area()
     with there(area):
         bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.6)
@@ -50,6 +51,12 @@ def steps():
     frame_all(upper)
     yield 1.0
     picture("passes_compared.png")
+    for node in tree.nodes:
+        node.select = node.technique in ("direct_light", "environment_light")
+    frame(upper, bpy.ops.node.view_selected)
+    yield 1.0
+    picture("passes_nodes.png")
+    frame_all(upper)
     result["errors"] = [line for one in tree.nodes if pass_tree.result(one) for line in pass_tree.result(one).errors]
     film = next(one for one in tree.nodes if one.technique == "film")
     surfaces = next(one for one in tree.nodes if one.technique == "surfaces")
@@ -86,8 +93,12 @@ def job(name, area, operator):
 
 
 def frame_all(area):
+    frame(area, bpy.ops.node.view_all)
+
+
+def frame(area, operator):
     with bpy.context.temp_override(window=window(), area=area, region=main_region(area)):
-        bpy.ops.node.view_all()
+        operator()
 
 
 run(steps)
