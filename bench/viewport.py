@@ -5,9 +5,10 @@ again. Blender's own part of a redraw is not in the figures; what `make test-win
 too.
 
 An edit is made several times, as by a drag, and each followed by a redraw; what is told is the last. After turning the
-view the picture comes to rest. Uploads are counted where Candela hands data to Blender's `gpu` module: meshes, and
-bytes of images and of uniform blocks. Processor seconds (of all threads) stand beside wall time, because they are
-steadier on a busy machine; on a software GPU that has two cores to itself a step takes somewhat more than half of them.
+view the picture comes to rest. Uploads are counted where Candela hands data to Blender's `gpu` module: bytes of images
+and uniform blocks, and meshes. What an edit itself uploads is told apart from what the sample after it does, such as
+this sample's points of lights. Processor seconds (of all threads) stand beside wall time, because they are steadier on
+a busy machine; on a software GPU that has two cores to itself a step takes somewhat more than half of them.
 """
 
 from __future__ import annotations
@@ -38,18 +39,18 @@ MOVES = 6
 
 
 class Traffic:
-    """Counts bytes handed to the GPU, by kind."""
+    """Counts bytes handed to the GPU."""
 
     def __init__(self):
-        self.bytes: dict[str, int] = {}
-        self._watch(images, "upload", "images", lambda pixels, *_: np.asarray(pixels).size * 4)
-        self._watch(Block, "_bytes", "blocks", lambda block: block.struct.dtype.itemsize)
+        self.bytes = 0
+        self._watch(images, "upload", lambda pixels, *_: np.asarray(pixels).size * 4)
+        self._watch(Block, "_bytes", lambda block: block.struct.dtype.itemsize)
 
-    def _watch(self, owner, name: str, kind: str, size: Callable) -> None:
+    def _watch(self, owner, name: str, size: Callable) -> None:
         original = getattr(owner, name)
 
         def counted(*arguments):
-            self.bytes[kind] = self.bytes.get(kind, 0) + size(*arguments)
+            self.bytes += size(*arguments)
             return original(*arguments)
 
         setattr(owner, name, counted)
@@ -65,7 +66,8 @@ class Edit:
     scale: int  # screen pixels per side of a drawn pixel
     read: bool  # whether the scene was read
     meshes: int  # uploaded
-    uploaded: dict[str, int]  # bytes by kind
+    uploaded: int  # bytes, for the edit
+    sample: int  # and for the sample after it
 
 
 @dataclass
@@ -87,13 +89,25 @@ class Driver:
         self.scene = bpy.context.scene
         self.scene.candela.viewport_samples = samples
         self.camera = camera_of_scene(self.scene, self.graph, *SIZE)
-        self.reads = 0
+        self.reads = self.begun = 0
+        self._watch_edits()
 
     @property
     def graph(self):
         graph = bpy.context.evaluated_depsgraph_get()
         graph.update()
         return graph
+
+    def _watch_edits(self) -> None:
+        """Note what has been uploaded when a frame has begun, and no sample yet."""
+        begin = self.viewport.renderer.begin
+
+        def noted(*arguments):
+            frame = begin(*arguments)
+            self.begun = self.traffic.bytes
+            return frame
+
+        self.viewport.renderer.begin = noted
 
     def read(self, camera, width, height):
         self.reads += 1
@@ -127,12 +141,12 @@ class Driver:
             if scene:
                 self.viewport.cache.invalidate(self.graph.updates)
                 self.viewport.dirty = True
-            self.traffic.bytes.clear()
+            self.traffic.bytes = self.begun = 0
             uploads, reads, cpu = self.viewport.renderer.geometry.uploads, self.reads, time.process_time()
             seconds = self.draw()
         return Edit(
             name, seconds, time.process_time() - cpu, self.viewport.scale, self.reads > reads,
-            self.viewport.renderer.geometry.uploads - uploads, dict(self.traffic.bytes),
+            self.viewport.renderer.geometry.uploads - uploads, self.begun, self.traffic.bytes - self.begun,
         )  # fmt: skip
 
 
@@ -188,22 +202,24 @@ def measure(name: str, samples: int, bounces: int) -> list[tuple[str, ...]]:
         bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
     bpy.context.scene.render.engine = "CANDELA"
     bpy.context.scene.candela.bounces = bounces
-    driver = Driver(samples)
+    driver = Driver(max(samples, 1))
     compiled, started = library.compile_count, time.perf_counter()
     driver.draw()
     seconds, programs = time.perf_counter() - started, library.compile_count - compiled
     print(f"{name}: the first redraw took {seconds:.1f} s and compiled {programs} programs")
     found = [driver.edit("turn the view", driver.turn, scene=False)]
-    rest = driver.rest()
-    print(f"{name}: at rest {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) later, after {rest.redraws} redraws, of which "
-          f"the slowest took {1000 * rest.slowest:.0f} ms")  # fmt: skip
+    rest = driver.rest() if samples else None
+    if rest is not None:
+        print(
+            f"{name}: at rest {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) later, after {rest.redraws} redraws, of which "
+            f"the slowest took {1000 * rest.slowest:.0f} ms"
+        )
     found += edits(driver)
     driver.viewport.release()
     return [
         (
             name, one.name, f"{1000 * one.seconds:.0f}", f"{1000 * one.cpu:.0f}", f"1/{one.scale}",
-            "yes" if one.read else "no", str(one.meshes), str(one.uploaded.get("blocks", 0)),
-            str(one.uploaded.get("images", 0)),
+            "yes" if one.read else "no", str(one.meshes), str(one.uploaded), str(one.sample),
         )
         for one in found
     ]  # fmt: skip
@@ -229,12 +245,12 @@ def in_a_window() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("scenes", nargs="*", default=["soft_shadow_garden", "window_interior", "field"])
-    parser.add_argument("--samples", type=int, default=4, help="samples until the picture rests")
+    parser.add_argument("--samples", type=int, default=4, help="samples until the picture rests; 0: edits alone")
     parser.add_argument("--bounces", type=int, default=16)
     options = parser.parse_args()
     register()
     context.ensure()
-    head = "scene", "edit", "ms", "CPU ms", "pixels", "scene read", "meshes", "block bytes", "image bytes"
+    head = "scene", "edit", "ms", "CPU ms", "pixels", "scene read", "meshes", "bytes", "sample's bytes"
     in_a_window()
     print(table([head, *(row for name in options.scenes for row in measure(name, options.samples, options.bounces))]))
 
