@@ -211,8 +211,8 @@ def measure(name: str, samples: int, bounces: int) -> list[tuple[str, ...]]:
     rest = driver.rest() if samples else None
     if rest is not None:
         print(
-            f"{name}: at rest {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) later, after {rest.redraws} redraws, of which "
-            f"the slowest took {1000 * rest.slowest:.0f} ms"
+            f"{name}: at rest {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) later, after {rest.redraws} redraws; the "
+            f"slowest took {1000 * rest.slowest:.0f} ms"
         )
     found += edits(driver)
     driver.viewport.release()
