@@ -12,6 +12,7 @@ from .environment_light import EnvironmentLight
 from .film import Film
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
+from .multires_radiosity import MultiresRadiosity
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
@@ -31,6 +32,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     TracedGlossy,
     TracedRefraction,
     InstantRadiosity,
+    MultiresRadiosity,
     ScreenSpaceBounce,
     Film,
 )

@@ -43,14 +43,16 @@ from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .neighbours import smooth
 from .surfaces import SURFACES
-from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VIRTUAL_LIGHTS, VirtualLights, near_radius
+from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights, VirtualLightSet, near_radius
 
+GATHER_TEXTURES = (*PATH_TEXTURES, ("FLOAT_2D", "virtual_lights"))
+GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("INT", "rays"), ("FLOAT", "near_radius"))
 GATHER = passes.fullscreen_program(
     "instant radiosity",
     "indirect/gather.frag.glsl",
-    textures=PATH_TEXTURES,
-    blocks=(*PATH_BLOCKS, (VIRTUAL_LIGHTS, "virtual_lights")),
-    constants=(*PATH_CONSTANTS, ("INT", "virtual_count"), ("INT", "rays"), ("FLOAT", "near_radius")),
+    textures=GATHER_TEXTURES,
+    blocks=PATH_BLOCKS,
+    constants=GATHER_CONSTANTS,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )
 INDIRECT_WRITES = (
@@ -79,13 +81,23 @@ def _may_reflect(graph) -> bool:
     return any("Bsdf" in node.type and node.type != "ShaderNodeBsdfTransparent" for node in graph.nodes.values())
 
 
+def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet, rays: int) -> dict:
+    """What shaders/indirect/lights.glsl needs: textures, blocks and constants of this sample."""
+    bindings = finder.path_bindings(frame)
+    bindings["textures"]["virtual_lights"] = lights.image
+    bindings["constants"] |= {
+        "virtual_count": len(lights), "rays": rays, "near_radius": near_radius(frame, len(lights)),
+    }  # fmt: skip
+    return bindings
+
+
 class InstantRadiosity(Technique):
     name = "instant_radiosity"
     label = "Instant radiosity"
     slot = "indirect"
     params = (
         Param(
-            "virtual_lights", "Virtual lights", 128, "Points of surfaces that light the picture in a sample", 1, 128,
+            "virtual_lights", "Virtual lights", 128, "Points of surfaces that light the picture in a sample", 1, 1024,
             draft=32,
         ),
         Param("rays", "Rays", 4, "How many of the virtual lights each pixel traces in a sample", 1, 64, draft=1),
@@ -103,12 +115,7 @@ class InstantRadiosity(Technique):
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
-        bindings = self.virtual_lights.path_bindings(frame)
-        bindings["blocks"]["virtual_lights"] = lights.block
-        bindings["constants"] |= {
-            "virtual_count": len(lights), "rays": frame.settings.get(self, "rays"),
-            "near_radius": near_radius(frame),
-        }  # fmt: skip
+        bindings = gather_bindings(frame, self.virtual_lights, lights, frame.settings.get(self, "rays"))
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
         for rows in frame.bands(self):

@@ -15,16 +15,17 @@ density of candidates there is the sum over all probes x (the balance heuristic)
 
 and a candidate stands for the area 1 / n(y): it has the intensity L / n. `count` of them are kept by systematic
 resampling in proportion to L, which is what they bring to the picture (L / n times the probes that see them), each
-weighted by the inverse of its chance (Georgiev & Slusallek 2010 keep by the same measure, by lot). Only for those the
-densities are traced.
+weighted by the inverse of its chance (Georgiev & Slusallek 2010 keep by the same measure, by lot): along a curve
+through space, so that they spread. Only for those the densities are traced.
 
 Colours of a path's surfaces are those of the picture where the camera sees them, else the mean of the material
 (reflectance.py); glossy reflection counts as diffuse there, so the energy is right and only its direction is blurred.
 
-| cost | per sample, with P = 96, R = 12 |
+| cost | per sample, with P = 96 probes and N virtual lights |
 |---|---|
-| rays | 1152 x (2 per bounce + 4), then 96 per virtual light for the densities |
-| readback | 72 KB of candidates, 48 KB of densities |
+| candidates | 1152, or 4 N if that is more |
+| rays | 2 per bounce + 4 for each candidate, then 96 for the density of each virtual light |
+| readback | 64 bytes per candidate, 384 per virtual light |
 
 Bias: points that only pixels see which no probe of a sample came near are missing in that sample. With 96 probes, that
 is light which reaches less than about a hundredth of the picture. Alpha is taken as the material's mean opacity.
@@ -37,23 +38,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..frame import lights
+from ..frame.morton import morton_codes
 from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
-from ..gfx.struct import Block, Struct
+from ..gfx.struct import Block
 from ..materials.compiler import may_emit
 from .emissive_light import EmissiveTriangles
 from .reflectance import Reflectance
 from .surfaces import SURFACE_TEXTURES, surface_bindings
 
 PROBES = (12, 8)
-RAYS, DRAFT_RAYS = 12, 3  # per probe
-NEAR = 0.1  # the bound of virtual lights, in median distances of what is seen
-MOST_SOURCES = 32  # points of light sources that a sample's paths look for
+LEAST_RAYS, DRAFT_RAYS = 12, 3  # per probe
+CHOICE = 4  # candidates at least, for each virtual light that is kept
+NEAR = 0.1  # the bound of 128 virtual lights, in median distances of what is seen
+MOST_SOURCES = 64  # points of light sources that the paths of a sample look for
 FLOOR = 1.0  # share of the mean importance that every candidate keeps
-MOST_VIRTUAL = 128
-TEXELS = 3
-VIRTUAL_LIGHTS = Struct("VirtualLights", ("vec4", f"light[{MOST_VIRTUAL * TEXELS}]"))
+MOST_VIRTUAL = 2048
 
 PATH_TEXTURES = (
     *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
@@ -84,12 +85,12 @@ DENSITY = passes.fullscreen_program(
 
 @dataclass(frozen=True)
 class VirtualLightSet:
-    """The virtual lights of one sample, as arrays and as the uniform block that shaders/indirect/lights.glsl reads."""
+    """The virtual lights of one sample, as arrays and as the image that shaders/indirect/lights.glsl reads."""
 
     positions: np.ndarray  # (N, 3) relative to the render origin
     normals: np.ndarray  # (N, 3) unit; a virtual light shines to this side, Lambertian
     intensities: np.ndarray  # (N, 3) along the normal, W/sr
-    block: Block
+    image: images.Image
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -103,36 +104,32 @@ class VirtualLights:
         self._sources = lights.Sources()
         self._source_block: Block | None = None
         self._source_count = 0
-        self._block: Block | None = None
         self._emissive: EmissiveTriangles | None = None
 
     def make(self, frame: Frame, technique, count: int) -> VirtualLightSet:
         """At most `count` virtual lights for this sample. Counts rays in the technique's ledger row."""
         self.draw_sources(frame)
-        found = self._candidates(frame)
+        rays = _rays(frame, count)
+        found = self._candidates(frame, rays)
         point, normal, radiance, shorter = (
             images.read(image).reshape(-1, 4)[:, :3].astype(np.float64) for image in found.colors
         )
-        keep, weight = _resample(radiance, count, frame.random("virtual lights/keep")[0])
-        density = self._densities(frame, found, keep)
+        keep, weight = _resample(point, radiance, count, frame.random("virtual lights/keep")[0])
+        density = self._densities(frame, rays, found, keep)
         for image in found.colors:
             images.pool.give(image)
         keep, weight = keep[density > 0], (weight[density > 0] / density[density > 0])
-        candidates = PROBES[0] * PROBES[1] * _rays(frame)
+        candidates = PROBES[0] * PROBES[1] * rays
         frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
         frame.count(technique, "density rays", len(density) * PROBES[0] * PROBES[1])
         intensity = radiance[keep] * weight[:, None]
-        light = np.zeros((MOST_VIRTUAL * TEXELS, 4), np.float32)
-        packed = light.reshape(MOST_VIRTUAL, TEXELS, 4)[: len(keep)]
-        packed[:, 0, :3], packed[:, 1, :3], packed[:, 2, :3] = point[keep], normal[keep], intensity
-        whole = np.abs(radiance[keep]) @ lights.LUMINANCE
-        packed[:, 2, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
-        if self._block is None:
-            self._block = Block(VIRTUAL_LIGHTS, light=light)
-        else:
-            self._block.update(light=light)
+        packed = np.zeros((3, max(len(keep), 1), 4), np.float32)
+        if len(keep):
+            packed[0, :, :3], packed[1, :, :3], packed[2, :, :3] = point[keep], normal[keep], intensity
+            whole = np.abs(radiance[keep]) @ lights.LUMINANCE
+            packed[2, :, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
         frame.count(technique, "virtual lights", len(keep))
-        return VirtualLightSet(point[keep], normal[keep], intensity, self._block)
+        return VirtualLightSet(point[keep], normal[keep], intensity, images.upload(packed))
 
     def draw_sources(self, frame: Frame) -> None:
         """Points on light sources for this sample's paths, and what materials reflect: what `path_bindings` needs."""
@@ -213,23 +210,23 @@ class VirtualLights:
                 rows.append(emitter.row(sample, 0, shadowed, weight / points, points=total))
         return rows
 
-    def _probing(self, frame: Frame) -> dict:
+    def _probing(self, frame: Frame, rays: int) -> dict:
         bindings = self.path_bindings(frame)
-        bindings["constants"] |= {"probes": PROBES, "rays": _rays(frame)}
+        bindings["constants"] |= {"probes": PROBES, "rays": rays}
         return bindings
 
-    def _candidates(self, frame: Frame) -> images.Target:
+    def _candidates(self, frame: Frame, rays: int) -> images.Target:
         """Points, normals, radiances, and radiances of paths one bounce shorter: a row per probe."""
-        size = (_rays(frame), PROBES[0] * PROBES[1])
+        size = (rays, PROBES[0] * PROBES[1])
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(4)))
-        passes.fullscreen(CANDIDATES, found, **self._probing(frame))
+        passes.fullscreen(CANDIDATES, found, **self._probing(frame, rays))
         return found
 
-    def _densities(self, frame: Frame, found: images.Target, keep: np.ndarray) -> np.ndarray:
+    def _densities(self, frame: Frame, rays: int, found: images.Target, keep: np.ndarray) -> np.ndarray:
         """(N,) how many rays of all probes fall on a square metre around each candidate that is kept."""
         if not len(keep):
             return np.zeros(0)
-        bindings = self._probing(frame)
+        bindings = self._probing(frame, rays)
         kept = np.zeros((1, MOST_VIRTUAL), np.float32)
         kept[0, : len(keep)] = keep
         bindings["textures"] |= {
@@ -243,26 +240,31 @@ class VirtualLights:
     def release(self) -> None:
         self.reflectance.release()
         self._sources.release()
-        self._source_block = self._block = self._emissive = None
+        self._source_block = self._emissive = None
 
 
-def _rays(frame: Frame) -> int:
-    """Rays of a probe."""
-    return DRAFT_RAYS if frame.settings.draft else RAYS
+def _rays(frame: Frame, count: int) -> int:
+    """Rays of a probe for `count` virtual lights."""
+    return DRAFT_RAYS if frame.settings.draft else max(LEAST_RAYS, -(-CHOICE * count // (PROBES[0] * PROBES[1])))
 
 
-def near_radius(frame: Frame) -> float:
-    """Distance below which virtual lights leave light to short rays, m."""
-    return NEAR * float(np.median(frame.receivers.distance))
+def near_radius(frame: Frame, count: int) -> float:
+    """Distance below which `count` virtual lights leave light to short rays, m: in proportion to their spacing."""
+    return NEAR * float(np.sqrt(128 / max(count, 1)) * np.median(frame.receivers.distance))
 
 
-def _resample(radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the candidates that are kept, and how many candidates each stands for."""
+def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the candidates that are kept, and how many candidates each stands for.
+
+    Marks at equal steps of the importance run along a curve through space, so that what is kept is spread over the
+    surfaces as evenly as the candidates allow.
+    """
     importance = np.abs(np.nan_to_num(radiance, posinf=0.0, neginf=0.0)) @ lights.LUMINANCE
     if not importance.sum() > 0:
         return np.zeros(0, int), np.zeros(0)
     importance = np.where(importance > 0, importance + FLOOR * importance.mean(), 0.0)
     expected = importance / importance.sum() * count
-    picked = np.searchsorted(np.cumsum(expected), np.arange(count) + u, side="right")
-    keep, times = np.unique(np.minimum(picked, len(expected) - 1), return_counts=True)
+    order = np.argsort(morton_codes(point), kind="stable")
+    picked = np.searchsorted(np.cumsum(expected[order]), np.arange(count) + u, side="right")
+    keep, times = np.unique(order[np.minimum(picked, len(order) - 1)], return_counts=True)
     return keep, times / expected[keep]

@@ -1,7 +1,8 @@
 // Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out.
 //
 // Both kernels are shares of the same light: a virtual light at distance d counts min(1, d2 / r2), a ray that meets a
-// surface at distance d counts 1 - min(1, d2 / r2).
+// surface at distance d counts 1 - min(1, d2 / r2). With SHARED, regions of pixels have gathered the virtual lights
+// (regions.frag.glsl).
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
 
@@ -50,7 +51,12 @@ void main()
   uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7)));
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   if (max_component(s.diffuse) > 0.0) {
-    out_diffuse.rgb = virtual_reflection(s, to_viewer, origin, rays, scrambled(film_view.bits_w, salt.z), salt.x + roll.x);
+#ifdef SHARED
+    out_diffuse.rgb = s.diffuse / PI * texelFetch(shared_irradiance, pixel + grid_offset, 0).rgb;
+#else
+    float choice = scrambled(film_view.bits_w, salt.z);
+    out_diffuse.rgb = virtual_gather(s, to_viewer, true, origin, rays, choice, salt.x + roll.x);
+#endif
     vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
     vec3 direction = cosine_direction(s.normal, u);
     if (dot(direction, s.geometric_normal) > 0.0) {

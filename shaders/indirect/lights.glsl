@@ -1,8 +1,7 @@
-// Virtual lights: points of surfaces that stand for the light which those reflect (`virtual_lights`, three vec4 each):
-//   0: position
-//   1: normal of the surface
-//   2: radiance over density, W/sr/m2 x m2; w: the share of it that was reflected at least once less than allowed
-#define VIRTUAL_TEXELS 3
+// Virtual lights: points of surfaces that stand for the light which those reflect (`virtual_lights`, a column each):
+//   row 0: position
+//   row 1: normal of the surface
+//   row 2: radiance over density, W/sr/m2 x m2; w: the share of it that was reflected at least once less than allowed
 
 struct VirtualLight {
   vec3 position;
@@ -14,11 +13,9 @@ struct VirtualLight {
 VirtualLight virtual_light(int index)
 {
   VirtualLight light;
-  vec4 a = virtual_lights.light[index * VIRTUAL_TEXELS];
-  vec4 b = virtual_lights.light[index * VIRTUAL_TEXELS + 1];
-  vec4 c = virtual_lights.light[index * VIRTUAL_TEXELS + 2];
-  light.position = a.xyz;
-  light.normal = b.xyz;
+  light.position = texelFetch(virtual_lights, ivec2(index, 0), 0).xyz;
+  light.normal = texelFetch(virtual_lights, ivec2(index, 1), 0).xyz;
+  vec4 c = texelFetch(virtual_lights, ivec2(index, 2), 0);
   light.intensity = c.xyz;
   light.shorter = c.w;
   return light;
@@ -33,19 +30,22 @@ float bounded_kernel(VirtualLight light, vec3 position, out vec3 direction)
   return max(-dot(light.normal, direction), 0.0) / max(squared, near_radius * near_radius);
 }
 
-// Radiance that a surface reflects of all virtual lights. Of all of them `count` are traced, drawn in proportion to what
-// they bring unblocked (systematic resampling).
-vec3 virtual_reflection(Surface s, vec3 to_viewer, vec3 origin, int count, float u, uint salt)
+// Irradiance at a surface by all virtual lights, and, given the surface's diffuse closure, what it reflects of it. Of all
+// of them `count` are traced, drawn in proportion to what they bring unblocked (systematic resampling); 0: none is, and
+// walls let all light pass.
+vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, int count, float u, uint salt)
 {
   float total = 0.0;
+  vec3 unblocked = vec3(0.0);
   vec3 direction;
   for (int i = 0; i < virtual_count; i++) {
     VirtualLight light = virtual_light(i);
     float kernel = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
     total += kernel * luminance(abs(light.intensity));
+    unblocked += kernel * light.intensity;
   }
-  if (!(total > 0.0)) {
-    return vec3(0.0);
+  if (!(total > 0.0) || count == 0) {
+    return reflected ? unblocked * s.diffuse / PI : unblocked;
   }
   float step_size = total / float(count);
   float mark = u * step_size;
@@ -54,7 +54,8 @@ vec3 virtual_reflection(Surface s, vec3 to_viewer, vec3 origin, int count, float
   for (int i = 0; i < virtual_count; i++) {
     VirtualLight light = virtual_light(i);
     float kernel = bounded_kernel(light, s.position, direction);
-    float share = kernel * max(dot(s.normal, direction), 0.0) * luminance(abs(light.intensity));
+    float cosine = max(dot(s.normal, direction), 0.0);
+    float share = kernel * cosine * luminance(abs(light.intensity));
     passed += share;
     if (share > 0.0 && mark < passed) {
       float marks = ceil((passed - mark) / step_size);
@@ -62,21 +63,27 @@ vec3 virtual_reflection(Surface s, vec3 to_viewer, vec3 origin, int count, float
       if (dot(direction, s.geometric_normal) > 0.0) {
         vec3 path = ray_origin(light.position, light.normal) - origin;
         float reach = length(path);
-        vec3 reflected = diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction);
         vec3 arriving = light.intensity * (kernel * marks * step_size / share);
-        sum += reflected * arriving * clear_path(origin, path / max(reach, 1e-30), reach, salt + uint(i));
+        arriving *= clear_path(origin, path / max(reach, 1e-30), reach, salt + uint(i));
+        sum += arriving * (reflected ? diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction)
+                                     : vec3(cosine));
       }
     }
   }
   return sum;
 }
 
-// Irradiance at a surface by virtual lights that may be reflected once more; one of them is traced.
+// Irradiance at a surface by virtual lights that may be reflected once more. Every n-th of them stands for n, such that
+// no more than PART are looked at; one of those is traced.
+#define PART 64
+
 vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt)
 {
+  int stride = (virtual_count + PART - 1) / PART;
+  int first = int(hash3(uvec3(salt, 5u, uint(virtual_count))).x % uint(max(stride, 1)));
   float total = 0.0;
   vec3 direction;
-  for (int i = 0; i < virtual_count; i++) {
+  for (int i = first; i < virtual_count; i += stride) {
     VirtualLight light = virtual_light(i);
     float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
     total += kernel * luminance(abs(light.intensity)) * light.shorter;
@@ -85,7 +92,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt)
     return vec3(0.0);
   }
   float passed = 0.0;
-  for (int i = 0; i < virtual_count; i++) {
+  for (int i = first; i < virtual_count; i += stride) {
     VirtualLight light = virtual_light(i);
     float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
     float share = kernel * luminance(abs(light.intensity)) * light.shorter;
@@ -95,7 +102,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt)
       vec3 path = ray_origin(light.position, light.normal) - origin;
       float reach = length(path);
       float visible = clear_path(origin, path / max(reach, 1e-30), reach, salt);
-      return light.intensity * light.shorter * kernel * (total / share) * visible;
+      return light.intensity * light.shorter * kernel * (float(stride) * total / share) * visible;
     }
   }
   return vec3(0.0);

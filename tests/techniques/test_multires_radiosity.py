@@ -1,0 +1,80 @@
+"""Multi-resolution radiosity: closed forms whatever the regions are, and the gather of every pixel as their measure."""
+
+import numpy as np
+import pytest
+
+from addon.compare.passes import light_paths
+from addon.compare.reference import render_passes
+from addon.frame import ledger
+from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def render(stage):
+    """Diffuse indirect radiance of the stage, with the technique's parameters by name."""
+
+    def render(bounces, samples=8, size=(32, 32), virtual_lights=256, **params):
+        stage.scene.candela.slot_indirect = "multires_radiosity"
+        for name, value in {"virtual_lights": virtual_lights, **params}.items():
+            setattr(stage.scene.candela, f"multires_radiosity_{name}", value)
+        images = render_passes(stage.scene, "CANDELA", samples, 0, size=size, bounces=bounces).images
+        assert ledger.latest().bad_pixels == 0
+        return light_paths(images)["diffuse_indirect"]
+
+    return render
+
+
+def counters():
+    return next(row.counters for row in ledger.latest().rows if row.name == "multires_radiosity")
+
+
+@pytest.mark.parametrize("bounces", [1, 3])
+def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces):
+    """Every virtual light brings the same everywhere in a sphere, so that interpolation must not change it."""
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    light = render(bounces)
+    assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
+    assert light.mean(axis=2).std() < 0.06 * light.mean()
+
+
+def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render):
+    stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
+    corners = [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
+    stage.mesh(corners, [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    camera = stage.camera((3, 0.5, 0.5), (np.pi / 2, 0, np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
+    irradiance = render(1, samples=32, size=(64, 64)).mean(axis=2) * np.pi
+    assert irradiance.mean() == pytest.approx(8 * 0.200044, rel=0.02)
+    height = (np.arange(64) + 0.5) / 64
+    four_rows = irradiance[:, 28:36].reshape(16, 32).mean(axis=1)
+    np.testing.assert_allclose(four_rows, wall_irradiance(height).reshape(16, 4).mean(axis=1), rtol=0.06)
+
+
+def test_regions_differ_little_from_the_gather_of_every_pixel_and_are_few(stage, render):
+    """The same virtual lights, none of them traced."""
+    corner(stage)
+    settings = {"samples": 1, "size": (320, 240), "rays": 0}
+    regions = render(2, levels=3, **settings)
+    count = counters()["regions"]
+    pixels = render(2, levels=0, **settings)
+    assert counters()["regions"] == 320 * 240
+    assert count < 320 * 240 / 4
+    assert np.sqrt(((regions - pixels) ** 2).mean()) < 0.03 * pixels.mean()
+
+
+def test_light_that_is_not_traced_passes_walls(stage, render):
+    """Each virtual light only adds where its shadow is not asked for."""
+    corner(stage)
+    stage.rectangle((-0.3, -0.3), (0.3, 0.3), z=0.6, material=stage.diffuse(0.2))
+    traced = render(2, samples=4, rays=64)
+    assert render(2, samples=4, rays=0).mean() > 1.01 * traced.mean()
+
+
+def test_every_size_of_picture_has_its_regions(stage, render):
+    corner(stage)
+    for size in ((1, 1), (7, 3), (33, 17)):
+        assert np.isfinite(render(1, samples=2, size=size, levels=5)).all()
