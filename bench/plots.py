@@ -9,7 +9,7 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
-from matplotlib.ticker import LogFormatterSciNotation
+from matplotlib.ticker import LogFormatterSciNotation, NullFormatter
 
 from bench.figures import Results, bias_floor, staircase
 
@@ -60,6 +60,7 @@ def time_error(axes, results: Results, scene: str, labels: list[str], path: str 
         axes.axhspan(low, floor, color="#d8d4cb", alpha=0.7, linewidth=0, zorder=0)
         axes.set_ylim(bottom=low)
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_major_formatter(LogFormatterSciNotation())
     axes.grid(which="major", color="#e4e4e4", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
@@ -138,6 +139,7 @@ def growth(rows: list[dict], path: Path) -> None:
         axes.set_ylim(bottom=max(min(seconds) / 30, 1e-4))
         axes.set_title(name, fontsize=10, loc="left")
         axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(color="#e4e4e4", linewidth=0.6)
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=8)
