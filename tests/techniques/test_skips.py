@@ -58,6 +58,7 @@ WITHOUT = {
     "light_probes": nothing_lit,
     "accumulated_maps": no_shadow,
     "vssm": no_shadow,
+    "cssm": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
     "environment_light": no_world,
