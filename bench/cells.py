@@ -21,7 +21,7 @@ SCENES = ROOT / "sample_blends"
 SWEEP = (1, 2, 4, 8, 16, 32, 64)  # of Candela
 CYCLES_SWEEP = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 EEVEE_SWEEP = (16, 4, 64)
-MAIN_SAMPLES = {  # what is dropped last when time runs out
+MAIN_SAMPLES = {  # for these more time is spent when it is short
     "CANDELA": (1, 4, 16, 64),
     "BLENDER_EEVEE": (16,),
     "CYCLES": (1, 4, 16, 64),

@@ -30,7 +30,7 @@ def command(options: argparse.Namespace) -> int:
     run.size_of(options.size)
     scenes = ["--scenes", *options.scenes] if options.scenes else []
     size = ["--size", options.size]
-    short = ["--runs", "1"] if options.budget else []
+    short = ["--runs", "0"] if options.budget else []
     failed = [step("profile", *scenes, *size), step("growth", *short)]
     budget = []
     if options.budget:

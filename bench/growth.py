@@ -1,9 +1,10 @@
 """How cost grows over dials, in counters and seconds: `python -m bench growth`.
 
 The dials are those of the procedural scenes (bench/families.py), and of one sample scene the size of the picture, the
-samples and the virtual lights. Each value is rendered cold once and then `--runs` times; a whole render's time is the
-median. Times by technique come from one more render that waits for the GPU after each step. The exponent is that of
-time over the dial between its two largest values: 1 is in proportion, 0 is free. Counters hold on every machine.
+samples and the virtual lights. Each value is rendered cold once, then once waiting for the GPU after each step, which
+gives the times by technique, and then `--runs` times; a whole render's time is the median of all warm ones. The
+exponent is that of time over the dial between its two largest values: 1 is in proportion, 0 is free. Counters hold on
+every machine.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ def dials() -> tuple[Dial, ...]:
     own = [Dial(f.name, f.path, f.values, member(f.name)) for f in families.FAMILIES.values()]
     return (
         *own,
-        Dial("width", "all", (64, 128, 256, 512), _open_sample, size=lambda value: (int(value), int(value * 3 / 4))),
-        Dial("samples", "all", (1, 4, 16, 64), _open_sample, samples=int),
+        Dial("width", "all", (64, 128, 256), _open_sample, size=lambda value: (int(value), int(value * 3 / 4))),
+        Dial("samples", "all", (1, 4, 16), _open_sample, samples=int),
         Dial("virtual lights", "diffuse indirect", (8, 32, 128), _open_with_virtual_lights),
     )
 
@@ -82,7 +83,7 @@ def profiled(scene) -> Iterator[None]:
 
 
 def measure(dial: Dial, value: float, runs: int) -> dict:
-    """Seconds, stages, and per technique time and counters at one value of a dial."""
+    """Seconds, and per technique time and counters, at one value of a dial."""
     import bpy
 
     from addon import engine
@@ -94,14 +95,13 @@ def measure(dial: Dial, value: float, runs: int) -> dict:
     opened = worker.Open(scene, scene.view_layers[0], None, set())
     samples, size = dial.samples(value), dial.size(value)
     cold = worker.render(opened, SERIES, samples, 1000, size)["seconds"]
-    times = [worker.render(opened, SERIES, samples, run + 1, size)["seconds"] for run in range(runs)]
-    stages = worker.of_ledger()["stages"]
     with profiled(scene):
-        worker.render(opened, SERIES, samples, 0, size)
+        times = [worker.render(opened, SERIES, samples, 0, size)["seconds"]]
     ledger = worker.of_ledger()["techniques"]
+    times += [worker.render(opened, SERIES, samples, run + 1, size)["seconds"] for run in range(runs)]
     return {
         "dial": dial.name, "path": dial.path, "value": value, "samples": samples, "size": list(size), "cold": cold,
-        "seconds": float(np.median(times)), "stages": stages,
+        "seconds": float(np.median(times)),
         "techniques": {row["label"]: row["ms"] for row in ledger},
         "counters": {row["label"]: row["counters"] for row in ledger if row["counters"]},
     }  # fmt: skip
@@ -147,7 +147,7 @@ def grown_counters(first: dict, last: dict) -> str:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dials", nargs="+", metavar="NAME", help="default: all")
-    parser.add_argument("--runs", default=3, type=int, metavar="N", help="default 3")
+    parser.add_argument("--runs", default=2, type=int, metavar="N", help="default 2")
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
 
 

@@ -3,7 +3,7 @@
 Every cell (bench/cells.py) is measured by a worker, a fresh process per scene, and kept at once in out/bench: a run
 that is interrupted goes on where it was. `--budget` gives the minutes that the whole may take: how long each cell will
 take is predicted from what has been measured, and the dearest cells that do not fit are left out; those of the engines
-as they come, at 1, 4, 16 and 64 samples, go last. What was measured becomes one file, bench/results/bench.json.
+as they come, at 1, 4, 16 and 64 samples, may cost more. What was measured becomes one file, bench/results/bench.json.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from bench.cells import ROOT, Cell, Scene, Series, Store, in_turns
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
 GUESS = {"CANDELA": (0.3, 0.15), "BLENDER_EEVEE": (8.0, 0.02), "CYCLES": (0.4, 0.06)}  # seconds: fixed, per sample
+MAIN_WORTH = 4.0  # a cell of the engines as they come may cost so many times more than another before it is left out
 OPENING = 4.0  # seconds to start a worker and open a scene
 
 
@@ -91,11 +92,11 @@ def guess(series: Series, samples: int) -> float:
 
 
 def that_fit(cells: list[Cell], cost: Callable[[Cell], float], seconds: float) -> list[Cell]:
-    """The cells, in their order, without the dearest ones that the time does not allow; main cells go last."""
+    """The cells, in their order, without the dearest ones that the time does not allow; main cells weigh less."""
     costs = {cell: cost(cell) for cell in cells}
     total = sum(costs.values())
     dropped = set()
-    for cell in sorted(cells, key=lambda cell: (cell.main, -costs[cell])):
+    for cell in sorted(cells, key=lambda cell: costs[cell] / (MAIN_WORTH if cell.main else 1.0), reverse=True):
         if total <= seconds:
             break
         dropped.add(cell)

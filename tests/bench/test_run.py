@@ -54,13 +54,15 @@ def test_store_keeps_each_cell_at_once_and_survives_half_a_line(tmp_path):
     assert Store(path).found == {"a": {"key": "a", "wall": 1.0}}
 
 
-def test_dearest_cells_are_left_out_and_main_ones_last():
+def test_dearest_cells_are_left_out_and_main_ones_may_cost_more():
     own, eevee, other = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 256)
     costs = {own: 1.0, eevee: 20.0, other: 10.0}
     assert run.that_fit([own, eevee, other], costs.get, 31.0) == [own, eevee, other]
     assert run.that_fit([own, eevee, other], costs.get, 30.0) == [own, eevee]
     assert run.that_fit([own, eevee, other], costs.get, 5.0) == [own]
     assert run.that_fit([own, eevee, other], costs.get, 0.0) == []
+    costs[other] = 4.0
+    assert run.that_fit([own, eevee, other], costs.get, 10.0) == [own, other]
 
 
 def test_time_is_predicted_from_what_is_most_alike():
