@@ -157,6 +157,12 @@ def _errors(rendered: Rendered, reference) -> dict[str, str]:
     return lines
 
 
+def _ended(called: set[str]) -> set[str]:
+    """What an operator says that has called another. The other one may be running; it has ended itself: Blender never
+    frees an operator that claims to be modal and is not."""
+    return {"CANCELLED"} if "CANCELLED" in called else {"FINISHED"}
+
+
 class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
     """Run only what the active node needs, and show what it gives"""
 
@@ -169,7 +175,7 @@ class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
         return Job.running is None and space is not None and space.type == "NODE_EDITOR" and context.active_node
 
     def execute(self, context):
-        return bpy.ops.candela.passes_run("INVOKE_DEFAULT", tree=self.tree, node=context.active_node.name)
+        return _ended(bpy.ops.candela.passes_run("INVOKE_DEFAULT", tree=self.tree, node=context.active_node.name))
 
 
 class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
@@ -184,7 +190,7 @@ class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
 
     def execute(self, context):
         mode = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        return bpy.ops.candela.passes_run(mode, tree=self.tree, compare=True)
+        return _ended(bpy.ops.candela.passes_run(mode, tree=self.tree, compare=True))
 
 
 class CANDELA_OT_passes_bake(_OnTree, bpy.types.Operator):
