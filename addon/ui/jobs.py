@@ -103,7 +103,7 @@ def draw_progress(layout) -> None:
     if Job.running is not None:
         share, sentence = Job.progress
         layout.progress(factor=share, text=sentence or "begins")
-        layout.label(text="Esc cancels", icon="EVENT_ESC")
+        layout.label(text="Esc cancels")
 
 
 def _redraw(context) -> None:
