@@ -1,64 +1,93 @@
-"""Directional occlusion: light of the world where nothing that the picture shows stands before it.
+"""Directional occlusion: light of the world where nothing stands before it: first on the screen, then along a ray.
 
-    L(x) = albedo * mean over fans of  sum over groups of sectors  L_world(w) (sectors that nothing hides) / 32
+    L(x) = albedo * mean over fans of  V * sum over groups of sectors  L_world(w) (sectors that nothing hides) / 32
 
 Half planes through x and the viewer are searched on the screen as in ssdo.py; of their 32 sectors, equal shares of the
 cosine-weighted solid angle, the hidden ones are marked, and groups of eight read the world in a direction of their own.
 So shadows have the colour, direction and softness of the light that is missing there (Ritschel, Grosch and Seidel 2009;
 sectors after Therrien, Levesque and Gilet 2023). An open plane has all its light at every tilt: no sector is lost to
-the surface itself, and the fans' weights are equal.
+the surface itself, and the fans' weights are equal. V: what the screen leaves of a fan's light is asked for by one ray
+(`rays`), in a direction drawn in proportion to it; so what the picture does not show hides light as well.
 
 | cost | per sample |
 |---|---|
-| passes | 2 over the screen (3 if the sample is shown alone), no depth map |
+| passes | 2 over the screen (4 if the sample is shown alone), no depth map |
 | fetches per pixel | `fans` x (2 x `steps` + 16) |
+| rays per pixel | `fans` |
 
-For pictures of one sample, outdoors: there it replaces a few hard shadows of environment_light by smooth shade. Auto
-takes environment_light, whose error falls with the samples.
+For pictures of one sample, where it replaces a few hard shadows of environment_light by smooth shade. relMSE of direct
+diffuse light, 96x72, one sample and 16, in one to three times the time of environment_light:
 
-Bias, in diffuse direct light, by design: what is off the screen, hidden, or farther than `radius` hides nothing, so
-light gets into rooms through walls that the camera does not see; hidden sides are as thick as `thickness`. The world is
-blurred to cells of 5.6 degrees, and small suns in it are noise. Glossy lobes get the world by rays (traced_glossy), not
-from here; translucent and velvet ones get none.
+| | courtyard | product | garden | foliage | window |
+|---|---|---|---|---|---|
+| environment_light, 1 | 20 | 0.134 | 0.224 | 0.249 | 0.57 |
+| this, 1 | 1.1 | 0.093 | 0.221 | 0.195 | 0.37 |
+| this without rays, 1 | 93 | 0.25 | 0.225 | 0.194 | 98 |
+| environment_light, 16 | 0.26 | 0.013 | 0.030 | 0.022 | 0.49 |
+| this, 16 | 0.20 | 0.084 | 0.026 | 0.026 | 0.50 |
+
+Auto takes environment_light, whose error falls to zero with the samples.
+
+Bias, in diffuse direct light, by design: patches hide up to a step more than they are (0.94 to 0.99 of the light is
+left on these scenes), hidden sides are as thick as `thickness`, and the world is blurred to cells of 5.6 degrees; small
+suns in it are noise. Without rays, or with more than 4 million triangles, what is off the screen, hidden, or farther
+than `radius` hides nothing, so light gets into rooms through walls that the camera does not see. Glossy lobes get the
+world by rays (traced_glossy), not from here; translucent and velvet ones get none.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from ..frame.environment import WORLD, Environment
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import Technique
+from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES
 from .environment_light import no_environment_light
 from .neighbours import reflect
-from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, POINTS, fan_bindings, fan_params
+from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, fan_bindings, fan_params
 from .surfaces import SURFACES
 
 CELLS = (32, 64)
-OCCLUSION_BITS, OCCLUSION_POINTS = (
+ENVIRONMENT_TEXTURES = (("FLOAT_2D", "environment_map"), ("FLOAT_2D", "environment_density_map"))
+OCCLUSION_BITS, OCCLUSION_POINTS, OCCLUSION_RAYS = (
     passes.fullscreen_program(
         f"directional occlusion, {kind}",
         f"ssdo/{file}.frag.glsl",
-        textures=(*FAN_TEXTURES, ("FLOAT_2D", "environment_map"), ("FLOAT_2D", "environment_density_map")),
+        textures=(*FAN_TEXTURES, *ENVIRONMENT_TEXTURES, *textures),
         blocks=((VIEW, "film_view"), (WORLD, "world_light")),
-        constants=FAN_CONSTANTS,
+        constants=(*FAN_CONSTANTS, *constants),
+        defines=defines,
         outputs=(("VEC4", "out_arriving"),),
     )
-    for kind, file in (("bits", "occlusion"), ("points", "occlusion_points"))
+    for kind, file, textures, constants, defines in (
+        ("bits", "occlusion", (), (), ()),
+        ("points", "occlusion_points", (), (), ()),
+        (
+            "bits and rays",
+            "occlusion",
+            (("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves")),
+            (("FLOAT", "offset_size"), ("INT", "trace_levels")),
+            (("RAYS", ""),),
+        ),
+    )
 )
-OCCLUSION = {BITS: OCCLUSION_BITS, POINTS: OCCLUSION_POINTS}
 
 
 class DirectionalOcclusion(Technique):
     name = "directional_occlusion"
     label = "Directional occlusion"
     slot = "environment"
-    params = fan_params(radius=1.0, thickness=0.2)
+    params = (
+        *fan_params(radius=1.0, thickness=0.02),
+        Param("rays", "Rays", True, "One ray per fan for what the screen does not show"),
+    )
     reads = SURFACES
     writes = DIRECT_WRITES
 
@@ -69,7 +98,7 @@ class DirectionalOcclusion(Technique):
         reason = no_environment_light(snapshot)
         return reason or (None if snapshot.world.visibility.diffuse else "the world is hidden from diffuse surfaces")
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         if self._blurred is None or self._blurred[0] is not frame.environment:
@@ -79,9 +108,23 @@ class DirectionalOcclusion(Technique):
         bindings["textures"]["environment_map"] = self._blurred[1]
         bindings["textures"]["environment_density_map"] = frame.environment.density_map
         bindings["blocks"]["world_light"] = frame.environment.block
+        program = OCCLUSION_POINTS
+        traced = False
+        if frame.settings.get(self, "visibility") == BITS:
+            hierarchy = frame.hierarchy("shadow") if frame.settings.get(self, "rays") else None
+            traced = hierarchy is not None
+            program = OCCLUSION_RAYS if traced else OCCLUSION_BITS
+        if traced:
+            bindings["textures"] |= {"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves}
+            bindings["constants"] |= {
+                "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
+            }  # fmt: skip
+            frame.count(self, "rays", frame.size[0] * frame.size[1] * frame.settings.get(self, "fans"))
         with images.borrowed(*frame.size, "RGBA32F") as arriving:
-            passes.fullscreen(OCCLUSION[frame.settings.get(self, "visibility")], arriving, **bindings)
-            reflect(frame, self, arriving.colors[0], "radiance.diffuse_direct")
+            for rows in frame.bands(self):
+                passes.fullscreen(program, arriving, rows=rows, **bindings)
+                yield
+            reflect(frame, self, arriving.colors[0], "radiance.diffuse_direct", noisy=traced)
         frame.count(self, "passes", 2)
 
     def release(self) -> None:

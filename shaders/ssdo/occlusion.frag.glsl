@@ -1,8 +1,14 @@
 // Light of the world that what the picture shows does not hide, as its cosine-weighted mean over the hemisphere.
 //
 // Eight sectors of a fan share one direction, in which the world is read from a map that is blurred about as far.
+//
+// With RAYS each fan asks with one ray whether what the picture does not show hides the light that is left, in a direction
+// drawn in proportion to it.
 #include "ssdo/fan.glsl"
 #include "lib/environment.glsl"
+#ifdef RAYS
+#include "trace/hierarchy.glsl"
+#endif
 
 #define GROUP 8
 
@@ -19,16 +25,29 @@ uint fan_hidden(Fan fan, vec2 u)
   return hidden;
 }
 
-vec3 fan_environment(Fan fan, Surface s, uint hidden, float within)
+vec3 fan_environment(Fan fan, Surface s, uint hidden, vec2 u, uint salt)
 {
   vec3 sum = vec3(0.0);
+  vec3 chosen = s.normal;
   for (int group = 0; group < 32 / GROUP; group++) {
     uint open = ~(hidden >> uint(group * GROUP)) & ((1u << uint(GROUP)) - 1u);
     if (open != 0u) {
-      vec3 direction = fan_direction(fan, (float(group) + within) * (float(GROUP) / 32.0));
-      sum += environment_radiance(direction) * diffuse_weight(s, fan.toward, direction) * float(bitCount(open));
+      vec3 direction = fan_direction(fan, (float(group) + u.x) * (float(GROUP) / 32.0));
+      vec3 light = environment_radiance(direction) * diffuse_weight(s, fan.toward, direction) * float(bitCount(open));
+      sum += light;
+      float share = luminance(abs(light)) / max(luminance(abs(sum)), 1e-30);
+      bool taken = u.y < share;
+      chosen = taken ? direction : chosen;
+      u.y = clamp(taken ? u.y / max(share, 1e-7) : (u.y - share) / max(1.0 - share, 1e-7), 0.0, 0.999999);
     }
   }
+#ifdef RAYS
+  if (max_component(abs(sum)) > 0.0) {
+    vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+    ivec2 hit;
+    sum *= (trace_until(origin, chosen, 1e29, 1e29, salt, hit) >= 1e29) ? 1.0 : 0.0;
+  }
+#endif
   return sum / 32.0;
 }
 
@@ -52,7 +71,7 @@ void main()
     vec3 direction = cosine_direction(s.normal, fan_numbers(turn, i));
     if (fan_begin(s, gl_FragCoord.xy, direction, to_unit(roll.x), fan)) {
       uint hidden = fan_hidden(fan, fan_numbers(within, i));
-      out_arriving.rgb += fan_environment(fan, s, hidden, to_unit(roll.y)) / float(fan_count);
+      out_arriving.rgb += fan_environment(fan, s, hidden, vec2(to_unit(roll.y), to_unit(roll.z)), roll.x) / float(fan_count);
     }
   }
 }

@@ -52,7 +52,7 @@ def test_a_wall_hides_its_form_factor_of_the_sky(stage, render, elevation):
     place = (5 * np.cos(elevation) + 0.5, 0, 5 * np.sin(elevation))
     camera = stage.camera(place, (np.pi / 2 - elevation, 0, np.pi / 2))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0
-    light = render(radius=100.0)[:, 20:28].mean(axis=(1, 2))
+    light = render(radius=100.0, rays=False)[:, 20:28].mean(axis=(1, 2))
     distance = 0.5 - ((np.arange(SIZE[1]) + 0.5) / SIZE[1] - 0.5) * 4 / np.sin(elevation)
     floor = (distance > 0.05) & (distance < 1.9)
     expected = 0.5 + 0.5 * distance[floor] / np.hypot(1.0, distance[floor])
@@ -86,8 +86,25 @@ def test_a_sphere_hides_the_sky_above_the_floor_it_lies_on(stage, render):
     beside = np.hypot(x, y) > 0.6
     expected = 1 - (0.25 / (x * x + y * y + 0.25)) ** 1.5
     for thickness, bias in ((0.0, 0.06), (0.02, 0.02), (0.2, -0.04)):
-        error = (render(radius=100.0, thickness=thickness).mean(axis=2) - expected)[beside & (np.hypot(x, y) < 1)]
+        error = (render(radius=100.0, thickness=thickness, rays=False).mean(axis=2) - expected)[
+            beside & (np.hypot(x, y) < 1)
+        ]
         assert error.mean() == pytest.approx(bias, abs=0.03), thickness
+
+
+def test_rays_find_what_the_screen_does_not_show(stage, render):
+    """A roof that the camera does not see hides its form factor of the sky; a sphere its lower half too."""
+    stage.world()
+    stage.floor(300)
+    ball(stage)
+    stage.camera_above(4.0)
+    x, y = places(SIZE)
+    distance = np.hypot(x, y)
+    expected = 1 - (0.25 / (x * x + y * y + 0.25)) ** 1.5
+    beside = (distance > 0.6) & (distance < 1)
+    assert (render().mean(axis=2) - expected)[beside].mean() == pytest.approx(0.0, abs=0.02)
+    stage.blocker((-300, -300), (300, 300), 5.0)
+    assert render().mean() < 0.005
 
 
 def test_shade_lies_opposite_to_where_the_light_is_and_has_the_others_colour(stage, render):
@@ -117,7 +134,7 @@ def test_what_is_farther_than_the_radius_hides_nothing(stage, render):
     ball(stage)
     stage.camera_above(4.0)
     x, y = places(SIZE)
-    assert render(radius=0.01)[np.hypot(x, y) > 0.7].min() > 0.99
+    assert render(radius=0.01, rays=False)[np.hypot(x, y) > 0.7].min() > 0.99
 
 
 def test_a_blurred_sky_has_the_same_power():
