@@ -1,4 +1,4 @@
-"""`python -m bench run | growth | profile | costs | page | all`: see the module of each, or `--help` after it."""
+"""`python -m bench run | growth | indirect | profile | costs | page | all`: see the module of each, or ask `--help`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,17 @@ import argparse
 import os
 import sys
 
-from bench import costs, everything, growth, page, profile, run
+from bench import costs, everything, growth, indirect, page, profile, run
 
-VERBS = {"run": run, "growth": growth, "profile": profile, "costs": costs, "page": page, "all": everything}
+VERBS = {
+    "run": run,
+    "growth": growth,
+    "indirect": indirect,
+    "profile": profile,
+    "costs": costs,
+    "page": page,
+    "all": everything,
+}
 
 
 def main(arguments: list[str]) -> int:

@@ -12,7 +12,8 @@ neighbours, those without data left out, the others weighted by exp(-(distance o
 (n . n')^8. Virtual lights, their bound near surfaces, and the short rays that give back what the bound takes are those
 of instant_radiosity.py, as is glossy light; nothing is doubled and nothing is lost. As a region is gathered for many
 pixels, it can look at many more virtual lights and trace more of them: at one sample the error of a picture is that of
-the set of virtual lights, which falls with their number. In every sample the grid of regions is shifted.
+the set of virtual lights, which falls with their number. In every sample the grid of regions is shifted. A sample that
+is shown alone is filtered over neighbouring pixels (neighbours.py), which takes the grain of the short rays.
 
 Sources: Nichols & Wyman 2009 (multi-resolution splatting); Nichols, Shopf & Wyman 2009; Le Hoang Quyen 2014.
 
@@ -45,6 +46,7 @@ from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, INDIRECT_WRITES, gather_bindings, no_indirect_light
+from .neighbours import smooth
 from .surfaces import SURFACES, surface_bindings
 from .virtual_lights import PATH_BLOCKS, VirtualLights
 
@@ -141,6 +143,7 @@ class MultiresRadiosity(Technique):
         for rows in frame.bands(self):
             passes.fullscreen(GATHER_SHARED, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
             yield
+        smooth(frame, self, "radiance.diffuse_indirect")
         images.pool.give(irradiance)
         for level in pyramid:
             for image in level.colors:
