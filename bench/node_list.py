@@ -83,6 +83,15 @@ def _patterns() -> list[Case]:
         values = {"Scale": 0.7, "Distortion": 2.0, "Detail": 1.5, "Phase Offset": 0.4}
         name = f"Wave {kind.lower()} {profile.lower()}"
         cases.append(Case(name, "TexWave", "Color", settings, values, "Object", procedural=True))
+    for kind, isotropic in product(("2D", "3D"), (False, True)):
+        values = {"Scale": 3.0, "Frequency": 1.7, "Anisotropy": 0.3 if isotropic else 1.0}
+        name = f"Gabor {kind}{' turned at random' if isotropic else ''}"
+        cases += [
+            Case(
+                f"{name} {output.lower()}", "TexGabor", output, {"gabor_type": kind}, values, "Object", procedural=True
+            )
+            for output in ("Value", "Phase", "Intensity")
+        ]
     for direction in "XYZ":
         settings = {"wave_type": "RINGS", "bands_direction": direction, "rings_direction": direction}
         cases.append(Case(f"Wave rings {direction}", "TexWave", "Fac", settings, {"Scale": 0.7}, "Object", sphere=True))
@@ -156,7 +165,10 @@ def _inputs() -> list[Case]:
         *shown("UVMap", ("UV",), {"uv_map": "UVMap"}, name="UV Map"),
         *shown(
             "NewGeometry",
-            ("Position", "Normal", "Tangent", "True Normal", "Incoming", "Backfacing"),
+            (
+                *("Position", "Normal", "Tangent", "True Normal", "Incoming", "Backfacing"),
+                *("Pointiness", "Random Per Island"),
+            ),
             name="Geometry",
         ),
         *shown(

@@ -89,6 +89,7 @@ def _state(made, entries: list[Entry]) -> tuple[str, str]:
     for entry in entries:
         sentences += [approximation.sentence for approximation in entry.approximations]
         sentences += [sentence for _, _, sentence in entry.setting_approximations]
+        sentences += [sentence for _, sentence in entry.output_approximations]
     known = {output for entry in entries for output, _ in entry.outputs}
     shown = {socket.identifier: socket.name for socket in made.outputs if socket.type != "SHADER"}
     unknown = sorted(shown[one] for one in shown if one not in known and not one.startswith(("__", "Result_Rot")))

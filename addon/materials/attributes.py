@@ -26,7 +26,8 @@ def attributes_of(graph: Graph) -> frozenset[Attribute]:
         entry = nodes.find(node.type, node.properties)
         for argument in entry.arguments if entry is not None else ():
             if isinstance(argument, words.Attribute) and (not argument.output or (node.key, argument.output) in read):
-                found.add(Attribute(argument.kind, str(node.properties.get(argument.property, ""))))
+                name = argument.name or str(node.properties.get(argument.property, ""))
+                found.add(Attribute(argument.kind, name))
             elif isinstance(argument, words.Socket) and argument.implicit in IMPLICIT:
                 given = node.inputs.get(argument.identifier)
                 if (given is None or given.link is None) and asked_for(node, argument):

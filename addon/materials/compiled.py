@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .estimate import Interface
+from .volume import Medium
 
 
 @dataclass(frozen=True)
@@ -41,4 +42,5 @@ class CompiledMaterial:
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon
     tinted: bool  # what passes straight through may be coloured
     glass: Interface | None  # how it bends light, on average
+    medium: Medium | None  # what its inside does with light
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated

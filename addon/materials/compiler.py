@@ -26,6 +26,7 @@ from .graph import Graph, Input, Node
 from .nodes.entry import Entry
 from .nodes.shader import IMPLICIT_EMISSION, UNKNOWN_SHADER
 from .values import glsl_number
+from .volume import medium_of
 
 BUMP_FILTER_WIDTH = 0.1  # pixels between the heights that a displacement's normal is made of, as in Cycles
 
@@ -78,6 +79,7 @@ class _Compilation:
             soft=summary.soft,
             tinted=summary.tinted,
             glass=summary.glass,
+            medium=medium_of(self.graph),
             fallbacks=tuple(code.fallbacks),
         )
 

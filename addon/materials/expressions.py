@@ -21,6 +21,8 @@ MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
 DEEPEST_BUMP = 3  # bump nodes within the heights of bump nodes: each level is evaluated three times
 MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the programs that include the material
 
+# The Texture Mapping panel of a node as the reader hands it on, where nobody has touched it.
+PLAIN_MAPPING = ("POINT", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
 
 GLSL_TYPES = {"FLOAT": "float", "VECTOR": "vec3", "COLOR": "vec3"}
@@ -98,6 +100,11 @@ class Expressions:
                 continue
             if self.exists(socket.link) or to_kind(socket.value, socket.kind, "FLOAT") != approximation.harmless:
                 self.note(node, approximation.sentence)
+        if node.properties.get("texture_mapping", PLAIN_MAPPING) != PLAIN_MAPPING:
+            self.note(node, "The node's own Texture Mapping panel is not read; use a Mapping node.")
+        for output, sentence in entry.output_approximations:
+            if (node.key, output) in self._read_outputs:
+                self.note(node, sentence)
         for name, values, sentence in entry.setting_approximations:
             if node.properties.get(name) in values:
                 self.note(node, sentence)
@@ -198,7 +205,8 @@ class Expressions:
         if isinstance(argument, words.Attribute):
             if argument.output and (node.key, argument.output) not in self._read_outputs:
                 return "vec4(0.0)"
-            return self._attribute(node, argument.kind, str(node.properties.get(argument.property, "")))
+            name = argument.name or str(node.properties.get(argument.property, ""))
+            return self._attribute(node, argument.kind, name)
         if isinstance(argument, words.Used):
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
         if isinstance(argument, words.Rows):

@@ -73,6 +73,8 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     for name in ("Surface", "Volume", "Displacement"):
         socket = output.inputs.get(name)
         links[name.lower()] = None if socket is None else reading.source(place, output, socket)[0]
+    if links["displacement"] is not None and getattr(owner, "displacement_method", "BUMP") != "BUMP":
+        reading.notes.append((owner.name, "Displacement bends the surface's normal only; its shape stays."))
     reading.read_pending()
     found = reading.cut_cycles(links)
     if isinstance(owner, bpy.types.Material) and links["volume"] is not None and links["surface"] is None:

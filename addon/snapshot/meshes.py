@@ -14,8 +14,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..materials.nodes.inputs import ISLAND, POINTINESS
 from .cache import next_version
 from .scene import Mesh, Note
+from .shape import island_numbers, pointiness
 from .strands import HAIR_RADIUS, POINT_RADIUS, spheres, tubes
 from .tangents import corner_tangents
 
@@ -220,6 +222,9 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
     index = mesh.color_attributes.render_color_index
     active = names[index] if 0 <= index < len(names) else ""
     for name in [*names, *sorted(wanted.attributes - set(names) - {layer.name for layer in mesh.uv_layers})]:
+        if name in (POINTINESS, ISLAND):
+            colors[name] = np.repeat(_shape(mesh, name)[corner_vertices][:, None], 4, axis=1)
+            continue
         attribute = mesh.attributes.get(name)
         values = None if attribute is None else _as_rgba(attribute)
         if values is None:
@@ -233,6 +238,20 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
             continue
         colors[name] = np.ascontiguousarray(_finite(values))
     return colors, active
+
+
+def _shape(mesh, name: str) -> np.ndarray:
+    """(V,) what the Geometry node asks about the whole mesh."""
+    count = len(mesh.vertices)
+    edges = np.zeros(2 * len(mesh.edges), np.int32)
+    mesh.edges.foreach_get("vertices", edges)
+    edges = edges.reshape(-1, 2)
+    if name == ISLAND:
+        return island_numbers(count, edges)
+    places, normals = np.zeros((2, 3 * count), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    mesh.vertex_normals.foreach_get("vector", normals)
+    return pointiness(_finite(places.reshape(-1, 3)), _finite(normals.reshape(-1, 3)), edges)
 
 
 # data type of an attribute -> (field that foreach_get reads, numbers per element, dtype)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..materials.graph import Graph
+from ..materials.volume import Medium
 
 
 @dataclass(frozen=True)
@@ -179,6 +180,7 @@ class World:
     mapping: np.ndarray = None  # (3, 4) float64
     graph: Graph | None = None  # a tree that is more than that; it then says all, and `color` is white
     visibility: Visibility = Visibility()
+    medium: Medium | None = None  # what fills all space
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..materials.graph import Graph, Node
 from ..materials.sky import disc_radiance, sky_of
+from ..materials.volume import medium_of
 from .constants import constant_color, constant_number
 from .scene import Image, Light, Note, Visibility, World
 
@@ -26,9 +27,9 @@ def read_world(graph: Graph, name: str, images: Mapping[str, Image], visibility:
         notes = (Note(f"World '{name}'", "the world's volume is not drawn."),)
     plain = _plain(graph, graph.surface, images)
     if plain is None:
-        return World(np.ones(3), None, IDENTITY.copy(), graph, visibility), notes
+        return World(np.ones(3), None, IDENTITY.copy(), graph, visibility, medium_of(graph)), notes
     color, image, mapping = plain
-    return World(color, image, mapping, None, visibility), notes
+    return World(color, image, mapping, None, visibility, medium_of(graph)), notes
 
 
 def sun_of(graph: Graph, visibility: Visibility) -> tuple[Graph, Light | None]:

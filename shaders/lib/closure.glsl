@@ -69,9 +69,10 @@ Closures closures_begin(vec3 normal, float random_number)
 
 void closure_diffuse(inout Closures c, vec3 weight, float roughness, vec3 normal)
 {
-  float before = dot(c.diffuse, vec3(1.0));
-  float added = dot(weight, vec3(1.0));
-  if (added <= 0.0) {
+  // Weights near the end of float32 add up to infinity, of which there is no share.
+  float before = min(dot(c.diffuse, vec3(1.0)), 1e30);
+  float added = min(dot(weight, vec3(1.0)), 1e30);
+  if (!(added > 0.0)) {
     return;
   }
   float share = added / (before + added);

@@ -91,15 +91,19 @@ vec3 surface_tangent(SurfacePoint point, vec3 direction)
   return cross(point.normal, safe_normalize(turned));
 }
 
-void input_geometry(SurfacePoint point, vec4 generated, out vec3 position, out vec3 normal, out vec3 tangent,
-                    out vec3 true_normal, out vec3 incoming, out float backfacing)
+void input_geometry(SurfacePoint point, vec4 generated, vec4 shape, vec4 island, out vec3 position, out vec3 normal,
+                    out vec3 tangent, out vec3 true_normal, out vec3 incoming, out vec3 parametric,
+                    out float backfacing, out float pointiness, out float random_per_island)
 {
   position = point.position + material_scene.origin.xyz;
   normal = point.normal;
   tangent = surface_tangent(point, vec3(0.5 - generated.y, generated.x - 0.5, 0.0));
   true_normal = point.geometric_normal;
   incoming = point.incoming;
+  parametric = vec3(0.0);  // not known: corners are shared between triangles
   backfacing = point.backfacing ? 1.0 : 0.0;
+  pointiness = shape.x;
+  random_per_island = island.x;
 }
 
 void input_object_info(SurfacePoint point, float material, out vec3 location, out vec3 color, out float alpha,

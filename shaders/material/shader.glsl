@@ -185,6 +185,11 @@ void shader_transparent(inout Closures closures, SurfacePoint point, vec3 weight
   closure_transparent(closures, weight * max(color, vec3(0.0)));
 }
 
+// A volume has no surface: plugged in as one, it is black.
+void shader_inside(inout Closures closures, SurfacePoint point, vec3 weight)
+{
+}
+
 void shader_holdout(inout Closures closures, SurfacePoint point, vec3 weight)
 {
   closures.holdout += vector_average(weight);

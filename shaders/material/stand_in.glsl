@@ -79,13 +79,6 @@ void no_hit(float reach, out float hit, out float own, out float distance, out v
   normal = vec3(0.0);
 }
 
-void even_pattern(out float value, out float phase, out float intensity)
-{
-  value = 0.5;
-  phase = 0.5;
-  intensity = 0.5;
-}
-
 void absent_attribute(out vec3 color, out vec3 vector, out float average, out float alpha)
 {
   color = vec3(0.0);

@@ -262,3 +262,38 @@ def studio(stage):
     texture.image = image
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
     world.node_tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+
+
+def test_holdout_cuts_a_hole_as_in_cycles(stage):
+    """Whole, half of a mix, and not at all."""
+    stage.scene.render.film_transparent = True
+    hole = stage.material("ShaderNodeHoldout")
+    half = stage.material("ShaderNodeMixShader")
+    nodes, links = half.node_tree.nodes, half.node_tree.links
+    mix = next(node for node in nodes if node.type == "MIX_SHADER")
+    links.new(nodes.new("ShaderNodeHoldout").outputs[0], mix.inputs[1])
+    links.new(nodes.new("ShaderNodeBsdfDiffuse").outputs[0], mix.inputs[2])
+    size = strips(stage, [material for material in (hole, half, stage.diffuse(0.5)) for _ in range(3)], 0)
+    ours, cycles = (stage.render(64, size, engine=engine)["combined"] for engine in ("CANDELA", "CYCLES"))
+    a, b = (pixels.reshape(ROWS, -1, PIXELS, 4).mean(axis=(0, 2)) for pixels in (ours, cycles))
+    assert a == pytest.approx(b, abs=0.01)
+    assert a[1::3, 3] == pytest.approx([0.0, 0.5, 1.0], abs=0.01)
+
+
+def test_the_coat_has_a_normal_of_its_own(stage):
+    """The coat mirrors a sun where the surface below, tilted the other way, does not."""
+    material = stage.principled(Base_Color=(0.02, 0.02, 0.02, 1.0), Roughness=0.3, Coat_Weight=1.0, Coat_Roughness=0.2)
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    for name, x in (("Coat Normal", 0.3), ("Normal", -0.3)):
+        normal = nodes.new("ShaderNodeCombineXYZ")
+        normal.inputs[0].default_value, normal.inputs[2].default_value = x, 1.0
+        links.new(normal.outputs[0], shader.inputs[name])
+    stage.floor(material=material)
+    stage.camera_above(4.0)
+    for turn in ((0, 0.58, 0), (0, -0.58, 0), (0.2, 0.3, 0)):
+        sun = stage.light("SUN", turn=turn, angle=0.1)
+        ours = stage.render(32, (4, 4))["combined"][..., :3].mean(axis=(0, 1))
+        cycles = stage.render(256, (4, 4), engine="CYCLES")["combined"][..., :3].mean(axis=(0, 1))
+        assert ours == pytest.approx(cycles, rel=0.01, abs=1e-4), turn
+        stage.scene.collection.objects.unlink(sun)

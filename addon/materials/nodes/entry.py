@@ -60,6 +60,7 @@ class Attribute:
     kind: str  # UV, COLOR, TANGENT, GENERATED, NAMED
     property: str = ""
     output: str = ""
+    name: str = ""  # always this one
 
 
 @dataclass(frozen=True)
@@ -136,6 +137,8 @@ class Entry:
     approximations: tuple[Approximation, ...] = ()
     # The same for settings: property, the values for which the sentence holds, sentence.
     setting_approximations: tuple[tuple[str, tuple[object, ...], str], ...] = ()
+    # Outputs that are given otherwise than in Cycles: name, sentence for where somebody reads it.
+    output_approximations: tuple[tuple[str, str], ...] = ()
     note: str = ""  # the whole node is a stand-in: the sentence that says so
     # Bounds of the outputs from bounds of the sockets; None: nothing is known about them.
     estimate: Callable[[dict[str, Estimate]], dict[str, Estimate]] | None = None

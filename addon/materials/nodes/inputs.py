@@ -5,6 +5,7 @@ from __future__ import annotations
 from .entry import POINT, Attribute, Entry, Rows, Setting, Socket
 
 SURFACE = "material/input.glsl"
+POINTINESS, ISLAND = ".pointiness", ".island"  # attributes that snapshot/shape.py makes
 
 GENERATED = Attribute("GENERATED", output="Generated")
 UV = Attribute("UV", output="UV")
@@ -18,6 +19,8 @@ LIGHT_PATH = (
     *("Is Transmission Ray", "Is Volume Scatter Ray", "Ray Length", "Ray Depth", "Diffuse Depth", "Glossy Depth"),
     *("Transparent Depth", "Transmission Depth", "Portal Depth"),
 )
+# Light samples ask casters as shadow rays, the world as no ray of the camera; traced rays take a material's means.
+ONLY_TWO_RAYS = "Node trees are asked by camera and shadow rays alone; for other rays, materials count at their mean."
 
 
 def _matrix(rows) -> list[tuple[float, float, float, float]]:
@@ -86,16 +89,25 @@ ENTRIES = (
     Entry(
         "ShaderNodeNewGeometry",
         "input_geometry",
-        (POINT, Attribute("GENERATED", output="Tangent")),
+        (
+            POINT,
+            Attribute("GENERATED", output="Tangent"),
+            Attribute("NAMED", output="Pointiness", name=POINTINESS),
+            Attribute("NAMED", output="Random Per Island", name=ISLAND),
+        ),
         (
             ("Position", "VECTOR"),
             ("Normal", "VECTOR"),
             ("Tangent", "VECTOR"),
             ("True Normal", "VECTOR"),
             ("Incoming", "VECTOR"),
+            ("Parametric", "VECTOR"),
             ("Backfacing", "FLOAT"),
+            ("Pointiness", "FLOAT"),
+            ("Random Per Island", "FLOAT"),
         ),
         SURFACE,
+        output_approximations=(("Parametric", "Where a point lies in its triangle is not known; Parametric is 0."),),
     ),
     Entry(
         "ShaderNodeObjectInfo",
@@ -118,7 +130,14 @@ ENTRIES = (
         (("View Vector", "VECTOR"), ("View Z Depth", "FLOAT"), ("View Distance", "FLOAT")),
         SURFACE,
     ),
-    Entry("ShaderNodeLightPath", "input_light_path", (POINT,), tuple((name, "FLOAT") for name in LIGHT_PATH), SURFACE),
+    Entry(
+        "ShaderNodeLightPath",
+        "input_light_path",
+        (POINT,),
+        tuple((name, "FLOAT") for name in LIGHT_PATH),
+        SURFACE,
+        output_approximations=tuple((name, ONLY_TWO_RAYS) for name in LIGHT_PATH[2:] if name != "Ray Length"),
+    ),
     Entry(
         "ShaderNodeTangent",
         "input_tangent",

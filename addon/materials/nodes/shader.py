@@ -294,6 +294,16 @@ ENTRIES = (
         note="Rays pass straight on instead of leaving elsewhere.",
         summary=_transparent,
     ),
+    *(
+        Entry(
+            f"ShaderNode{name}",
+            "shader_inside",
+            include="material/shader.glsl",
+            note="Read as coefficients (materials/volume.py); volumes are not drawn.",
+            summary=lambda sockets: Summary(),
+        )
+        for name in ("VolumeAbsorption", "VolumeScatter", "VolumePrincipled", "VolumeCoefficients")
+    ),
     Entry(
         "ShaderNodeSubsurfaceScattering",
         "shader_diffuse",

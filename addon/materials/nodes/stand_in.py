@@ -48,13 +48,6 @@ ENTRIES = (
         note="Rays are not cast from materials; the node says that nothing is hit.",
     ),
     Entry(
-        "ShaderNodeTexGabor",
-        "even_pattern",
-        outputs=_floats("Value", "Phase", "Intensity"),
-        include=SOURCE,
-        note="The Gabor texture is drawn as an even grey.",
-    ),
-    Entry(
         "ShaderNodeTexIES",
         "no_light_profile",
         (Socket("Strength", "FLOAT", 1.0),),

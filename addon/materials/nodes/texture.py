@@ -65,6 +65,22 @@ VORONOI_SPACE = (_dimensions("voronoi_dimensions"), Choice("cell_hash", {"PCG": 
 
 ENTRIES = (
     Entry(
+        "ShaderNodeTexGabor",
+        "texture_gabor_{gabor_type}",
+        (
+            VECTOR,
+            SCALE,
+            Socket("Frequency", "FLOAT", 2.0),
+            Socket("Anisotropy", "FLOAT", 1.0),
+            Socket("Orientation 2D", "FLOAT", 0.7853982),
+            Socket("Orientation 3D", "VECTOR", (1.4142136, 1.4142136, 0.0)),
+        ),
+        (("Value", "FLOAT"), ("Phase", "FLOAT"), ("Intensity", "FLOAT")),
+        "material/gabor.glsl",
+        choices={"gabor_type": ("2D", "3D")},
+        estimate=_within_unit,
+    ),
+    Entry(
         "ShaderNodeTexNoise",
         "noise_texture",
         (
