@@ -25,6 +25,14 @@ from .technique import Technique
 SUM, FAMILY, SERVICE, RESULT = "sum", "family", "service", "result"
 
 
+def in_words(name: str) -> str:
+    """An image, family or service in words: "Diffuse direct" of radiance.diffuse_direct, "Color diffuse" of
+    color.diffuse."""
+    family, _, rest = name.partition(".")
+    words = rest if family in ("radiance", "film") and rest else f"{family} {rest}"
+    return words.replace("_", " ").strip().capitalize()
+
+
 @dataclass(frozen=True)
 class Socket:
     """One thing that a pass takes or gives. Links connect sockets of the same name."""
@@ -37,14 +45,8 @@ class Socket:
 
     @property
     def label(self) -> str:
-        """In words: "Diffuse direct" of radiance.diffuse_direct, "Color diffuse" of color.diffuse."""
-        family, _, name = self.name.partition(".")
-        return (
-            (name if family in ("radiance", "film") and name else f"{family} {name}")
-            .replace("_", " ")
-            .strip()
-            .capitalize()
-        )
+        """In words."""
+        return in_words(self.name)
 
 
 @dataclass(frozen=True)

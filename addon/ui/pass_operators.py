@@ -153,7 +153,7 @@ def _errors(rendered: Rendered, reference) -> dict[str, str]:
         noise = half.get(path) if path in mean else None
         error = metrics.compare_radiance(path, rendered.images[name][..., :3] * exposure, truth, noise)
         relmse, _, _, bias, _ = metrics.figures(error)
-        lines[name] = f"{path.replace('_', ' ')}: {relmse}, bias {bias}"
+        lines[name] = f"{pass_graph.in_words(name)}: {relmse}, bias {bias}"
     return lines
 
 

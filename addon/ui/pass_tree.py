@@ -14,7 +14,19 @@ import bpy
 import numpy as np
 
 from ..compare import pictures
-from ..frame.pass_graph import FAMILY, RESULT, SERVICE, SUM, Checked, Link, PassGraph, PassNode, check, sockets
+from ..frame.pass_graph import (
+    FAMILY,
+    RESULT,
+    SERVICE,
+    SUM,
+    Checked,
+    Link,
+    PassGraph,
+    PassNode,
+    check,
+    in_words,
+    sockets,
+)
 from ..techniques import REGISTRY
 
 TREE = "CandelaPassTree"
@@ -272,7 +284,7 @@ def _technique_node(technique) -> type:
         "draw_settings": draw_settings,
     }
     if shown:
-        items = [(name, name, "", number) for number, name in enumerate(shown)]
+        items = [(name, in_words(name), "", number) for number, name in enumerate(shown)]
         best = "film.combined" if "film.combined" in shown else shown[0]
         body["__annotations__"]["shown"] = bpy.props.EnumProperty(
             name="Shown", description="Image that the node shows after a run", items=items, default=best

@@ -176,7 +176,7 @@ def test_compare_shows_the_error_of_each_light_path(tree, tmp_path, monkeypatch)
     monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
     assert bpy.ops.candela.passes_compare(tree="Passes") == {"FINISHED"}
     lines = " ".join(line for one in tree.nodes for line in (result(one).errors if result(one) else []))
-    for path in ("diffuse direct", "glossy direct", "combined", "color.diffuse"):
+    for path in ("Diffuse direct", "Glossy direct", "Combined", "Color diffuse"):
         assert f"{path}: " in lines
     assert len(result(node(tree, "direct_light")).errors) == 2, "diffuse and glossy"
     assert list(tmp_path.glob("*.npz"))

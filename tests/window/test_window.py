@@ -233,7 +233,7 @@ def test_pass_tree_is_made_run_and_compared_in_the_window(passed):
     assert not complaints(folder)
     assert result["from_auto"] == ["FINISHED"]
     assert result["times"]["Film"] > 0 and result["times"]["Direct light"] > 0
-    assert any(line.startswith("combined: ") for line in result["errors"])
+    assert any(line.startswith("Combined: ") for line in result["errors"])
     assert result["links_fine_after_undo"]
     assert result["viewport"].startswith("Sample 4 of 4")
 
