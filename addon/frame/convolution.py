@@ -25,6 +25,7 @@ import numpy as np
 from ..gfx import images
 from . import tables
 
+MOST_SIDE = 16384  # of an image on every GPU of today
 PYRAMID, TABLE = "PYRAMID", "TABLE"
 # Sums over 256x256 texels stay below 2^31.
 _TABLE_SOURCE = """uvec4 table_source(ivec2 texel)
@@ -54,14 +55,14 @@ class Basis:
     textures: tuple[tuple[str, str], ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
 
-    @property
-    def columns(self) -> int:
-        """Tiles in a row of the grid, about as many as rows."""
-        return int(np.ceil(np.sqrt(self.order + 1)))
+    def columns(self, width: int) -> int:
+        """Tiles in a row of the grid: about as many as rows, and no more than an image can hold."""
+        return max(min(int(np.ceil(np.sqrt(self.order + 1))), MOST_SIDE // width), 1)
 
     def size(self, width: int, height: int) -> tuple[int, int]:
-        """Of the grid of tiles."""
-        return self.columns * width, -(-(self.order + 1) // self.columns) * height
+        """Of the grid of tiles of this size."""
+        columns = self.columns(width)
+        return columns * width, -(-(self.order + 1) // columns) * height
 
     @property
     def source(self) -> tables.TableSource | tables.PyramidSource:
@@ -82,11 +83,15 @@ class Basis:
 
     def constants_for(self, width: int, height: int) -> dict[str, object]:
         """What the lookup must know besides."""
-        return {"base_extent": (width, height), "tile_columns": self.columns, "basis_rows": self.size(width, height)[1]}
+        return {
+            "base_extent": (width, height),
+            "tile_columns": self.columns(width),
+            "basis_rows": self.size(width, height)[1],
+        }
 
     def build(self, out: images.Image, extent: tuple[int, int], levels: int, textures, constants) -> None:
         """Fill `out` from a depth map of `extent`; a pyramid gets `levels` levels, both sides multiples of 2^levels."""
-        own = {"base_extent": extent, "tile_columns": self.columns, **constants}
+        own = {"base_extent": extent, "tile_columns": self.columns(extent[0]), **constants}
         if self.prefilter == TABLE:
             tables.build_table(self.source, out, textures=textures, constants=own)
         else:

@@ -26,7 +26,7 @@ DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHO
 class Emitter:
     """A light in the frame's units: positions relative to the render origin, radiance ready to use."""
 
-    light: Light
+    light: Light | None  # None: a part of the world
     kind: int
     flags: int
     centre: np.ndarray  # (3,); for suns the unit vector towards the light

@@ -8,6 +8,7 @@ from .cssm import ConvolutionSoftShadows
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
+from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .film import Film
 from .instant_radiosity import InstantRadiosity
@@ -27,6 +28,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ConvolutionSoftShadows,
     DirectLight,
     EmissiveLight,
+    EnvironmentAreaLights,
     EnvironmentLight,
     DirectionalOcclusion,
     TracedGlossy,

@@ -116,12 +116,14 @@ class DepthMapService:
 _NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
 
 
-def rounds(items: list[tuple[np.ndarray, list]], resolution: int) -> Iterator[tuple[list[np.ndarray], list]]:
+def rounds(
+    items: list[tuple[np.ndarray, list]], resolution: int, most_texels: int = ATLAS_TEXELS
+) -> Iterator[tuple[list[np.ndarray], list]]:
     """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers."""
     rows, views, texels = [], [], 0
     for row, own in items:
         size = sum((resolution // view.scale) ** 2 for view in own)
-        full = texels + size > ATLAS_TEXELS or len(views) + len(own) > lights.MOST_VIEWS
+        full = texels + size > most_texels or len(views) + len(own) > lights.MOST_VIEWS
         if rows and (full or len(rows) == lights.MOST_LIGHTS):
             yield rows, views
             rows, views, texels = [], [], 0
@@ -138,6 +140,7 @@ class AccumulatedMaps(Technique):
     label = "Accumulated shadow maps"
     slot = "shadow"
     params = (RESOLUTION, CUTOFF)
+    atlas_texels = ATLAS_TEXELS
 
     def __init__(self):
         self.service = DepthMapService()

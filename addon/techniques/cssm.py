@@ -92,6 +92,10 @@ class ConvolutionSoftShadows(SoftMaps):
         REFINE,
     )  # fmt: skip
 
+    def resolution(self, frame: Frame) -> int:
+        """Half of what a plain map may have: basis images are several times as large."""
+        return min(super().resolution(frame), 1024)
+
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
         order, prefilter = int(frame.settings.get(self, "order")), frame.settings.get(self, "prefilter")
         basis = _basis(order, prefilter)

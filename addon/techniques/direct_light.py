@@ -39,7 +39,7 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import HARD, DepthMapService, Lookup, Maps, rounds
+from .accumulated_maps import ATLAS_TEXELS, HARD, DepthMapService, Lookup, Maps, rounds
 from .light_probes import rate_of
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
@@ -154,7 +154,7 @@ class DirectLight(Technique):
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
                 (near if by_rays else items).append((row, views))
         resolution = shadow.resolution(frame) if shadow else 16
-        for rows, views in rounds(items, resolution):
+        for rows, views in rounds(items, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
             maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
             yield
             yield from shade(frame, self, rows, self._sources, maps)

@@ -41,6 +41,8 @@ DEPTH_BOUNDS = tables.level_program(BOUNDS)
 class SoftMaps(AccumulatedMaps):
     """Base of the techniques; `filtered` is theirs."""
 
+    atlas_texels = 2**22  # filtered maps take several times the bytes of plain ones
+
     def __init__(self):
         super().__init__()
         self._drawn: tuple[weakref.ref, tuple, Maps] | None = None

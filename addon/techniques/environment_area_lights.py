@@ -1,0 +1,155 @@
+"""Environment light by area lights: the world as some dozens of lights with extent, each with one soft shadow map.
+
+    L(x, v) = sum over lights of  f(x, v, w_l) E_l(x) V_l(x)
+
+with E_l the irradiance of a cone of even radiance in closed form (shaders/light/whole.glsl) and V_l its visibility by
+variance or convolution soft shadow maps, with the settings of those. The lights are fitted to the map once per world
+(addon/frame/area_fit.py); a small bright part becomes a small light with a sharp shadow, an even sky a few wide ones.
+
+One sample shows all of the world, smoothly: for pictures of one sample, where environment_light shows a few hard
+shadows. With more samples each map stands for a part of its light, so that shadows get better; what stays is that a
+light's part of the world is even within its cone. Hence Auto takes this technique for one sample only.
+
+| cost | per sample |
+|---|---|
+| maps | `lights` orthographic views, filtered (vssm.py, cssm.py) |
+| passes | 1 over the screen per round of lights |
+| per pixel and light | closed form; where the min-max pyramid does not decide, the lookup of the shadows |
+
+Bias (direct diffuse light): the world is even within each light, whose shape is a cone; shadows as in vssm and cssm,
+and wide lights show most what these cannot. Light leaks below roofs and behind walls that stand aslant in the maps: a
+court with an arcade is 1.3 times as bright as it should be, its dark parts many times. Glossy light comes from traced
+rays; without them closures see four points per light.
+
+Measured with one sample at 96x72 against Cycles, pixels without filter: relMSE of a product under an image of a studio
+0.063 (30 lights 0.057, convolution maps 0.078), where two directions drawn leave 0.086 and hard shadows. On the axis of
+a disc that hides 58 degrees of an even sky variance maps leave 0.295 of the light and convolution maps 0.44, where
+0.281 is right: floors that lie aslant in a map stretch its depths, and the series cannot tell apart a tenth of their
+range. The source shadows its lights by convolution maps; here variance maps are the default.
+
+Source: Annen et al., "Real-time, all-frequency shadows in dynamic scenes", SIGGRAPH 2008.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..frame import area_fit, depth_maps, lights
+from ..frame.environment import Environment
+from ..frame.run import Frame
+from ..frame.settings import AUTO, Settings
+from ..frame.technique import Param, Technique
+from ..snapshot.scene import Snapshot
+from .accumulated_maps import map_resolution, rounds
+from .cssm import ConvolutionSoftShadows
+from .direct_light import DIRECT_WRITES, shade
+from .environment_light import EnvironmentLight
+from .soft_maps import SoftMaps
+from .surfaces import SURFACES
+from .vssm import VarianceSoftShadows
+
+SHADOWS = (("VARIANCE", "Variance", 0), ("CONVOLUTION", "Convolution", 1))
+NO_SHARE = 1e-9  # of traced lobes: rays bring all of the world's light to them
+
+
+class EnvironmentAreaLights(Technique):
+    name = "environment_area_lights"
+    label = "Environment area lights"
+    slot = "environment"
+    params = (
+        Param("lights", "Lights", 45, "Area lights that the world is split into, at most", 24, 64),
+        Param(
+            "texels_per_pixel", "Map resolution", 1.0,
+            "Texels of a depth map per pixel of the picture's longer side", 0.125, 4.0,
+        ),
+        Param("shadows", "Shadows", "VARIANCE", "Kind of soft shadow maps", items=SHADOWS),
+    )  # fmt: skip
+    reads = SURFACES
+    writes = DIRECT_WRITES
+
+    def __init__(self):
+        self._shadows: dict[str, SoftMaps] = {
+            "VARIANCE": _with_resolution_of(self, VarianceSoftShadows),
+            "CONVOLUTION": _with_resolution_of(self, ConvolutionSoftShadows),
+        }
+        self._sources = lights.Sources()
+        self._fitted: tuple[weakref.ref, int, list[area_fit.AreaLight]] | None = None
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        chosen = settings.passes is not None or settings.slots.get(self.slot, AUTO) == self.name
+        if not chosen and settings.samples > 1:
+            return "with several samples, directions drawn from the world come nearer to the truth"
+        return EnvironmentLight().skip(snapshot, settings)
+
+    def run(self, frame: Frame) -> Iterator[None]:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        seen = frame.snapshot.world.visibility
+        flags = lights.DIFFUSE_FLAG * seen.diffuse + lights.GLOSSY_FLAG * seen.glossy
+        flags += lights.SHADOW_FLAG + lights.TRACED_FLAG
+        maps_of = self._shadows[frame.settings.get(self, "shadows")]
+        resolution = maps_of.resolution(frame)
+        cell = maps_of.cell(frame, frame.sample, frame.settings.samples)
+        shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
+        jitter = (*frame.random("map/environment"), *frame.random("map/environment/turn"))
+        items = []
+        for light in self._lights(frame):
+            emitter = _emitter(light, flags)
+            sample = emitter.middle() if cell >= 1.0 else emitter.sample(*frame.random_volume("light"))
+            views = []
+            if shadows:
+                reach = cell * np.tan(min(emitter.radius, 1.5))
+                views = depth_maps.directional_views(sample, frame.receivers, frame.geometry, jitter, resolution, reach)
+                views = [replace(view, cell=cell) for view in views]
+            row = emitter.row(sample, 0, len(views))
+            row[0, 1] += lights.WHOLE_FLAG * (cell >= 1.0)
+            row[2, 3] = NO_SHARE
+            items.append((row, views))
+        for rows, views in rounds(items, resolution, maps_of.atlas_texels):
+            maps = maps_of.draw(frame, views)
+            frame.count(self, "maps", len(views))
+            yield
+            yield from shade(frame, self, rows, self._sources, maps)
+
+    def _lights(self, frame: Frame) -> list[area_fit.AreaLight]:
+        """Fitted anew when the world or the number of lights has changed."""
+        world, budget = frame.environment, frame.settings.get(self, "lights")
+        if self._fitted is None or self._fitted[0]() is not world or self._fitted[1] != budget:
+            self._fitted = weakref.ref(world), budget, fitted(world, budget)
+            frame.count(self, "fits")
+        frame.count(self, "area lights", len(self._fitted[2]))
+        return self._fitted[2]
+
+    def release(self) -> None:
+        for shadows in self._shadows.values():
+            shadows.release()
+        self._sources.release()
+        self._fitted = None
+
+
+def _with_resolution_of(owner: Technique, kind: type[SoftMaps]) -> SoftMaps:
+    """Maps with the settings of their own technique, apart from the resolution."""
+
+    class Owned(kind):
+        def resolution(self, frame: Frame) -> int:
+            return 1 << round(np.log2(map_resolution(frame, frame.settings.get(owner, "texels_per_pixel"))))
+
+    return Owned()
+
+
+def fitted(world: Environment, budget: int) -> list[area_fit.AreaLight]:
+    """The world's lights."""
+    return area_fit.fit(area_fit.cube_energy(world.pixels * world.color, world.rotation), budget)
+
+
+def _emitter(light: area_fit.AreaLight, flags: int) -> lights.Emitter:
+    """The light as a sun of even radiance; no light of the scene belongs to it."""
+    zero = np.zeros(3)
+    return lights.Emitter(
+        None, lights.SUN, flags, light.direction, light.half_angle, light.energy / light.solid_angle,
+        light.solid_angle, -light.direction, 0.0, zero, zero, zero,
+    )  # fmt: skip
