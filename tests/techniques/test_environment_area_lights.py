@@ -93,8 +93,8 @@ def test_the_fit_is_kept_while_the_world_stays(plain):
     assert "fits" not in plain.ledger.row("environment_area_lights").counters
 
 
-def test_auto_takes_area_lights_for_one_sample_only(plain):
+def test_auto_leaves_it_out_and_says_why(plain):
     plain.scene.candela.slot_environment = "AUTO"
-    for samples, state in ((1, "ran"), (2, "skipped")):
-        plain.render(samples, (8, 8))
-        assert plain.ledger.row("environment_area_lights").state == state
+    plain.render(1, (8, 8))
+    row = plain.ledger.row("environment_area_lights")
+    assert (row.state, "rooms" in row.reason) == ("skipped", True)
