@@ -62,10 +62,12 @@ WITHOUT = {
     "direct_light": no_light,
     "emissive_light": no_emission,
     "environment_light": no_world,
+    "environment_area_lights": no_world,
     "directional_occlusion": no_world,
     "traced_glossy": no_gloss,
     "traced_refraction": no_glass,
     "instant_radiosity": no_bounces,
+    "multires_radiosity": no_bounces,
     "ssdo": no_bounces,
 }
 
