@@ -107,70 +107,111 @@ def that_fit(cells: list[Cell], cost: Callable[[Cell], float], seconds: float) -
 # ------------------------------------------------------------------------------------------------------------- the run
 
 
-def run(cells: Iterable[Cell], budget: float | None, store: Store, bar) -> tuple[dict, dict, list[str], list[Cell]]:
-    """Measure what the store lacks. Returns about, references by scene name, failures, and cells that were left out.
+class Run:
+    """One run: what is known, what is left, and the worker of the scene that is being measured.
 
-    `bar` is told predicted seconds of work done (a tqdm bar, or anything with total, update and set_postfix_str).
+    `bar` is told predicted seconds of work done (a tqdm bar, or anything with total, n, update, set_postfix_str).
     """
-    started = time.monotonic()
-    cells = in_turns(cells)
-    first = Worker(OUT / "worker.log")
-    about = first.ask(ask="about")
-    first.end()
-    if "failed" in about:
-        raise Failed(f"Blender's GPU module could not be used: {about['failed']}")
-    machine = f"{about['blender']} {about['device']} {about['cpu']}"
-    references: dict[str, dict] = {}
-    failures: list[str] = []
-    known = {
-        (cell.scene, cell.series, cell.samples): store.found[cell.key(machine)]["wall"]
-        for cell in cells
-        if cell.key(machine) in store.found
-    }
-    left = [cell for cell in cells if cell.key(machine) not in store.found]
-    worker, scene = None, None
-    try:
-        while left:
-            now = time.monotonic() - started
-            scenes_left = len({cell.scene for cell in left} - {scene})
-            time_left = float("inf") if budget is None else budget - now - OPENING * scenes_left
-            kept = that_fit(left, lambda cell: predicted(cell, known), time_left)
-            bar.total = round(now + sum(predicted(cell, known) for cell in kept) + OPENING * scenes_left)
-            bar.update(round(now) - bar.n)
-            if not kept:
-                break
-            cell = next((cell for cell in kept if cell.scene == scene), kept[0])
-            if cell.scene != scene:
-                if worker:
-                    worker.end()
-                scene = cell.scene
-                worker = Worker(OUT / "worker.log")
-                bar.set_postfix_str(f"{scene.name}: reference")
-                size, samples = cell.size, cell.reference_samples
-                opened = worker.ask(ask="open", scene=asdict(scene), size=size, reference_samples=samples)
-                if "failed" in opened:
-                    failures.append(f"{scene.name} could not be opened: {opened['failed']}")
-                    left = [other for other in left if other.scene != scene]
-                    continue
-                references[scene.name] = opened
-            bar.set_postfix_str(f"{scene.name}: {cell.series.label}, {cell.samples}")
-            begun = time.monotonic()
-            left.remove(cell)
-            try:
-                figures = worker.ask(ask="cell", series=asdict(cell.series), samples=cell.samples, size=cell.size)
-            except Failed as failure:
-                figures, scene = {"failed": str(failure)}, None
-            if "failed" in figures:
-                failures.append(f"{cell.scene.name}, {cell.series.label}, {cell.samples}: {figures['failed']}")
-                continue
-            wall = time.monotonic() - begun
-            known[cell.scene, cell.series, cell.samples] = wall
-            store.add(cell.key(machine), {**described(cell), "wall": wall, "load": load(), **figures})
-    finally:
-        if worker and worker.process.poll() is None:
+
+    def __init__(self, cells: Iterable[Cell], budget: float | None, store: Store, bar):
+        self.started = time.monotonic()
+        self.budget, self.store, self.bar = budget, store, bar
+        self.cells = in_turns(cells)
+        first = Worker(OUT / "worker.log")
+        self.about = first.ask(ask="about")
+        first.end()
+        if "failed" in self.about:
+            raise Failed(f"Blender's GPU module could not be used: {self.about['failed']}")
+        self.machine = " ".join(self.about[name] for name in ("blender", "device", "cpu"))
+        self.references: dict[str, dict] = {}
+        self.failures: list[str] = []
+        self.known = {
+            (cell.scene, cell.series, cell.samples): store.found[cell.key(self.machine)]["wall"]
+            for cell in self.cells
+            if cell.key(self.machine) in store.found
+        }
+        self.left = [cell for cell in self.cells if cell.key(self.machine) not in store.found]
+
+    def measure(self) -> None:
+        """Measure what the store lacks: each scene gets an equal share of the time that is left, and whatever the
+        others did not need goes into further rounds."""
+        progress = True
+        while self.left and progress:
+            progress = False
+            scenes = list(dict.fromkeys(cell.scene for cell in self.left))
+            for number, scene in enumerate(scenes):
+                progress |= self._measure_scene(scene, self._time_left() / (len(scenes) - number))
+
+    @property
+    def missing(self) -> list[Cell]:
+        return [cell for cell in self.cells if cell.key(self.machine) not in self.store.found]
+
+    def _time_left(self) -> float:
+        return float("inf") if self.budget is None else self.started + self.budget - time.monotonic()
+
+    def _cost(self, cell: Cell) -> float:
+        return predicted(cell, self.known)
+
+    def _measure_scene(self, scene: Scene, share: float) -> bool:
+        """Measure the cells of a scene that fit into `share` seconds; whether there was any."""
+        end = time.monotonic() + share
+        worker, any_measured = None, False
+        try:
+            while True:
+                opening = 0.0 if worker else OPENING
+                mine = [cell for cell in self.left if cell.scene == scene]
+                kept = that_fit(mine, self._cost, end - time.monotonic() - opening)
+                if not kept:
+                    return any_measured
+                self._tell(kept[0])
+                worker = worker or self._open(kept[0])
+                if worker is None:
+                    return any_measured
+                any_measured = True
+                if not self._measure_cell(worker, kept[0]):
+                    worker = None
+        finally:
+            if worker:
+                worker.end()
+
+    def _open(self, cell: Cell) -> Worker | None:
+        """A worker with the cell's scene open; None where that failed."""
+        worker = Worker(OUT / "worker.log")
+        opened = worker.ask(
+            ask="open", scene=asdict(cell.scene), size=cell.size, reference_samples=cell.reference_samples
+        )
+        if "failed" in opened:
+            self.failures.append(f"{cell.scene.name} could not be opened: {opened['failed']}")
+            self.left = [other for other in self.left if other.scene != cell.scene]
             worker.end()
-    missing = [cell for cell in cells if cell.key(machine) not in store.found]
-    return {**about, "machine": machine}, references, failures, missing
+            return None
+        self.references[cell.scene.name] = opened
+        return worker
+
+    def _measure_cell(self, worker: Worker, cell: Cell) -> bool:
+        """Measure and keep a cell; whether the worker still lives."""
+        begun = time.monotonic()
+        self.left.remove(cell)
+        alive = True
+        try:
+            figures = worker.ask(ask="cell", series=asdict(cell.series), samples=cell.samples, size=cell.size)
+        except Failed as failure:
+            figures, alive = {"failed": str(failure)}, False
+        if "failed" in figures:
+            self.failures.append(f"{cell.scene.name}, {cell.series.label}, {cell.samples}: {figures['failed']}")
+            return alive
+        wall = time.monotonic() - begun
+        self.known[cell.scene, cell.series, cell.samples] = wall
+        self.store.add(cell.key(self.machine), {**described(cell), "wall": wall, "load": load(), **figures})
+        return True
+
+    def _tell(self, cell: Cell) -> None:
+        now = time.monotonic() - self.started
+        fitting = that_fit(self.left, self._cost, self._time_left())
+        scenes = len({other.scene for other in fitting})
+        self.bar.total = round(now + sum(map(self._cost, fitting)) + OPENING * scenes)
+        self.bar.update(round(now) - self.bar.n)
+        self.bar.set_postfix_str(f"{cell.scene.name}: {cell.series.label}, {cell.samples}")
 
 
 def load() -> float | None:
@@ -278,19 +319,20 @@ def command(options: argparse.Namespace) -> int:
     budget = None if options.budget is None else 60.0 * options.budget
     form = "{desc}{percentage:3.0f}% |{bar}| {elapsed}, {remaining} left, {postfix}"
     with tqdm(total=1, bar_format=form, disable=not sys.stderr.isatty()) as bar:
-        about, references, failures, missing = run(cells, budget, store, bar)
-    about |= {
+        done = Run(cells, budget, store, bar)
+        done.measure()
+    about = done.about | {
         "date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "size": list(options.size),
         "reference_samples": options.reference_samples,
         "load": load(),
     }
-    rows = gathered(cells, about.pop("machine"), store)
+    rows, references = gathered(cells, done.machine, store), done.references
     if options.results.exists():  # references that this run found no need to open
         references = {**json.loads(options.results.read_text(encoding="utf-8"))["references"], **references}
-    left_out = [f"{cell.scene.name}, {cell.series.label}, {cell.samples}" for cell in missing]
+    left_out = [f"{cell.scene.name}, {cell.series.label}, {cell.samples}" for cell in done.missing]
     write_results(options.results, about, references, rows, left_out)
-    for failure in failures:
+    for failure in done.failures:
         print(failure, file=sys.stderr)
     print(f"{len(rows)} cells in {options.results}; {len(left_out)} left out")
-    return 1 if failures else 0
+    return 1 if done.failures else 0

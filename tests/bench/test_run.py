@@ -104,3 +104,70 @@ def test_results_hold_five_digits_and_one_cell_per_line():
     text = run.one_row_per_line({"about": {"load": 1.23456789}, "cells": [{"a": [0.000123456789]}, {"a": None}]})
     assert '{"a": [0.00012346]},\n{"a": null}' in text
     assert "1.2346" in text
+
+
+class FakeWorker:
+    """Answers at once; a cell takes as many seconds of the fake clock as `costs` says."""
+
+    clock, costs, opened = 0.0, {}, []
+
+    def __init__(self, log):
+        pass
+
+    def ask(self, ask, **request):
+        if ask == "about":
+            return {"blender": "5", "device": "none", "cpu": "one"}
+        if ask == "open":
+            FakeWorker.opened.append(request["scene"]["name"])
+            return {"samples": 1, "floors": {}, "share": {}}
+        if request["samples"] == 13:
+            return {"failed": "no luck"}
+        FakeWorker.clock += FakeWorker.costs[request["series"]["label"]]
+        return {"times": [1.0]}
+
+    def end(self):
+        pass
+
+
+class Bar:
+    n = total = 0
+
+    def update(self, step):
+        self.n += step
+
+    def set_postfix_str(self, text):
+        pass
+
+
+@pytest.fixture
+def fake(monkeypatch, tmp_path):
+    FakeWorker.clock, FakeWorker.costs, FakeWorker.opened = 0.0, {"Candela": 1.0, "EEVEE": 20.0, "Cycles": 1.0}, []
+    monkeypatch.setattr(run, "Worker", FakeWorker)
+    monkeypatch.setattr(run.time, "monotonic", lambda: FakeWorker.clock)
+    return Store(tmp_path / "cells.jsonl")
+
+
+def test_every_scene_gets_a_share_of_the_time(fake):
+    wanted = [cell(series, 16, scene) for scene in (ROOM, HALL) for series in (OWN, EEVEE, CYCLES)]
+    done = run.Run(wanted, 60.0, fake, Bar())
+    done.measure()
+    assert FakeWorker.opened[:2] == ["cornell_box", "colonnade_hall"]
+    measured = {(row["scene"], row["series"]["label"]) for row in fake.found.values()}
+    assert {(scene.name, label) for scene in (ROOM, HALL) for label in ("Candela", "Cycles")} <= measured
+
+
+def test_without_a_budget_all_is_measured_and_a_second_run_measures_nothing(fake):
+    wanted = [cell(series, 16) for series in (OWN, EEVEE, CYCLES)]
+    first = run.Run(wanted, None, fake, Bar())
+    first.measure()
+    assert not first.missing and not first.failures
+    FakeWorker.opened.clear()
+    run.Run(wanted, None, fake, Bar()).measure()
+    assert FakeWorker.opened == []
+
+
+def test_a_cell_that_fails_is_named_and_the_rest_goes_on(fake):
+    done = run.Run([cell(OWN, 13), cell(OWN, 16)], None, fake, Bar())
+    done.measure()
+    assert done.failures == ["cornell_box, Candela, 13: no luck"]
+    assert [one.samples for one in done.missing] == [13]
