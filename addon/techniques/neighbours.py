@@ -4,7 +4,12 @@ A masked mean over 4x4 pixels, of those on the same surface (normals within 37 d
 plane), of light without the surface's colour, so that textures stay: neighbours, whose random numbers
 shaders/ssdo/fan.glsl stratifies together. For noisier estimates a second time over pixels four apart, 16x16 in all, of
 those that differ by no more than three standard errors of both. Single samples of instant radiosity lose half to four
-fifths of their squared error.
+fifths of their squared error: relMSE over the reference's noise at 96x72, mean of four seeds,
+
+| | Cornell box | window | hall | door | courtyard | lamp |
+|---|---|---|---|---|---|---|
+| as drawn (one seed) | 0.55 | 0.80 | 0.55 | 2.8 | 0.24 | 0.28 |
+| filtered | 0.20 | 0.35 | 0.24 | 0.44 | 0.09 | 0.09 |
 
     reflected = albedo * mean over neighbours on the surface of  arriving
 

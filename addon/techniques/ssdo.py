@@ -42,7 +42,9 @@ over the reference's noise at 96x72, of single samples (filtered, mean of four s
 | this, 16 | 0.05 | 1.0 | 0.32 | 2.6 | 0.20 | 0.12 |
 
 Auto takes instant radiosity: its virtual lights find the light that single paths seldom meet, and its error falls to
-zero. This one is for single samples of rooms that are seen whole.
+zero. This one is for single samples of rooms that are seen whole, and steadier there: over 24 pictures of one sample of
+the Cornell box, with camera and lamp moving, half the squared change of the error from one to the next is 0.019 of the
+squared mean, beside an error of 0.185; with instant radiosity 0.070 and 0.191.
 
 Bias, in diffuse indirect light, by design. Patches reach up to a step beyond their edges, and hidden sides are as
 thick as `thickness`: up to a tenth of the light where posts stand close (hall: 0.90). Without rays, surfaces off the
