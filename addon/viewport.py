@@ -40,7 +40,7 @@ from .ui.properties import settings_of
 STEP_S = 0.1  # what a sample may take while the picture changes: coarser pixels are drawn to stay below it
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
-REST_S = 0.25  # without a change for so long, the picture is drawn in full resolution
+REST_S = 0.25  # without a change for so long, or for two redraws, the picture is drawn in full resolution
 SCALES = (1, 2, 4, 8, 16)  # screen pixels per side of a drawn pixel; all but the first are drafts
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
 
@@ -99,6 +99,7 @@ class Viewport:
         self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
         self._sample: Iterator | None = None  # what is left of a sample that was begun
         self._sample_seconds = 0.0
+        self._pauses = (0.0, 0.0)  # between the last redraws
         self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
         self._compiled = -1  # programs made so far, when the sample was begun
         self.local_view = False
@@ -147,6 +148,7 @@ class Viewport:
         by default all. Whatever the renderer raises goes through.
         """
         elsewhere = clock() - self._left_at if self._left_at is not None else 0.0
+        self._pauses = self._pauses[1], elsewhere
         self._prepare(source, camera, size, border or (0, 0, *size), settings, clock)
         frame, started = self.frame, clock()
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
@@ -227,7 +229,7 @@ class Viewport:
             before = self.frame
             if self._begin(camera, size, border, settings, self.pace.scale()) is not before:
                 self._waits = False
-        elif self.scale > 1 and clock() - self._changed_at > REST_S:
+        elif self.scale > 1 and clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses)):
             self._begin(camera, size, border, settings, 1)
             self._waits = True
 

@@ -224,6 +224,23 @@ def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_i
     assert region.viewport.picture.size == SIZE
 
 
+def test_view_that_is_redrawn_seldom_does_not_rest_between_two_changes(region):
+    """Where Blender takes longer than REST_S for its window, a moving view is not taken for one at rest."""
+    region.rest()
+    for step in range(1, 6):
+        region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+        region.camera = region.moved(0.1)
+        region.draw()
+        region.clock.now += 1.5 * viewport.REST_S
+        region.draw()
+        region.clock.now += 1.5 * viewport.REST_S
+        assert step == 1 or region.viewport.scale == 4
+    for _ in range(3):
+        region.draw()
+        region.clock.now += 1.5 * viewport.REST_S
+    assert region.viewport.scale == 1
+
+
 def test_bands_change_no_pixel(region):
     class Thin(Bands):
         def learn(self, seconds, wanted):

@@ -192,7 +192,6 @@ def same_view():
     space.overlay.show_overlays = space.show_gizmo = False
     space.show_region_header = space.show_region_tool_header = space.show_region_toolbar = False
     space.region_3d.view_perspective = "PERSP"
-    scene.candela.samples = scene.candela.viewport_samples = 2
     scene.candela.bounces, scene.candela.light_probes_maps = 1, 0.0  # one point per light and sample, as viewports have
     yield from wait_for_rest()
     picture("view.png")
