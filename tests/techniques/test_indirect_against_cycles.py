@@ -19,7 +19,7 @@ RELMSE, BIAS = 0.01, 0.03
 MISSED = {  # measured at 96x72
     "colonnade_hall": "relMSE 0.014: grain of partly hidden virtual lights",
     "door_ajar": "relMSE 0.07: few candidates meet what the door lets in",
-    "window_interior": "relMSE 0.03: candidates seldom meet the patch of sun, whose light they carry",
+    "window_interior": "relMSE 0.03: candidates seldom meet the patch of sun; bias 1.03: varnish sends it elsewhere",
 }
 
 pytestmark = pytest.mark.slow

@@ -294,6 +294,7 @@ CHOICES = {
     f"{technique}, {name}": (slot, technique, name)
     for slot, technique, groups in (
         ("indirect", "ssdo", ("geometry", "camera")),
+        ("indirect", "multires_radiosity", ("camera",)),
         ("environment", "directional_occlusion", ("geometry", "camera", "world")),
     )
     for name in CORPUS
