@@ -120,6 +120,9 @@ def orbit(bounces):
 
     candela().draw = timed
     settings.bounces = bounces
+    while viewports()[0].frame.settings.bounces == 0 or viewports()[0].frame.samples_done == 0:
+        yield 0.1  # programs of indirect light are compiled once
+    took.clear(), scales.clear()
     started = time.monotonic()
     while time.monotonic() - started < ORBIT_S:
         space.region_3d.view_rotation = Quaternion((0, 0, 1), 0.02) @ space.region_3d.view_rotation
