@@ -84,7 +84,7 @@ class EnvironmentAreaLights(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         chosen = settings.passes is not None or settings.slots.get(self.slot, AUTO) == self.name
         if not chosen:
-            return "Auto draws directions from the world, which leak nothing into rooms"
+            return "unless it is chosen, directions are drawn from the world, which leak nothing into rooms"
         return EnvironmentLight().skip(snapshot, settings)
 
     def run(self, frame: Frame) -> Iterator[None]:
