@@ -67,6 +67,9 @@ class SoftMaps(AccumulatedMaps):
         return shift_x, shift_y, turn, other
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
+        # A light without extent has no kernel: its map is asked for one texel.
+        cell *= emitter.extended
+        frame.count(self, "lights with penumbra" if cell else "hard lights")
         return [replace(view, cell=cell) for view in super().views(frame, emitter, sample, number, cell)]
 
     def draw(self, frame: Frame, views: list) -> Maps:

@@ -122,18 +122,24 @@ def test_a_closed_roof_lets_no_light_pass_whatever_its_distance(floor):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "settings", "height"),
+    ("technique", "kind", "settings", "height"),
     [
-        ("AREA", {"size": 200.0}, 2.0),
-        ("AREA", {"size": 1.0}, 1e-6),
-        ("POINT", {"shadow_soft_size": 50.0}, 1.0),
-        ("POINT", {"shadow_soft_size": 0.5}, -1.0),
-        ("SUN", {"angle": 3.1}, 1.0),
-        ("AREA", {"size": 1e-6}, 1e4),
+        ("vssm", "AREA", {"size": 200.0}, 2.0),
+        ("cssm", "AREA", {"size": 200.0}, 2.0),
+        ("vssm", "AREA", {"size": 1.0}, 1e-6),
+        ("cssm", "AREA", {"size": 1.0}, 1e-6),
+        ("vssm", "POINT", {"shadow_soft_size": 50.0}, 1.0),
+        ("vssm", "POINT", {"shadow_soft_size": 0.5}, -1.0),
+        ("vssm", "SUN", {"angle": 3.1}, 1.0),
+        ("cssm", "SUN", {"angle": 3.1}, 1.0),
+        ("vssm", "AREA", {"size": 1e-6}, 1e4),
+        ("vssm", "AREA", {"size": 0.5}, 2e7),
+        ("cssm", "AREA", {"size": 0.5}, 2e7),
     ],
-    ids=["wider than the scene", "on the floor", "around the scene", "behind the floor", "half the sky", "far away"],
-)
-def test_lights_beyond_reason_give_finite_light_between_none_and_all(floor, kind, settings, height):
+    ids=str,
+)  # fmt: skip
+def test_lights_beyond_reason_give_finite_light_between_none_and_all(floor, technique, kind, settings, height):
+    floor.scene.candela.slot_shadow = technique
     floor.light(kind, (0, 0, height), **settings)
     bars = [floor.blocker((x, -0.5), (x + 0.3, 0.5), 0.4) for x in (-1.0, 0.0, 1.0)]
     shadowed = irradiance(floor, 1, (32, 32))
@@ -184,3 +190,31 @@ def test_a_wall_is_lit_by_the_part_of_the_light_above_its_horizon(floor, x):
     free = irradiance(floor, 1, (24, 24))[8:-4, 4:-4]
     assert (free > 0).all()
     assert shadowed == pytest.approx(free, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("technique", ["vssm", "cssm"])
+def test_maps_of_a_texel_or_few_and_lights_that_touch_what_they_light(floor, technique):
+    """Finite, and never more than without blockers."""
+    candela = floor.scene.candela
+    candela.slot_shadow = technique
+    setattr(candela, f"{technique}_texels_per_pixel", 0.125)
+    floor.light("AREA", (0, 0, 0.5), size=1.0)
+    blockers = [floor.blocker((-0.5, -0.5), (0.0, 0.5), z) for z in (0.5, 0.499999, 1e-6)]
+    shadowed = irradiance(floor, 1, (16, 16))
+    for blocker in blockers:
+        blocker.visible_shadow = False
+    free = irradiance(floor, 1, (16, 16))
+    assert ((shadowed >= 0) & (shadowed <= free * 1.0001 + 1e-12)).all()
+
+
+@pytest.mark.parametrize("technique", ["vssm", "cssm"])
+def test_a_light_without_extent_casts_hard_shadows(floor, technique):
+    floor.scene.candela.slot_shadow = technique
+    floor.light("POINT", (0, 0, HEIGHT), shadow_soft_size=0.0)
+    floor.blocker(*EDGE)
+    share = irradiance(floor, 1, (64, 4)) / model.irradiance(
+        model.point((0, 0, HEIGHT), 100), receivers((64, 4))
+    ).reshape(4, 64)
+    assert set(np.round(share, 3).ravel()) == {0.0, 1.0}
+    assert floor.ledger.row(technique).counters["hard lights"] == 1
