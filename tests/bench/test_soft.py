@@ -1,0 +1,38 @@
+"""The benchmark of soft shadows: its scenes can be made, and what it measures tells techniques apart."""
+
+import numpy as np
+import pytest
+
+from bench import soft
+
+SIZE = (48, 36)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["far background", "stacked blockers"])
+def test_one_soft_map_leaves_less_error_than_four_points_of_the_light(registered, family):
+    from bench import soft_scenes
+
+    scene = soft_scenes.build(family)
+    expected = soft.visibility(scene, soft.Entrant("truth", soft.POINTS, (("texels_per_pixel", 4.0),), 128), SIZE)
+    assert 0.1 < (expected < 0.9).mean() < 0.9
+    errors = {
+        (technique, samples): soft.rms(
+            soft.visibility(scene, soft.Entrant("", technique, (("texels_per_pixel", 4.0),), samples), SIZE), expected
+        )
+        for technique, samples in ((soft.VSSM, 1), (soft.CSSM, 1), (soft.POINTS, 4))
+    }
+    assert errors[soft.VSSM, 1] < errors[soft.POINTS, 4]
+    assert errors[soft.CSSM, 1] < errors[soft.POINTS, 4]
+
+
+def test_the_table_has_a_row_per_technique():
+    entrants = (soft.Entrant("one", soft.VSSM), soft.Entrant("map", soft.POINTS))
+    results = [soft.Result(0.25, [3.0, 2.5], [0.5]), soft.Result(0.5, [1.5, 1.6], [0.5])]
+    lines = soft.report({"grid": results, "foliage": results}, entrants).splitlines()
+    assert lines[1].split() == ["one", "0.2500", "0.2500", "0.2500", "2.0"]
+    assert lines[2].split() == ["map", "0.5000", "0.5000", "0.5000", "1.0"]
+
+
+def test_dark_pixels_count_as_lit():
+    assert soft.lit(np.array([1.0, 0.04, 0.06])).tolist() == [True, False, True]
