@@ -213,8 +213,10 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
   }
   if (largest(reflected) > 0.0) {
     vec3 lobe_scale = multiscatter_scale(FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, mu);
-    closure_glossy(closures, scale * reflected / lobe_scale, color_luminance(mirrored), FRESNEL_DIELECTRIC, f0,
-                   vec3(1.0), ior, r, 0.0, default_tangent(n), n);
+    // What little glass mirrors is often the brightest in view: kept more often than its albedo asks for.
+    float importance = max(color_luminance(mirrored), point.refracts ? 0.25 : 0.0);
+    closure_glossy(closures, scale * reflected / lobe_scale, importance, FRESNEL_DIELECTRIC, f0, vec3(1.0), ior, r, 0.0,
+                   default_tangent(n), n);
   }
   vec3 color = scale * max(transmitted, vec3(0.0));
   if (point.refracts) {
