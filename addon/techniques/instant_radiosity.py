@@ -43,16 +43,24 @@ from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .neighbours import smooth
 from .surfaces import SURFACES
-from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights, VirtualLightSet, near_radius
+from .virtual_lights import (
+    PATH_BLOCKS,
+    PATH_CONSTANTS,
+    PATH_TEXTURES,
+    TRACED,
+    VirtualLights,
+    VirtualLightSet,
+    near_radius,
+)
 
 GATHER_TEXTURES = (*PATH_TEXTURES, ("FLOAT_2D", "virtual_lights"))
-GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("INT", "rays"), ("FLOAT", "near_radius"))
+GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("FLOAT", "near_radius"))
 GATHER = passes.fullscreen_program(
     "instant radiosity",
     "indirect/gather.frag.glsl",
     textures=GATHER_TEXTURES,
     blocks=PATH_BLOCKS,
-    constants=GATHER_CONSTANTS,
+    constants=(*GATHER_CONSTANTS, *TRACED.constants),
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )
 INDIRECT_WRITES = (
@@ -81,13 +89,11 @@ def _may_reflect(graph) -> bool:
     return any("Bsdf" in node.type and node.type != "ShaderNodeBsdfTransparent" for node in graph.nodes.values())
 
 
-def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet, rays: int) -> dict:
+def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet) -> dict:
     """What shaders/indirect/lights.glsl needs: textures, blocks and constants of this sample."""
     bindings = finder.path_bindings(frame)
     bindings["textures"]["virtual_lights"] = lights.image
-    bindings["constants"] |= {
-        "virtual_count": len(lights), "rays": rays, "near_radius": near_radius(frame, len(lights)),
-    }  # fmt: skip
+    bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near_radius(frame, len(lights))}
     return bindings
 
 
@@ -115,7 +121,8 @@ class InstantRadiosity(Technique):
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
-        bindings = gather_bindings(frame, self.virtual_lights, lights, frame.settings.get(self, "rays"))
+        bindings = gather_bindings(frame, self.virtual_lights, lights)
+        bindings["constants"]["rays"] = frame.settings.get(self, "rays")
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
         for rows in frame.bands(self):

@@ -35,6 +35,7 @@ Lambertian.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
@@ -44,11 +45,12 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, INDIRECT_WRITES, gather_bindings, no_indirect_light
 from .neighbours import smooth
 from .surfaces import SURFACES, surface_bindings
-from .virtual_lights import PATH_BLOCKS, VirtualLights
+from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLights, VirtualLightSet
 
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.1  # ranges within a region: share of its depth, and of each axis of unit normals
 BOUNDS_CONSTANTS = (
@@ -73,19 +75,29 @@ BOUNDS = passes.fullscreen_program(
     constants=BOUNDS_CONSTANTS,
     outputs=BOUNDS_OUTPUTS,
 )
-REGIONS = passes.fullscreen_program(
-    "regions",
-    "indirect/regions.frag.glsl",
-    textures=(
-        *GATHER_TEXTURES, ("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags"),
-        ("FLOAT_2D", "coarser_irradiance"),
-    ),
-    blocks=PATH_BLOCKS,
-    constants=(
-        *GATHER_CONSTANTS, ("IVEC2", "grid_offset"), ("INT", "level"), ("INT", "levels"), ("FLOAT", "depth_scale"),
-    ),
-    outputs=(("VEC4", "out_irradiance"),),
-)  # fmt: skip
+
+
+@cache
+def regions(gather: Gather) -> Program:
+    """The pass over the regions of a level, with what tells which virtual lights are hidden."""
+    return passes.fullscreen_program(
+        f"regions, {gather.name}",
+        "indirect/regions.frag.glsl",
+        textures=(
+            *GATHER_TEXTURES, ("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags"),
+            ("FLOAT_2D", "coarser_irradiance"), *gather.textures,
+        ),
+        blocks=PATH_BLOCKS,
+        constants=(
+            *GATHER_CONSTANTS, ("IVEC2", "grid_offset"), ("INT", "level"), ("INT", "levels"), ("FLOAT", "depth_scale"),
+            *gather.constants,
+        ),
+        snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
+        outputs=(("VEC4", "out_irradiance"),),
+    )  # fmt: skip
+
+
+TRACED_REGIONS = regions(TRACED)
 GATHER_SHARED = passes.fullscreen_program(
     "instant radiosity of regions",
     "indirect/gather.frag.glsl",
@@ -128,15 +140,17 @@ class MultiresRadiosity(Technique):
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         scale = float(np.median(frame.receivers.distance))
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
-        bindings = gather_bindings(frame, self.virtual_lights, lights, frame.settings.get(self, "rays"))
+        bindings = gather_bindings(frame, self.virtual_lights, lights)
         bindings["constants"]["grid_offset"] = offset
+        yield
+        bound = self.visibility(frame, lights)
         yield
         pyramid = self._bounds(frame, levels, offset, scale)
         if frame.sample == 0:
             frame.count(self, "regions", _count([images.read(target.colors[2]) for target in pyramid], frame.size))
         irradiance = None
         for level in range(levels, -1, -1):
-            irradiance = self._gather(level, levels, pyramid, irradiance, bindings, scale, frame.size)
+            irradiance = self._gather(level, levels, pyramid, irradiance, bindings, bound, scale, frame.size)
             yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
         bindings["textures"]["shared_irradiance"] = irradiance
@@ -149,6 +163,10 @@ class MultiresRadiosity(Technique):
             for image in level.colors:
                 images.pool.give(image)
         frame.count(self, "passes", 2 * levels + 2)
+
+    def visibility(self, frame: Frame, lights: VirtualLightSet) -> BoundGather:
+        """What tells which of the virtual lights are hidden from a region."""
+        return BoundGather(TRACED, constants={"rays": frame.settings.get(self, "rays")})
 
     def _bounds(self, frame: Frame, levels: int, offset: tuple[int, int], scale: float) -> list[images.Target]:
         """Bounds and flags of the regions of levels 1 to `levels`."""
@@ -172,7 +190,7 @@ class MultiresRadiosity(Technique):
             pyramid.append(target)
         return pyramid
 
-    def _gather(self, level, levels, pyramid, coarser, bindings, scale, size) -> images.Image:
+    def _gather(self, level, levels, pyramid, coarser, bindings, bound, scale, size) -> images.Image:
         """Irradiance at the regions of a level, from that of the `coarser` one, which goes back to the pool."""
         found = images.pool.take(*_level_size(size, level, levels), "RGBA32F")
         anything = bindings["textures"]["virtual_lights"]  # for what this level does not look at
@@ -181,11 +199,15 @@ class MultiresRadiosity(Technique):
             "region_flags": pyramid[level - 1].colors[2] if level > 0 else anything,
             "coarser_flags": pyramid[level].colors[2] if level < levels else anything,
             "coarser_irradiance": coarser or anything,
+            **bound.textures,
         }
-        constants = {**bindings["constants"], "level": level, "levels": levels, "depth_scale": scale}
+        constants = {
+            **bindings["constants"], **bound.constants, "level": level, "levels": levels, "depth_scale": scale,
+        }  # fmt: skip
         passes.fullscreen(
-            REGIONS, images.Target((found,)), textures=textures, blocks=bindings["blocks"], constants=constants
-        )
+            regions(bound.gather), images.Target((found,)), textures=textures, blocks=bindings["blocks"],
+            constants=constants,
+        )  # fmt: skip
         if coarser is not None:
             images.pool.give(coarser)
         return found

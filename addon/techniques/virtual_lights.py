@@ -40,7 +40,7 @@ Bias, in diffuse and glossy indirect light:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -88,6 +88,29 @@ DENSITY = passes.fullscreen_program(
     constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
     outputs=(("FLOAT", "out_density"),),
 )
+
+
+@dataclass(frozen=True)
+class Gather:
+    """GLSL file with `vec3 virtual_gather(Surface, vec3 to_viewer, bool reflected, vec3 origin, float u, uint salt)`,
+    the light by all virtual lights and what hides them, and what else it binds."""
+
+    name: str
+    file: str
+    textures: tuple[tuple[str, str], ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class BoundGather:
+    """A way to gather with what it binds for the virtual lights of a sample."""
+
+    gather: Gather
+    textures: dict[str, images.Image] = field(default_factory=dict)
+    constants: dict[str, object] = field(default_factory=dict)
+
+
+TRACED = Gather("rays", "indirect/traced_gather.glsl", constants=(("INT", "rays"),))
 
 
 @dataclass(frozen=True)

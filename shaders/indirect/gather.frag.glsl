@@ -5,6 +5,9 @@
 // (regions.frag.glsl).
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
+#ifndef SHARED
+#include "indirect/traced_gather.glsl"
+#endif
 
 // Radiance that arrives along a ray from surfaces nearer than the bound (from all surfaces, if `whole`), each with the
 // share that virtual lights leave to it, and what reaches those surfaces in the same way.
@@ -55,7 +58,7 @@ void main()
     out_diffuse.rgb = s.diffuse / PI * texelFetch(shared_irradiance, pixel + grid_offset, 0).rgb;
 #else
     float choice = scrambled(film_view.bits_w, salt.z);
-    out_diffuse.rgb = virtual_gather(s, to_viewer, true, origin, rays, choice, salt.x + roll.x);
+    out_diffuse.rgb = virtual_gather(s, to_viewer, true, origin, choice, salt.x + roll.x);
 #endif
     vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
     vec3 direction = cosine_direction(s.normal, u);

@@ -1,7 +1,7 @@
 // Irradiance by virtual lights in the regions of one level: gathered where the region stands for itself, interpolated from
 // the coarser level where a larger region covers it, nothing where it is split. From the coarsest level down to pixels.
 #include "indirect/path.glsl"
-#include "indirect/lights.glsl"
+#include "generated/gather"
 
 // The pixel that stands for a region.
 ivec2 region_pixel(ivec2 region, int level_of_region)
@@ -63,5 +63,5 @@ void main()
   uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7)));
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   float choice = scrambled(film_view.bits_w, salt.z);
-  out_irradiance = vec4(virtual_gather(s, vec3(0.0), false, origin, rays, choice, salt.x + roll.x), 1.0);
+  out_irradiance = vec4(virtual_gather(s, vec3(0.0), false, origin, choice, salt.x + roll.x), 1.0);
 }
