@@ -17,6 +17,11 @@ def _number(low: float, high: float, *special: float):
     return usual | st.sampled_from(special) if special else usual
 
 
+def _mostly(usual: st.SearchStrategy, rare: st.SearchStrategy) -> st.SearchStrategy:
+    """The rare one once in eight times; what fails is shrunk towards it."""
+    return st.integers(0, 7).flatmap(lambda k: usual if k else rare)
+
+
 COLOR = st.tuples(*[_number(0, 1, 0.0, 1.0)] * 3)
 TURN = st.tuples(*[_number(-3.2, 3.2, 0.0, float(np.float32(np.pi / 2)))] * 3)
 PLACE = st.tuples(_number(-2, 2, 0.0), _number(-2, 2, 0.0), _number(0, 2, 0.0, 1.0))
@@ -92,9 +97,12 @@ def scenes(slots: dict[str, list[str]]) -> st.SearchStrategy[Scene]:
     chosen = st.fixed_dictionaries({}, optional={slot: st.sampled_from(names) for slot, names in slots.items()})
     return st.builds(
         Scene,
-        shapes=st.lists(SHAPE, max_size=4).map(lambda shapes: (Shape("floor"), *shapes)) | st.just(()),
+        shapes=_mostly(
+            st.lists(SHAPE, min_size=1, max_size=4).map(lambda shapes: (Shape("floor"), *shapes)),
+            st.lists(SHAPE, max_size=1).map(tuple),
+        ),
         surfaces=st.lists(PRINCIPLED | PLAIN, min_size=1, max_size=3).map(tuple),
-        lamps=st.lists(LAMP, max_size=3).map(tuple),
+        lamps=_mostly(st.lists(LAMP, min_size=1, max_size=4), st.just([])).map(tuple),
         world=WORLD,
         viewer=VIEWER,
         unit=_one_of(1.0, 1.0, 1.0, 1e-3, 1e3),

@@ -1,12 +1,16 @@
 """Scenes that nobody thought of: drawn by hypothesis, rendered by every technique, held against what must be true.
 
-`make test` draws a few, always the same; `make stress` draws CANDELA_STRESS (2000) new ones. What fails is shrunk, and
+`make test` draws a few; `make stress` draws CANDELA_STRESS (2000), in batches of 100 scenes. A batch is seeded by its
+number, so that its scenes are the same on every machine with the same hypothesis. out/stress/clean.json names the
+batches that ran clean and the commit at which they did: another run goes on with the rest. What fails is shrunk, and
 the smallest failing scene is left as out/stress/<claim>.blend; moved to tests/stress/found it stays a test.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, given, seed, settings
 
 from addon import engine
 from addon.techniques import REGISTRY
@@ -29,15 +33,36 @@ for _technique in REGISTRY:
     if _technique.slot:
         SLOTS.setdefault(_technique.slot, []).append(_technique.name)
 
-drawn = settings(
-    max_examples=EXAMPLES // 4 or 12,
-    derandomize=not EXAMPLES,
-    deadline=None,
-    database=None,
-    print_blob=False,
-    suppress_health_check=list(HealthCheck),
-)
+CLAIMS = 4
+BATCH = min(100, EXAMPLES // CLAIMS) if EXAMPLES else 12  # the first ten of a batch are small
+batches = pytest.mark.parametrize("batch", range(max(1, EXAMPLES // (CLAIMS * BATCH))))
 long_run = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+OUT = Path(__file__).resolve().parents[2] / "out" / "stress"
+CLEAN = OUT / "clean.json"
+
+
+def hold(claim: str, batch: int, check) -> None:
+    """Call `check(scene)` for every scene of a batch; in the long run, unless the batch is known to be clean."""
+    clean = json.loads(CLEAN.read_text()) if EXAMPLES and CLEAN.exists() else {}
+    key = f"{claim} {batch}"
+    if key in clean:
+        pytest.skip(f"clean at {clean[key]}: {CLEAN}")
+
+    def held(scene):
+        check(scene)
+
+    drawn = settings(
+        max_examples=BATCH, deadline=None, database=None, print_blob=False, suppress_health_check=list(HealthCheck)
+    )
+    drawn(seed(batch)(given(scene=scenes(SLOTS))(held)))()
+    if EXAMPLES:
+        OUT.mkdir(parents=True, exist_ok=True)
+        CLEAN.write_text(json.dumps(clean | {key: commit()}, indent=1))
+
+
+def commit() -> str:
+    asked = ["git", "rev-parse", "--short", "HEAD"]
+    return subprocess.run(asked, capture_output=True, text=True, cwd=FOUND.parent, check=False).stdout.strip()
 
 
 @contextmanager
@@ -47,9 +72,8 @@ def kept(stage, scene: Scene, claim: str):
     try:
         yield
     except Exception:
-        folder = Path(__file__).resolve().parents[2] / "out" / "stress"
-        folder.mkdir(parents=True, exist_ok=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{claim}.blend"), copy=True, check_existing=False)
+        OUT.mkdir(parents=True, exist_ok=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(OUT / f"{claim}.blend"), copy=True, check_existing=False)
         raise
 
 
@@ -63,35 +87,43 @@ def sound(images: dict[str, np.ndarray]) -> None:
 
 
 @long_run
-@drawn
-@given(scene=scenes(SLOTS))
-def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, scene):
-    with kept(kept_stage, scene, "finite_and_same"):
-        first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
-        sound(first)
-        engine.free_sessions()
-        again = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
-        for name in first:
-            np.testing.assert_array_equal(first[name], again[name], err_msg=name)
+@batches
+def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, batch):
+    claim = "finite_and_same"
+
+    def check(scene):
+        with kept(kept_stage, scene, claim):
+            first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            sound(first)
+            engine.free_sessions()
+            again = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            for name in first:
+                np.testing.assert_array_equal(first[name], again[name], err_msg=name)
+
+    hold(claim, batch, check)
 
 
 @long_run
-@drawn
-@given(scene=scenes(SLOTS))
-def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, scene):
+@batches
+def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, batch):
     """A power of two, so that nothing is rounded. Colour, depth and normals stay."""
-    with kept(kept_stage, scene, "linear"):
-        assume(all(lamp.energy < 1e9 for lamp in scene.lamps) and (scene.world is None or scene.world[3] < 1e6))
-        once = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
-        build(kept_stage, brighter(scene, 8.0))
-        eight_times = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
-        for name in once:
-            factor = 8.0 if name.endswith(("direct", "indirect", "emission", "environment")) else 1.0
-            expected = once[name] * factor
-            # Below 1e-30 GPUs may round to zero.
-            tolerance = 1e-4 * float(np.abs(expected).max(initial=0.0)) + 1e-30
-            if name != "combined":
-                np.testing.assert_allclose(eight_times[name], expected, rtol=1e-3, atol=tolerance, err_msg=name)
+    claim = "linear"
+
+    def check(scene):
+        with kept(kept_stage, scene, claim):
+            assume(all(lamp.energy < 1e9 for lamp in scene.lamps) and (scene.world is None or scene.world[3] < 1e6))
+            once = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            build(kept_stage, brighter(scene, 8.0))
+            eight_times = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            for name in once:
+                factor = 8.0 if name.endswith(("direct", "indirect", "emission", "environment")) else 1.0
+                expected = once[name] * factor
+                # Below 1e-30 GPUs may round to zero.
+                tolerance = 1e-4 * float(np.abs(expected).max(initial=0.0)) + 1e-30
+                if name != "combined":
+                    np.testing.assert_allclose(eight_times[name], expected, rtol=1e-3, atol=tolerance, err_msg=name)
+
+    hold(claim, batch, check)
 
 
 def brighter(scene: Scene, factor: float) -> Scene:
@@ -112,19 +144,23 @@ def brighter(scene: Scene, factor: float) -> Scene:
 
 
 @long_run
-@drawn
-@given(scene=scenes(SLOTS))
-def test_order_and_names_of_objects_change_nothing(kept_stage, scene):
-    with kept(kept_stage, scene, "order"):
-        first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
-        build(kept_stage, replace(scene, shapes=scene.shapes[::-1], lamps=scene.lamps[::-1]))
-        for k, thing in enumerate(kept_stage.scene.objects):
-            thing.name = f"{997 * k % 1009:04d}"
-        second = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
-        assume(not coplanar(scene))
-        # Stochastic transparency and sums depend on the order in the last digits.
-        close = np.isclose(first, second, rtol=1e-3, atol=1e-4 * float(first.max(initial=0.0)))
-        assert close.all(axis=-1).mean() > 0.97
+@batches
+def test_order_and_names_of_objects_change_nothing(kept_stage, batch):
+    claim = "order"
+
+    def check(scene):
+        with kept(kept_stage, scene, claim):
+            first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
+            build(kept_stage, replace(scene, shapes=scene.shapes[::-1], lamps=scene.lamps[::-1]))
+            for k, thing in enumerate(kept_stage.scene.objects):
+                thing.name = f"{997 * k % 1009:04d}"
+            second = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
+            assume(not coplanar(scene))
+            # Stochastic transparency and sums depend on the order in the last digits.
+            close = np.isclose(first, second, rtol=1e-3, atol=1e-4 * float(first.max(initial=0.0)))
+            assert close.all(axis=-1).mean() > 0.97
+
+    hold(claim, batch, check)
 
 
 def coplanar(scene: Scene) -> bool:
@@ -137,22 +173,26 @@ def coplanar(scene: Scene) -> bool:
 
 
 @long_run
-@drawn
-@given(scene=scenes(SLOTS))
-def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, scene):
+@batches
+def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, batch):
     """Of direct light. Virtual lights share their points among lamps: in the mean only (test_instant_radiosity.py)."""
-    scene = replace(scene, bounces=0)
-    with kept(kept_stage, scene, "halves"):
-        assume(scene.lamps)
-        whole = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
-        halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
-        build(kept_stage, replace(scene, lamps=halves))
-        np.testing.assert_allclose(
-            kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"],
-            whole,
-            rtol=2e-3,
-            atol=1e-4 * float(whole.max(initial=0.0)),
-        )
+    claim = "halves"
+
+    def check(scene):
+        scene = replace(scene, bounces=0)
+        with kept(kept_stage, scene, claim):
+            assume(scene.lamps)
+            whole = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
+            halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
+            build(kept_stage, replace(scene, lamps=halves))
+            np.testing.assert_allclose(
+                kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"],
+                whole,
+                rtol=2e-3,
+                atol=1e-4 * float(whole.max(initial=0.0)),
+            )
+
+    hold(claim, batch, check)
 
 
 @pytest.mark.parametrize("path", sorted(FOUND.glob("*.blend")), ids=lambda path: path.stem)
