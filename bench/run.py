@@ -1,9 +1,12 @@
 """Time against error over scenes, techniques and samples, beside EEVEE and Cycles: `python -m bench run`.
 
 Every cell (bench/cells.py) is measured by a worker, a fresh process per scene, and kept at once in out/bench: a run
-that is interrupted goes on where it was. `--budget` gives the minutes that the whole may take: how long each cell will
-take is predicted from what has been measured, and the dearest cells that do not fit are left out; those of the engines
-as they come, at 1, 4, 16 and 64 samples, may cost more. What was measured becomes one file, bench/results/bench.json.
+that is interrupted goes on where it was. What was measured becomes one file, bench/results/bench.json.
+
+`--budget` gives the minutes that the whole may take. How long each cell will take is predicted from what has been
+measured; what a page needs (bench/cells.py: NEEDED) is set aside for every scene, the rest of the time is shared out
+among the scenes, and of what does not fit the dearest cells of the lowest rank are left out. References, which no
+figure's time depends on, may be rendered before with `--references`, on a busy machine too.
 """
 
 from __future__ import annotations
@@ -21,13 +24,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from bench.cells import ROOT, Cell, Scene, Series, Store, in_turns
+from bench.cells import MAIN, NEEDED, ROOT, Cell, Scene, Series, Store, in_turns
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
 GUESS = {"CANDELA": (0.3, 0.15), "BLENDER_EEVEE": (8.0, 0.02), "CYCLES": (0.4, 0.06)}  # seconds: fixed, per sample
-MAIN_WORTH = 4.0  # a cell of the engines as they come may cost so many times more than another before it is left out
+GUESSED_SIZE = 128 * 96  # pixels at which these hold; what is paid per sample grows with the pixels
 OPENING = 4.0  # seconds to start a worker and open a scene
+REFERENCE = 0.015  # seconds of a sample of the reference at that size
 
 
 class Failed(RuntimeError):
@@ -65,38 +69,50 @@ class Worker:
 # -------------------------------------------------------------------------------------------------------------- budget
 
 
-def predicted(cell: Cell, known: dict[tuple[Scene, Series, int], float]) -> float:
-    """Seconds that a cell will take: from the same series and scene, else from its engine in this scene, else in all.
+class Known:
+    """Seconds of measured cells over the guess for them: by scene and series, by scene and engine, and by engine."""
 
-    What is known of others is scaled by the guess for both; of several, the median counts.
-    """
-    for like in (
-        lambda scene, series: (scene, series) == (cell.scene, cell.series),
-        lambda scene, series: (scene, series.engine) == (cell.scene, cell.series.engine),
-        lambda scene, series: series.engine == cell.series.engine,
-    ):
-        found = [
-            (n, seconds / guess(series, n)) for (scene, series, n), seconds in known.items() if like(scene, series)
-        ]
-        if found:
-            nearest = min(abs(math.log(n / cell.samples)) for n, _ in found)
-            ratios = [ratio for n, ratio in found if abs(math.log(n / cell.samples)) == nearest]
-            return statistics.median(ratios) * guess(cell.series, cell.samples)
-    return guess(cell.series, cell.samples)
+    def __init__(self):
+        self.ratios: dict[tuple, list[tuple[int, float]]] = {}
+
+    def add(self, cell: Cell, seconds: float) -> None:
+        found = cell.samples, seconds / guess(cell.series, cell.samples, cell.size)
+        for like in self._alike(cell):
+            self.ratios.setdefault(like, []).append(found)
+
+    @staticmethod
+    def _alike(cell: Cell) -> tuple[tuple, ...]:
+        engine = cell.series.engine
+        return (cell.scene, cell.series), (cell.scene, engine), (engine,)
+
+    def predicted(self, cell: Cell) -> float:
+        """Seconds that a cell will take: from what is most alike, and of that from the nearest number of samples.
+
+        Of several the median counts. One scene says little about the next (EEVEE takes ten times longer where leaves
+        cover each other), so that the guess itself counts beside other scenes.
+        """
+        own = guess(cell.series, cell.samples, cell.size)
+        for like in self._alike(cell):
+            found = self.ratios.get(like)
+            if found:
+                nearest = min(abs(math.log(n / cell.samples)) for n, _ in found)
+                ratios = [ratio for n, ratio in found if abs(math.log(n / cell.samples)) == nearest]
+                return own * statistics.median(ratios if cell.scene in like else [*ratios, 1.0])
+        return own
 
 
-def guess(series: Series, samples: int) -> float:
-    """Seconds of a cell on two cores at 128x96 pixels."""
+def guess(series: Series, samples: int, size: tuple[int, int]) -> float:
+    """Seconds of a cell on two cores."""
     fixed, each = GUESS[series.engine]
-    return fixed + each * samples
+    return fixed + each * samples * size[0] * size[1] / GUESSED_SIZE
 
 
 def that_fit(cells: list[Cell], cost: Callable[[Cell], float], seconds: float) -> list[Cell]:
-    """The cells, in their order, without the dearest ones that the time does not allow; main cells weigh less."""
+    """The cells, in their order, without what the time does not allow: first the extra ones go, the dearest first."""
     costs = {cell: cost(cell) for cell in cells}
     total = sum(costs.values())
     dropped = set()
-    for cell in sorted(cells, key=lambda cell: costs[cell] / (MAIN_WORTH if cell.main else 1.0), reverse=True):
+    for cell in sorted(cells, key=lambda cell: (cell.rank, costs[cell]), reverse=True):
         if total <= seconds:
             break
         dropped.add(cell)
@@ -125,22 +141,22 @@ class Run:
         self.machine = " ".join(self.about[name] for name in ("blender", "device", "cpu"))
         self.references: dict[str, dict] = {}
         self.failures: list[str] = []
-        self.known = {
-            (cell.scene, cell.series, cell.samples): store.found[cell.key(self.machine)]["wall"]
-            for cell in self.cells
-            if cell.key(self.machine) in store.found
-        }
-        self.left = [cell for cell in self.cells if cell.key(self.machine) not in store.found]
+        self.known, self.left = Known(), []
+        for cell in self.cells:
+            row = store.found.get(cell.key(self.machine))
+            if row is None:
+                self.left.append(cell)
+            else:
+                self.known.add(cell, row["wall"])
 
     def measure(self) -> None:
-        """Measure what the store lacks: each scene gets an equal share of the time that is left, and whatever the
-        others did not need goes into further rounds."""
+        """Measure what the store lacks; whatever the scenes did not need of their shares goes into further rounds."""
         progress = True
         while self.left and progress:
             progress = False
             scenes = list(dict.fromkeys(cell.scene for cell in self.left))
             for number, scene in enumerate(scenes):
-                progress |= self._measure_scene(scene, self._time_left() / (len(scenes) - number))
+                progress |= self._measure_scene(scene, scenes[number + 1 :])
 
     @property
     def missing(self) -> list[Cell]:
@@ -149,18 +165,35 @@ class Run:
     def _time_left(self) -> float:
         return float("inf") if self.budget is None else self.started + self.budget - time.monotonic()
 
-    def _cost(self, cell: Cell) -> float:
-        return predicted(cell, self.known)
+    def _needed(self, scenes: Iterable[Scene]) -> float:
+        """Predicted seconds of what a page needs of these scenes."""
+        scenes = set(scenes)
+        unopened = {cell.scene: cell for cell in self.left if cell.scene in scenes}
+        seconds = sum(self.known.predicted(cell) for cell in self.left if cell.scene in scenes and cell.rank == NEEDED)
+        return seconds + sum(self._opening(cell) for cell in unopened.values())
 
-    def _measure_scene(self, scene: Scene, share: float) -> bool:
-        """Measure the cells of a scene that fit into `share` seconds; whether there was any."""
-        end = time.monotonic() + share
-        worker, any_measured = None, False
+    def _opening(self, cell: Cell) -> float:
+        """Seconds to open a cell's scene, with a reference that may have to be rendered."""
+        if cell.scene.name in self.references:
+            return 0.0
+        if self.references and all(one.get("cached") for one in self.references.values()):
+            return OPENING
+        return OPENING + 2 * cell.reference_samples * REFERENCE * cell.size[0] * cell.size[1] / GUESSED_SIZE
+
+    def _measure_scene(self, scene: Scene, later: list[Scene]) -> bool:
+        """Measure of a scene what it needs, and what fits into an equal part of the time that none of the scenes from
+        here on needs; where even that time is short, all are short of an equal part. Whether anything was measured.
+        """
+        worker, any_measured, extra = None, False, 0.0
+        part = self._spare(scene, later) / (len(later) + 1)
         try:
             while True:
-                opening = 0.0 if worker else OPENING
                 mine = [cell for cell in self.left if cell.scene == scene]
-                kept = that_fit(mine, self._cost, end - time.monotonic() - opening)
+                spare = self._spare(scene, later)
+                more = min(part - extra, spare) if spare > 0 else spare / (len(later) + 1)
+                share = min(self._needed([scene]) + more, self._time_left())
+                opening = 0.0 if worker or not mine else max(self._opening(mine[0]), OPENING)
+                kept = that_fit(mine, self.known.predicted, share - opening)
                 if not kept:
                     return any_measured
                 self._tell(kept[0])
@@ -168,18 +201,23 @@ class Run:
                 if worker is None:
                     return any_measured
                 any_measured = True
+                begun = time.monotonic()
                 if not self._measure_cell(worker, kept[0]):
                     worker = None
+                if kept[0].rank != NEEDED:
+                    extra += time.monotonic() - begun
         finally:
             if worker:
                 worker.end()
 
+    def _spare(self, scene: Scene, later: list[Scene]) -> float:
+        """Seconds of the budget beyond what this scene and the later ones need; negative where it is short."""
+        return self._time_left() - self._needed([scene, *later])
+
     def _open(self, cell: Cell) -> Worker | None:
         """A worker with the cell's scene open; None where that failed."""
         worker = Worker(OUT / "worker.log")
-        opened = worker.ask(
-            ask="open", scene=asdict(cell.scene), size=cell.size, reference_samples=cell.reference_samples
-        )
+        opened = open_in(worker, cell)
         if "failed" in opened:
             self.failures.append(f"{cell.scene.name} could not be opened: {opened['failed']}")
             self.left = [other for other in self.left if other.scene != cell.scene]
@@ -201,17 +239,22 @@ class Run:
             self.failures.append(f"{cell.scene.name}, {cell.series.label}, {cell.samples}: {figures['failed']}")
             return alive
         wall = time.monotonic() - begun
-        self.known[cell.scene, cell.series, cell.samples] = wall
+        self.known.add(cell, wall)
         self.store.add(cell.key(self.machine), {**described(cell), "wall": wall, "load": load(), **figures})
         return True
 
     def _tell(self, cell: Cell) -> None:
         now = time.monotonic() - self.started
-        fitting = that_fit(self.left, self._cost, self._time_left())
+        fitting = that_fit(self.left, self.known.predicted, self._time_left())
         scenes = len({other.scene for other in fitting})
-        self.bar.total = round(now + sum(map(self._cost, fitting)) + OPENING * scenes)
+        self.bar.total = round(now + sum(map(self.known.predicted, fitting)) + OPENING * scenes)
         self.bar.update(round(now) - self.bar.n)
         self.bar.set_postfix_str(f"{cell.scene.name}: {cell.series.label}, {cell.samples}")
+
+
+def open_in(worker: Worker, cell: Cell) -> dict:
+    """Open the cell's scene in a worker: what is known of its reference, or a failure."""
+    return worker.ask(ask="open", scene=asdict(cell.scene), size=cell.size, reference_samples=cell.reference_samples)
 
 
 def load() -> float | None:
@@ -265,6 +308,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="leave out the dearest cells beyond this time")
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
     parser.add_argument("--list", action="store_true", help="print the cells and end")
+    parser.add_argument(
+        "--references", action="store_true", help="render the references alone, which may be done while others work"
+    )
 
 
 def size_of(text: str) -> tuple[int, int]:
@@ -303,6 +349,24 @@ def chosen(options: argparse.Namespace) -> list[Cell]:
     ]
 
 
+def render_references(cells: list[Cell]) -> int:
+    """Render and keep what the cells are compared with; the exit code."""
+    from tqdm import tqdm
+
+    failed = 0
+    first = {cell.scene: cell for cell in cells}
+    for cell in tqdm(first.values(), disable=not sys.stderr.isatty(), unit="scene"):
+        worker = Worker(OUT / "worker.log")
+        made = open_in(worker, cell)
+        worker.end()
+        if "failed" in made:
+            failed = 1
+            print(f"{cell.scene.name}: {made['failed']}", file=sys.stderr)
+        else:
+            print(f"{cell.scene.name}: {'found' if made['cached'] else 'rendered'}", flush=True)
+    return failed
+
+
 def command(options: argparse.Namespace) -> int:
     from tqdm import tqdm
 
@@ -313,8 +377,11 @@ def command(options: argparse.Namespace) -> int:
         return 2
     if options.list:
         for cell in in_turns(cells):
-            print(f"{cell.scene.name:<20} {cell.series.label:<34} {cell.samples:4}{'  main' if cell.main else ''}")
+            rank = {NEEDED: "needed", MAIN: "main"}.get(cell.rank, "")
+            print(f"{cell.scene.name:<20} {cell.series.label:<34} {cell.samples:4}  {rank}")
         return 0
+    if options.references:
+        return render_references(cells)
     store = Store(OUT / "cells.jsonl")
     budget = None if options.budget is None else 60.0 * options.budget
     form = "{desc}{percentage:3.0f}% |{bar}| {elapsed}, {remaining} left, {postfix}"

@@ -8,7 +8,7 @@ from bench import cells, run
 from bench.cells import PEERS, Cell, Scene, Series, Store, in_turns
 
 OWN = Series("Candela", "CANDELA", (1, 4), main=True)
-EEVEE, CYCLES = PEERS[0], PEERS[2]
+EEVEE, CYCLES = PEERS[1], PEERS[2]
 ROOM, HALL = Scene("cornell_box"), Scene("colonnade_hall")
 
 
@@ -54,25 +54,33 @@ def test_store_keeps_each_cell_at_once_and_survives_half_a_line(tmp_path):
     assert Store(path).found == {"a": {"key": "a", "wall": 1.0}}
 
 
-def test_dearest_cells_are_left_out_and_main_ones_may_cost_more():
-    own, eevee, other = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 256)
-    costs = {own: 1.0, eevee: 20.0, other: 10.0}
-    assert run.that_fit([own, eevee, other], costs.get, 31.0) == [own, eevee, other]
-    assert run.that_fit([own, eevee, other], costs.get, 30.0) == [own, eevee]
-    assert run.that_fit([own, eevee, other], costs.get, 5.0) == [own]
-    assert run.that_fit([own, eevee, other], costs.get, 0.0) == []
-    costs[other] = 4.0
-    assert run.that_fit([own, eevee, other], costs.get, 10.0) == [own, other]
+def test_dearest_cells_of_the_lowest_rank_are_left_out():
+    own, ray_traced, main, extra = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 64), cell(CYCLES, 256)
+    assert [one.rank for one in (own, ray_traced, main, extra)] == [cells.NEEDED, cells.NEEDED, cells.MAIN, cells.EXTRA]
+    costs = {own: 1.0, ray_traced: 20.0, main: 8.0, extra: 2.0}
+    wanted = list(costs)
+    assert run.that_fit(wanted, costs.get, 31.0) == wanted
+    assert run.that_fit(wanted, costs.get, 30.0) == [own, ray_traced, main]
+    assert run.that_fit(wanted, costs.get, 28.0) == [own, ray_traced]
+    assert run.that_fit(wanted, costs.get, 5.0) == [own]
+    assert run.that_fit(wanted, costs.get, 0.0) == []
 
 
 def test_time_is_predicted_from_what_is_most_alike():
-    known = {(ROOM, OWN, 4): 2.0, (ROOM, OWN, 16): 6.0, (ROOM, CYCLES, 4): 1.0}
-    assert run.predicted(cell(OWN, 4), known) == 2.0
-    assert run.predicted(cell(OWN, 32), known) == pytest.approx(6.0 * run.guess(OWN, 32) / run.guess(OWN, 16))
-    assert run.predicted(cell(OWN, 4, HALL), known) == pytest.approx(2.0)
+    known = run.Known()
+    for one, seconds in ((cell(OWN, 4), 2.0), (cell(OWN, 16), 6.0), (cell(CYCLES, 4), 1.0)):
+        known.add(one, seconds)
+
+    def guess(series, samples):
+        return run.guess(series, samples, (64, 48))
+
+    assert known.predicted(cell(OWN, 4)) == pytest.approx(2.0)
+    assert known.predicted(cell(OWN, 32)) == pytest.approx(6.0 * guess(OWN, 32) / guess(OWN, 16))
+    between = (2.0 + guess(OWN, 4)) / 2  # another scene counts as much as the guess
+    assert known.predicted(cell(OWN, 4, HALL)) == pytest.approx(between)
     other = replace(CYCLES, denoised=True)
-    assert run.predicted(cell(other, 4), known) == pytest.approx(1.0)
-    assert run.predicted(cell(EEVEE, 16), known) == run.guess(EEVEE, 16)
+    assert known.predicted(cell(other, 4)) == pytest.approx(1.0)
+    assert known.predicted(cell(EEVEE, 16)) == guess(EEVEE, 16)
 
 
 def test_choice_of_techniques_comes_from_the_registry():
@@ -141,17 +149,28 @@ class Bar:
 
 @pytest.fixture
 def fake(monkeypatch, tmp_path):
-    FakeWorker.clock, FakeWorker.costs, FakeWorker.opened = 0.0, {"Candela": 1.0, "EEVEE": 20.0, "Cycles": 1.0}, []
+    FakeWorker.clock, FakeWorker.costs, FakeWorker.opened = 0.0, {"Candela": 1.0, EEVEE.label: 20.0, "Cycles": 1.0}, []
     monkeypatch.setattr(run, "Worker", FakeWorker)
     monkeypatch.setattr(run.time, "monotonic", lambda: FakeWorker.clock)
     return Store(tmp_path / "cells.jsonl")
 
 
-def test_every_scene_gets_a_share_of_the_time(fake):
-    wanted = [cell(series, 16, scene) for scene in (ROOM, HALL) for series in (OWN, EEVEE, CYCLES)]
-    done = run.Run(wanted, 60.0, fake, Bar())
+def test_every_scene_gets_what_a_page_needs_before_any_gets_more(fake):
+    samples = {OWN: (1, 4, 16, 64), EEVEE: (16, 4, 1), CYCLES: (1, 4, 16, 64, 256)}
+    wanted = [cell(s, n, scene) for scene in (ROOM, HALL) for s, counts in samples.items() for n in counts]
+    needed = {(one.scene.name, one.series.label, one.samples) for one in wanted if one.rank == cells.NEEDED}
+    done = run.Run(wanted, 2 * (60.0 + 6.0) + 3.0, fake, Bar())
     done.measure()
     assert FakeWorker.opened[:2] == ["cornell_box", "colonnade_hall"]
+    measured = {(row["scene"], row["series"]["label"], row["samples"]) for row in fake.found.values()}
+    assert needed <= measured
+    assert len(measured - needed) == 3
+
+
+def test_a_budget_that_is_too_short_is_kept_and_shared(fake):
+    wanted = [cell(series, 16, scene) for scene in (ROOM, HALL) for series in (OWN, EEVEE, CYCLES)]
+    run.Run(wanted, 26.0, fake, Bar()).measure()
+    assert FakeWorker.clock <= 26.0
     measured = {(row["scene"], row["series"]["label"]) for row in fake.found.values()}
     assert {(scene.name, label) for scene in (ROOM, HALL) for label in ("Candela", "Cycles")} <= measured
 
