@@ -51,6 +51,7 @@ class Series:
         return self.engine != "BLENDER_EEVEE" and not self.denoised
 
 
+OWN = Series("Candela", "CANDELA", SWEEP, main=True)
 PEERS = (
     Series("EEVEE", "BLENDER_EEVEE", EEVEE_SWEEP),
     Series("EEVEE, ray traced", "BLENDER_EEVEE", EEVEE_SWEEP, main=True, ray_traced=True),
@@ -77,7 +78,7 @@ def own_series(registry: Iterable) -> tuple[Series, ...]:
 
     What is set by hand is set in every slot that has a choice, so that those series do not depend on what Auto knows.
     """
-    found = [Series("Candela", "CANDELA", SWEEP, main=True), Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
+    found = [OWN, Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
     slots = choices(registry)
     first = {slot: techniques[0].name for slot, techniques in slots.items()}
     if first:

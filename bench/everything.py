@@ -1,8 +1,8 @@
 """All measurements and the page, one after the other: `python -m bench all`, which `make bench` calls.
 
-Profile and growth of cost come first, because they take the same time always; time against error gets what is left of
-the budget. Each is a process of its own. The table that Auto reads is not written: that changes pictures, and is
-decided by hand (`python -m bench costs`, and then the tests).
+Profile and growth of cost come first, each within a part of the budget; time against error gets what is left. Pictures
+are 256x192, or as large as a budget allows for what a page needs. Each step is a process of its own. The table that
+Auto reads is not written: that changes pictures, and is decided by hand (`python -m bench costs`, and then the tests).
 """
 
 from __future__ import annotations
@@ -13,32 +13,50 @@ import sys
 import time
 
 from bench import run
-from bench.cells import ROOT
+from bench.cells import ROOT, sample_scenes
 
-LEAST = 2.0  # minutes that time against error gets at least
-FIXED = 25.0  # seconds for the page
+SIZES = ((256, 192), (192, 144), (128, 96), (64, 48))
+PROFILE, GROWTH, ERROR = 0.1, 0.08, 0.75  # parts of a budget; what is left is for the page
+PROFILE_SIZE = "128x96"  # within a budget
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="for everything; default: all cells")
-    parser.add_argument("--size", default="128x96", metavar="WxH", help="default 128x96")
+    parser.add_argument("--size", type=run.size_of, metavar="WxH", help="default: the largest that fits, to 256x192")
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="default: all of sample_blends")
 
 
 def command(options: argparse.Namespace) -> int:
     started = time.monotonic()
-    run.size_of(options.size)
     scenes = ["--scenes", *options.scenes] if options.scenes else []
-    size = ["--size", options.size]
-    short = ["--runs", "0"] if options.budget else []
-    failed = [step("profile", *scenes, *size), step("growth", *short)]
-    budget = []
+    width, height = options.size or largest(options.budget, len(options.scenes or sample_scenes()))
+    size = ["--size", f"{width}x{height}"]
     if options.budget:
-        left = options.budget - (time.monotonic() - started + FIXED) / 60
-        budget = ["--budget", f"{max(left, LEAST):.2f}"]
-    failed += [step("run", *scenes, *size, *budget), step("page")]
+        profile = ["--size", PROFILE_SIZE, *minutes(PROFILE * options.budget)]
+        growth = ["--runs", "0", *minutes(GROWTH * options.budget)]
+    else:
+        profile, growth = size, []
+    failed = [step("profile", *scenes, *profile), step("growth", *growth)]
+    left = []
+    if options.budget:
+        spent = (time.monotonic() - started) / 60
+        left = minutes(options.budget * (PROFILE + GROWTH + ERROR) - spent)
+    failed += [step("run", *scenes, *size, *left), step("page")]
     print(f"{(time.monotonic() - started) / 60:.1f} minutes")
     return max(failed)
+
+
+def largest(budget: float | None, scenes: int) -> tuple[int, int]:
+    """The largest size at which so many scenes have what a page needs within a budget of minutes, with references
+    that are there already."""
+    for size in SIZES:
+        if budget is None or run.needed_seconds(scenes, size) <= 60 * ERROR * budget:
+            return size
+    return SIZES[-1]
+
+
+def minutes(value: float) -> list[str]:
+    return ["--budget", f"{value:.2f}"]
 
 
 def step(*arguments: str) -> int:

@@ -4,7 +4,7 @@ The dials are those of the procedural scenes (bench/families.py), and of one sam
 samples and the virtual lights. Each value is rendered cold once, then once waiting for the GPU after each step, which
 gives the times by technique, and then `--runs` times; a whole render's time is the median of all warm ones. The
 exponent is that of time over the dial between its two largest values: 1 is in proportion, 0 is free. Counters hold on
-every machine.
+every machine. Within a budget the dials are measured from their small values on, as long as there is time.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import argparse
 import datetime as dt
 import json
 import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -107,6 +108,31 @@ def measure(dial: Dial, value: float, runs: int) -> dict:
     }  # fmt: skip
 
 
+def measured(chosen: list[Dial], runs: int, budget: float | None, terminal) -> list[dict]:
+    """Rows by dial; within `budget` minutes, the small values of all dials first.
+
+    A value that is likely to outlast the time, taking as much longer than the one before as that one did, ends its
+    dial.
+    """
+    from tqdm import tqdm
+
+    end = float("inf") if budget is None else time.monotonic() + 60 * budget
+    work = [(dial, value) for dial in chosen for value in dial.values]
+    if budget is not None:
+        work.sort(key=lambda one: one[0].values.index(one[1]))
+    walls: dict[Dial, list[float]] = {}
+    rows = []
+    for dial, value in tqdm(work, file=terminal, disable=not terminal.isatty(), unit="scene"):
+        past = walls.setdefault(dial, [])
+        likely = past[-1] * max(past[-1] / past[-2], 1.0) if len(past) > 1 else sum(past)
+        begun = time.monotonic()
+        if begun + likely > end:
+            continue
+        rows.append(measure(dial, value, runs))
+        past.append(time.monotonic() - begun)
+    return sorted(rows, key=lambda row: [dial.name for dial in chosen].index(row["dial"]))
+
+
 def exponent(rows: list[dict]) -> float:
     """Growth of time between the two largest values, as a power of the dial."""
     before, last = rows[-2:]
@@ -148,12 +174,12 @@ def grown_counters(first: dict, last: dict) -> str:
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dials", nargs="+", metavar="NAME", help="default: all")
     parser.add_argument("--runs", default=2, type=int, metavar="N", help="default 2")
+    parser.add_argument("--budget", type=float, metavar="MINUTES", help="leave out the large values that do not fit")
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
 
 
 def command(options: argparse.Namespace) -> int:
     import bpy  # noqa: F401
-    from tqdm import tqdm
 
     import addon
     from addon.cli.terminal import quiet
@@ -165,11 +191,8 @@ def command(options: argparse.Namespace) -> int:
     with quiet():
         about = worker.about()
     chosen = [dial for dial in dials() if not options.dials or dial.name in options.dials]
-    work = [(dial, value) for dial in chosen for value in dial.values]
-    rows = []
     with quiet() as terminal:
-        for dial, value in tqdm(work, file=terminal, disable=not terminal.isatty(), unit="scene"):
-            rows.append(measure(dial, value, options.runs))
+        rows = measured(chosen, options.runs, options.budget, terminal)
     about |= {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"), "load": load()}
     options.results.parent.mkdir(parents=True, exist_ok=True)
     lines = ",\n".join(json.dumps(rounded(row), ensure_ascii=False) for row in rows)

@@ -150,6 +150,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="default: all of sample_blends")
     parser.add_argument("--samples", default=16, type=int, metavar="N", help="default 16")
     parser.add_argument("--size", default=(128, 96), type=size_of, metavar="WxH", help="default 128x96")
+    parser.add_argument("--budget", type=float, metavar="MINUTES", help="leave out the scenes that do not fit")
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
 
 
@@ -168,7 +169,8 @@ def command(options: argparse.Namespace) -> int:
     with quiet() as terminal:
         about = worker.about()
         bar = tqdm(scenes, file=terminal, disable=not terminal.isatty(), unit="scene")
-        rows = [profile(scene, options.samples, options.size) for scene in bar]
+        end = float("inf") if options.budget is None else time.monotonic() + 60 * options.budget
+        rows = [profile(scene, options.samples, options.size) for scene in bar if time.monotonic() < end]
     about |= {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"), "load": load()}
     about |= {"samples": options.samples, "size": list(options.size)}
     options.results.parent.mkdir(parents=True, exist_ok=True)

@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from bench.cells import MAIN, NEEDED, ROOT, Cell, Scene, Series, Store, in_turns
+from bench.cells import MAIN, NEEDED, NEEDED_SAMPLES, OWN, PEERS, ROOT, Cell, Scene, Series, Store, in_turns
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
@@ -105,6 +105,12 @@ def guess(series: Series, samples: int, size: tuple[int, int]) -> float:
     """Seconds of a cell on two cores."""
     fixed, each = GUESS[series.engine]
     return fixed + each * samples * size[0] * size[1] / GUESSED_SIZE
+
+
+def needed_seconds(scenes: int, size: tuple[int, int]) -> float:
+    """Guessed seconds of what a page needs of so many scenes; without their references."""
+    needed = [(one, samples) for one in (OWN, *PEERS) if one.main for samples in NEEDED_SAMPLES[one.engine]]
+    return scenes * (OPENING + sum(guess(one, samples, size) for one, samples in needed))
 
 
 def that_fit(cells: list[Cell], cost: Callable[[Cell], float], seconds: float) -> list[Cell]:
