@@ -4,7 +4,7 @@
 def register():
     """Called by Blender when the extension is enabled."""
     from . import cli, engine
-    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties, quality
+    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
 
     pass_tree.register()
     properties.register()
@@ -12,6 +12,7 @@ def register():
     pass_run.register()
     quality.register()
     panels.register()
+    tuning.register()
     pass_operators.register()
     compare_editor.register()
     cli.register()
@@ -20,11 +21,12 @@ def register():
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
     from . import cli, engine
-    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties, quality
+    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
 
     cli.unregister()
     compare_editor.unregister()
     pass_operators.unregister()
+    tuning.unregister()
     panels.unregister()
     quality.unregister()
     pass_run.unregister()

@@ -12,13 +12,12 @@ from ..compare import metrics, reference, tune
 from ..frame import ledger as ledgers
 from ..gfx import context
 from ..techniques import REGISTRY
-from ..ui.properties import identifier, settings_of
+from ..ui.properties import settings_of
+from ..ui.tuning import SEED, choices, properties
 from .files import output
 from .refused import USAGE, Refused, reason
 from .terminal import progress, quiet
 from .verbs import Job
-
-SEED = 11  # of timed renders; programs are compiled by a render of another one
 
 
 def tune_scene(job: Job) -> None:
@@ -56,25 +55,6 @@ def tune_scene(job: Job) -> None:
     if path is not None:
         save(options.file, job.scene.name, best.candidate, path)
         print(path)
-
-
-def choices(scene) -> dict[str, list[str]]:
-    """Techniques to try by slot, the one that is set first; slots without a choice stay away."""
-    found: dict[str, list[str]] = {}
-    for technique in REGISTRY:
-        if technique.slot:
-            found.setdefault(technique.slot, []).append(technique.name)
-    chosen = {slot: getattr(scene.candela, f"slot_{slot}") for slot in found}
-    return {
-        slot: sorted(names, key=lambda name: name != chosen[slot]) for slot, names in found.items() if len(names) > 1
-    }
-
-
-def properties(candidate: tune.Candidate) -> list[tuple[str, object]]:
-    """The candidate as properties of scene.candela."""
-    own: list[tuple[str, object]] = [("samples", candidate.samples)]
-    own += [(f"slot_{slot}", name) for slot, name in candidate.slots]
-    return own + [(identifier(*name), value) for name, value in candidate.values]
 
 
 def _renders(job: Job, layer, truth, deadline: float, seconds: float, terminal):

@@ -17,7 +17,7 @@ step must win by more than that.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ..frame.technique import Technique
@@ -75,29 +75,50 @@ def search(
     seconds: float,
     most_samples: int = 4096,
 ) -> list[Trial]:
-    """All trials in the order in which they were made. `render` raises Spent when the budget is used up.
+    """All trials in the order in which they were made. `render` raises Spent when the budget is used up; the other
+    arguments are those of `candidates`.
+    """
+    trials: list[Trial] = []
+    asked = candidates(trials, slots, techniques, values, seconds, most_samples)
+    try:
+        candidate = next(asked)
+        while True:
+            candidate = asked.send(render(candidate))
+    except (StopIteration, Spent):
+        return trials
+
+
+Asking = Generator[Candidate, Picture, Trial]
+
+
+def candidates(
+    trials: list[Trial],
+    slots: dict[str, Sequence[str]],
+    techniques: Iterable[type[Technique]],
+    values: dict[tuple[str, str], object],
+    seconds: float,
+    most_samples: int = 4096,
+) -> Generator[Candidate, Picture, None]:
+    """Yields what to render next, and is sent what came out; `trials`, empty at first, grows by one each time.
 
     `slots` names the techniques to choose from by slot, the scene's own choice first; `values` are the scene's own
     parameters; `seconds` is the time that a picture may take.
     """
-    trials: list[Trial] = []
+    for choice in _choices(slots):
+        yield from _sweep(trials, Candidate(1, choice), seconds, most_samples)
+    best = proposal(trials, seconds)
+    fitted = yield from _fitted(trials, best, seconds, most_samples)
+    best = max(best, fitted, key=lambda trial: _worth(trial, seconds))
+    yield from _step_parameters(trials, best, techniques, values, seconds, most_samples)
 
-    def tried(candidate: Candidate) -> Trial:
-        for trial in trials:
-            if trial.candidate == candidate:
-                return trial
-        trials.append(Trial(candidate, render(candidate)))
-        return trials[-1]
 
-    try:
-        for choice in _choices(slots):
-            _sweep(tried, trials, Candidate(1, choice), seconds, most_samples)
-        best = proposal(trials, seconds)
-        best = max(best, _fitted(tried, best, seconds, most_samples), key=lambda trial: _worth(trial, seconds))
-        _step_parameters(tried, best, techniques, values, seconds, most_samples)
-    except Spent:
-        pass
-    return trials
+def _tried(trials: list[Trial], candidate: Candidate) -> Asking:
+    """The candidate's trial, made now if it was not made before."""
+    for trial in trials:
+        if trial.candidate == candidate:
+            return trial
+    trials.append(Trial(candidate, (yield candidate)))
+    return trials[-1]
 
 
 def _choices(slots: dict[str, Sequence[str]]) -> list[tuple[tuple[str, str], ...]]:
@@ -109,11 +130,11 @@ def _choices(slots: dict[str, Sequence[str]]) -> list[tuple[tuple[str, str], ...
     return found
 
 
-def _sweep(tried, trials: list[Trial], start: Candidate, seconds: float, most: int) -> None:
+def _sweep(trials: list[Trial], start: Candidate, seconds: float, most: int) -> Generator[Candidate, Picture, None]:
     """1, 2, 4, … samples, as long as the next is likely to fit and the choice keeps up with the others."""
     samples = 1
     while samples <= most:
-        trial = tried(replace(start, samples=samples))
+        trial = yield from _tried(trials, replace(start, samples=samples))
         if any(one.candidate.slots != start.slots and one.picture.ran == trial.picture.ran for one in trials):
             return  # the choice makes no difference in this scene
         others = [one.error for one in trials if one.candidate.slots != start.slots and one.seconds <= trial.seconds]
@@ -122,13 +143,15 @@ def _sweep(tried, trials: list[Trial], start: Candidate, seconds: float, most: i
         samples *= 2
 
 
-def _fitted(tried, trial: Trial, seconds: float, most: int) -> Trial:
+def _fitted(trials: list[Trial], trial: Trial, seconds: float, most: int) -> Asking:
     """The same settings with as many samples as fit into the time, taking time to be in proportion to them."""
     samples = max(1, min(most, math.floor(trial.candidate.samples * seconds / trial.seconds)))
-    return tried(replace(trial.candidate, samples=samples)) if samples != trial.candidate.samples else trial
+    return (yield from _tried(trials, replace(trial.candidate, samples=samples)))
 
 
-def _step_parameters(tried, best: Trial, techniques, own: dict, seconds: float, most: int) -> None:
+def _step_parameters(
+    trials: list[Trial], best: Trial, techniques, own: dict, seconds: float, most: int
+) -> Generator[Candidate, Picture, None]:
     """Double and halve each numeric parameter of the techniques that ran; what wins is kept."""
     for technique in techniques:
         if technique.name not in best.picture.ran:
@@ -143,7 +166,8 @@ def _step_parameters(tried, best: Trial, techniques, own: dict, seconds: float, 
                 if value is None:
                     continue
                 changed = replace(best.candidate, values=tuple({**values, name: value}.items()))
-                trial = _fitted(tried, tried(changed), seconds, most)
+                trial = yield from _tried(trials, changed)
+                trial = yield from _fitted(trials, trial, seconds, most)
                 if trial.seconds <= seconds and trial.error < WINS * best.error:
                     best = trial
                     break

@@ -61,8 +61,12 @@ class _Kept:
 _kept: dict[int, _Kept] = {}  # by session_uid of the scene
 
 
-def render_steps(scene, depsgraph, size: tuple[int, int], settings: Settings) -> Iterator[tuple[float, str]]:
+def render_steps(
+    scene, depsgraph, size: tuple[int, int], settings: Settings, profile: bool = True
+) -> Iterator[tuple[float, str]]:
     """Render the scene with these settings; yields the share done and a sentence, returns `Rendered`.
+
+    With `profile` each technique's time is true, and the whole takes longer, for the GPU is waited for after each.
 
     Raises ValueError with a sentence when there is nothing to look through or the passes do not fit together, and
     RuntimeError when the GPU cannot.
@@ -75,7 +79,7 @@ def render_steps(scene, depsgraph, size: tuple[int, int], settings: Settings) ->
         raise ValueError(str(error)) from None
     yield 0.0, "compiling shaders"
     with turn:
-        frame = kept.renderer.begin(snapshot, replace(settings, profile=True))
+        frame = kept.renderer.begin(snapshot, replace(settings, profile=profile))
     yield from _samples(kept.renderer, frame)
     with turn:
         if "film.combined" in frame.images:
