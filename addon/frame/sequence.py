@@ -84,21 +84,41 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     return np.stack([x, y], axis=-1).astype(np.float64) / 4294967296.0
 
 
-@lru_cache(maxsize=4096)
+BLOCK = 64  # numbers that are made at once: an array of so many costs hardly more than one of a single number
+
+
+@lru_cache(maxsize=1024)
+def _block(number: int, use: str, seed: int) -> list[tuple[float, float]]:
+    return [(x, y) for x, y in points(number * BLOCK, BLOCK, use, seed).tolist()]
+
+
+@lru_cache(maxsize=1024)
+def _thirds(number: int, use: str, seed: int) -> list[float]:
+    salt = zlib.crc32(f"{use}/{seed}".encode())
+    scrambled = _owen(bits(_indices(number), 2), salt * 3266489917 + 3)
+    return (scrambled.astype(np.float64) / 4294967296.0).tolist()
+
+
+@lru_cache(maxsize=64)
+def _unscrambled(number: int) -> list[tuple[int, int, int, int]]:
+    found = [bits(_indices(number), dimension).astype(np.uint32).view(np.int32) for dimension in (0, 1, 5, 6)]
+    return list(zip(*(values.tolist() for values in found)))
+
+
+def _indices(block: int) -> np.ndarray:
+    return np.arange(block * BLOCK, (block + 1) * BLOCK, dtype=np.uint64)
+
+
 def point(index: int, use: str, seed: int = 0) -> tuple[float, float]:
     """One point of the sequence for `use`."""
-    x, y = points(index, 1, use, seed)[0]
-    return float(x), float(y)
+    return _block(index // BLOCK, use, seed)[index % BLOCK]
 
 
-@lru_cache(maxsize=4096)
 def third(index: int, use: str, seed: int = 0) -> float:
     """A third number that goes with `point`, for uses that fill a volume."""
-    salt = zlib.crc32(f"{use}/{seed}".encode())
-    return float(_owen(bits(np.array([index]), 2), salt * 3266489917 + 3)[0]) / 4294967296.0
+    return _thirds(index // BLOCK, use, seed)[index % BLOCK]
 
 
 def pixel_bits(index: int) -> tuple[int, int, int, int]:
     """Dimensions 1, 2, 6, 7 of point `index` as signed 32-bit integers, for shaders to scramble per pixel."""
-    values = [int(bits(np.uint64(index), dimension)) for dimension in (0, 1, 5, 6)]
-    return tuple(value - 2**32 if value >= 2**31 else value for value in values)
+    return _unscrambled(index // BLOCK)[index % BLOCK]

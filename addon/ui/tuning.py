@@ -94,7 +94,7 @@ class CandelaTuning(bpy.types.PropertyGroup):
         subtype="PERCENTAGE",
     )  # fmt: skip
     budget: bpy.props.IntProperty(
-        name="Search", description="Seconds to measure in, after Cycles has rendered the reference", default=60, min=1,
+        name="Search", description="Seconds to measure in, after Cycles has rendered the reference", default=120, min=1,
         soft_max=600,
     )  # fmt: skip
     reference_samples: bpy.props.IntProperty(
