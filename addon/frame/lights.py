@@ -5,7 +5,7 @@ Radiance follows Cycles' conventions for every kind. All points inside a light c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,20 @@ class Emitter:
             return self.centre + (2 * x - 1) * self.u[:3] + (2 * y - 1) * self.v[:3]
         radius, turn = np.sqrt(x), 2 * np.pi * y
         return self.centre + radius * (np.cos(turn) * self.u[:3] + np.sin(turn) * self.v[:3])
+
+    def part(self, x: float, y: float, count: int) -> Emitter | None:
+        """The one of `count` alike parts, as square as can be, that holds the point (x, y) of the unit square.
+
+        None where the light cannot be cut so: only rectangles, in two again and again.
+        """
+        if self.kind != RECTANGLE or count < 1 or count & (count - 1):
+            return None
+        u, v, sides = self.u, self.v, [1, 1]
+        while sides[0] * sides[1] < count:
+            sides[int(np.linalg.norm(u) / sides[0] < np.linalg.norm(v) / sides[1])] *= 2
+        place = [2 * (np.floor(value * side) + 0.5) / side - 1 for value, side in zip((x, y), sides)]
+        centre = self.centre + place[0] * u + place[1] * v
+        return replace(self, centre=centre, u=u / sides[0], v=v / sides[1], area=self.area / count)
 
     def middle(self) -> np.ndarray:
         """The sample that stands for the whole light."""

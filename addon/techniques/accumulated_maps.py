@@ -198,6 +198,10 @@ class AccumulatedMaps(Technique):
         alone; 1: the whole light, from its middle."""
         return 0.0
 
+    def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
+        """The part of the light that point `number` of `points` stands for as a whole; None where it is a point."""
+        return None
+
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""
         receivers = self._reached.get(emitter.light.key)

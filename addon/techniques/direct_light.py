@@ -143,13 +143,15 @@ class DirectLight(Technique):
             rate = rate_of(frame, emitter.light.key)
             for number in rate.points(frame.sample):
                 points = rate.per_sample * frame.settings.samples / weight
-                cell = shadow.cell(frame, number, points) if shadow else 0.0
+                part = shadow.part(frame, emitter, number, points) if shadow else None
+                shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
+                cell = 1.0 if part else (shadow.cell(frame, number, points) if shadow else 0.0)
                 whole = cell >= 1.0 and emitter.extended
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
-                sample = emitter.middle() if whole else emitter.sample(*frame.random_volume_at(number, "light"))
+                sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
                 by_rays = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
-                views = shadow.views(frame, emitter, sample, number, cell) if shadow and not by_rays else []
-                row = emitter.row(sample, 0, len(views) or by_rays, weight, rate.per_sample, points)
+                views = shadow.views(frame, shown, sample, number, cell) if shadow and not by_rays else []
+                row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
                 (near if by_rays else items).append((row, views))

@@ -54,6 +54,12 @@ class SoftMaps(AccumulatedMaps):
         # What is shown while it grows has `number` + 1 points up to here.
         return float((points if frame.settings.whole else number + 1) ** -0.5)
 
+    def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
+        """Where the number of points is known and even, parts that tile the light: 2^k points lie in one each."""
+        if not (frame.settings.get(self, "refine") and frame.settings.whole and points == round(points)):
+            return None
+        return emitter.part(*frame.random_at(number, "light"), round(points))
+
     def resolution(self, frame: Frame) -> int:
         """A power of two, so that no entry of the pyramid lies in two views."""
         return 1 << round(np.log2(map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))))
@@ -64,6 +70,8 @@ class SoftMaps(AccumulatedMaps):
         shift_x, shift_y, turn, other = super().jitter(frame, emitter, number)
         if emitter.has_span:
             turn = depth_maps.turn_along(-emitter.axis, emitter.u[:3])  # boxes of texels are the light's shape
+            # Points that share their place along an axis of the light, now the map's too, shift it differently there.
+            shift_x, shift_y = shift_y, shift_x
         return shift_x, shift_y, turn, other
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:

@@ -1,5 +1,6 @@
 // Visibility of a light with extent, or of the part of it that a map stands for, in two steps: the mean height of the
-// blockers in the largest kernel that matters, then the share of blockers in the kernel of that height.
+// blockers in the largest kernel that matters, then the share of blockers in the kernel of that height. The same is asked
+// of ever smaller windows, and the darkest answer counts: each is what the blockers of some height hide at least.
 //
 // The technique that includes this file last brings `kernel_cells`, which adds what it finds in a box. A texel at the
 // offset d in the kernel of height h stands for one point of the light (lib/soft_kernel.glsl). It counts by the cosine
@@ -76,6 +77,71 @@ vec3 kernel_towards(Light light, vec3 position)
   return light.point + (offset ? light.centre : vec3(0.0)) - position;
 }
 
+// A blocker much lower than the mean is a small part of the window, and hides all of the light where its own kernel is
+// full: a wire that touches another. Such blockers are looked for, texel by texel, in windows that shrink by NEAR_RATIO.
+#define NEAR_WINDOWS 3
+#define NEAR_RATIO 0.25
+#define NEAR_TEXELS 6  // along each side of a window, at most
+
+// Blockers in the box r.texel -+ half_size. One that stands higher than `most_height` hides, with a texel of this box, a
+// smaller part of the light.
+Blockers kernel_near(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, float most_height, vec2 horizon)
+{
+  Blockers found = Blockers(0.0, 0.0, 0.0, vec2(0.0), horizon);
+  ivec2 first;
+  ivec2 last;
+  kernel_texels(light, r, half_size, first, last);
+  vec2 low = max(r.texel - half_size, vec2(first));
+  vec2 high = min(r.texel + half_size, vec2(last + 1));
+  ivec2 count = min(last - first + 1, ivec2(NEAR_TEXELS));
+  vec2 step_size = (high - low) / vec2(count);
+  for (int y = 0; y < count.y; y++) {
+    for (int x = 0; x < count.x; x++) {
+      vec2 offset = low + (vec2(x, y) + 0.5) * step_size - r.texel;
+      ivec2 texel = ivec2(clamp(floor(r.texel + offset), vec2(first), vec2(last)));
+      float weight = kernel_weight(light, offset / half_size, 2.0 / float(NEAR_TEXELS));
+      weight *= kernel_cosine(found, offset, 0.5 * step_size);
+      found.whole += weight;
+      if (shadow_blocked(r, vec2(texel), normal)) {
+        float height = max(kernel_entry(ivec2(r.rectangle.xy) + texel, 0).y - r.q, r.slack);
+        float part = min(most_height / height, 1.0);
+        kernel_add(found, offset, vec2(0.0), height, weight * part * part);
+      }
+    }
+  }
+  return found;
+}
+
+float kernel_lit(Blockers kernel)
+{
+  return (kernel.whole > 0.0) ? clamp(1.0 - kernel.blocked / kernel.whole, 0.0, 1.0) : 1.0;
+}
+
+// Visibility past blockers that stand lower than `height`.
+float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, float most, float height)
+{
+  float visibility = 1.0;
+  for (int k = 0; k < NEAR_WINDOWS; k++) {
+    height *= NEAR_RATIO;
+    vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
+    ivec2 first;
+    ivec2 last;
+    kernel_texels(light, r, window, first, last);
+    float deepest;
+    if (kernel_bounds(r, first, last, deepest).y <= deepest) {
+      break;  // nothing stands above the receiver here, nor in what is left of the window
+    }
+    Blockers search = kernel_near(light, r, normal, window, height, vec2(0.0));
+    if (search.blocked > 0.0) {
+      float blocker = min(search.height / search.blocked, height);
+      vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
+      // Heights scatter around their mean, hence twice: else a slanted blocker would count in part.
+      visibility = min(visibility, kernel_lit(kernel_near(light, r, normal, size, 2.0 * blocker, r.gradient / blocker)));
+    }
+  }
+  return visibility;
+}
+
 float light_visibility(Light light, vec3 position, vec3 normal)
 {
   ShadowReceiver r;
@@ -108,7 +174,7 @@ float light_visibility(Light light, vec3 position, vec3 normal)
     search = kernel_box(light, r, normal, window, within, vec2(0.0));
   }
   if (search.blocked <= 0.0) {
-    return 1.0;
+    return back ? 1.0 : near_visibility(light, r, normal, extent, most, height);
   }
   float blocker = min(search.height / search.blocked, height);
   vec2 horizon = r.gradient / blocker;
@@ -120,5 +186,5 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   else {
     kernel = kernel_box(light, r, normal, size, vec2(0.0), horizon);
   }
-  return (kernel.whole > 0.0) ? clamp(1.0 - kernel.blocked / kernel.whole, 0.0, 1.0) : 1.0;
+  return back ? kernel_lit(kernel) : min(kernel_lit(kernel), near_visibility(light, r, normal, extent, most, blocker));
 }

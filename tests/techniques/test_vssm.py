@@ -77,6 +77,31 @@ def test_points_that_stand_for_parts_of_the_light_leave_less_error_than_points(f
     assert parts[1] < 0.5 * parts[0]
 
 
+@pytest.mark.parametrize("name", ["square", "rectangle"])
+def test_sixteen_parts_that_tile_a_light_show_its_penumbra_and_all_of_its_light(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    floor.blocker(*EDGE)
+    expected = expected_visibility(source, [EDGE])
+    found = visibility(floor, source, 16)
+    assert rms(found, expected) < 0.008
+    assert found[expected == 1] == pytest.approx(1.0, abs=2e-4)
+
+
+def test_a_low_bar_hides_the_light_whatever_else_stands_higher(floor):
+    """Its shadow is closed, though it is a small part of the window in which the plate's edge is looked for."""
+    kind, settings, source = LIGHTS["square"]
+    floor.scene.candela.vssm_texels_per_pixel = 8.0
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    blockers = [((-EVERYWHERE, -EVERYWHERE), (0.0, EVERYWHERE), 1.0), ((0.15, -EVERYWHERE), (0.35, EVERYWHERE), 0.05)]
+    for blocker in blockers:
+        floor.blocker(*blocker)
+    size = (128, 4)
+    under = expected_visibility(source, blockers[1:], size) == 0
+    assert under.sum() >= 16
+    assert visibility(floor, source, size=size)[under].max() < 0.02
+
+
 @pytest.mark.parametrize("name", ["square", "sphere", "sun"])
 def test_blockers_at_two_heights_that_close_the_light_together_leak_nothing(floor, name):
     kind, settings, source = LIGHTS[name]
