@@ -19,6 +19,7 @@ SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4",
 POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = range(7)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
+NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
 
 
@@ -160,7 +161,11 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
             return None
         cosine = np.cos(np.clip(light.spot_angle, 0.0, np.pi) / 2)
         soft = (1.0 - cosine) * light.spot_blend
-        rows = [np.append(inverse[0], cosine), np.append(inverse[1], 1.0 / soft if soft > 0 else 0.0), inverse[2]]
+        rows = [
+            np.append(inverse[0], cosine),
+            np.append(inverse[1], 1.0 / soft if soft > NO_BLEND else 0.0),
+            inverse[2],
+        ]
     return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
 
 

@@ -185,6 +185,7 @@ LIGHTS = {
     "narrow spot": lambda r: r.one_light("SPOT", spot_size=np.radians(1), spot_blend=0.0),
     "spot of half the world": lambda r: r.one_light("SPOT", spot_size=np.pi, spot_blend=1.0),
     "hard spot": lambda r: r.one_light("SPOT", spot_blend=0.0, shadow_soft_size=0.0),
+    "narrow spot of hardly any blend": lambda r: r.one_light("SPOT", spot_size=np.radians(1), spot_blend=1e-38),
     "sun of 0 degrees": lambda r: r.one_light("SUN", angle=0.0),
     "sun of 180 degrees": lambda r: r.one_light("SUN", angle=np.pi),
     "spread 0": lambda r: r.one_light("AREA", spread=0.0),
