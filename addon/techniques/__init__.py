@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
+from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
@@ -35,6 +36,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     TracedRefraction,
     InstantRadiosity,
     MultiresRadiosity,
+    ClusteredVisibility,
     ScreenSpaceBounce,
     Film,
 )

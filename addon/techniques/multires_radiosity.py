@@ -52,6 +52,7 @@ from .neighbours import smooth
 from .surfaces import SURFACES, surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLights, VirtualLightSet
 
+LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.1  # ranges within a region: share of its depth, and of each axis of unit normals
 BOUNDS_CONSTANTS = (
     ("IVEC2", "grid_offset"), ("FLOAT", "depth_scale"), ("FLOAT", "depth_step"), ("FLOAT", "normal_step"),
@@ -94,6 +95,7 @@ def regions(gather: Gather) -> Program:
         ),
         snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
         outputs=(("VEC4", "out_irradiance"),),
+        defines=gather.defines,
     )  # fmt: skip
 
 
@@ -122,7 +124,7 @@ class MultiresRadiosity(Technique):
             "rays", "Rays", 64, "How many of the virtual lights each region traces in a sample; 0: light passes walls",
             0, 1024, draft=8,
         ),
-        Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5),
+        LEVELS,
     )  # fmt: skip
     reads = SURFACES
     writes = INDIRECT_WRITES

@@ -68,6 +68,7 @@ WITHOUT = {
     "traced_refraction": no_glass,
     "instant_radiosity": no_bounces,
     "multires_radiosity": no_bounces,
+    "clustered_visibility": no_bounces,
     "ssdo": no_bounces,
 }
 

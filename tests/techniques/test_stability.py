@@ -296,6 +296,7 @@ CHOICES = {
     for slot, technique, groups in (
         ("indirect", "ssdo", ("geometry", "camera")),
         ("indirect", "multires_radiosity", ("camera",)),
+        ("indirect", "clustered_visibility", ("geometry",)),
         ("environment", "directional_occlusion", ("geometry", "camera", "world")),
     )
     for name in CORPUS
