@@ -181,9 +181,9 @@ def _stepped(param, value: float, factor: float) -> float | None:
     return None if new == value else new
 
 
-def _worth(trial: Trial, seconds: float) -> float:
-    """Larger is better: least error among those that fit, else least time."""
-    return -trial.error if trial.seconds <= seconds else -1e30 - trial.seconds
+def _worth(trial: Trial, seconds: float) -> tuple[float, ...]:
+    """Larger is better: least error among those that fit, and of the same error the fastest; else least time."""
+    return (1.0, -trial.error, -trial.seconds) if trial.seconds <= seconds else (0.0, -trial.seconds)
 
 
 def proposal(trials: list[Trial], seconds: float) -> Trial:

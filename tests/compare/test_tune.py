@@ -50,7 +50,14 @@ def test_a_parameter_that_only_costs_is_turned_down_and_its_time_goes_into_sampl
 def test_no_proposal_is_slower_than_asked_unless_nothing_is_as_fast():
     for seconds in (0.05, 0.3, 2.0):
         assert tune.proposal(search(seconds), seconds).seconds <= seconds * (1 + 1e-9)
-    assert tune.proposal(search(0.001), 0.001).seconds == 0.01
+    trials = search(0.001)
+    assert tune.proposal(trials, 0.001).seconds == min(trial.seconds for trial in trials)
+
+
+def test_of_two_settings_with_the_same_picture_the_faster_is_proposed_and_is_on_the_curve():
+    slow, fast = (Trial(Candidate(4, (("shadow", name),)), Picture(s, 0.1, ())) for name, s in (("a", 0.3), ("b", 0.2)))
+    assert tune.proposal([slow, fast], 1.0) is fast
+    assert tune.front([slow, fast]) == [fast]
 
 
 def test_a_choice_that_stays_behind_is_not_swept():
