@@ -9,6 +9,7 @@ import argparse
 import base64
 import html
 import json
+import statistics
 from pathlib import Path
 from string import Template
 
@@ -27,6 +28,17 @@ from bench.figures import (
 )
 from bench.run import OUT, RESULTS
 
+REMEDIES = {  # of the paths that figures.at_fault ranks
+    "diffuse_direct": "fewer visible steps between samples of the lights, by filtering the picture or by more of "
+    "each light's points per sample",
+    "glossy_direct": "lobes and lights sampled together for more of the roughness' range, or filtering the picture",
+    "diffuse_indirect": "virtual lights that are shared among more pixels, or filtering of indirect light apart from "
+    "the surfaces' colours",
+    "glossy_indirect": "rays by the surface's lobe that reuse those of neighbours, where virtual lights are too few",
+    "transmission_indirect": "more than one path through glass a sample",
+}
+WORDS = 28  # letters from which on a cell of a table is text that may be broken
+BUSY = 2.0  # processes that want each thread, from which on times say little; the benchmark itself wants about one
 PEERS = ("EEVEE", "EEVEE, ray traced", "Cycles", "Cycles, denoised")
 README, PERFORMANCE = ROOT / "README.md", ROOT / "docs" / "performance.md"
 PICTURE = ROOT / "docs" / "images" / "bench.png"
@@ -41,15 +53,16 @@ main { max-width: 1240px; margin: 0 auto; padding: 28px 20px 60px; }
 h1 { font-size: 26px; margin: 0; } h2 { font-size: 19px; margin: 40px 0 8px; }
 p { max-width: 86ch; margin: 6px 0; } .dim { color: #6b675f; }
 img { max-width: 100%; background: #fff; border: 1px solid #e3dfd7; border-radius: 8px; }
-table { border-collapse: collapse; background: #fff; font-size: 14px; margin: 8px 0; }
-th, td { padding: 5px 12px; border-bottom: 1px solid #e3dfd7; text-align: right; white-space: nowrap;
+.wide { overflow-x: auto; } table { border-collapse: collapse; background: #fff; font-size: 14px; margin: 8px 0; }
+th, td { padding: 5px 12px; border-bottom: 1px solid #e3dfd7; text-align: right; vertical-align: top;
   font-variant-numeric: tabular-nums; }
-th { color: #6b675f; font-weight: 550; } th:first-child, td:first-child { text-align: left; }
-td:last-child.words { text-align: left; white-space: normal; }
+td { white-space: nowrap; } td.words { text-align: left; white-space: normal; min-width: 26ch; }
+th { color: #6b675f; font-weight: 550; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; }
 .good { color: #2f7d4f; } .bad { color: #b3261e; } details { margin: 8px 0; } summary { cursor: pointer; }
 </style></head><body><main>
 <h1>Time against error</h1>
-<p class="dim">$facts</p>
+<p class="dim">$facts</p>$reserve
 <h2>All scenes</h2>
 <p>$reading</p>
 <img src="$overview" alt="Time against error of every scene">
@@ -124,13 +137,28 @@ def claims(results: Results) -> list[str]:
         if found.gain is not None:
             gains.append((scene, found.gain))
     if gains:
-        won = [scene for scene, gain in gains if gain > 1]
+        lost = [(scene, gain) for scene, gain in gains if gain <= 1]
         sentences.append(
             f"At the time of Candela's {MIDDLE} samples it has less error than Cycles with its denoiser on "
-            f"{len(won)} of {len(gains)} scenes" + listed("; not on", [f"{s} ({times(g)})" for s, g in gains if g <= 1])
+            f"{len(gains) - len(lost)} of {len(gains)} scenes"
+            + listed("; not on", [f"{scene} ({times(gain)})" for scene, gain in lost])
             + "."
-        )  # fmt: skip
+        )
+        sentences += remedies(results, [scene for scene, _ in lost])
     return sentences
+
+
+def remedies(results: Results, scenes: list[str]) -> list[str]:
+    """For scenes by the light path that is most at fault in them: what would mend it."""
+    by_path: dict[str, list[str]] = {}
+    for scene in scenes:
+        paths = at_fault(results, scene)
+        if paths:
+            by_path.setdefault(paths[0][0], []).append(scene)
+    return [
+        f"On {', '.join(some).replace('_', ' ')} most of the error is {path.replace('_', ' ')} light: {REMEDIES[path]}."
+        for path, some in by_path.items()
+    ]
 
 
 def listed(before: str, names: list[str]) -> str:
@@ -197,12 +225,12 @@ def as_html(table: Table) -> str:
     head, *rows = table
     lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
     lines += ["<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows]
-    return "<table>" + "".join(lines) + "</table>"
+    return f'<div class="wide"><table>{"".join(lines)}</table></div>'
 
 
 def _cell(text: str) -> str:
     number = text.removesuffix(" ×")
-    kind = ""
+    kind = ' class="words"' if len(text) > WORDS else ""
     if text.endswith("×"):
         kind = ' class="good"' if float(number) > 1 else ' class="bad"'
     return f"<td{kind}>{html.escape(text)}</td>"
@@ -211,12 +239,34 @@ def _cell(text: str) -> str:
 def facts(results: Results) -> str:
     about = results.about
     width, height = about["size"]
-    load = about.get("load")
-    busy = "" if load is None else f", load {load:.1f} at the end"
     return (
         f"{about['date']}, {width} × {height} pixels, Blender {about['blender']}, {about['device']}, "
-        f"{about['cpu']}{busy}. Reference: Cycles with all bounces, 2 × {about['reference_samples']} samples."
+        f"{about['cpu']}. Reference: Cycles with all bounces, 2 × {about['reference_samples']} samples."
     )
+
+
+def reserve(results: Results) -> list[str]:
+    """What a reader must know before believing the figures: what is missing, and whether the machine had rest."""
+    said = []
+    measured, asked = len(results.cells), len(results.cells) + len(results.left_out)
+    if results.left_out:
+        absent = sorted({name.partition(",")[0] for name in results.left_out} - set(results.scenes))
+        said.append(
+            f"{measured} of {asked} points were measured within the time that was given"
+            + listed("; nothing of", absent) + ". Another run of the command goes on with the rest."
+        )  # fmt: skip
+    loads = [cell["load"] for cell in results.cells if cell.get("load") is not None]
+    threads = results.about.get("threads")
+    if loads and threads and statistics.median(loads) > BUSY * threads:
+        said.append(
+            f"The machine was busy with other things (a load of {statistics.median(loads):.0f} on {threads} threads): "
+            "times are too long, of all engines alike."
+        )
+    return said
+
+
+def paragraphs(sentences: list[str]) -> str:
+    return "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
 
 
 def image(path: Path) -> str:
@@ -250,7 +300,7 @@ def make_page(results: Results, grown: list[dict], profiled: list[dict], folder:
         rows = "".join(f"<li>{html.escape(name)}</li>" for name in results.left_out)
         count = f"{len(results.left_out)} of the cells that were asked for"
         left_out = f"<h2>Not measured</h2><details><summary>{count}</summary><ul>{rows}</ul></details>"
-    said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in claims(results))
+    said = paragraphs(claims(results))
     tables = (
         f"<h2>Candela against the others</h2><p>Speed-up: at equal error, the least that both reach. Error ratio: the "
         f"other's error over Candela's at equal time. More than 1 is in favour of Candela.</p>{said}"
@@ -259,7 +309,8 @@ def make_page(results: Results, grown: list[dict], profiled: list[dict], folder:
     page = folder / "index.html"
     page.write_text(
         PAGE.substitute(
-            facts=html.escape(facts(results)), reading=html.escape(READING), overview=image(folder / "overview.png"),
+            facts=html.escape(facts(results)), reserve=paragraphs(reserve(results)), reading=html.escape(READING),
+            overview=image(folder / "overview.png"),
             tables=tables, scenes="".join(scenes), growth=growth, left_out=left_out,
         ),
         encoding="utf-8",
@@ -278,7 +329,16 @@ def generated_part(results: Results, grown: list[dict], profiled: list[dict]) ->
         "adds most to it."
     )
     picture = "![Time against error of every scene](images/bench.png)"
-    parts = [facts(results), picture, READING, *claims(results), ratios, markdown(summary(results)), rest]
+    parts = [
+        facts(results),
+        *reserve(results),
+        picture,
+        READING,
+        *claims(results),
+        ratios,
+        markdown(summary(results)),
+        rest,
+    ]
     parts.append(markdown(faults(results)))
     if profiled:
         parts += ["### Where a render's time goes", PROFILE, markdown(profile.table(profiled))]
@@ -295,7 +355,7 @@ def readme_part(results: Results) -> str:
         rows.append((f"{peer}, over Candela", means[1 + 2 * number], means[2 + 2 * number]))
     picture = "![Time against error of every sample scene](docs/images/bench.png)"
     more = "More than 1 is in favour of Candela; [docs/performance.md](docs/performance.md) has every scene."
-    return "\n\n".join([facts(results), picture, markdown(rows), more])
+    return "\n\n".join([facts(results), *reserve(results), picture, markdown(rows), more])
 
 
 def put_between(path: Path, part: str) -> None:

@@ -3,10 +3,10 @@
 Every cell (bench/cells.py) is measured by a worker, a fresh process per scene, and kept at once in out/bench: a run
 that is interrupted goes on where it was. What was measured becomes one file, bench/results/bench.json.
 
-`--budget` gives the minutes that the whole may take. How long each cell will take is predicted from what has been
-measured; what a page needs (bench/cells.py: NEEDED) is set aside for every scene, the rest of the time is shared out
-among the scenes, and of what does not fit the dearest cells of the lowest rank are left out. References, which no
-figure's time depends on, may be rendered before with `--references`, on a busy machine too.
+`--budget` gives the minutes that the whole may take. What a page needs (bench/cells.py: NEEDED) is measured of all
+scenes before anything else. How long each cell will take is predicted from what has been measured, and of what does not
+fit the dearest cells of the lowest rank are left out. References, which no figure's time depends on, may be rendered
+before with `--references`, on a busy machine too.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from bench.cells import MAIN, NEEDED, NEEDED_SAMPLES, OWN, PEERS, ROOT, Cell, Scene, Series, Store, in_turns
+from bench.cells import EXTRA, MAIN, NEEDED, NEEDED_SAMPLES, OWN, PEERS, ROOT, Cell, Scene, Series, Store, in_turns
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
-GUESS = {"CANDELA": (0.5, 0.2), "BLENDER_EEVEE": (8.0, 0.1), "CYCLES": (2.0, 0.06)}  # seconds: fixed, per sample
+GUESS = {"CANDELA": (0.5, 0.3), "BLENDER_EEVEE": (8.0, 0.1), "CYCLES": (2.0, 0.06)}  # seconds: fixed, per sample
 GUESSED_SIZE = 128 * 96  # pixels at which these hold; what is paid per sample grows with the pixels
 OPENING = 4.0  # seconds to start a worker and open a scene
 REFERENCE = 0.015  # seconds of a sample of the reference at that size
@@ -156,13 +156,18 @@ class Run:
                 self.known.add(cell, row["wall"])
 
     def measure(self) -> None:
-        """Measure what the store lacks; whatever the scenes did not need of their shares goes into further rounds."""
-        progress = True
-        while self.left and progress:
-            progress = False
-            scenes = list(dict.fromkeys(cell.scene for cell in self.left))
-            for number, scene in enumerate(scenes):
-                progress |= self._measure_scene(scene, scenes[number + 1 :])
+        """Measure what the store lacks: first what a page needs, of all scenes, and then the rest.
+
+        Each scene gets an equal share of the time that is left, and what the others did not need of theirs goes into
+        further rounds.
+        """
+        for last in (NEEDED, EXTRA):
+            progress = True
+            while progress:
+                progress = False
+                scenes = list(dict.fromkeys(cell.scene for cell in self.left if cell.rank <= last))
+                for number, scene in enumerate(scenes):
+                    progress |= self._measure_scene(scene, last, self._time_left() / (len(scenes) - number))
 
     @property
     def missing(self) -> list[Cell]:
@@ -171,35 +176,23 @@ class Run:
     def _time_left(self) -> float:
         return float("inf") if self.budget is None else self.started + self.budget - time.monotonic()
 
-    def _needed(self, scenes: Iterable[Scene]) -> float:
-        """Predicted seconds of what a page needs of these scenes."""
-        scenes = set(scenes)
-        unopened = {cell.scene: cell for cell in self.left if cell.scene in scenes}
-        seconds = sum(self.known.predicted(cell) for cell in self.left if cell.scene in scenes and cell.rank == NEEDED)
-        return seconds + sum(self._opening(cell) for cell in unopened.values())
-
     def _opening(self, cell: Cell) -> float:
-        """Seconds to open a cell's scene, with a reference that may have to be rendered."""
-        if cell.scene.name in self.references:
-            return 0.0
-        if self.references and all(one.get("cached") for one in self.references.values()):
+        """Predicted seconds to open a cell's scene, with a reference that may have to be rendered."""
+        if cell.scene.name in self.references or (
+            self.references and all(one.get("cached") for one in self.references.values())
+        ):
             return OPENING
         return OPENING + 2 * cell.reference_samples * REFERENCE * cell.size[0] * cell.size[1] / GUESSED_SIZE
 
-    def _measure_scene(self, scene: Scene, later: list[Scene]) -> bool:
-        """Measure of a scene what it needs, and what fits into an equal part of the time that none of the scenes from
-        here on needs; where even that time is short, all are short of an equal part. Whether anything was measured.
-        """
-        worker, any_measured, extra = None, False, 0.0
-        part = self._spare(scene, later) / (len(later) + 1)
+    def _measure_scene(self, scene: Scene, last: int, share: float) -> bool:
+        """Measure the cells of a scene, up to the rank `last`, that fit into `share` seconds; whether there was any."""
+        end = time.monotonic() + share
+        worker, any_measured = None, False
         try:
             while True:
-                mine = [cell for cell in self.left if cell.scene == scene]
-                spare = self._spare(scene, later)
-                more = min(part - extra, spare) if spare > 0 else spare / (len(later) + 1)
-                share = min(self._needed([scene]) + more, self._time_left())
-                opening = 0.0 if worker or not mine else max(self._opening(mine[0]), OPENING)
-                kept = that_fit(mine, self.known.predicted, share - opening)
+                mine = [cell for cell in self.left if cell.scene == scene and cell.rank <= last]
+                opening = 0.0 if worker or not mine else self._opening(mine[0])
+                kept = that_fit(mine, self.known.predicted, end - time.monotonic() - opening)
                 if not kept:
                     return any_measured
                 self._tell(kept[0])
@@ -207,18 +200,11 @@ class Run:
                 if worker is None:
                     return any_measured
                 any_measured = True
-                begun = time.monotonic()
                 if not self._measure_cell(worker, kept[0]):
                     worker = None
-                if kept[0].rank != NEEDED:
-                    extra += time.monotonic() - begun
         finally:
             if worker:
                 worker.end()
-
-    def _spare(self, scene: Scene, later: list[Scene]) -> float:
-        """Seconds of the budget beyond what this scene and the later ones need; negative where it is short."""
-        return self._time_left() - self._needed([scene, *later])
 
     def _open(self, cell: Cell) -> Worker | None:
         """A worker with the cell's scene open; None where that failed."""

@@ -8,8 +8,8 @@ A time is that of a whole render with Combined alone, from Blender's call to the
 another render with the same seed, which is not timed (Candela hands out the passes of the frame that it has). Errors
 are against one reference with all bounces, so that what an engine leaves out shows as bias.
 
-Candela's programs compile in a render that is reported apart. EEVEE's first render counts: on a software GPU its later
-ones of a scene take longer than the first (see bench/quick.py). Cycles compiles nothing here.
+Candela's programs compile in a render of one sample that is reported apart. EEVEE's first render counts: on a software
+GPU its later ones of a scene take longer than the first (see bench/quick.py). Cycles compiles nothing here.
 """
 
 from __future__ import annotations
@@ -95,6 +95,7 @@ def about() -> dict:
         "numpy": np.__version__,
         "device": context.describe(),
         "cpu": f"{cpu_name()}, {os.cpu_count()} threads",
+        "threads": os.cpu_count(),
         "system": platform.platform(),
     }
 
@@ -193,7 +194,7 @@ def measure(opened: Open, series: Series, samples: int, size: tuple[int, int]) -
     figures: dict = {"cold": None}
     kind = replace(series, label="", samples=(), main=False)
     if series.own and kind not in opened.warm:
-        figures["cold"] = render(opened, series, samples, 1000, size)["seconds"]
+        figures["cold"] = render(opened, series, 1, 1000, size)["seconds"]
     opened.warm.add(kind)
     times, cpu, combined = [], [], []
     for run in range(RUNS):
