@@ -143,8 +143,9 @@ vec2 kernel_box(ClusterReceiver r, vec2 half_size, bool search)
 #endif
 }
 
-// Share of a cluster that a point of a surface sees. `normal`: of the triangle.
-float cluster_visibility(Cluster c, vec3 position, vec3 normal)
+// Share of a cluster that a point of a surface sees. `normal`: of the triangle. `doubt`: how far single members may differ
+// from it, as the standard deviation of what they see.
+float cluster_visibility(Cluster c, vec3 position, vec3 normal, out float doubt)
 {
   vec3 path = position - ray_origin(c.middle, c.surface_normal);
   ClusterReceiver r;
@@ -155,8 +156,10 @@ float cluster_visibility(Cluster c, vec3 position, vec3 normal)
   r.height = -dot(normal, path);
   r.towards = cluster_local(c, path) / max(r.reach, 1e-30);
   vec2 place = map_place(r.towards);
-  // Behind the map the middle has no information, though some members may shine there.
-  if (any(lessThanEqual(place, vec2(0.0))) || any(greaterThanEqual(place, vec2(1.0)))) {
+  bool outside = any(lessThanEqual(place, vec2(0.0))) || any(greaterThanEqual(place, vec2(1.0)));
+  // Behind its own surface or below the receiver's plane the middle knows little of the members that are not.
+  doubt = (outside || r.height <= 0.0 || dot(path, c.surface_normal) <= 0.0) ? 0.5 : 0.0;
+  if (outside) {
     return 1.0;
   }
   r.texel = place * r.rectangle.z;
@@ -166,5 +169,7 @@ float cluster_visibility(Cluster c, vec3 position, vec3 normal)
     return 1.0;
   }
   float away = max(1.0 / max(found.y, 1e-3 * r.reach) - 1.0 / r.reach, 0.0);
-  return clamp(1.0 - kernel_box(r, extent * away, false).x, 0.0, 1.0);
+  float visible = clamp(1.0 - kernel_box(r, extent * away, false).x, 0.0, 1.0);
+  doubt = max(doubt, sqrt(visible * (1.0 - visible)));
+  return visible;
 }
