@@ -10,7 +10,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-quick bench-viewport clean
+.PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
@@ -61,6 +61,9 @@ nodes: environment ## every shader node beside Cycles: docs/nodes.md
 
 bench: environment ## run time against error of every technique, EEVEE and Cycles (BUDGET=minutes): docs/performance.md
 	$(PYTHON) -m bench all $(if $(BUDGET),--budget $(BUDGET))
+
+bench-references: environment ## what the benchmark compares with, rendered ahead; may run on a busy machine
+	$(PYTHON) -m bench run --references --size $(or $(SIZE),256x192)
 
 bench-quick: environment ## time against error, beside EEVEE and Cycles
 	$(PYTHON) -m bench.quick

@@ -126,6 +126,7 @@ def build(stage, scene: Scene) -> None:
         stage.scene.world = None
     _camera(stage, scene.viewer, unit)
     stage.scene.render.film_transparent = scene.transparent
+    stage.scene.candela.bounces = scene.bounces
     for slot, technique in scene.slots:
         setattr(stage.scene.candela, f"slot_{slot}", technique)
 
