@@ -1,9 +1,10 @@
 """From measured cells to figures: curves of time against error, their staircases, speed-ups, and bias floors.
 
 Two curves are compared where both have something to say. At equal error: the least error that both reach; how many
-times longer the peer takes for it. At equal time: the time of Candela's 16 samples, or of the peer's fastest picture if
-that is longer; how many times larger the peer's error is. Between measured points both are interpolated on logarithmic
-axes, along the staircase of points that no other point beats in time and error at once.
+times longer the peer takes for it (a bound, where even the fastest point of one has less error than that). At equal
+time: the time of Candela's 16 samples, or of the peer's fastest picture if that is longer; how many times larger the
+peer's error is. Between measured points both are interpolated on logarithmic axes, along the staircase of points that
+no other point beats in time and error at once.
 
 An error below the reference's noise is quoted as that noise.
 """
@@ -124,7 +125,8 @@ class Against:
 
     peer: str
     speed_up: float | None  # at equal error
-    error: float | None  # that error
+    error: float | None  # that error, the least that both reach
+    bound: str  # of the speed-up: ">" where Candela's worst point has less error already, "<" where the peer's has
     gain: float | None  # the peer's error over Candela's at equal time
     seconds: float | None  # that time
 
@@ -132,12 +134,13 @@ class Against:
 def against(own: list[Point], peer: list[Point], name: str) -> Against:
     """Both figures, or None where a curve has no point."""
     if not own or not peer:
-        return Against(name, None, None, None, None)
+        return Against(name, None, None, "", None, None)
     error = max(min(point.error for point in own), min(point.error for point in peer))
     speed_up = seconds_for(peer, error) / seconds_for(own, error)
+    bound = ">" if staircase(own)[0].error < error else "<" if staircase(peer)[0].error < error else ""
     middle = next((point.seconds for point in own if point.samples == MIDDLE), own[-1].seconds)
     seconds = max(middle, *(min(point.seconds for point in curve) for curve in (own, peer)))
-    return Against(name, speed_up, error, error_after(peer, seconds) / error_after(own, seconds), seconds)
+    return Against(name, speed_up, error, bound, error_after(peer, seconds) / error_after(own, seconds), seconds)
 
 
 def geometric_mean(values: list[float]) -> float | None:

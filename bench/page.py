@@ -29,8 +29,7 @@ from bench.figures import (
 from bench.run import OUT, RESULTS
 
 REMEDIES = {  # of the paths that figures.at_fault ranks
-    "diffuse_direct": "fewer visible steps between samples of the lights, by filtering the picture or by more of "
-    "each light's points per sample",
+    "diffuse_direct": "more points of each light a sample, or filtering of the picture",
     "glossy_direct": "lobes and lights sampled together for more of the roughness' range, or filtering the picture",
     "diffuse_indirect": "virtual lights that are shared among more pixels, or filtering of indirect light apart from "
     "the surfaces' colours",
@@ -94,7 +93,10 @@ Table = list[tuple[str, ...]]  # the first row is the head
 
 
 def summary(results: Results) -> Table:
-    """Per scene and peer: speed-up at equal error and error ratio at equal time; the last row is the mean."""
+    """Per scene and peer: speed-up at equal error and error ratio at equal time; the last row is the mean.
+
+    Bounds that say nothing (faster than something below 1, slower than something above) are not part of the mean.
+    """
     head = ("scene", *(f"{peer}: {what}" for peer in PEERS for what in ("speed-up", "error ratio")))
     rows: Table = [head]
     columns: list[list[float]] = [[] for _ in range(2 * len(PEERS))]
@@ -103,13 +105,18 @@ def summary(results: Results) -> Table:
         own = results.curve(scene, OWN)
         for number, peer in enumerate(PEERS):
             found = against(own, results.curve(scene, peer), peer)
-            for place, value in ((2 * number, found.speed_up), (2 * number + 1, found.gain)):
-                cells.append(times(value))
-                if value is not None:
+            for place, value, bound in ((2 * number, found.speed_up, found.bound), (2 * number + 1, found.gain, "")):
+                cells.append(f"{bound} {times(value)}".strip())
+                if value is not None and not vague(value, bound):
                     columns[place].append(value)
         rows.append(tuple(cells))
     rows.append(("geometric mean", *(times(geometric_mean(column)) for column in columns)))
     return rows
+
+
+def vague(value: float, bound: str) -> bool:
+    """Whether a bound leaves open which of the two is better."""
+    return (bound == ">" and value < 1) or (bound == "<" and value > 1)
 
 
 def claims(results: Results) -> list[str]:
@@ -229,10 +236,11 @@ def as_html(table: Table) -> str:
 
 
 def _cell(text: str) -> str:
-    number = text.removesuffix(" ×")
     kind = ' class="words"' if len(text) > WORDS else ""
     if text.endswith("×"):
-        kind = ' class="good"' if float(number) > 1 else ' class="bad"'
+        bound, _, number = text.removesuffix(" ×").rpartition(" ")
+        value = float(number)
+        kind = "" if vague(value, bound) else ' class="good"' if value > 1 else ' class="bad"'
     return f"<td{kind}>{html.escape(text)}</td>"
 
 
@@ -303,7 +311,8 @@ def make_page(results: Results, grown: list[dict], profiled: list[dict], folder:
     said = paragraphs(claims(results))
     tables = (
         f"<h2>Candela against the others</h2><p>Speed-up: at equal error, the least that both reach. Error ratio: the "
-        f"other's error over Candela's at equal time. More than 1 is in favour of Candela.</p>{said}"
+        f"other's error over Candela's at equal time. More than 1 is in favour of Candela. With > or <, the fastest "
+        f"picture of one has less error than the best of the other.</p>{said}"
         f"{as_html(summary(results))}<h2>What is left, and where</h2>{as_html(faults(results))}"
     )
     page = folder / "index.html"
@@ -322,7 +331,8 @@ def generated_part(results: Results, grown: list[dict], profiled: list[dict]) ->
     """The part of docs/performance.md that this command writes."""
     ratios = (
         "Speed-up: at equal error, the least that both reach, the other's time over Candela's. Error ratio: at equal "
-        "time, the other's error over Candela's. More than 1 is in favour of Candela."
+        "time, the other's error over Candela's. More than 1 is in favour of Candela. With > or <, the fastest picture "
+        "of one has less error than the best of the other."
     )
     rest = (
         f"Candela's own error against the reference: at {MIDDLE} samples, at the most samples, and the light path that "
@@ -352,7 +362,8 @@ def readme_part(results: Results) -> str:
     means = summary(results)[-1]
     rows = [("geometric mean over the scenes", "time for equal error", "error in equal time")]
     for number, peer in enumerate(PEERS):
-        rows.append((f"{peer}, over Candela", means[1 + 2 * number], means[2 + 2 * number]))
+        if any(results.curve(scene, peer) for scene in results.scenes):
+            rows.append((f"{peer}, over Candela", means[1 + 2 * number], means[2 + 2 * number]))
     picture = "![Time against error of every sample scene](docs/images/bench.png)"
     more = "More than 1 is in favour of Candela; [docs/performance.md](docs/performance.md) has every scene."
     return "\n\n".join([facts(results), *reserve(results), picture, markdown(rows), more])
