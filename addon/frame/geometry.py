@@ -122,6 +122,10 @@ class SceneGeometry:
             self._clusters = (key, casters.clusters(*self._placed, self.origin))
         return self._clusters[1]
 
+    def is_closed(self, mesh: Mesh) -> bool:
+        """Whether a mesh that is shown bounds a volume and faces outwards."""
+        return self._closed[mesh.key, mesh.version]
+
     def _ordered(self, instances: list[Instance]) -> list[Instance]:
         """Equal ones together, neighbours beside each other; as before while only a few have moved."""
         kinds = tuple((i.mesh, i.materials) for i in instances)

@@ -39,3 +39,8 @@ def triangle_batch(vertices: gpu.types.GPUVertBuf, indices: np.ndarray) -> Batch
     flat = np.ascontiguousarray(indices, np.int32).reshape(-1, 3)
     elements = gpu.types.GPUIndexBuf(type="TRIS", seq=flat)
     return Batch(gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=elements), len(flat))
+
+
+def numbered_points(count: int) -> gpu.types.GPUBatch:
+    """Points with nothing but an int attribute `number`, 0 to count - 1."""
+    return gpu.types.GPUBatch(type="POINTS", buf=vertex_buffer(number=np.arange(count, dtype=np.int32)))

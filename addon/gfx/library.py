@@ -57,6 +57,7 @@ class Program:
     defines: tuple[tuple[str, str], ...] = ()
     snippets: tuple[tuple[str, str], ...] = ()
     group: tuple[int, int, int] = (8, 8, 1)
+    writes_depth: bool = False  # the fragment shader sets gl_FragDepth
 
     def __post_init__(self):
         for kind, name in self.textures:
@@ -211,6 +212,8 @@ def _compile(program: Program):
             for mode, kind, name in program.varyings:
                 getattr(interface, mode)(kind, name)
             info.vertex_out(interface)
+        if program.writes_depth:
+            info.depth_write("ANY")
         for slot, (kind, name) in enumerate(program.outputs):
             info.fragment_out(slot, kind, name)
         sources = [resolve(program.vertex, snippets), resolve(program.fragment, snippets)]

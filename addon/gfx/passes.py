@@ -57,6 +57,13 @@ def draw_range(shader: Shader, batch: Batch, first: int, count: int) -> None:
     batch.handle.draw_range(shader.handle, elem_start=3 * first, elem_count=3 * count)
 
 
+def draw_points(shader: Shader, batch: gpu.types.GPUBatch, instances: int = 1) -> None:
+    """Draw points as squares of gl_PointSize pixels, at least up to 255 on any desktop. Only inside `drawing`."""
+    gpu.state.program_point_size_set(True)
+    batch.draw_instanced(shader.handle, instance_start=0, instance_count=instances)
+    gpu.state.program_point_size_set(False)
+
+
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
     shader = get(program)

@@ -12,6 +12,7 @@ from .emissive_light import EmissiveLight
 from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .film import Film
+from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
@@ -37,6 +38,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     InstantRadiosity,
     MultiresRadiosity,
     ClusteredVisibility,
+    ImperfectShadowMaps,
     ScreenSpaceBounce,
     Film,
 )

@@ -54,6 +54,7 @@ from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLig
 
 LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.1  # ranges within a region: share of its depth, and of each axis of unit normals
+LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 BOUNDS_CONSTANTS = (
     ("IVEC2", "grid_offset"), ("FLOAT", "depth_scale"), ("FLOAT", "depth_step"), ("FLOAT", "normal_step"),
 )  # fmt: skip

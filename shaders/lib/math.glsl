@@ -59,3 +59,16 @@ vec3 octahedral_decode(vec2 e)
   }
   return safe_normalize(n);
 }
+
+// A unit vector in one number that is exact in a float: two octahedral coordinates in 4096 steps each.
+float pack_normal(vec3 n)
+{
+  vec2 steps = floor((octahedral_encode(n) * 0.5 + 0.5) * 4095.0 + 0.5);
+  return steps.x + 4096.0 * steps.y;
+}
+
+vec3 unpack_normal(float packed_normal)
+{
+  float y = floor(packed_normal / 4096.0);
+  return octahedral_decode(vec2(packed_normal - 4096.0 * y, y) * (2.0 / 4095.0) - 1.0);
+}

@@ -182,12 +182,6 @@ vec3 triangle_emission(ivec2 hit, out vec3 normal)
   return vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
 }
 
-vec3 unpack_normal(float packed_normal)
-{
-  float y = floor(packed_normal / 4096.0);
-  return octahedral_decode(vec2(packed_normal - 4096.0 * y, y) * (2.0 / 4095.0) - 1.0);
-}
-
 // Unit shading normal of a triangle where a ray meets it, interpolated between its corners.
 vec3 triangle_shading_normal(ivec2 hit, vec3 position)
 {

@@ -69,6 +69,7 @@ WITHOUT = {
     "instant_radiosity": no_bounces,
     "multires_radiosity": no_bounces,
     "clustered_visibility": no_bounces,
+    "imperfect_shadow_maps": no_bounces,
     "ssdo": no_bounces,
 }
 

@@ -297,6 +297,7 @@ CHOICES = {
         ("indirect", "ssdo", ("geometry", "camera")),
         ("indirect", "multires_radiosity", ("camera",)),
         ("indirect", "clustered_visibility", ("geometry",)),
+        ("indirect", "imperfect_shadow_maps", ("geometry",)),
         ("environment", "directional_occlusion", ("geometry", "camera", "world")),
     )
     for name in CORPUS

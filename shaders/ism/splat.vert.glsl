@@ -1,0 +1,72 @@
+// A disc or triangle of a surface in the map of one virtual light: a square about it.
+#include "ism/paraboloid.glsl"
+#include "lib/random.glsl"
+
+#define BLOCK 6.0  // radii of discs
+
+vec4 entry_texel(int index)
+{
+  return texelFetch(surface_points, ivec2(index & 2047, index >> 11), 0);
+}
+
+void main()
+{
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  gl_PointSize = 1.0;
+  disc = vec4(0.0);
+  plane = vec4(0.0);
+  tile = vec2(0.0);
+  first_bound = vec4(0.0);
+  second_bound = vec3(0.0);
+  third_bound = vec3(0.0);
+  int map = gl_InstanceID;
+  int run = (map + first_run) % run_count;
+  int index = ENTRY_TEXELS * ((number < triangle_count) ? number : number + run * run_points);
+  vec4 place = entry_texel(index);
+  vec4 look = entry_texel(index + 1);
+  vec4 first = entry_texel(index + 2);
+  vec3 second = entry_texel(index + 3).xyz;
+  bool whole = first.w > 0.5;
+  float radius = sqrt(place.w);
+  // What lets light pass stands in a share of the maps. Discs overlap, and lots for each would add up to too much: those
+  // of a block have one lot, layers that are farther apart have their own.
+  uvec3 block = whole ? uvec3(uint(abs(look.w))) : uvec3(ivec3(clamp(floor(place.xyz / (BLOCK * radius)), -1e9, 1e9)));
+  if (to_unit(hash3(hash3(block) + uvec3(uint(map), uint(salt), 0u)).x) >= look.z) {
+    return;
+  }
+  vec3 origin = texelFetch(virtual_lights, ivec2(map, 0), 0).xyz;
+  mat3 frame = map_frame(texelFetch(virtual_lights, ivec2(map, 1), 0).xyz);
+  vec3 centre = (place.xyz - origin) * frame;
+  vec3 normal = octahedral_decode(look.xy) * frame;
+  float away = dot(centre, normal);
+  float reach = length(centre);
+  // Below the horizon lies what lights up nothing, and in the plane of the map's point its own surface. Of a closed thing
+  // that is seen from outside, the fronts hide all that its backs do; discs of the backs would only stick out.
+  bool outside = !whole && (any(greaterThan(first.xyz, origin)) || any(lessThan(second, origin)));
+  if (centre.z <= (whole ? -radius : 1e-3 * reach) || abs(away) <= 1e-5 * max(reach, radius)
+      || (look.w < 0.0 && outside && away > 0.0)) {
+    return;
+  }
+  float side_of = (away < 0.0) ? -1.0 : 1.0;
+  disc = vec4(centre, radius * radius);
+  plane = vec4(side_of * normal, abs(away));
+  tile = vec2(float(map % map_columns), float(map / map_columns)) * float(map_side);
+  first_bound = vec4(first.xyz - origin, first.w);
+  second_bound = second - origin;
+  third_bound = entry_texel(index + 4).xyz - origin;
+  // The cone about the disc is a circle in the map, from tan((a - b) / 2) to tan((a + b) / 2) off its middle.
+  float sine = radius / max(reach, 1e-30);
+  float cosine = sqrt(max(1.0 - sine * sine, 0.0));
+  vec3 direction = centre / max(reach, 1e-30);
+  vec2 middle = vec2(0.0);
+  float size = 1.0;
+  if (sine < 0.95 && cosine + direction.z > 0.05) {
+    middle = direction.xy / (cosine + direction.z);
+    size = sine / (cosine + direction.z);
+  }
+  // No larger than the map, whose middle then serves as well.
+  middle = (size >= 1.0) ? vec2(0.0) : middle;
+  vec2 extent = float(map_side) * vec2(float(map_columns), float(map_rows));
+  gl_PointSize = min(size, 1.0) * float(map_side) + 1.0;
+  gl_Position = vec4(((middle * 0.5 + 0.5) * float(map_side) + tile) / extent * 2.0 - 1.0, 0.0, 1.0);
+}

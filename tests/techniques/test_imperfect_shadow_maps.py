@@ -1,0 +1,159 @@
+"""Imperfect shadow maps: closed forms where nothing is hidden, traced visibility as the measure where something is."""
+
+import numpy as np
+import pytest
+
+from addon.compare.passes import light_paths
+from addon.compare.reference import render_passes
+from addon.frame import ledger
+from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
+
+NAME = "imperfect_shadow_maps"
+
+
+@pytest.fixture
+def render(stage):
+    """Diffuse indirect radiance of the stage by a technique of the slot, with the technique's parameters by name."""
+
+    def render(bounces, samples=4, size=(32, 32), technique=NAME, virtual_lights=64, **params):
+        stage.scene.candela.slot_indirect = technique
+        for name, value in {"virtual_lights": virtual_lights, **params}.items():
+            setattr(stage.scene.candela, f"{technique}_{name}", value)
+        images = render_passes(stage.scene, "CANDELA", samples, 0, size=size, bounces=bounces).images
+        assert ledger.latest().bad_pixels == 0
+        return light_paths(images)["diffuse_indirect"]
+
+    return render
+
+
+def counters():
+    return ledger.latest().row(NAME).counters
+
+
+def shelf(stage, side=1, **options):
+    """A shelf in the corner's middle, of 2 x side^2 triangles."""
+    steps = np.linspace(-0.3, 0.3, side + 1)
+    vertices = [(x, y, 0.6) for y in steps for x in steps]
+    faces = [(k, k + 1, k + side + 2, k + side + 1) for k in range(side * (side + 1)) if k % (side + 1) < side]
+    return stage.mesh(vertices, faces, **options)
+
+
+def error(found, expected):
+    """Root of the mean square and mean of the difference, as shares of the mean."""
+    return np.sqrt(((found - expected) ** 2).mean()) / expected.mean(), found.mean() / expected.mean() - 1
+
+
+@pytest.mark.parametrize("bounces", [1, 3])
+@pytest.mark.parametrize("points", [64, 1024])
+def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces, points):
+    """Everything sees everything: whatever is missing is a false shadow."""
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    light = render(bounces, points=points)
+    assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
+    assert light.mean(axis=2).std() < 0.06 * light.mean()
+
+
+@pytest.mark.slow
+def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render):
+    stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
+    stage.mesh([(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    camera = stage.camera((3, 0.5, 0.5), (np.pi / 2, 0, np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
+    irradiance = render(1, samples=16, size=(64, 64), virtual_lights=128).mean(axis=2) * np.pi
+    assert irradiance.mean() == pytest.approx(8 * 0.200044, rel=0.02)
+    height = (np.arange(64) + 0.5) / 64
+    four_rows = irradiance[:, 28:36].reshape(16, 32).mean(axis=1)
+    np.testing.assert_allclose(four_rows, wall_irradiance(height).reshape(16, 4).mean(axis=1), rtol=0.06)
+
+
+def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
+    """Radiance 1 and albedo 1/2: each wall sends out 2 in all, so what it gets from others' reflection is 1/2."""
+    shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
+    shining.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1, 1, 1, 1)
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    stage.mesh(corners, faces, material=shining)
+    stage.camera((0.3, 0.2, -0.1), (1.2, 0.3, 0.4), angle=1.4)
+    assert render(12, samples=16).mean() == pytest.approx(0.5, rel=0.03)
+
+
+def test_large_things_hide_virtual_lights_as_rays_say(stage, render):
+    """The same virtual lights, all of them traced; unless anything hides them, the picture is 6 % brighter."""
+    corner(stage)
+    shelf(stage, material=stage.diffuse(0.2))
+    settings = {"samples": 4, "size": (64, 64), "levels": 0}
+    traced = render(2, technique="multires_radiosity", rays=64, **settings)
+    spread, bias = error(render(2, **settings), traced)
+    assert spread < 0.02
+    assert abs(bias) < 0.005
+
+
+@pytest.mark.slow
+def test_small_things_hide_them_the_better_the_more_points_they_have(stage, render):
+    corner(stage)
+    shelf(stage, side=48, material=stage.diffuse(0.2))
+    settings = {"samples": 4, "size": (64, 64), "levels": 0}
+    traced = render(2, technique="multires_radiosity", rays=64, **settings)
+    few, some, many = (error(render(2, points=points, **settings), traced) for points in (16, 128, 1024))
+    assert counters()["splats"] == counters()["maps"] * counters()["surface points made"]
+    assert many[0] < some[0] < few[0]
+    assert many[0] < 0.04
+    assert abs(many[1]) < 0.015
+
+
+@pytest.mark.slow
+def test_a_shelf_that_lets_half_of_the_light_pass_hides_half(stage, render):
+    light = []
+    for opacity in (0.0, 0.5, 1.0):
+        stage.clear()
+        corner(stage)
+        placed = shelf(stage, side=24, material=stage.see_through(opacity))
+        placed.visible_camera = placed.visible_shadow = False
+        light.append(render(1, samples=16, points=256).mean())
+    assert light[2] < 0.97 * light[0]
+    assert light[1] == pytest.approx((light[0] + light[2]) / 2, rel=0.01)
+
+
+def test_points_are_made_anew_only_where_geometry_changes(stage, render):
+    corner(stage)
+    placed = shelf(stage, side=24, material=stage.diffuse(0.2))
+    render(1, samples=2)
+    assert "surface points made" in counters()
+    lamp = next(thing for thing in stage.scene.objects if thing.type == "LIGHT")
+    lamp.location.x += 0.1
+    render(1, samples=2)
+    assert "surface points kept" in counters() and "surface points made" not in counters()
+    placed.location.x += 0.1
+    render(1, samples=2)
+    assert "surface points made" in counters()
+
+
+def test_the_same_scene_gives_the_same_picture(stage, render):
+    from addon import engine
+
+    corner(stage)
+    shelf(stage, side=24, material=stage.diffuse(0.2))
+    first = render(2, samples=2)
+    engine.free_sessions()
+    np.testing.assert_array_equal(render(2, samples=2), first)
+
+
+@pytest.mark.parametrize("scale", [2.0**-10, 2.0**13])
+def test_maps_do_not_depend_on_the_scale_of_the_scene(stage, render, scale):
+    def room(scale):
+        stage.clear()
+        corner(stage, energy=60.0 * scale**2)
+        shelf(stage, side=24, material=stage.diffuse(0.2))
+        for placed in stage.scene.objects:
+            placed.location *= scale
+            if placed.type == "LIGHT":
+                placed.data.shadow_soft_size *= scale
+            elif placed.type == "MESH":
+                placed.scale *= scale
+            else:
+                placed.data.clip_start, placed.data.clip_end = 0.01 * scale, 100 * scale
+        return render(2, points=256)
+
+    assert error(room(scale), room(1.0))[1] == pytest.approx(0.0, abs=0.02)
