@@ -1,4 +1,4 @@
-"""`python -m bench run | growth | indirect | profile | costs | page | all`: see the module of each, or ask `--help`."""
+"""`python -m bench VERB`: run, again, growth, indirect, profile, costs, page or all. Each verb knows `--help`."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import argparse
 import os
 import sys
 
-from bench import costs, everything, growth, indirect, page, profile, run
+from bench import again, costs, everything, growth, indirect, page, profile, run
 
 VERBS = {
     "run": run,
+    "again": again,
     "growth": growth,
     "indirect": indirect,
     "profile": profile,

@@ -1,6 +1,6 @@
 """The page of the benchmark, and its part of the README and of docs/performance.md: `python -m bench page`.
 
-Reads bench/results/bench.json (and growth.json, profile.json beside it, where they are) and renders nothing.
+Reads bench/results/bench.json, and growth.json, profile.json and again.json beside it where they are; renders nothing.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import statistics
 from pathlib import Path
 from string import Template
 
+from bench import again, plots, profile
 from bench import growth as growth_of_cost
-from bench import plots, profile
 from bench.cells import ROOT
 from bench.figures import (
     MIDDLE,
@@ -155,6 +155,11 @@ def claims(results: Results) -> list[str]:
     return sentences
 
 
+def said(results: Results, repeated: list[dict]) -> list[str]:
+    """The claims, and whether figures came out again."""
+    return claims(results) + ([again.sentence(repeated)] if repeated else [])
+
+
 def remedies(results: Results, scenes: list[str]) -> list[str]:
     """For scenes by the light path that is most at fault in them: what would mend it."""
     by_path: dict[str, list[str]] = {}
@@ -255,22 +260,22 @@ def facts(results: Results) -> str:
 
 def reserve(results: Results) -> list[str]:
     """What a reader must know before believing the figures: what is missing, and whether the machine had rest."""
-    said = []
+    sentences = []
     measured, asked = len(results.cells), len(results.cells) + len(results.left_out)
     if results.left_out:
         absent = sorted({name.partition(",")[0] for name in results.left_out} - set(results.scenes))
-        said.append(
+        sentences.append(
             f"{measured} of {asked} points were measured within the time that was given"
             + listed("; nothing of", absent) + ". Another run of the command goes on with the rest."
         )  # fmt: skip
     loads = [cell["load"] for cell in results.cells if cell.get("load") is not None]
     threads = results.about.get("threads")
     if loads and threads and statistics.median(loads) > BUSY * threads:
-        said.append(
+        sentences.append(
             f"The machine was busy with other things (a load of {statistics.median(loads):.0f} on {threads} threads): "
             "times are too long, of all engines alike."
         )
-    return said
+    return sentences
 
 
 def paragraphs(sentences: list[str]) -> str:
@@ -281,7 +286,7 @@ def image(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
 
 
-def make_page(results: Results, grown: list[dict], profiled: list[dict], folder: Path) -> Path:
+def make_page(results: Results, grown: list[dict], profiled: list[dict], repeated: list[dict], folder: Path) -> Path:
     """Write index.html and its pictures into the folder."""
     plots.overview(results, folder / "overview.png")
     scenes = []
@@ -308,11 +313,11 @@ def make_page(results: Results, grown: list[dict], profiled: list[dict], folder:
         rows = "".join(f"<li>{html.escape(name)}</li>" for name in results.left_out)
         count = f"{len(results.left_out)} of the cells that were asked for"
         left_out = f"<h2>Not measured</h2><details><summary>{count}</summary><ul>{rows}</ul></details>"
-    said = paragraphs(claims(results))
+    sentences = paragraphs(said(results, repeated))
     tables = (
         f"<h2>Candela against the others</h2><p>Speed-up: at equal error, the least that both reach. Error ratio: the "
         f"other's error over Candela's at equal time. More than 1 is in favour of Candela. With > or <, the fastest "
-        f"picture of one has less error than the best of the other.</p>{said}"
+        f"picture of one has less error than the best of the other.</p>{sentences}"
         f"{as_html(summary(results))}<h2>What is left, and where</h2>{as_html(faults(results))}"
     )
     page = folder / "index.html"
@@ -327,7 +332,7 @@ def make_page(results: Results, grown: list[dict], profiled: list[dict], folder:
     return page
 
 
-def generated_part(results: Results, grown: list[dict], profiled: list[dict]) -> str:
+def generated_part(results: Results, grown: list[dict], profiled: list[dict], repeated: list[dict]) -> str:
     """The part of docs/performance.md that this command writes."""
     ratios = (
         "Speed-up: at equal error, the least that both reach, the other's time over Candela's. Error ratio: at equal "
@@ -344,7 +349,7 @@ def generated_part(results: Results, grown: list[dict], profiled: list[dict]) ->
         *reserve(results),
         picture,
         READING,
-        *claims(results),
+        *said(results, repeated),
         ratios,
         markdown(summary(results)),
         rest,
@@ -395,12 +400,12 @@ def rows_beside(path: Path, name: str) -> list[dict]:
 
 def command(options: argparse.Namespace) -> int:
     results = load(options.results)
-    grown, profiled = (rows_beside(options.results, name) for name in ("growth.json", "profile.json"))
-    page = make_page(results, grown, profiled, options.output)
+    beside = [rows_beside(options.results, f"{name}.json") for name in ("growth", "profile", "again")]
+    page = make_page(results, *beside, options.output)
     print(page)
     if not options.no_docs:
         plots.overview(results, PICTURE)
-        put_between(PERFORMANCE, generated_part(results, grown, profiled))
+        put_between(PERFORMANCE, generated_part(results, *beside))
         put_between(README, readme_part(results))
         print(f"{PERFORMANCE}\n{README}")
     return 0

@@ -224,7 +224,7 @@ class Run:
         self.left.remove(cell)
         alive = True
         try:
-            figures = worker.ask(ask="cell", series=asdict(cell.series), samples=cell.samples, size=cell.size)
+            figures = ask_for(worker, cell.series, cell.samples, cell.size)
         except Failed as failure:
             figures, alive = {"failed": str(failure)}, False
         if "failed" in figures:
@@ -247,6 +247,11 @@ class Run:
 def open_in(worker: Worker, cell: Cell) -> dict:
     """Open the cell's scene in a worker: what is known of its reference, or a failure."""
     return worker.ask(ask="open", scene=asdict(cell.scene), size=cell.size, reference_samples=cell.reference_samples)
+
+
+def ask_for(worker: Worker, series: Series, samples: int, size: tuple[int, int]) -> dict:
+    """The figures of a cell of the scene that the worker has opened. Raises Failed when the process is gone."""
+    return worker.ask(ask="cell", series=asdict(series), samples=samples, size=size)
 
 
 def load() -> float | None:

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from bench import figures, page, plots
+from bench import again, figures, page, plots
 from bench.figures import Point, Results, against, bias_floor, error_after, seconds_for, staircase
 
 
@@ -86,7 +86,7 @@ def test_path_at_fault_weighs_error_by_the_square_of_its_light():
 
 def test_page_and_table_say_what_was_found(tmp_path):
     data = results()
-    text = page.make_page(data, [], [], tmp_path).read_text(encoding="utf-8")
+    text = page.make_page(data, [], [], [], tmp_path).read_text(encoding="utf-8")
     assert "room" in text and "10 ×" in text and "room, Cycles, 256" in text
     table = page.markdown(page.summary(data)).splitlines()
     assert len(table) == 4 and "| 10 × | 10 × |" in table[2]
@@ -113,6 +113,13 @@ def test_readme_shows_the_means_of_every_peer():
 def test_pages_have_the_marks(path):
     text = path.read_text(encoding="utf-8")
     assert text.count(page.BEGIN) == text.count(page.END) == 1
+
+
+def test_a_second_run_is_told_by_its_ratios():
+    rows = again.rows_of("room", {"Candela": 1.0, "Cycles": 2.0}, {"Candela": 3.0, "Cycles": 6.6})
+    assert again.difference(rows[0]) == pytest.approx(0.1)
+    assert "1 of 1 ratios" in again.sentence(rows) and "Cycles on room" in again.sentence(rows)
+    assert again.sentence(rows) in page.generated_part(results(), [], [], rows)
 
 
 def test_growth_is_drawn(tmp_path):
