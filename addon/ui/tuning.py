@@ -120,9 +120,7 @@ class CANDELA_OT_tune(Job, bpy.types.Operator):
         truth = yield from part(steps, 0.0, REFERENCE_SHARE)
         trials: list[tune.Trial] = []
         searching = self._search(context, size, settings, truth, trials, options.milliseconds / 1000)
-        yield from part(_within(searching, options.budget), REFERENCE_SHARE, 1.0)
-        if not trials:
-            raise ValueError(f"Not one render was done within {options.budget} seconds; give Tune a longer search.")
+        yield from part(_within(searching, options.budget, trials), REFERENCE_SHARE, 1.0)
         global _found
         seconds = options.milliseconds / 1000
         _found = Found(scene.session_uid, trials, tune.proposal(trials, seconds), seconds)
@@ -175,15 +173,15 @@ def _timed(context, size, settings, told: str) -> Iterator[str]:
         steps.close()
 
 
-def _within(steps: Iterator[str], budget: float) -> Iterator[tuple[float, str]]:
-    """The steps with the share of the budget that is spent, ended when all of it is."""
+def _within(steps: Iterator[str], budget: float, trials: list[tune.Trial]) -> Iterator[tuple[float, str]]:
+    """The steps with the share of the budget that is spent, ended when all of it is; not before the first trial."""
     started = time.monotonic()
     try:
         for told in steps:
             spent = time.monotonic() - started
-            if spent > budget:
+            if spent > budget and trials:
                 return
-            yield spent / budget, told
+            yield min(spent / budget, 1.0), told
     finally:
         steps.close()
 
