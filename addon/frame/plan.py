@@ -39,7 +39,7 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
         place = {name: number for number, name in enumerate(tree)}
         registry = sorted(registry, key=lambda technique: place.get(technique.name, len(place)))
     reasons = {technique: technique.skip(snapshot, settings) for technique in registry}
-    wishes = {} if tree is not None else _wishes(reasons, settings)
+    wishes = {} if tree is not None else _wishes(reasons, snapshot, settings)
     labels = {technique.name: technique.label for technique in registry}
     for technique, reason in reasons.items():
         if tree is not None and technique.name not in tree:
@@ -59,13 +59,19 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
     return Plan(_ordered(chosen, skipped), tuple(skipped))
 
 
-def _wishes(reasons: dict[Technique, str | None], settings: Settings) -> dict[str, str]:
-    """Technique by slot: the one that is set, or, where that is Auto, the one that the measurements favour."""
-    able: dict[str, list[str]] = {}
+def _wishes(reasons: dict[Technique, str | None], snapshot: Snapshot, settings: Settings) -> dict[str, str]:
+    """Technique by slot: the one that is set, or, where that is Auto, the one that claims the scene or that the
+    measurements favour.
+    """
+    able: dict[str, list[Technique]] = {}
     for technique, reason in reasons.items():
         if technique.slot and not reason:
-            able.setdefault(technique.slot, []).append(technique.name)
-    found = {slot: costs.preferred(costs.known(), slot, names, settings.samples) for slot, names in able.items()}
+            able.setdefault(technique.slot, []).append(technique)
+    found = {}
+    for slot, techniques in able.items():
+        names = [technique.name for technique in techniques]
+        claimed = [technique.name for technique in techniques if technique.claims(snapshot, settings)]
+        found[slot] = claimed[0] if claimed else costs.preferred(costs.known(), slot, names, settings.samples)
     return found | {slot: wish for slot, wish in settings.slots.items() if wish != AUTO}
 
 

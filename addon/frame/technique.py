@@ -101,6 +101,10 @@ class Technique:
         """Why this scene does not need the technique, as a sentence; None if it does. Cheap, no GPU."""
         return None
 
+    def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
+        """Whether Auto takes it for its slot in this scene, whatever the benchmark's means over scenes say."""
+        return False
+
     def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
         """Equal keys in two frames mean that what `prepare` made still stands."""
         return None

@@ -16,6 +16,7 @@ from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
+from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
@@ -28,6 +29,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     AccumulatedMaps,
     VarianceSoftShadows,
     ConvolutionSoftShadows,
+    ShadowsByLight,
     DirectLight,
     EmissiveLight,
     EnvironmentLight,

@@ -158,6 +158,10 @@ class AccumulatedMaps(Technique):
         if frame.sample == 0:
             self._find_reached(frame)
 
+    def serving(self, emitter: lights.Emitter) -> AccumulatedMaps:
+        """The kind of maps that this light has."""
+        return self
+
     def _find_reached(self, frame: Frame) -> None:
         """For each light the receivers where its shadows can be seen (see CUTOFF)."""
         self._reached = {}

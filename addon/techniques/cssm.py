@@ -101,6 +101,10 @@ class ConvolutionSoftShadows(SoftMaps):
         """Half of what a plain map may have: basis images are several times as large."""
         return min(super().resolution(frame), 1024)
 
+    def cells(self, frame: Frame) -> int:
+        """Boxes along each side of a kernel."""
+        return frame.settings.get(self, "cells")
+
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
         order, prefilter = int(frame.settings.get(self, "order")), frame.settings.get(self, "prefilter")
         basis = _basis(order, prefilter)
@@ -110,7 +114,7 @@ class ConvolutionSoftShadows(SoftMaps):
             basis.build(image, size, maps.constants["top_level"], bound, maps.constants)
         return replace(
             maps,
-            lookup=_lookup(order, prefilter, frame.settings.get(self, "cells")),
+            lookup=_lookup(order, prefilter, self.cells(frame)),
             textures={**maps.textures, "basis_table" if prefilter == TABLE else "basis_means": image},
             constants={**maps.constants, **basis.constants_for(*size)},
         )

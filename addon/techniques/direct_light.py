@@ -39,7 +39,7 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import ATLAS_TEXELS, HARD, DepthMapService, Lookup, Maps, rounds
+from .accumulated_maps import ATLAS_TEXELS, HARD, AccumulatedMaps, DepthMapService, Lookup, Maps, rounds
 from .light_probes import rate_of
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
@@ -137,9 +137,11 @@ class DirectLight(Technique):
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
-        shadow = frame.services.get("shadow")
-        items, near = [], []
+        service = frame.services.get("shadow")
+        items: dict[AccumulatedMaps | None, list] = {}
+        near = []
         for emitter, weight in self._chosen(frame):
+            shadow = service.serving(emitter) if service else None
             rate = rate_of(frame, emitter.light.key)
             for number in rate.points(frame.sample):
                 points = rate.per_sample * frame.settings.samples / weight
@@ -154,13 +156,14 @@ class DirectLight(Technique):
                 row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-                (near if by_rays else items).append((row, views))
-        resolution = shadow.resolution(frame) if shadow else 16
-        for rows, views in rounds(items, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
-            maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
-            yield
-            yield from shade(frame, self, rows, self._sources, maps)
-        for rows, _ in rounds(near, resolution):
+                (near if by_rays else items.setdefault(shadow, [])).append((row, views))
+        for shadow, own in items.items():
+            resolution = shadow.resolution(frame) if shadow else 16
+            for rows, views in rounds(own, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
+                maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
+                yield
+                yield from shade(frame, self, rows, self._sources, maps)
+        for rows, _ in rounds(near, 16):
             yield from shade(frame, self, rows, self._sources, self._rays(frame))
 
     def _rays(self, frame: Frame) -> Maps:

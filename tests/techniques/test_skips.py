@@ -59,6 +59,7 @@ WITHOUT = {
     "accumulated_maps": no_shadow,
     "vssm": no_shadow,
     "cssm": no_shadow,
+    "shadows_by_light": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
     "environment_light": no_world,

@@ -1,0 +1,133 @@
+"""Shadow maps by light: each light gets the kind of map that its penumbrae ask for, in pictures of one sample.
+
+| light | kind | why |
+|---|---|---|
+| without extent | plain | nothing to filter |
+| widest penumbra below one texel | plain | filtered or not, the map shows the same |
+| the `important` strongest of the others | variance (vssm.py) | the least error of one map |
+| all others | convolution (cssm.py) with 2 x 2 boxes | a lookup that costs two thirds and never branches |
+
+The widest penumbra of a light is bounded by its angle a from the nearest receiver and the space s that a blocker can
+stand in: 2 a s, s the light's distance or the scene's size, whichever is less. A light's strength is the median of its
+unblocked irradiance over the picture's tiles: power, size, distance and the part of the picture that it can reach.
+
+Auto takes this technique for pictures of one sample in which a light has extent and casts shadows. With more samples
+points of the lights (accumulated_maps.py) converge, and which is better is left to what the benchmark measured. Drafts
+of a moving view keep points too: their maps are drawn in half the time.
+
+Each kind keeps its own parameters. Cost and bias (direct diffuse and glossy light) are those of the kinds; lights of
+one kind share atlas and pass.
+
+Measured with one sample at 128x96 against Cycles, relMSE of the direct diffuse light, by this technique and by points
+with the same 6 maps per sample: Cornell box 0.036 and 0.059, door ajar 0.066 and 0.63, garden 0.19 and 0.24, window
+0.54 and 0.57, instances 0.60 and 0.64, foliage 0.31 and 0.33; colonnade 2.2 and 1.9. All figures include the film's
+filter, of which one sample shows nothing. Large round lights, whose points are asked by rays, are no exception: with
+rays to them the garden has 0.20.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame import lights
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param
+from ..snapshot.scene import Light, Snapshot
+from .accumulated_maps import AccumulatedMaps
+from .cssm import ConvolutionSoftShadows
+from .vssm import VarianceSoftShadows
+
+PLAIN = "lights without penumbra: plain maps"
+VARIANCE, CONVOLUTION = "important soft lights: variance maps", "other soft lights: convolution maps"
+
+
+class FewBoxes(ConvolutionSoftShadows):
+    """Convolution maps for lights that matter little each."""
+
+    def cells(self, frame: Frame) -> int:
+        return min(super().cells(frame), 2)
+
+
+class ShadowsByLight(AccumulatedMaps):
+    name = "shadows_by_light"
+    label = "Shadow maps by light"
+    slot = "shadow"
+    params = (
+        Param(
+            "important", "Important lights", 8,
+            "So many lights with wide penumbrae have variance soft shadow maps, the others convolution maps", 0, 64,
+        ),
+    )  # fmt: skip
+
+    def __init__(self):
+        self._services = {PLAIN: AccumulatedMaps(), VARIANCE: VarianceSoftShadows(), CONVOLUTION: FewBoxes()}
+        self._kinds: dict[str, str] = {}
+
+    def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
+        return settings.samples == 1 and not settings.draft and any(_is_soft(light) for light in snapshot.lights)
+
+    def run(self, frame: Frame) -> None:
+        if frame.sample == 0:
+            self._kinds = self._chosen(frame)
+            for kind in self._kinds.values():
+                frame.count(self, kind)
+        for kind in dict.fromkeys(self._kinds.values()):
+            self._services[kind].run(frame)
+        frame.services["shadow"] = self
+
+    def serving(self, emitter: lights.Emitter) -> AccumulatedMaps:
+        return self._services[self._kinds.get(emitter.light.key, PLAIN)]
+
+    def _chosen(self, frame: Frame) -> dict[str, str]:
+        """Kind by light."""
+        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights if light.cast_shadow)
+        emitters = [emitter for emitter in found if emitter is not None]
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return {}
+        kinds, soft = {}, []
+        for emitter in emitters:
+            if penumbra(frame, emitter) * self._services[VARIANCE].resolution(frame) < 1.0:
+                kinds[emitter.light.key] = PLAIN
+            else:
+                soft.append(emitter)
+        soft.sort(key=lambda emitter: -strength(frame, emitter))
+        most = frame.settings.get(self, "important")
+        kinds |= {emitter.light.key: VARIANCE for emitter in soft[:most]}
+        return kinds | {emitter.light.key: CONVOLUTION for emitter in soft[most:]}
+
+    def release(self) -> None:
+        for service in self._services.values():
+            service.release()
+        self._kinds = {}
+
+
+def _is_soft(light: Light) -> bool:
+    """Whether the light has extent and casts shadows."""
+    extent = {"SUN": light.angle, "AREA": max(map(abs, light.size), default=0.0)}.get(light.kind, light.radius)
+    return light.cast_shadow and extent > 0.0 and bool(np.any(light.strength))
+
+
+def penumbra(frame: Frame, emitter: lights.Emitter) -> float:
+    """Bound of the widest penumbra, as a share of what the picture's receivers span; 0 for a light without extent."""
+    if not emitter.extended:
+        return 0.0
+    receivers, size = frame.receivers, frame.geometry.size
+    span = max(float((receivers.high.max(axis=0) - receivers.low.min(axis=0)).max()), 1e-6 * size)
+    if emitter.kind == lights.SUN:
+        return 2.0 * np.tan(min(emitter.radius, 1.5)) * size / span
+    nearest = np.clip(emitter.centre, receivers.low, receivers.high)
+    distance = max(float(np.linalg.norm(nearest - emitter.centre, axis=1).min()), 1e-6 * size)
+    return 2.0 * emitter.reach / distance * min(distance, size) / span
+
+
+def strength(frame: Frame, emitter: lights.Emitter) -> float:
+    """Median over the picture's tiles of the irradiance that the light brings unblocked, by its middle, W/m2."""
+    power = float(np.abs(emitter.radiance).max()) * emitter.area
+    if emitter.kind == lights.SUN:
+        return power
+    receivers = frame.receivers
+    offset = (receivers.low + receivers.high) / 2 - emitter.centre
+    squared = np.maximum((offset**2).sum(axis=1), max(emitter.reach, 1e-6 * frame.geometry.size) ** 2)
+    reached = offset @ emitter.axis > 0 if emitter.has_span else True
+    return float(np.median(np.where(reached, power / squared, 0.0)))
