@@ -69,7 +69,6 @@ from .multires_radiosity import LEVELS, MultiresRadiosity, regions
 from .soft_maps import REFINE
 from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, BoundGather, Gather, VirtualLightSet
 
-SIDES = tuple((str(side), str(side), number) for number, side in enumerate((32, 64, 128, 256)))
 TEXELS, CONVOLUTION = "TEXELS", "CONVOLUTION"
 FILTERS = ((TEXELS, "Texels", 0), (CONVOLUTION, "Convolution", 1))
 TAPS, CELLS = 4, 2  # along each side of a kernel: texels that are looked at; boxes of the filtered map
@@ -130,7 +129,7 @@ class ClusteredVisibility(MultiresRadiosity):
         Param(
             "clusters", "Clusters", 64, "Groups of virtual lights that share a shadow map, at most", 1, 256, draft=16
         ),
-        Param("map_size", "Map size", "64", "Texels along each side of a shadow map", items=SIDES),
+        Param("map_size", "Map size", 64, "Texels along each side of a shadow map", 8, 256, draft=32),
         Param("shadows", "Shadows", TEXELS, "How the share of a kernel that is blocked is found", items=FILTERS),
         Param("order", "Order", "8", "Terms of the series that compares depths, for convolution", items=ORDERS),
         Param("rays", "Rays", 8, "Rays of a region that correct the clusters in a sample; 0: none", 0, 64, draft=4),
@@ -146,7 +145,9 @@ class ClusteredVisibility(MultiresRadiosity):
         self._standing: tuple[Clusters, np.ndarray] | None = None  # of this frame's last sample that made clusters
 
     def visibility(self, frame: Frame, found: VirtualLightSet) -> BoundGather:
-        side = int(frame.settings.get(self, "map_size"))
+        side, filtered = frame.settings.get(self, "map_size"), frame.settings.get(self, "shadows") == CONVOLUTION
+        if filtered:
+            side = 1 << round(np.log2(side))
         label, areas = self._areas(frame, found)
         count = len(areas)
         columns = max(int(np.ceil(np.sqrt(count))), 1)
@@ -159,7 +160,7 @@ class ClusteredVisibility(MultiresRadiosity):
             BY_TEXELS, {"virtual_lights": lights_image, "cluster_maps": maps},
             {"cluster_count": count, "map_side": side, "rays": frame.settings.get(self, "rays")},
         )  # fmt: skip
-        return bound if frame.settings.get(self, "shadows") == TEXELS else self._filtered(frame, bound, extent, drawn)
+        return self._filtered(frame, bound, extent, drawn) if filtered else bound
 
     def _draw(self, frame: Frame, lights_image, maps, areas: np.ndarray, side: int, columns: int) -> bool:
         """Trace the maps, unless they hold these clusters among this geometry. Returns whether they were traced."""

@@ -109,7 +109,15 @@ def test_maps_are_kept_while_nothing_in_them_changes(stage, render):
     assert counters()["maps"] > 0 and "maps kept" not in counters()
 
 
-@pytest.mark.parametrize("params", [{"virtual_lights": 1}, {"clusters": 1}, {"map_size": "32", "clusters": 256}])
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"virtual_lights": 1},
+        {"clusters": 1},
+        {"map_size": 8, "clusters": 256},
+        {"map_size": 33, "shadows": "CONVOLUTION"},
+    ],
+)
 def test_every_number_of_lights_and_clusters_works(stage, render, params):
     corner(stage)
     assert render(2, samples=2, size=(7, 5), **params).mean() > 0
@@ -145,7 +153,7 @@ def test_a_single_cluster_casts_the_penumbra_of_its_area(stage, render, aside, s
     stage.light("SPOT", (0, 0, 2.1), (np.pi, 0, 0), spot_size=0.8, spot_blend=0.0, shadow_soft_size=0.0)
     stage.camera_above(4.0).location.x = aside
     size, shared = (48, 48), {"virtual_lights": 2048, "levels": 0}
-    params = {"clusters": 1, "rays": 0, "refine": False, "map_size": "128"}
+    params = {"clusters": 1, "rays": 0, "refine": False, "map_size": 128}
     clustered = render(1, 2, size, shadows=shadows, **params, **shared)
     unshadowed = diffuse_indirect(stage.scene, 1, 2, size, "multires_radiosity", rays=0, **shared)
     visible = (clustered / unshadowed).mean(axis=(0, 2))
