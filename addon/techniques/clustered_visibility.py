@@ -141,7 +141,7 @@ class ClusteredVisibility(MultiresRadiosity):
         super().__init__()
         self._kept: dict[str, images.Image] = {}
         self._drawn: tuple[weakref.ref, tuple] | None = None
-        self._built = 0  # order of the means
+        self._built = 0  # order of the means of what the maps hold; 0: none
         self._standing: tuple[Clusters, np.ndarray] | None = None  # of this frame's last sample that made clusters
 
     def visibility(self, frame: Frame, found: VirtualLightSet) -> BoundGather:
@@ -155,37 +155,36 @@ class ClusteredVisibility(MultiresRadiosity):
         areas[:, 4, 0], areas[:, 4, 1] = np.arange(count) % columns * side, np.arange(count) // columns * side
         lights_image = images.upload(_packed(found, label, areas))
         maps = self._image("maps", extent, "RGBA32F")
-        drawn = self._draw(frame, lights_image, maps, areas, side, columns)
+        self._draw(frame, lights_image, maps, areas, side, columns)
         bound = BoundGather(
             BY_TEXELS, {"virtual_lights": lights_image, "cluster_maps": maps},
             {"cluster_count": count, "map_side": side, "rays": frame.settings.get(self, "rays")},
         )  # fmt: skip
-        return self._filtered(frame, bound, extent, drawn) if filtered else bound
+        return self._filtered(frame, bound, extent) if filtered else bound
 
-    def _draw(self, frame: Frame, lights_image, maps, areas: np.ndarray, side: int, columns: int) -> bool:
-        """Trace the maps, unless they hold these clusters among this geometry. Returns whether they were traced."""
+    def _draw(self, frame: Frame, lights_image, maps, areas: np.ndarray, side: int, columns: int) -> None:
+        """Trace the maps, unless they hold these clusters among this geometry."""
         count, hierarchy = len(areas), frame.hierarchy("diffuse")
         key = areas.tobytes(), side
         varies = any(compiled.transparent for compiled in frame.materials.compiled)  # alpha is met by lot
         if not varies and self._drawn is not None and self._drawn[0]() is hierarchy and self._drawn[1] == key:
             frame.count(self, "maps kept", count)
-            return False
-        self._drawn = weakref.ref(hierarchy), key
+            return
+        self._drawn, self._built = (weakref.ref(hierarchy), key), 0
         bindings = self.virtual_lights.path_bindings(frame)
         bindings["textures"]["virtual_lights"] = lights_image
         bindings["constants"] |= {"cluster_count": count, "map_side": side, "map_columns": columns}
         passes.fullscreen(MAPS, images.Target((maps,)), **bindings)
         frame.count(self, "maps", count)
         frame.count(self, "map rays", count * side * side)
-        return True
 
-    def _filtered(self, frame: Frame, bound: BoundGather, extent: tuple[int, int], drawn: bool) -> BoundGather:
+    def _filtered(self, frame: Frame, bound: BoundGather, extent: tuple[int, int]) -> BoundGather:
         """The same with means of the basis functions of what the maps hold."""
         order = int(frame.settings.get(self, "order"))
         basis = _basis(order)
         means = self._image("means", *basis.image(*extent))
         levels = int(np.log2(bound.constants["map_side"]))
-        if drawn or self._built != order:
+        if self._built != order:
             basis.build(means, extent, levels, {"cluster_maps": bound.textures["cluster_maps"]}, {})
             self._built = order
         return BoundGather(

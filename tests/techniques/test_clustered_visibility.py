@@ -96,6 +96,22 @@ def test_clusters_and_maps_of_the_first_sample_stand_where_samples_do_not_refine
     assert counters()["maps kept"] == 3 * counters()["maps"]
 
 
+def test_a_change_of_shadows_and_back_changes_nothing(stage, render):
+    """Kept maps are filtered anew when they were not, though no map is traced."""
+    corner(stage)
+    stage.rectangle((-0.3, -0.3), (0.3, 0.3), z=0.6, material=stage.diffuse(0.2))
+    fresh = render(1, samples=1, shadows="CONVOLUTION")
+    lamp = stage.scene.objects["POINT"]
+    place = lamp.location.x
+    lamp.location.x = place + 0.1
+    render(1, samples=1, shadows="CONVOLUTION")
+    lamp.location.x = place
+    render(1, samples=1, shadows="TEXELS")
+    again = render(1, samples=1, shadows="CONVOLUTION")
+    assert counters()["maps kept"] > 0 and "maps" not in counters()
+    np.testing.assert_array_equal(again, fresh)
+
+
 def test_maps_are_kept_while_nothing_in_them_changes(stage, render):
     """A lamp of another strength leaves virtual lights where they are."""
     corner(stage)
