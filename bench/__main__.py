@@ -1,4 +1,4 @@
-"""`python -m bench VERB`: run, again, growth, indirect, profile, costs, page or all. Each verb knows `--help`."""
+"""`python -m bench VERB`, one of the table below: see the module of each, or ask `--help`."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, everything, growth, indirect, page, profile, run
+from bench import again, costs, direct, everything, growth, indirect, page, profile, run
 
 VERBS = {
     "run": run,
     "again": again,
     "growth": growth,
+    "direct": direct,
     "indirect": indirect,
     "profile": profile,
     "costs": costs,

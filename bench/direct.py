@@ -1,0 +1,79 @@
+"""Direct light at 64 samples beside Cycles, by light path, on every sample scene: `python -m bench direct`.
+
+Both engines render without bounces and are compared with the mean of two renders by Cycles. Their squared errors
+(relMSE) have the reference's own noise taken off, so they are those of the pictures; the noise stands beside them.
+Cycles with as many samples shows what the scene asks for at this number of samples, and Candela with four times as
+many what its error is made of: noise falls to a quarter or less, a bias would stay.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from bench.quick import size_of, table
+
+SCENES = Path(__file__).resolve().parent.parent / "sample_blends"
+PATHS = {"direct_light": "all", "diffuse_direct": "diffuse", "glossy_direct": "glossy"}
+SEED = 3  # unlike those of the reference
+MORE = 4
+HEAD = ("scene", "light", "relMSE", "bias", "with 4x the samples", "Cycles", "Cycles' bias", "reference's noise")
+
+
+def lines(scene, name: str, samples: int, size: tuple[int, int], reference_samples: int) -> list[tuple[str, ...]]:
+    """Of the table, for the open scene."""
+    from addon.compare.metrics import compare_radiance
+    from addon.compare.passes import light_paths
+    from addon.compare.reference import reference, render_passes
+
+    mean, half = reference(scene, reference_samples, direct_only=True, size=size).paths()
+    pictures = [
+        light_paths(render_passes(scene, engine, count, SEED, direct_only=True, size=size).images)
+        for engine, count in (("CANDELA", samples), ("CANDELA", MORE * samples), ("CYCLES", samples))
+    ]
+    found = []
+    for path, label in PATHS.items():
+        if not mean[path].any():
+            continue
+        own, more, cycles = (compare_radiance(path, picture[path], mean[path], half[path]) for picture in pictures)
+        net = [f"{max(error.relmse - error.floor, 0.0):.4f}" for error in (own, more, cycles)]
+        found.append((name, label, net[0], f"{own.bias:.3f}", net[1], net[2], f"{cycles.bias:.3f}", f"{own.floor:.4f}"))
+        name = ""
+    return found
+
+
+def page(rows: list[tuple[str, ...]], samples: int, size: tuple[int, int], reference_samples: int) -> str:
+    """The rows as a page of the documentation."""
+    cells = ["| " + " | ".join(row) + " |" for row in (HEAD, ("---",) * len(HEAD), *rows)]
+    return "\n".join([
+        f"# Direct light at {samples} samples", "",
+        f"Written by `python -m bench direct --page PATH`; do not edit. Pictures of {size[0]} x {size[1]} pixels",
+        f"without bounces against two renders of {reference_samples} samples by Cycles, whose noise is taken off the",
+        "errors (relMSE).", "", *cells, "",
+    ])  # fmt: skip
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    names = sorted(path.stem for path in SCENES.glob("*.blend"))
+    parser.add_argument("--scenes", nargs="+", default=names, metavar="NAME", help="default: all of sample_blends")
+    parser.add_argument("--samples", type=int, default=64, metavar="N", help="default 64")
+    parser.add_argument("--size", type=size_of, default=(256, 192), metavar="WxH", help="default 256x192")
+    parser.add_argument("--reference", type=int, default=512, metavar="N", help="of each of two (default 512)")
+    parser.add_argument("--page", type=Path, metavar="PATH", help="write the table as Markdown, too")
+
+
+def command(options: argparse.Namespace) -> int:
+    import bpy
+
+    import addon
+
+    addon.register()
+    rows: list[tuple[str, ...]] = []
+    for name in options.scenes:
+        bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
+        added = lines(bpy.context.scene, name, options.samples, options.size, options.reference)
+        print(table([HEAD, *added]), flush=True)
+        rows += added
+        if options.page:  # after each scene: what is measured stays when the run is ended
+            options.page.write_text(page(rows, options.samples, options.size, options.reference), encoding="utf-8")
+    return 0
