@@ -20,7 +20,7 @@ from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
 from .snapshot.scene import Snapshot
 from .techniques import make_registry
-from .techniques.film import resolve
+from .techniques.film import check_tree, resolve
 from .ui import ENGINE
 from .ui.passes import RenderPass, wanted_passes
 from .ui.properties import settings_of
@@ -117,6 +117,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         shared = session(scene, "preview" if self.is_preview else "final")
         settings = settings_of(scene, viewport=False, preview=self.is_preview)
         try:
+            check_tree(settings.passes)
             with context.turn:
                 frame = shared.renderer.begin(snapshot, settings, self._compiling)
             frame.ledger.times["sync"] = self._sync_seconds

@@ -34,7 +34,7 @@ from .gfx import images, library
 from .gfx.context import turn
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, camera_of_view, take
 from .snapshot.scene import Camera, Snapshot
-from .techniques.film import resolve
+from .techniques.film import check_tree, resolve
 from .ui.properties import settings_of
 
 STEP_S = 0.1  # what a sample may take while the picture changes: coarser pixels are drawn to stay below it
@@ -234,6 +234,7 @@ class Viewport:
             self._waits = True
 
     def _begin(self, camera: Camera, size, border, settings: Settings, scale: int) -> Frame:
+        check_tree(settings.passes)
         width, height = (max(-(-extent // scale), 1) for extent in size)
         x, y = width / size[0], height / size[1]
         border = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)

@@ -53,6 +53,7 @@ class Frame:
     services: dict[str, object] = field(default_factory=dict)  # what one technique offers to others, by slot
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
+    shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
     rates: dict[str, Rate] = field(default_factory=dict)  # of lights by key, where not one point per sample
     _hierarchies: dict[str, Hierarchy | None] = field(default_factory=dict)  # by path, of this frame
 
@@ -105,6 +106,10 @@ class Frame:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
+
+    def to_show(self, name: str) -> images.Image:
+        """The image of that name, or, of sums, the one that shows them better."""
+        return self.images[self.shown.get(name, name)]
 
     def bands(self, technique: Technique) -> Iterator[tuple[int, int]]:
         """Rows (from, to) of the picture: a long pass draws them one after the other, with a `yield` after each."""
@@ -210,6 +215,7 @@ class Renderer:
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
         frame.sample = frame.samples_done
         frame.look()
+        frame.shown.clear()
         if frame.sample == 0:
             self._clear_sums(frame)
         for technique in frame.plan.techniques:
@@ -231,7 +237,7 @@ class Renderer:
         sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
         out, bad = {}, 0
         for name in names:
-            pixels = images.read(frame.images[name])
+            pixels = images.read(frame.to_show(name))
             finite = np.isfinite(pixels)
             if not finite.all():
                 bad += int(pixels.size - finite.sum())

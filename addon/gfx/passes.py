@@ -9,7 +9,7 @@ import numpy as np
 
 from .context import on_release
 from .geometry import Batch
-from .images import Target
+from .images import Image, Target
 from .library import Program, Shader, get
 
 FULLSCREEN_VERTEX = "lib/fullscreen.vert.glsl"
@@ -25,6 +25,16 @@ def fullscreen_program(name: str, fragment: str, **declared) -> Program:
         name=name, vertex=FULLSCREEN_VERTEX, fragment=fragment, inputs=FULLSCREEN_INPUTS, varyings=FULLSCREEN_VARYINGS,
         **declared,
     )  # fmt: skip
+
+
+COPY = fullscreen_program(
+    "copy", "lib/copy.frag.glsl", textures=(("FLOAT_2D", "original"),), outputs=(("VEC4", "out_copy"),)
+)
+
+
+def copy(image: Image, target: Target) -> None:
+    """Put an image into a target of the same size."""
+    fullscreen(COPY, target, textures={"original": image})
 
 
 def fullscreen(program: Program, target: Target, *, blend="NONE", rows=None, viewport=None, **bindings) -> None:

@@ -6,6 +6,7 @@ from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
+from .denoise import Denoise
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
@@ -43,6 +44,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ImperfectShadowMaps,
     ScreenSpaceBounce,
     Film,
+    Denoise,
 )
 
 

@@ -7,6 +7,8 @@ Lights with extent that are visible to the camera are intersected analytically a
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from ..frame import lights
 from ..frame.environment import WORLD
 from ..frame.run import Frame
@@ -113,16 +115,20 @@ class Film(Technique):
         self._sources.release()
 
 
+def check_tree(names: Collection[str] | None) -> None:
+    """ValueError if these are the techniques of a pass tree that makes no picture. None: no tree, Auto."""
+    if names is not None and Film.name not in names:
+        raise ValueError("The pass tree holds no Film, which makes the picture: add it, or use New from Auto.")
+
+
 def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
     """The mean of all samples so far as one picture, scene-linear, premultiplied: in `target`, or film.combined.
 
-    ValueError if the plan holds no film.
+    Needs a plan with a film.
     """
-    if "film.combined" not in frame.images:
-        raise ValueError("The pass tree holds no Film, which makes the picture: add it, or use New from Auto.")
     target = target or frame.target("film.combined")
     with shown_sum(frame, "diffuse_indirect") as indirect:
-        textures = {name: frame.images[f"radiance.{name}"] for name in (*PATHS, "emission", "environment")}
+        textures = {name: frame.to_show(f"radiance.{name}") for name in (*PATHS, "emission", "environment")}
         passes.fullscreen(
             RESOLVE,
             target,

@@ -40,6 +40,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import passes
 from ..materials.compiler import may_emit
+from ..materials.graph import Graph
 from ..snapshot.scene import Snapshot
 from .neighbours import smooth
 from .surfaces import SURFACES
@@ -75,14 +76,22 @@ def no_indirect_light(snapshot: Snapshot, settings: Settings) -> str | None:
         return "the scene's bounces are set to 0"
     if not snapshot.instances:
         return "the scene has no surface"
-    used = [snapshot.materials[m].graph for m in {m for one in snapshot.instances for m in one.materials}]
-    if not any(_may_reflect(graph) for graph in used):
+    if not any(_may_reflect(graph) for graph in _used(snapshot)):
         return "no material reflects light"
+    return no_diffuse_light(snapshot)
+
+
+def no_diffuse_light(snapshot: Snapshot) -> str | None:
+    """Why nothing lights diffuse surfaces, as a sentence; None if something does."""
     lit = any(np.any(light.strength) and light.visibility.diffuse for light in snapshot.lights)
     lit = lit or (np.any(snapshot.world.color) and snapshot.world.visibility.diffuse)
-    if not lit and not any(may_emit(graph) for graph in used):
+    if not lit and not any(may_emit(graph) for graph in _used(snapshot)):
         return "no light reaches any surface"
     return None
+
+
+def _used(snapshot: Snapshot) -> list[Graph]:
+    return [snapshot.materials[m].graph for m in {m for one in snapshot.instances for m in one.materials}]
 
 
 def _may_reflect(graph) -> bool:

@@ -101,7 +101,7 @@ def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
     """
     name = f"radiance.{path}"
     if frame.settings.whole or frame.settings.draft or frame.samples_done >= min(FEW, frame.settings.samples):
-        yield frame.images[name]
+        yield frame.to_show(name)
         return
     with ExitStack() as stack:
         near, far, shown = (stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in range(3))

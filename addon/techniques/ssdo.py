@@ -113,9 +113,6 @@ SENDERS_OF_SUMS, SENDERS = (
         ("senders of a bounce", ("arriving",), ()),
     )
 )
-KEEP = passes.fullscreen_program(
-    "sums so far", "ssdo/keep.frag.glsl", textures=(("FLOAT_2D", "sum_now"),), outputs=(("VEC4", "out_sum"),)
-)
 
 
 def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
@@ -180,7 +177,7 @@ class ScreenSpaceBounce(Technique):
                 with_rays = traced and not bounce
                 yield from self._gather(frame, arriving, fans, with_rays)
                 reflect(frame, self, arriving.colors[0], "radiance.diffuse_indirect", noisy=with_rays)
-        passes.fullscreen(KEEP, frame.target("ssdo.direct"), textures={"sum_now": direct["sum_now"]})
+        passes.copy(direct["sum_now"], frame.target("ssdo.direct"))
         frame.count(self, "passes", 2 + traced + 3 * bounces)
         if traced:
             frame.count(self, "paths", frame.size[0] * frame.size[1])

@@ -24,7 +24,7 @@ from ..gfx import images
 from ..gfx.context import turn
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import make_registry
-from ..techniques.film import resolve
+from ..techniques.film import Film, resolve
 from .passes import PASSES
 
 PART_S = 0.05  # of a sample, between which Blender answers
@@ -82,7 +82,7 @@ def render_steps(
         frame = kept.renderer.begin(snapshot, replace(settings, profile=profile))
     yield from _samples(kept.renderer, frame)
     with turn:
-        if "film.combined" in frame.images:
+        if any(technique.name == Film.name for technique in frame.plan.techniques):
             resolve(frame)
         colors = sorted(name for name, image in frame.images.items() if image.format == "RGBA32F")
         arrays = kept.renderer.finish(frame, colors)

@@ -1,6 +1,7 @@
 // Mean of the light that arrives at 4x4 pixels `stride` apart, of those that lie on the same surface. Where there is
 // none (leaves, wires), of all that are near.
 #include "lib/gbuffer.glsl"
+#include "neighbours/pixel_size.glsl"
 
 // Light without the surface's colour, so that the mean keeps textures. The output's w is the variance of the mean's
 // luminance; where the input has it, only pixels join whose difference it explains, so that shade stays where it is.
@@ -23,8 +24,7 @@ void main()
     return;  // sums hold samples that met a surface here where the last one met none
   }
   vec3 normal = octahedral_decode(texelFetch(surface_normal, pixel, 0).xy);
-  float depth = (film_view.eye.w > 0.5) ? 1.0 : distance(centre.xyz, film_view.eye.xyz);
-  float pixel_size = (film_view.frame.y - film_view.frame.x) / film_view.film.x * depth;
+  float pixel_size = pixel_size_at(centre.xyz);
   vec4 on_surface = vec4(0.0);
   float squares = 0.0;
 #ifdef WITH_VARIANCE

@@ -283,7 +283,7 @@ def room(stage):
 @pytest.mark.parametrize("case", CORPUS)
 def test_every_pixel_is_finite_and_not_negative(room, case):
     CORPUS[case](room)
-    images = room.stage.render(2, SIZE, bounces=3)  # fails if a value had to be repaired, or is not finite
+    images = room.stage.render(4, SIZE, bounces=3)  # fails if a value had to be repaired, or is not finite
     for name, pixels in images.items():
         if name != "normal":
             assert pixels.min() >= 0, f"{name} is negative"

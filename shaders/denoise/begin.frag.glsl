@@ -1,0 +1,46 @@
+// Light without the surface's colour, and the variance of its mean: from what two halves of the samples differ by, a
+// single number per pixel, as its mean over 3x3 pixels of the same surface. Variance below 0: nothing to filter.
+#include "denoise/alike.glsl"
+#include "lib/math.glsl"
+
+vec3 without_color(vec3 light, ivec2 pixel)
+{
+  return light / max(texelFetch(color_sum, pixel, 0).rgb / float(count), vec3(LEAST_COLOR));
+}
+
+float half_difference(ivec2 pixel, vec3 whole)
+{
+  vec3 first = texelFetch(half_sum, pixel, 0).rgb;
+  float n = float(count);
+  float m = float(half_count);
+  float difference = luminance(without_color(first / m - (whole - first) / (n - m), pixel));
+  return difference * difference * (m * (n - m) / (n * n));
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 size = textureSize(sum_now, 0);
+  vec3 whole = texelFetch(sum_now, pixel, 0).rgb;
+  out_light = vec4(without_color(whole / float(count), pixel), -1.0);
+  Shown here;
+  bool colored = max_component(texelFetch(color_sum, pixel, 0).rgb) > LEAST_COLOR * float(count);
+  if (!shown_at(pixel, here) || !colored) {
+    return;
+  }
+  float pixel_size = pixel_size_at(here.position);
+  float sum = 0.0;
+  float weights = 0.0;
+  for (int y = -1; y <= 1; y++) {
+    for (int x = -1; x <= 1; x++) {
+      ivec2 place = clamp(pixel + ivec2(x, y), ivec2(0), size - 1);
+      Shown there;
+      if (shown_at(place, there)) {
+        float weight = alike(here, there, pixel_size, 1);
+        sum += weight * half_difference(place, texelFetch(sum_now, place, 0).rgb);
+        weights += weight;
+      }
+    }
+  }
+  out_light.a = sum / max(weights, 1e-30);
+}

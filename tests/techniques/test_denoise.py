@@ -1,0 +1,69 @@
+"""Denoising: less error, the same light, nothing where there is no noise, and nothing of it where it is not wanted."""
+
+import numpy as np
+import pytest
+
+from addon.compare.passes import light_paths
+from addon.frame import ledger
+
+SIZE = (64, 48)
+
+
+def lit_room(stage, angle=0.0):
+    """A lamp over a floor and a wall whose light comes by the floor alone; `angle` of a sun, or 0 for a point."""
+    stage.floor(material=stage.diffuse(0.7))
+    stage.rectangle((-2, 0), (2, 2), 0.0, location=(0, 2, 0), turn=(np.pi / 2, 0, 0), material=stage.diffuse(0.5))
+    stage.light("POINT", (0.5, 0.5, 1.5), shadow_soft_size=angle, energy=50)
+    stage.camera_above(6.0)
+
+
+def row():
+    return next(row for row in ledger.latest().rows if row.name == "denoise")
+
+
+def paths_of(stage, strength, samples, bounces, seed=1):
+    stage.scene.candela.denoise_strength = strength
+    return light_paths(stage.render(samples, SIZE, bounces=bounces, seed=seed))
+
+
+@pytest.mark.slow
+def test_indirect_light_has_half_the_error_and_the_same_mean(stage):
+    lit_room(stage)
+    truth = paths_of(stage, 0.0, 512, 2, seed=2)["diffuse_indirect"]
+    errors = []
+    for strength in (0.0, 1.0):
+        found = paths_of(stage, strength, 16, 2)["diffuse_indirect"]
+        errors.append(np.mean((found - truth) ** 2))
+        assert found.mean() == pytest.approx(truth.mean(), rel=0.03)
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_what_both_halves_agree_on_is_left_as_it_is(stage):
+    """A point without size: every sample has the same light, apart from edges."""
+    lit_room(stage)
+    plain, denoised = (paths_of(stage, strength, 8, 0)["diffuse_direct"] for strength in (0.0, 1.0))
+    floor = np.s_[4:20, 4:-4]
+    np.testing.assert_allclose(denoised[floor], plain[floor], rtol=2e-3)
+
+
+def test_the_picture_is_the_sum_of_its_passes(stage):
+    lit_room(stage, 0.3)
+    stage.scene.candela.denoise_strength = 1.0
+    images = stage.render(8, SIZE, bounces=2)
+    paths = light_paths(images)
+    names = ("diffuse_direct", "diffuse_indirect", "glossy_direct", "glossy_indirect", "emission", "environment")
+    total = sum(paths[name] for name in names if name in paths)
+    np.testing.assert_allclose(images["combined"][..., :3], total, rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize(("strength", "samples", "reason"), [(0.0, 8, "strength"), (1.0, 3, "fewer than 4")])
+def test_it_is_left_out_with_a_reason(stage, strength, samples, reason):
+    lit_room(stage)
+    paths_of(stage, strength, samples, 0)
+    assert row().state == "skipped" and reason in row().reason
+
+
+def test_light_paths_that_nothing_writes_are_not_filtered(stage):
+    lit_room(stage)
+    paths_of(stage, 1.0, 4, 0)
+    assert row().counters == {"passes": 5}
