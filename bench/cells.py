@@ -39,6 +39,7 @@ class Series:
     denoised: bool = False
     ray_traced: bool = False  # EEVEE's own ray tracing
     slots: tuple[tuple[str, str], ...] = ()  # Candela's technique by slot, where not Auto
+    values: tuple[tuple[str, float], ...] = ()  # Candela's parameters by property, where not the default
 
     @property
     def own(self) -> bool:
@@ -52,6 +53,7 @@ class Series:
 
 
 OWN = Series("Candela", "CANDELA", SWEEP, main=True)
+RAW = Series("Candela, raw", "CANDELA", (4, 8, 16, 32, 64), main=True, values=(("denoise_strength", 0.0),))
 PEERS = (
     Series("EEVEE", "BLENDER_EEVEE", EEVEE_SWEEP),
     Series("EEVEE, ray traced", "BLENDER_EEVEE", EEVEE_SWEEP, main=True, ray_traced=True),
@@ -74,11 +76,13 @@ def choices(registry: Iterable) -> dict[str, list]:
 
 
 def own_series(registry: Iterable) -> tuple[Series, ...]:
-    """Candela as it comes, without bounces, with the first technique of every slot, and with each other one instead.
+    """Candela as it comes, raw, without bounces, with the first technique of every slot, and with each other instead.
 
     What is set by hand is set in every slot that has a choice, so that those series do not depend on what Auto knows.
     """
     found = [OWN, Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
+    if any(technique.name == "denoise" for technique in registry):
+        found.append(RAW)
     slots = choices(registry)
     first = {slot: techniques[0].name for slot, techniques in slots.items()}
     if first:

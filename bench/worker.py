@@ -75,7 +75,8 @@ def scene_of(data: dict) -> Scene:
 
 
 def series_of(data: dict) -> Series:
-    return Series(**{**data, "samples": tuple(data["samples"]), "slots": tuple(map(tuple, data["slots"]))})
+    pairs = {name: tuple(map(tuple, data[name])) for name in ("slots", "values")}
+    return Series(**{**data, "samples": tuple(data["samples"]), **pairs})
 
 
 def about() -> dict:
@@ -163,6 +164,7 @@ def settings_for(opened: Open, series: Series, samples: int, seed: int, size: tu
         settings.append((scene.eevee, "use_raytracing", series.ray_traced))
     else:
         settings += [(scene.candela, f"slot_{slot}", technique) for slot, technique in series.slots]
+        settings += [(scene.candela, name, value) for name, value in series.values]
     return settings
 
 
