@@ -150,14 +150,14 @@ def test_order_and_names_of_objects_change_nothing(kept_stage, batch):
     claim = "order"
 
     def check(scene):
-        assume(not coplanar(scene))
+        assume(not coplanar(scene) and not chosen_at_random(scene))
         with kept(kept_stage, scene, claim):
             first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
             build(kept_stage, replace(scene, shapes=scene.shapes[::-1], lamps=scene.lamps[::-1]))
             for k, thing in enumerate(kept_stage.scene.objects):
                 thing.name = f"{997 * k % 1009:04d}"
             second = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
-            # Stochastic transparency and sums depend on the order in the last digits.
+            # Sums depend on the order in the last digits, and with them what is seen at edges.
             close = np.isclose(first, second, rtol=1e-3, atol=1e-4 * float(first.max(initial=0.0)))
             assert close.all(axis=-1).mean() > 0.97
 
@@ -170,6 +170,18 @@ def coplanar(scene: Scene) -> bool:
     return len({shape.kind for shape in scene.shapes}) < len(scene.shapes) or any(
         shape.kind in ("twice", "floor") or shape.location[2] == 0.0 or shape.copies > 1 or 0.0 in shape.scale
         for shape in standing
+    )
+
+
+def chosen_at_random(scene: Scene) -> bool:
+    """Whether a pixel may show one layer or lobe of several, chosen by a number that goes with the instance's place in
+    the list: then the order changes the noise, and the mean only stays."""
+    lobes = ("Transmission Weight", "Coat Weight", "Sheen Weight", "Subsurface Weight")
+    layers = ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
+    return any(
+        surface.node in layers
+        or any((name in lobes and value > 0) or (name == "Alpha" and 0 < value < 1) for name, value in surface.inputs)
+        for surface in scene.surfaces
     )
 
 
