@@ -49,7 +49,7 @@ def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, r
     """Everything sees everything: whatever is missing is a false shadow."""
     sphere(stage, stage.diffuse(0.5))
     stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
-    light = render(bounces, points=points)
+    light = render(bounces, points=points, rays=0)
     assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
     assert light.mean(axis=2).std() < 0.06 * light.mean()
 
@@ -68,6 +68,7 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(four_rows, wall_irradiance(height).reshape(16, 4).mean(axis=1), rtol=0.06)
 
 
+@pytest.mark.slow
 def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
     """Radiance 1 and albedo 1/2: each wall sends out 2 in all, so what it gets from others' reflection is 1/2."""
     shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
@@ -85,9 +86,23 @@ def test_large_things_hide_virtual_lights_as_rays_say(stage, render):
     shelf(stage, material=stage.diffuse(0.2))
     settings = {"samples": 4, "size": (64, 64), "levels": 0}
     traced = render(2, technique="multires_radiosity", rays=64, **settings)
-    spread, bias = error(render(2, **settings), traced)
+    spread, bias = error(render(2, rays=0, **settings), traced)
     assert spread < 0.02
     assert abs(bias) < 0.005
+
+
+@pytest.mark.slow
+def test_what_maps_show_wrong_rays_correct_in_the_mean(stage, render):
+    """Maps of 8 x 8 texels from 16 points see little of a finely divided shelf."""
+    corner(stage)
+    shelf(stage, side=48, material=stage.diffuse(0.2))
+    settings = {"samples": 8, "size": (64, 64), "levels": 0}
+    traced = render(2, technique="multires_radiosity", rays=64, **settings)
+    coarse = {"points": 16, "map_size": 8, **settings}
+    assert abs(error(render(2, rays=0, **coarse), traced)[1]) > 0.01
+    corrected = render(2, rays=4, **coarse)
+    assert abs(error(corrected, traced)[1]) < 0.005
+    assert corrected.min() >= 0
 
 
 @pytest.mark.slow
@@ -96,7 +111,9 @@ def test_small_things_hide_them_the_better_the_more_points_they_have(stage, rend
     shelf(stage, side=48, material=stage.diffuse(0.2))
     settings = {"samples": 4, "size": (64, 64), "levels": 0}
     traced = render(2, technique="multires_radiosity", rays=64, **settings)
-    few, some, many = (error(render(2, points=points, **settings), traced) for points in (16, 128, 1024))
+    few, some, many = (
+        error(render(2, points=points, rays=0, map_size=64, **settings), traced) for points in (16, 128, 1024)
+    )
     assert counters()["splats"] == counters()["maps"] * counters()["surface points made"]
     assert many[0] < some[0] < few[0]
     assert many[0] < 0.04
