@@ -103,7 +103,6 @@ def point_views(
     `cone_tangent` (inf for a half space) of it matter. Empty if no receiver can be lit. `reach`: half the light's
     extent in metres, if the map also serves points around this one.
     """
-    near = 1e-4 * geometry.size
     offsets = receivers.corners - position
     if axis is not None:
         keep = ((offsets @ axis) > 0).any(axis=1)
@@ -134,7 +133,7 @@ def point_views(
             far = float(depth[members].max())
             wide = reach * (1.0 / max(nearest, 0.1 * far) - 1.0 / far)
             low, high = _padded(*_widened(low, high, wide), jitter, resolution)
-            views.append(_perspective(position, u, v, forward, low, high, near, far))
+            views.append(_perspective(position, u, v, forward, low, high, geometry.size, far))
         return views
     views = []
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
@@ -153,11 +152,14 @@ def point_views(
             low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
             shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
             far = (offsets[inside] @ face_forward).max()
-            views.append(_perspective(position, face_u, face_v, face_forward, low + shift, high + shift, near, far, 2))
+            views.append(
+                _perspective(position, face_u, face_v, face_forward, low + shift, high + shift, geometry.size, far, 2)
+            )
     return views
 
 
-def _perspective(position, u, v, forward, low, high, near, far, scale=1) -> MapView:
+def _perspective(position, u, v, forward, low, high, size, far, scale=1) -> MapView:
+    near = 1e-4 * min(size, max(float(far), 1e-6 * size))  # what is seen may be small in a scene with a far background
     row_w = np.append(forward, -forward @ position)
     x, y = np.append(u, -u @ position), np.append(v, -v @ position)
     row_x = (2 * x - (low[0] + high[0]) * row_w) / (high[0] - low[0])

@@ -76,6 +76,7 @@ class SceneGeometry:
         self.instances: images.Image | None = None
         self.draws: list[Draw] = []  # by material, corner attributes: surfaces, and casters with alpha
         self.opaque_casters: list[Draw] = []  # positions only, materials ignored
+        self.changes = 0  # updates that changed anything: what was drawn of the same number still stands
         self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
         self._draw_key = None
         self.instance_rows = np.zeros((0, TEXELS_PER_INSTANCE, 4), np.float32)
@@ -107,6 +108,7 @@ class SceneGeometry:
             tuple((m.attributes, m.transparent) for m in materials),
         )
         self._placed = (instances, snapshot.meshes, materials)
+        self.changes += changed or key != self._draw_key
         if key == self._draw_key:
             if changed:
                 self._set_bounds()

@@ -2,7 +2,8 @@
 
 Which part a map stands for follows from the samples: all of the light with one, a part whose extents shrink by sqrt(n)
 with n (AccumulatedMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they
-are lit or in full shadow, and the limits of its depths. A map is kept as long as nothing that it shows changes.
+are lit or in full shadow, and the limits of its depths. Maps are kept, from frame to frame too, as long as the casters
+and what they are seen from are the same: a light may change its power or colour.
 
 How a kernel follows from the light and a blocker's height stands in shaders/lib/soft_kernel.glsl, the two steps
 (blocker search, penumbra) in shaders/lib/soft_visibility.glsl; a technique brings what it filters the map to, and how
@@ -11,7 +12,6 @@ it asks a box of the filtered map for blockers.
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +45,7 @@ class SoftMaps(AccumulatedMaps):
 
     def __init__(self):
         super().__init__()
-        self._drawn: tuple[weakref.ref, tuple, Maps] | None = None
+        self._drawn: tuple[tuple, Maps] | None = None
         self._kept: dict[str, images.Image] = {}
 
     def cell(self, frame: Frame, number: int, points: float) -> float:
@@ -81,14 +81,14 @@ class SoftMaps(AccumulatedMaps):
         return [replace(view, cell=cell) for view in super().views(frame, emitter, sample, number, cell)]
 
     def draw(self, frame: Frame, views: list) -> Maps:
-        key = (self.resolution(frame), *((view.rows.tobytes(), view.cell) for view in views))
+        key = (frame.geometry.changes, self.resolution(frame), *((view.rows.tobytes(), view.cell) for view in views))
         compiled = frame.materials.compiled
         varies = any(compiled[draw.material].transparent for draw in frame.geometry.draws)  # alpha is drawn by lot
-        if not varies and self._drawn is not None and self._drawn[0]() is frame and self._drawn[1] == key:
+        if not varies and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
-            return self._drawn[2]
+            return self._drawn[1]
         maps = self._with_bounds(frame, views, super().draw(frame, views))
-        self._drawn = (weakref.ref(frame), key, maps)
+        self._drawn = (key, maps)
         return maps
 
     def _with_bounds(self, frame: Frame, views: list, maps: Maps) -> Maps:
