@@ -6,6 +6,9 @@ they are in shadow. A technique's visibility is its direct light with shadows ov
 blocking is compared. The time is the processor time of a whole render on a software GPU, the least of some that take
 turns, less that of the same picture without shadows, as a ratio to that of one accumulated map.
 
+With `--cycles N` relMSE and FLIP of the direct diffuse light against Cycles with twice N samples follow, and what of
+both is the reference's own noise.
+
 References are kept in the cache folder of the comparison with Cycles, one small file per family and size.
 """
 
@@ -36,10 +39,13 @@ class Entrant:
     technique: str
     values: tuple[tuple[str, object], ...] = ()
     samples: int = 1
+    shared: float = 0.0  # maps per sample that the light probes share out; 0: one for every light
 
 
 VSSM, CSSM, POINTS = "vssm", "cssm", "accumulated_maps"
 ENTRANTS = (
+    Entrant("Auto, 1 sample", "AUTO", shared=6.0),
+    Entrant("maps, 1 sample, 6 shared", POINTS, shared=6.0),
     Entrant("VSSM", VSSM),
     Entrant("VSSM, rule of the source", VSSM, (("rule", "MEAN"),)),
     Entrant("VSSM, 3 cells", VSSM, (("cells", 3),)),
@@ -70,6 +76,8 @@ class Result:
     error: float
     shadowed: list[float] = field(default_factory=list)  # processor seconds of each run
     free: list[float] = field(default_factory=list)
+    relmse: float = float("nan")  # against Cycles
+    flip: float | None = None
 
     @property
     def seconds(self) -> float:
@@ -84,7 +92,7 @@ def configure(scene, entrant: Entrant) -> None:
         if prop.identifier not in ("rna_type", "name"):
             settings.property_unset(prop.identifier)
     settings.slot_shadow = entrant.technique
-    settings.light_probes_maps = 0.0
+    settings.light_probes_maps = entrant.shared
     for name, value in entrant.values:
         setattr(settings, f"{entrant.technique}_{name}", value)
 
@@ -161,6 +169,31 @@ def save(path: Path, found: np.ndarray, expected: np.ndarray) -> None:
     path.write_bytes(png((np.clip(picture, 0, 1)[..., None].repeat(3, axis=-1) * 255 + 0.5).astype(np.uint8)))
 
 
+def against_cycles(scene, entrants, results: list[Result], size: tuple[int, int], samples: int) -> Result:
+    """Fill in relMSE and FLIP of each result; returns those of one seed of Cycles, which are noise."""
+    from addon.compare.metrics import compare_radiance, flips
+    from addon.compare.reference import reference
+
+    made = reference(scene, samples, True, size)
+    expected, half = made.images["diffuse_direct"], made.half["diffuse_direct"]
+    pictures = [np.repeat(direct(scene, entrant, size)[0][..., None], 3, axis=-1) for entrant in entrants]
+    floor = Result(0.0)
+    pictures.append(expected + half)
+    for result, picture, flip in zip([*results, floor], pictures, flips([(one, expected) for one in pictures])):
+        result.relmse, result.flip = compare_radiance("direct", picture, expected).relmse, flip
+    return floor
+
+
+def report_cycles(found: dict[str, list[Result]], labels: list[str], figure: str) -> str:
+    """A row per label: `figure` (relmse, flip) on each family."""
+    families = list(found)
+    rows = [(figure, *families)]
+    for k, label in enumerate(labels):
+        values = [getattr(found[family][k], figure) for family in families]
+        rows.append((label, *("–" if value is None else f"{value:.4f}" for value in values)))
+    return table(rows)
+
+
 def report(found: dict[str, list[Result]], entrants) -> str:
     """A row per entrant: RMS error on each family, and its time over all families by that of one map."""
     families = list(found)
@@ -184,6 +217,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--size", default="128x96", type=size_of, metavar="WxH")
     parser.add_argument("--runs", default=3, type=int, metavar="N", help="for the times (default 3)")
     parser.add_argument("--maps", default=REFERENCE_MAPS, type=int, metavar="N", help="of the reference")
+    parser.add_argument("--cycles", default=0, type=int, metavar="N", help="samples of each seed of Cycles' reference")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write visibilities and errors there")
     return parser.parse_args(arguments)
 
@@ -196,13 +230,19 @@ def main(arguments: list[str]) -> int:
 
     addon.register()
     entrants = [entrant for entrant in ENTRANTS if options.only in entrant.label]
-    found = {}
+    found, cycles = {}, {}
     for family in options.families:
         with quiet():
             context.ensure()
             found[family] = measure(family, entrants, options.size, options.runs, options.maps, options.pictures)
+            if options.cycles:
+                scene = soft_scenes.build(family)
+                floor = against_cycles(scene, entrants, found[family], options.size, options.cycles)
+                cycles[family] = [*found[family], floor]
         print(f"{family} done", flush=True)
     print(report(found, entrants))
+    for figure in ("relmse", "flip") if cycles else ():
+        print(report_cycles(cycles, [*(entrant.label for entrant in entrants), "noise of the reference"], figure))
     return 0
 
 
