@@ -66,6 +66,7 @@ class Scene:
     transparent: bool = False
     slots: tuple[tuple[str, str], ...] = ()  # technique by slot, where not Auto
     bounces: int = 0
+    samples: int = 2
 
 
 def _box():

@@ -109,4 +109,5 @@ def scenes(slots: dict[str, list[str]]) -> st.SearchStrategy[Scene]:
         transparent=st.booleans(),
         slots=chosen.map(lambda names: tuple(sorted(names.items()))),
         bounces=_one_of(0, 1, 3),
+        samples=_one_of(2, 1, 4),
     )

@@ -26,7 +26,7 @@ from tests.stress.scenes import Scene, build
 from tests.stress.strategies import scenes
 
 EXAMPLES = int(os.environ.get("CANDELA_STRESS", "0"))
-SIZE, SAMPLES = (24, 16), 2
+SIZE = (24, 16)
 FOUND = Path(__file__).parent / "found"
 SLOTS: dict[str, list[str]] = {}
 for _technique in REGISTRY:
@@ -94,10 +94,10 @@ def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, batch)
 
     def check(scene):
         with kept(kept_stage, scene, claim):
-            first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            first = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)
             sound(first)
             engine.free_sessions()
-            again = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            again = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)
             for name in first:
                 np.testing.assert_array_equal(first[name], again[name], err_msg=name)
 
@@ -113,9 +113,9 @@ def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, batch):
     def check(scene):
         assume(all(lamp.energy < 1e9 for lamp in scene.lamps) and (scene.world is None or scene.world[3] < 1e6))
         with kept(kept_stage, scene, claim):
-            once = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            once = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)
             build(kept_stage, brighter(scene, 8.0))
-            eight_times = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)
+            eight_times = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)
             for name in once:
                 factor = 8.0 if name.endswith(("direct", "indirect", "emission", "environment")) else 1.0
                 expected = once[name] * factor
@@ -152,11 +152,11 @@ def test_order_and_names_of_objects_change_nothing(kept_stage, batch):
     def check(scene):
         assume(not coplanar(scene) and not chosen_at_random(scene))
         with kept(kept_stage, scene, claim):
-            first = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
+            first = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)["combined"]
             build(kept_stage, replace(scene, shapes=scene.shapes[::-1], lamps=scene.lamps[::-1]))
             for k, thing in enumerate(kept_stage.scene.objects):
                 thing.name = f"{997 * k % 1009:04d}"
-            second = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
+            second = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)["combined"]
             # Sums depend on the order in the last digits, and with them what is seen at edges.
             close = np.isclose(first, second, rtol=1e-3, atol=1e-4 * float(first.max(initial=0.0)))
             assert close.all(axis=-1).mean() > 0.97
@@ -195,11 +195,11 @@ def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, batch):
         scene = replace(scene, bounces=0)
         assume(scene.lamps and not chosen_at_random(scene))
         with kept(kept_stage, scene, claim):
-            whole = kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"]
+            whole = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)["combined"]
             halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
             build(kept_stage, replace(scene, lamps=halves))
             np.testing.assert_allclose(
-                kept_stage.render(SAMPLES, SIZE, bounces=scene.bounces)["combined"],
+                kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)["combined"],
                 whole,
                 rtol=2e-3,
                 atol=1e-4 * float(whole.max(initial=0.0)),
@@ -214,4 +214,4 @@ def test_what_was_once_found_stays_mended(registered, path):
 
     bpy.ops.wm.open_mainfile(filepath=str(path))
     engine.free_sessions()
-    sound(render_passes(bpy.context.scene, "CANDELA", SAMPLES, 0, direct_only=True, size=SIZE).images)
+    sound(render_passes(bpy.context.scene, "CANDELA", 2, 0, direct_only=True, size=SIZE).images)
