@@ -115,6 +115,16 @@ def test_pages_have_the_marks(path):
     assert text.count(page.BEGIN) == text.count(page.END) == 1
 
 
+def test_what_denoising_brings_is_told_where_both_were_measured():
+    data = results()
+    assert page.denoising(data) == []
+    for cell in [cell for cell in data.cells if cell["series"]["label"] == "Candela"]:
+        errors = {"combined": {"relmse": 3 * cell["errors"]["combined"]["relmse"], "bias": 1.0}}
+        raw = {"series": {"label": "Candela, raw"}, "times": [0.8 * cell["times"][0]], "errors": errors}
+        data.cells.append({**cell, **raw})
+    assert "divides the error of 16 samples by 3.00 and multiplies their time by 1.25" in page.denoising(data)[0]
+
+
 def test_a_second_run_is_told_by_its_ratios():
     rows = again.rows_of("room", {"Candela": 1.0, "Cycles": 2.0}, {"Candela": 3.0, "Cycles": 6.6})
     assert again.difference(rows[0]) == pytest.approx(0.1)
