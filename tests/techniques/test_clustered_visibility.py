@@ -1,11 +1,16 @@
 """Clustered visibility: closed forms, maps that are kept, pictures that repeat."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.frame.settings import Settings
+from addon.snapshot.scene import Film
+from addon.techniques.clustered_visibility import ClusteredVisibility
 from tests.techniques.test_instant_radiosity import corner, sphere
 
 NAME = "clustered_visibility"
@@ -123,6 +128,21 @@ def test_maps_are_kept_while_nothing_in_them_changes(stage, render):
     stage.rectangle((-0.3, -0.3), (0.3, 0.3), z=0.6, material=stage.diffuse(0.2))
     render(1, samples=1)
     assert counters()["maps"] > 0 and "maps kept" not in counters()
+
+
+@pytest.mark.parametrize(
+    ("size", "samples", "draft", "taken"),
+    [
+        ((320, 240), 1, False, True),
+        ((320, 240), 2, False, False),
+        ((320, 240), 1, True, False),
+        ((96, 72), 1, False, False),
+    ],
+)
+def test_auto_takes_it_for_single_samples_of_many_pixels(size, samples, draft, taken):
+    film = Film(*size, (0, 0, *size))
+    claimed = ClusteredVisibility().claims(SimpleNamespace(film=film), Settings(samples=samples, draft=draft))
+    assert claimed == taken
 
 
 @pytest.mark.parametrize(
