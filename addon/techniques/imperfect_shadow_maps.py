@@ -79,9 +79,12 @@ SPLAT = Program(
     vertex="ism/splat.vert.glsl",
     fragment="ism/splat.frag.glsl",
     inputs=(("INT", "number"),),
-    varyings=(
-        ("flat", "VEC4", "disc"), ("flat", "VEC4", "plane"), ("flat", "VEC2", "tile"), ("flat", "VEC4", "first_bound"),
-        ("flat", "VEC3", "second_bound"), ("flat", "VEC3", "third_bound"),
+    varyings=tuple(
+        ("flat", kind, name)
+        for kind, name in (
+            ("VEC4", "disc"), ("VEC4", "plane"), ("VEC3", "tile"), ("VEC4", "first_bound"), ("VEC4", "second_bound"),
+            ("VEC4", "third_bound"),
+        )
     ),
     outputs=PLANE_OUTPUT,
     textures=(("FLOAT_2D", "surface_points"), ("FLOAT_2D", "virtual_lights")),
@@ -89,7 +92,7 @@ SPLAT = Program(
         *MAP_CONSTANTS, ("INT", "map_rows"), ("INT", "triangle_count"), ("INT", "first_run"), ("INT", "run_count"),
         ("INT", "run_points"), ("FLOAT", "depth_unit"), ("INT", "salt"),
     ),
-    defines=(("ENTRY_TEXELS", str(TEXELS)),),
+    defines=(("ENTRY_TEXELS", str(TEXELS)), ("DISC", "0.0"), ("CUT_DISC", "1.0"), ("TRIANGLE", "2.0")),
     writes_depth=True,
 )  # fmt: skip
 PULL = passes.fullscreen_program(

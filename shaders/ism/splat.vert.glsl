@@ -9,16 +9,23 @@ vec4 entry_texel(int index)
   return texelFetch(surface_points, ivec2(index & 2047, index >> 11), 0);
 }
 
+// Plane through an edge, upright on its triangle: distance of a place to one side of it is dot(xyz, place) + w.
+vec4 edge_plane(vec3 from, vec3 to, vec3 up)
+{
+  vec3 across = safe_normalize(cross(up, to - from));
+  return vec4(across, -dot(across, from));
+}
+
 void main()
 {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   gl_PointSize = 1.0;
   disc = vec4(0.0);
   plane = vec4(0.0);
-  tile = vec2(0.0);
+  tile = vec3(0.0);
   first_bound = vec4(0.0);
-  second_bound = vec3(0.0);
-  third_bound = vec3(0.0);
+  second_bound = vec4(0.0);
+  third_bound = vec4(0.0);
   int map = gl_InstanceID;
   int run = (map + first_run) % run_count;
   int index = ENTRY_TEXELS * ((number < triangle_count) ? number : number + run * run_points);
@@ -50,10 +57,22 @@ void main()
   float side_of = (away < 0.0) ? -1.0 : 1.0;
   disc = vec4(centre, radius * radius);
   plane = vec4(side_of * normal, abs(away));
-  tile = vec2(float(map % map_columns), float(map / map_columns)) * float(map_side);
-  first_bound = vec4(first.xyz - origin, first.w);
-  second_bound = second - origin;
-  third_bound = entry_texel(index + 4).xyz - origin;
+  tile.xy = vec2(float(map % map_columns), float(map / map_columns)) * float(map_side);
+  if (whole) {
+    vec3 corner = (first.xyz - origin) * frame;
+    vec3 other = (second - origin) * frame;
+    vec3 last = (entry_texel(index + 4).xyz - origin) * frame;
+    tile.z = TRIANGLE;
+    first_bound = edge_plane(corner, other, normal);
+    second_bound = edge_plane(other, last, normal);
+    third_bound = edge_plane(last, corner, normal);
+  }
+  else {
+    bool within = all(lessThan(first.xyz, place.xyz - radius)) && all(greaterThan(second, place.xyz + radius));
+    tile.z = within ? DISC : CUT_DISC;
+    first_bound.xyz = first.xyz - origin;
+    second_bound.xyz = second - origin;
+  }
   // The cone about the disc is a circle in the map, from tan((a - b) / 2) to tan((a + b) / 2) off its middle.
   float sine = radius / max(reach, 1e-30);
   float cosine = sqrt(max(1.0 - sine * sine, 0.0));
@@ -68,5 +87,5 @@ void main()
   middle = (size >= 1.0) ? vec2(0.0) : middle;
   vec2 extent = float(map_side) * vec2(float(map_columns), float(map_rows));
   gl_PointSize = min(size, 1.0) * float(map_side) + 1.0;
-  gl_Position = vec4(((middle * 0.5 + 0.5) * float(map_side) + tile) / extent * 2.0 - 1.0, 0.0, 1.0);
+  gl_Position = vec4(((middle * 0.5 + 0.5) * float(map_side) + tile.xy) / extent * 2.0 - 1.0, 0.0, 1.0);
 }
