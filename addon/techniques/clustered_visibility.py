@@ -12,8 +12,8 @@ a cluster see, through the gap of a door, all of them light or none.
 So the clusters are a guess, a control variate. They are split into `rays` groups; in each, one cluster m is drawn in
 proportion to its doubt D_m = |U_m| sqrt(V_m (1 - V_m)), at least a tenth of |U_m| (D: the group's sum), one member i in
 proportion to what it brings, and a ray finds v_i, whether that is seen. In the mean the guess cancels: the estimate is
-that of tracing every virtual light, whatever the maps show, and its noise is that of what the maps do not know. A tenth
-of the rays that multires_radiosity traces gives its error (below).
+that of tracing every virtual light, whatever the maps show, and its noise is that of what the maps do not know. An
+eighth of the rays that multires_radiosity traces gives its error (below).
 
 The map is a paraboloid's, in the stereographic projection: conformal, one map per half space and a little more. It is
 traced, not rasterised: rays hit walls of two triangles exactly, whose straight edges a paraboloid bends, and the cost
