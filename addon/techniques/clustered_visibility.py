@@ -1,7 +1,7 @@
 """Clustered visibility: all virtual lights shine, some tens of clusters of them cast soft shadows, rays correct those.
 
-    irradiance = sum over clusters m of  V_m U_m    +    sum over groups of clusters of  (D / D_m) (v_i U_m - V_m U_m)
-    U_m = sum over members i of m of  L_i G_i s(d_i)
+    irradiance = sum over clusters m of  V_m U_m   +   sum over groups of them of  (D / D_m) (v_i u_i / p_i - V_m U_m)
+    U_m = sum of u_i,  u_i = L_i G_i s(d_i),  over members i of m
 
 Members are virtual lights (virtual_lights.py); their kernels G, their bound s near surfaces, the short rays that give
 back what the bound takes, and gathering by regions are those of multires_radiosity.py. What differs is visibility. Each
@@ -10,9 +10,9 @@ area light with its members' extent in it: V_m. That alone is the source's metho
 a cluster see, through the gap of a door, all of them light or none.
 
 So the clusters are a guess, a control variate. They are split into `rays` groups; in each, one cluster m is drawn in
-proportion to its doubt D_m = |U_m| sqrt(V_m (1 - V_m)), at least a tenth of |U_m| (D: the group's sum), one member i in
-proportion to what it brings, and a ray finds v_i, whether that is seen. In the mean the guess cancels: the estimate is
-that of tracing every virtual light, whatever the maps show, and its noise is that of what the maps do not know. An
+proportion to its doubt D_m = |U_m| sqrt(V_m (1 - V_m)), at least a tenth of |U_m| (D: the group's sum), one member i by
+the chance p_i = |u_i| / |U_m|, and a ray finds v_i, whether that is seen. In the mean the guess cancels: the estimate
+is that of tracing every virtual light, whatever the maps show, and its noise is that of what the maps do not know. An
 eighth of the rays that multires_radiosity traces gives its error (below).
 
 The map is a paraboloid's, in the stereographic projection: conformal, one map per half space and a little more. It is
