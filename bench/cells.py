@@ -23,8 +23,8 @@ CYCLES_SWEEP = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 EEVEE_SWEEP = (16, 4, 1, 64)  # the first is the one that claims are made about
 # What a page needs at least, and what tells most beyond that: kept the longest when time is short.
 NEEDED, MAIN, EXTRA = range(3)
-NEEDED_SAMPLES = {"CANDELA": (1, 4, 16), "BLENDER_EEVEE": (16, 4, 1), "CYCLES": (1, 4, 16)}
-MAIN_SAMPLES = {"CANDELA": (2, 64), "BLENDER_EEVEE": (), "CYCLES": (2, 64)}
+NEEDED_SAMPLES = {"CANDELA": (1, 4, 16), "BLENDER_EEVEE": (16, 4, 1), "CYCLES": (1, 4, 16, 64)}
+MAIN_SAMPLES = {"CANDELA": (2, 64), "BLENDER_EEVEE": (), "CYCLES": (256,)}
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Series:
 
 
 OWN = Series("Candela", "CANDELA", SWEEP, main=True)
-RAW = Series("Candela, raw", "CANDELA", (4, 8, 16, 32, 64), main=True, values=(("denoise_strength", 0.0),))
+RAW = Series("Candela, raw", "CANDELA", (16, 4, 8, 32, 64), main=True, values=(("denoise_strength", 0.0),))
 PEERS = (
     Series("EEVEE", "BLENDER_EEVEE", EEVEE_SWEEP),
     Series("EEVEE, ray traced", "BLENDER_EEVEE", EEVEE_SWEEP, main=True, ray_traced=True),

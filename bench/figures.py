@@ -2,9 +2,9 @@
 
 Two curves are compared where both have something to say. At equal error: the least error that both reach; how many
 times longer the peer takes for it (a bound, where even the fastest point of one has less error than that). At equal
-time: the time of Candela's 16 samples, or of the peer's fastest picture if that is longer; how many times larger the
-peer's error is. Between measured points both are interpolated on logarithmic axes, along the staircase of points that
-no other point beats in time and error at once.
+time: the time of Candela's 16 samples, at most that of the peer's slowest picture (what it would do with more is not
+known), at least that of the peer's fastest; how many times larger the peer's error is. Between measured points both are
+interpolated on logarithmic axes, along the staircase of points that no other point beats in time and error at once.
 
 An error below the reference's noise is quoted as that noise.
 """
@@ -139,6 +139,7 @@ def against(own: list[Point], peer: list[Point], name: str) -> Against:
     speed_up = seconds_for(peer, error) / seconds_for(own, error)
     bound = ">" if staircase(own)[0].error < error else "<" if staircase(peer)[0].error < error else ""
     middle = next((point.seconds for point in own if point.samples == MIDDLE), own[-1].seconds)
+    middle = min(middle, max(point.seconds for point in peer))
     seconds = max(middle, *(min(point.seconds for point in curve) for curve in (own, peer)))
     return Against(name, speed_up, error, bound, error_after(peer, seconds) / error_after(own, seconds), seconds)
 

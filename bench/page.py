@@ -146,7 +146,8 @@ def claims(results: Results) -> list[str]:
     if gains:
         lost = [(scene, gain) for scene, gain in gains if gain <= 1]
         sentences.append(
-            f"At the time of Candela's {MIDDLE} samples it has less error than Cycles with its denoiser on "
+            f"In equal time, that of Candela's {MIDDLE} samples or of the slowest picture of Cycles with its denoiser "
+            "that was measured, Candela has less error on "
             f"{len(gains) - len(lost)} of {len(gains)} scenes"
             + listed("; not on", [f"{scene} ({times(gain)})" for scene, gain in lost])
             + "."

@@ -28,7 +28,7 @@ from bench.cells import EXTRA, MAIN, NEEDED, NEEDED_SAMPLES, OWN, PEERS, RAW, RO
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
-GUESS = {"CANDELA": (0.5, 0.3), "BLENDER_EEVEE": (8.0, 0.1), "CYCLES": (2.0, 0.06)}  # seconds: fixed, per sample
+GUESS = {"CANDELA": (0.5, 0.3), "BLENDER_EEVEE": (5.0, 0.1), "CYCLES": (2.5, 0.03)}  # seconds: fixed, per sample
 GUESSED_SIZE = 128 * 96  # pixels at which these hold; what is paid per sample grows with the pixels
 OPENING = 4.0  # seconds to start a worker and open a scene
 REFERENCE = 0.015  # seconds of a sample of the reference at that size

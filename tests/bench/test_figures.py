@@ -47,6 +47,13 @@ def test_a_speed_up_is_a_bound_where_the_fastest_point_of_one_beats_the_best_of_
     assert not page.vague(3.0, ">") and not page.vague(0.1, "<") and not page.vague(0.1, "")
 
 
+def test_errors_are_compared_at_a_time_that_both_were_measured_at():
+    short = curve(lambda n: 0.1 / n, lambda n: 0.01 * n, samples=(1, 4, 16))
+    found = against(OWN, short, "")
+    assert found.seconds == pytest.approx(0.16)  # not 1.6 s, of which nobody knows what the peer would make of it
+    assert found.gain == pytest.approx((0.1 / 16) / (0.1 / 1.6))
+
+
 def test_curves_that_cannot_be_compared_give_no_figure():
     assert against(OWN, [], "none").speed_up is None
 

@@ -55,7 +55,7 @@ def test_store_keeps_each_cell_at_once_and_survives_half_a_line(tmp_path):
 
 
 def test_dearest_cells_of_the_lowest_rank_are_left_out():
-    own, ray_traced, main, extra = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 64), cell(CYCLES, 256)
+    own, ray_traced, main, extra = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 256), cell(CYCLES, 128)
     assert [one.rank for one in (own, ray_traced, main, extra)] == [cells.NEEDED, cells.NEEDED, cells.MAIN, cells.EXTRA]
     costs = {own: 1.0, ray_traced: 20.0, main: 8.0, extra: 2.0}
     wanted = list(costs)
