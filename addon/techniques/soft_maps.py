@@ -27,6 +27,9 @@ REFINE = Param(
     "With more samples, each stands for a smaller part of the light, so that the error goes to zero; else every sample "
     "shows the whole light from its middle",
 )  # fmt: skip
+FEWEST_POINTS = (
+    16  # fewer parts that do not tile the light, at points of a low-discrepancy set, are worse than all of it
+)
 LIMIT_TEXTURES = (("FLOAT_2D", "depth_bounds"), ("FLOAT_2D", "depth_limits"))
 LIMIT_CONSTANTS = (("INT", "bounds_rows"), ("INT", "top_level"))
 BOUNDS = tables.PyramidSource(
@@ -51,8 +54,9 @@ class SoftMaps(AccumulatedMaps):
     def cell(self, frame: Frame, number: int, points: float) -> float:
         if not frame.settings.get(self, "refine"):
             return 1.0
-        # What is shown while it grows has `number` + 1 points up to here.
-        return float((points if frame.settings.whole else number + 1) ** -0.5)
+        if not frame.settings.whole:
+            return float((number + 1) ** -0.5)  # what is shown while it grows has `number` + 1 points up to here
+        return float(points**-0.5) if points >= FEWEST_POINTS else 1.0
 
     def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
         """Where the number of points is known and even, parts that tile the light: 2^k points lie in one each."""
@@ -81,7 +85,8 @@ class SoftMaps(AccumulatedMaps):
         return [replace(view, cell=cell) for view in super().views(frame, emitter, sample, number, cell)]
 
     def draw(self, frame: Frame, views: list) -> Maps:
-        key = (frame.geometry.changes, self.resolution(frame), *((view.rows.tobytes(), view.cell) for view in views))
+        seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self))
+        key = (*seen, *((view.rows.tobytes(), view.cell) for view in views))
         compiled = frame.materials.compiled
         varies = any(compiled[draw.material].transparent for draw in frame.geometry.draws)  # alpha is drawn by lot
         if not varies and self._drawn is not None and self._drawn[0] == key:

@@ -88,6 +88,15 @@ def test_sixteen_parts_that_tile_a_light_show_its_penumbra_and_all_of_its_light(
     assert found[expected == 1] == pytest.approx(1.0, abs=2e-4)
 
 
+@pytest.mark.parametrize("name", ["disc", "sphere", "sun"])
+def test_few_samples_of_a_light_that_parts_do_not_tile_leave_no_more_error_than_one(floor, name):
+    kind, settings, source = LIGHTS[name]
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    floor.blocker(*EDGE)
+    expected = expected_visibility(source, [EDGE])
+    assert rms(visibility(floor, source, 4), expected) < PENUMBRA_RMS[name]
+
+
 def test_a_low_bar_hides_the_light_whatever_else_stands_higher(floor):
     """Its shadow is closed, though it is a small part of the window in which the plate's edge is looked for."""
     kind, settings, source = LIGHTS["square"]
