@@ -50,6 +50,17 @@ tracing the same 256 virtual lights, two samples, all pixels, RMS over the mean 
 | door ajar | 49 %, + 9.9 % | 22 %, + 0.2 % | 13 %, + 0.1 % |
 | colonnade | 31 %, - 0.1 % | 21 %, - 0.2 % | 10 %, - 0.2 % |
 | town of instances | 45 %, + 23 % | 15 %, + 0.2 % | 9 %, - 0.2 % |
+
+Beside Cycles' diffuse indirect pass (`python -m bench indirect`; relMSE, and bias at 64 samples), on a software GPU, on
+which the squares of splats are what costs most:
+
+| | 1 sample | 64 samples | instant radiosity: 1, 64 | time by instant radiosity's |
+|---|---|---|---|---|
+| Cornell box | 0.227 | 0.0024, 1.001 | 0.182, 0.0044 | 1.3 |
+| emissive lamp, denoised | 0.048 | 0.0045, 1.002 | 0.045, 0.0048 | 2.3 |
+| window interior | 0.43 | 0.105, 1.057 | 0.54, 0.097, 1.057 | 4.4 |
+
+The window's bias and error are those of the virtual lights.
 """
 
 from __future__ import annotations
