@@ -58,6 +58,7 @@ which the squares of splats are what costs most:
 |---|---|---|---|---|
 | Cornell box | 0.227 | 0.0024, 1.001 | 0.182, 0.0044 | 1.3 |
 | emissive lamp, denoised | 0.048 | 0.0045, 1.002 | 0.045, 0.0048 | 2.3 |
+| sky courtyard, denoised | 0.064 | 0.0029, 1.012 | 0.063, 0.0032 | 3.3 |
 | window interior | 0.43 | 0.105, 1.057 | 0.54, 0.097, 1.057 | 4.4 |
 
 The window's bias and error are those of the virtual lights.
