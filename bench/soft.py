@@ -86,13 +86,14 @@ class Result:
 
 
 def configure(scene, entrant: Entrant) -> None:
-    """Set the scene to the entrant's technique; every light gets one point per sample."""
+    """Set the scene to the entrant's technique; nothing is denoised."""
     settings = scene.candela
     for prop in settings.bl_rna.properties:
         if prop.identifier not in ("rna_type", "name"):
             settings.property_unset(prop.identifier)
     settings.slot_shadow = entrant.technique
     settings.light_probes_maps = entrant.shared
+    settings.denoise_strength = 0.0
     for name, value in entrant.values:
         setattr(settings, f"{entrant.technique}_{name}", value)
 

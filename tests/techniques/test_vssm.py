@@ -21,6 +21,7 @@ def floor(stage):
     stage.camera_above(SPAN)
     stage.scene.candela.slot_shadow = "vssm"
     stage.scene.candela.light_probes_maps = 0.0
+    stage.scene.candela.denoise_strength = 0.0
     return stage
 
 
