@@ -13,6 +13,9 @@ runs through its own texels. Every texel is read twice and written once per axis
 | reads, writes per texel | 4 + 2 W / CHUNK^2, 2 (pyramid: 4/3, 1/3) |
 | bytes per texel | 16 kept and 16 borrowed (pyramid: 4) |
 
+Measured with 1024x1024 RGBA32F on a software GPU, processor time: 94 ms; one thread per row and column 125 ms, doubling
+distances 470 ms. Three times as fast as the simple way is not reached: four reads and two writes of every texel stay.
+
 Source: Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984; the chunks are the scan-then-add of Sengupta et
 al., "Scan primitives for GPU computing", 2007, with texels summed one after another within a thread.
 """
