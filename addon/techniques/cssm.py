@@ -27,8 +27,8 @@ offset (6.4 % of the depth range with order 4, 1.6 % with 16) block in part only
 texels. It goes to zero with order and samples.
 
 Measured, RMS of the visibility on the families of `python -m bench.soft` at 128x96, one map, against 1,024 accumulated
-maps: mean 0.054 (table 0.056; order 4 0.067, 16 0.054; 1 box 0.076, 25 boxes 0.052; 16 samples 0.020; vssm 0.048). The
-order shows where something lies far behind: 0.130, 0.069, 0.064 with 4, 8, 16 terms. A sample at 640x360 takes 1.7
+maps: mean 0.050 (table 0.053; order 4 0.064, 16 0.050; 1 box 0.076, 25 boxes 0.048; 16 samples 0.014; vssm 0.045). The
+order shows where something lies far behind: 0.126, 0.061, 0.057 with 4, 8, 16 terms. A sample at 640x360 takes 1.7
 times the processor time of vssm on a software rasteriser.
 
 Source: Annen, Dong, Mertens, Bekaert, Seidel, Kautz, "Real-time, all-frequency shadows in dynamic scenes", SIGGRAPH
