@@ -55,7 +55,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
         unblocked += light;
         total += luminance(abs(light));
       }
-      if (!(total > 0.0)) {
+      if (!(total > DARK)) {
         continue;
       }
       float doubt;

@@ -45,7 +45,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt)
     float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
     total += kernel * luminance(abs(light.intensity)) * light.shorter;
   }
-  if (!(total > 0.0)) {
+  if (!(total > DARK)) {
     return vec3(0.0);
   }
   float passed = 0.0;

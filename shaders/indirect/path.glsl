@@ -129,7 +129,7 @@ vec3 direct_irradiance(vec3 position, vec3 normal, int rays, float u, uint salt)
   for (int i = 0; i < light_count; i++) {
     total += luminance(abs(unblocked_irradiance(light_read(i), position, normal, direction)));
   }
-  if (!(total > 0.0)) {
+  if (!(total > DARK)) {
     return vec3(0.0);
   }
   vec3 origin = ray_origin(position, normal);

@@ -15,7 +15,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
     total += kernel * luminance(abs(light.intensity));
     unblocked += kernel * light.intensity;
   }
-  if (!(total > 0.0) || rays == 0) {
+  if (!(total > DARK) || rays == 0) {
     return reflected ? unblocked * s.diffuse / PI : unblocked;
   }
   float step_size = total / float(rays);

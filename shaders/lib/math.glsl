@@ -1,5 +1,6 @@
 // Guards that stand where the singularities are, and small geometry.
 #define PI 3.14159265358979
+#define DARK 1e-30  // light below this is none: what shares it out would leave the range of float32
 
 vec3 safe_normalize(vec3 v)
 {

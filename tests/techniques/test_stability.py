@@ -165,6 +165,7 @@ GEOMETRY = {
     **{f"moved by {d:g}": (lambda r, d=d: r.move((d, -d, d / 2))) for d in (1e3, 1e5, 1e7)},
 }
 LIGHTS = {
+    "power 1e-20 in the dark": lambda r: (r.world_color((0, 0, 0)), r.every_light(energy=1e-20)),
     **{f"power {p:g}": (lambda r, p=p: r.every_light(energy=p)) for p in (0.0, 1e-20, 1e12)},
     **{
         f"size {s:g}": (lambda r, s=s: r.every_light(shadow_soft_size=s, size=s, angle=min(s, np.pi)))
