@@ -36,6 +36,7 @@ vec3 traced_member(Cluster c, Surface s, vec3 origin, float total, float u, uint
 vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, float u, uint salt)
 {
   vec3 sum = vec3(0.0);
+  bool takes_light = false;  // lamps of negative power
   int groups = clamp(rays, 1, max(cluster_count, 1));
   for (int group = 0; group < groups; group++) {
     // Of a group of clusters one is corrected, drawn while they pass in proportion to what may be wrong.
@@ -61,6 +62,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       float doubt;
       vec3 guess = unblocked * cluster_visibility(c, s.position, s.geometric_normal, doubt);
       sum += guess;
+      takes_light = takes_light || any(lessThan(unblocked, vec3(0.0)));
       doubt = total * max(doubt, LEAST_DOUBT);
       doubts += doubt;
       roll = hash3(roll);
@@ -76,5 +78,6 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       sum += (light - guess_of_picked) * (doubts / doubt_of_picked);
     }
   }
+  sum = takes_light ? sum : max(sum, vec3(0.0));  // where rays take more than the guesses gave
   return reflected ? sum * s.diffuse / PI : sum;
 }

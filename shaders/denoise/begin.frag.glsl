@@ -28,7 +28,6 @@ void main()
   if (!shown_at(pixel, here) || !colored) {
     return;
   }
-  float pixel_size = pixel_size_at(here.position);
   float sum = 0.0;
   float weights = 0.0;
   for (int y = -1; y <= 1; y++) {
@@ -36,7 +35,7 @@ void main()
       ivec2 place = clamp(pixel + ivec2(x, y), ivec2(0), size - 1);
       Shown there;
       if (shown_at(place, there)) {
-        float weight = alike(here, there, pixel_size, 1);
+        float weight = alike(here, there, 1);
         sum += weight * half_difference(place, texelFetch(sum_now, place, 0).rgb);
         weights += weight;
       }

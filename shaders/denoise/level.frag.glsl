@@ -1,11 +1,19 @@
 // One level of the edge-avoiding wavelet: 5x5 pixels `stride` apart, of those that show the same surface and differ by
-// what their variances explain. Carries the variance of what comes out.
+// what their variances explain. Pairs of pixels exchange light: what one gives the other takes, so none is lost, however
+// skewed the noise is. Carries the variance of what comes out.
 #include "denoise/alike.glsl"
 #include "lib/math.glsl"
 
 const float BINOMIAL[3] = float[3](6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0);
-const float UNSEEN = 0.004;   // a standard error below this share of the light is left as it is
-const float EQUAL = 0.01;     // shares of the light by which pixels may differ in any case
+const float UNSEEN = 0.004;  // a standard error below this share of the light is left as it is
+const float EQUAL = 0.01;    // share of the light by which pixels may differ in any case
+
+// Whether a pixel's noise is worth an exchange.
+bool noisy(vec4 light)
+{
+  float least = UNSEEN * luminance(light.rgb);
+  return light.a > least * least;
+}
 
 void main()
 {
@@ -13,34 +21,33 @@ void main()
   ivec2 size = textureSize(light_in, 0);
   vec4 own = texelFetch(light_in, pixel, 0);
   out_light = own;
-  float bright = luminance(own.rgb);
   Shown here;
-  if (own.a <= UNSEEN * UNSEEN * bright * bright || !shown_at(pixel, here)) {
+  if (!noisy(own) || !shown_at(pixel, here)) {
     return;
   }
-  float pixel_size = pixel_size_at(here.position);
-  vec3 sum = vec3(0.0);
+  float bright = luminance(own.rgb);
+  vec3 taken = vec3(0.0);
   float weights = 0.0;
   float variance = 0.0;
   for (int y = -2; y <= 2; y++) {
     for (int x = -2; x <= 2; x++) {
       ivec2 place = pixel + ivec2(x, y) * stride;
-      if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, size))) {
+      if ((x == 0 && y == 0) || any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, size))) {
         continue;
       }
       vec4 light = texelFetch(light_in, place, 0);
       Shown there;
-      if (light.a < 0.0 || !shown_at(place, there)) {
+      if (!noisy(light) || !shown_at(place, there)) {
         continue;
       }
-      float difference = luminance(light.rgb) - bright;
-      float allowed = 0.5 * tolerance * tolerance * (own.a + light.a) + EQUAL * EQUAL * bright * bright;
-      float weight = BINOMIAL[abs(x)] * BINOMIAL[abs(y)] * alike(here, there, pixel_size, max(abs(x), abs(y)) * stride)
-                     * exp(-difference * difference / max(allowed, 1e-37));
-      sum += weight * light.rgb;
+      float other = luminance(light.rgb);
+      float allowed = 0.5 * tolerance * tolerance * (own.a + light.a) + EQUAL * EQUAL * abs(bright * other);
+      float weight = BINOMIAL[abs(x)] * BINOMIAL[abs(y)] * alike(here, there, max(abs(x), abs(y)) * stride)
+                     * exp(-(other - bright) * (other - bright) / max(allowed, 1e-37));
+      taken += weight * (light.rgb - own.rgb);
       weights += weight;
       variance += weight * weight * light.a;
     }
   }
-  out_light = (weights > 0.0) ? vec4(sum / weights, variance / (weights * weights)) : own;
+  out_light = vec4(own.rgb + taken, variance + (1.0 - weights) * (1.0 - weights) * own.a);
 }

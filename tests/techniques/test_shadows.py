@@ -13,6 +13,8 @@ EVERYWHERE = 9.0
 
 @pytest.fixture
 def floor(stage):
+    """A white floor seen from above. Shadows as they are summed up, not denoised."""
+    stage.scene.candela.denoise_strength = 0.0
     stage.floor()
     stage.camera_above(SPAN)
     return stage
@@ -210,6 +212,7 @@ def test_a_smooth_sphere_is_lit_up_to_its_terminator(stage):
     import bmesh
     import bpy
 
+    stage.scene.candela.denoise_strength = 0.0
     data, shape = bpy.data.meshes.new("Sphere"), bmesh.new()
     bmesh.ops.create_icosphere(shape, subdivisions=5, radius=1.5)
     for face in shape.faces:
