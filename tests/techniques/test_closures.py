@@ -2,6 +2,7 @@
 
 import itertools
 
+import bpy
 import numpy as np
 import pytest
 
@@ -99,7 +100,9 @@ def test_closures_in_a_white_furnace_have_cycles_albedo(stage, degrees):
         assert a == pytest.approx(b, abs=0.01 * b.max() + 1e-3), name
     # Cycles leaves out of the colour of glass what it scatters more than once. The colours of emission below layers are
     # means over few random layers; that of the conductor is its reflectance at this angle, ours a mean over the lobe.
-    for color, tolerance in (("diffuse_color", 3e-3), ("glossy_color", 2.5e-2), ("transmission_color", 4e-2)):
+    # In 4.5 and 5.0 its colour of rough glass is darker still at the horizon, at the same light.
+    of_glass = 4e-2 if bpy.app.version > (5, 1) else 8e-2
+    for color, tolerance in (("diffuse_color", 3e-3), ("glossy_color", 2.5e-2), ("transmission_color", of_glass)):
         for name, a, b in zip(wanted, means(ours, color), means(cycles, color), strict=True):
             if name not in ("emission below layers", "conductor"):
                 assert a == pytest.approx(b, abs=tolerance), (name, color)
