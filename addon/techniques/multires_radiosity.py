@@ -39,18 +39,15 @@ from functools import cache
 
 import numpy as np
 
-from ..frame import acceleration
 from ..frame.run import Frame
-from ..frame.settings import Settings
-from ..frame.technique import Param, Technique
+from ..frame.technique import Param
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..snapshot.scene import Snapshot
-from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, INDIRECT_WRITES, gather_bindings, no_indirect_light
+from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings
 from .neighbours import smooth
-from .surfaces import SURFACES, surface_bindings
-from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLights, VirtualLightSet
+from .surfaces import surface_bindings
+from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 
 LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.1  # ranges within a region: share of its depth, and of each axis of unit normals
@@ -112,10 +109,9 @@ GATHER_SHARED = passes.fullscreen_program(
 )
 
 
-class MultiresRadiosity(Technique):
+class MultiresRadiosity(InstantRadiosity):
     name = "multires_radiosity"
     label = "Multi-resolution radiosity"
-    slot = "indirect"
     params = (
         Param(
             "virtual_lights", "Virtual lights", 1024, "Points of surfaces that light the picture in a sample", 1, 2048,
@@ -127,14 +123,6 @@ class MultiresRadiosity(Technique):
         ),
         LEVELS,
     )  # fmt: skip
-    reads = SURFACES
-    writes = INDIRECT_WRITES
-
-    def __init__(self):
-        self.virtual_lights = VirtualLights()
-
-    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
 
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
@@ -214,9 +202,6 @@ class MultiresRadiosity(Technique):
         if coarser is not None:
             images.pool.give(coarser)
         return found
-
-    def release(self) -> None:
-        self.virtual_lights.release()
 
 
 def _level_size(size: tuple[int, int], level: int, levels: int) -> tuple[int, int]:

@@ -125,20 +125,27 @@ vec3 lobe_reflection(Lobe lobe, vec3 light_world, out float pdf)
   return lobe.scale * fresnel * (facet / (1.0 + lambda_view + lambda_light));
 }
 
-// A direction in world space drawn from the lobe by visible normals (Dupuy & Benyoub 2023, spherical caps), and
-// `weight` = f * cos / pdf for it. Zero weight where it would go below the surface.
+// A microfacet's normal among those that `view` sees, all in the frame of the surface (Dupuy & Benyoub 2023, spherical
+// caps).
+vec3 visible_normal(vec3 view, vec2 alpha, vec2 u)
+{
+  vec3 stretched = safe_normalize(vec3(alpha * view.xy, view.z));
+  float phi = 2.0 * PI * u.x;
+  float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
+  float r = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+  vec3 cap = vec3(r * cos(phi), r * sin(phi), z) + stretched;
+  return safe_normalize(vec3(alpha * cap.xy, max(cap.z, 1e-7)));
+}
+
+// A direction in world space drawn from the lobe by visible normals, and `weight` = f * cos / pdf for it. Zero weight
+// where it would go below the surface.
 vec3 lobe_sample(Lobe lobe, vec2 u, out vec3 weight)
 {
   vec3 view = lobe.view;
   vec3 h = vec3(0.0, 0.0, 1.0);
   bool mirror = lobe_is_mirror(lobe);
   if (!mirror) {
-    vec3 stretched = safe_normalize(vec3(lobe.alpha * view.xy, view.z));
-    float phi = 2.0 * PI * u.x;
-    float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-    float r = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
-    vec3 cap = vec3(r * cos(phi), r * sin(phi), z) + stretched;
-    h = safe_normalize(vec3(lobe.alpha * cap.xy, max(cap.z, 1e-7)));
+    h = visible_normal(view, lobe.alpha, u);
   }
   vec3 light = 2.0 * dot(view, h) * h - view;
   weight = vec3(0.0);

@@ -94,7 +94,7 @@ vec3 interface_value(Interface surface, vec3 light_world, out float density)
   return color * (facet / (1.0 + lambda_view + ggx_lambda(light, alpha)));
 }
 
-// A direction drawn from the interface by visible normals (as lobe_sample), mirrored or bent by `choice`; `weight` =
+// A direction drawn from the interface by visible normals, mirrored or bent by `choice`; `weight` =
 // f |cos| / density for it. Zero weight where it would leave on the wrong side.
 vec3 interface_sample(Interface surface, vec2 u, float choice, out vec3 weight)
 {
@@ -102,12 +102,7 @@ vec3 interface_sample(Interface surface, vec2 u, float choice, out vec3 weight)
   vec3 h = vec3(0.0, 0.0, 1.0);
   bool smooth_surface = interface_is_smooth(surface);
   if (!smooth_surface) {
-    vec3 stretched = safe_normalize(vec3(surface.alpha * view.xy, view.z));
-    float phi = 2.0 * PI * u.x;
-    float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-    float r = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
-    vec3 cap = vec3(r * cos(phi), r * sin(phi), z) + stretched;
-    h = safe_normalize(vec3(surface.alpha * cap.xy, max(cap.z, 1e-7)));
+    h = visible_normal(view, vec2(surface.alpha), u);
   }
   float view_h = dot(view, h);
   vec3 mirrored = interface_reflectance(surface, view_h);

@@ -50,11 +50,8 @@ void main()
 {
   out_arriving = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
-    return;
-  }
-  Surface s = SURFACE_READ(pixel);
-  if (max_component(s.diffuse) <= 0.0) {
+  Surface s;
+  if (!diffuse_surface(pixel, s)) {
     return;
   }
   vec2 turn = tile_numbers(pixel, film_view.bits_x, film_view.bits_y);

@@ -15,6 +15,13 @@
 #include "lib/brdf.glsl"
 #include "lib/random.glsl"
 
+// Whether a pixel shows a surface with a diffuse closure, which is then read.
+bool diffuse_surface(ivec2 pixel, out Surface s)
+{
+  s = SURFACE_READ(pixel);
+  return s.hit && max_component(s.diffuse) > 0.0;
+}
+
 struct Fan {
   vec3 origin;
   vec3 toward;     // unit, to the viewer

@@ -79,6 +79,17 @@ class Stage:
             setattr(data, name, value)
         return self.link(kind, data, location, turn, scale)
 
+    def enlarge(self, scale):
+        """All that stands in the scene, `scale` times as large and as far apart; powers stay."""
+        for placed in self.scene.objects:
+            placed.location *= scale
+            if placed.type == "LIGHT":
+                placed.data.shadow_soft_size *= scale
+            elif placed.type == "MESH":
+                placed.scale *= scale
+            else:
+                placed.data.clip_start, placed.data.clip_end = 0.01 * scale, 100 * scale
+
     def camera_above(self, span=4.0, height=10.0):
         """An orthographic camera that looks down on `span` metres around the origin, +Y up."""
         data = bpy.data.cameras.new("Camera")

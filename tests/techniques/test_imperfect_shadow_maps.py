@@ -163,14 +163,7 @@ def test_maps_do_not_depend_on_the_scale_of_the_scene(stage, render, scale):
         stage.clear()
         corner(stage, energy=60.0 * scale**2)
         shelf(stage, side=24, material=stage.diffuse(0.2))
-        for placed in stage.scene.objects:
-            placed.location *= scale
-            if placed.type == "LIGHT":
-                placed.data.shadow_soft_size *= scale
-            elif placed.type == "MESH":
-                placed.scale *= scale
-            else:
-                placed.data.clip_start, placed.data.clip_end = 0.01 * scale, 100 * scale
+        stage.enlarge(scale)
         return render(2, points=256)
 
     assert error(room(scale), room(1.0))[1] == pytest.approx(0.0, abs=0.02)

@@ -122,14 +122,7 @@ def test_light_does_not_depend_on_the_scale_of_the_scene(stage, render, scale):
     unit = render(3, samples=8)["diffuse_indirect"]
     stage.clear()
     corner(stage, energy=60.0 * scale**2)
-    for placed in stage.scene.objects:
-        placed.location *= scale
-        if placed.type == "LIGHT":
-            placed.data.shadow_soft_size *= scale
-        elif placed.type == "MESH":
-            placed.scale *= scale
-        else:
-            placed.data.clip_start, placed.data.clip_end = 0.01 * scale, 100 * scale
+    stage.enlarge(scale)
     scaled = render(3, samples=8)["diffuse_indirect"]
     assert scaled.mean() == pytest.approx(unit.mean(), rel=0.02)
 
