@@ -80,7 +80,7 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
 
 
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
-BASIS_ROWS, BASIS_COLUMNS = tables.table_programs(_basis(8, TABLE).source)  # chunk sums and scan of each
+BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
 LOOKUPS = tuple(lighting(_lookup(8, prefilter, 4), False) for prefilter, _, _ in PREFILTERS)
 
 

@@ -85,7 +85,7 @@ def _lookup(rule: str, cells: int) -> Lookup:
 
 
 LOOKUPS = tuple(lighting(_lookup(rule, 5), False) for rule, _, _ in RULES)
-MOMENT_ROWS, MOMENT_COLUMNS = tables.table_programs(MOMENTS)  # chunk sums and scan of each
+MOMENT_VALUES = tables.values_program(MOMENTS)
 
 
 class VarianceSoftShadows(SoftMaps):
