@@ -4,12 +4,13 @@
 def register():
     """Called by Blender when the extension is enabled."""
     from . import cli, engine
-    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
+    from .ui import compare_editor, jobs, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
 
     pass_tree.register()
     properties.register()
     engine.register()
     pass_run.register()
+    jobs.register()
     quality.register()
     panels.register()
     tuning.register()
@@ -21,7 +22,7 @@ def register():
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
     from . import cli, engine
-    from .ui import compare_editor, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
+    from .ui import compare_editor, jobs, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
 
     cli.unregister()
     compare_editor.unregister()
@@ -29,6 +30,7 @@ def unregister():
     tuning.unregister()
     panels.unregister()
     quality.unregister()
+    jobs.unregister()
     pass_run.unregister()
     engine.unregister()
     properties.unregister()

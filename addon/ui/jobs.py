@@ -25,7 +25,8 @@ class Job:
     """Base of operators whose work is the generator `work(context)`.
 
     It yields (share done, sentence) and may end early with a ValueError or RuntimeError, which becomes a report. What
-    it holds must be given back in a `finally`: on Esc it is closed. One job runs at a time.
+    it holds must be given back in a `finally`: on Esc it is closed, and before an undo, which frees the data-blocks that
+    the work refers to. One job runs at a time.
     """
 
     running: Job | None = None
@@ -51,7 +52,7 @@ class Job:
         if bpy.app.background:
             return self.execute(context)
         Job.running, Job.progress = self, (0.0, "")
-        self._work = self.work(context)
+        self._work, self._undone = self.work(context), False
         self._timer = context.window_manager.event_timer_add(TICK_S, window=context.window)
         context.window_manager.progress_begin(0, 100)
         context.window_manager.modal_handler_add(self)
@@ -65,6 +66,10 @@ class Job:
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
+        if self._undone:
+            self._end(context)
+            self.report({"WARNING"}, f"{self.bl_label} was cancelled, because its scene was undone or redone.")
+            return {"CANCELLED"}
         try:
             share, sentence = next(self._work)
             context.window_manager.progress_update(100 * share)
@@ -79,6 +84,10 @@ class Job:
             self._end(context)
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        except ReferenceError:
+            self._end(context)
+            self.report({"ERROR"}, f"{self.bl_label} was cancelled, because what it works on was deleted.")
+            return {"CANCELLED"}
         except BaseException:
             self._end(context)
             raise
@@ -88,6 +97,11 @@ class Job:
         """Blender ends the operator: the window is closed or another file is opened."""
         self._work.close()
         Job.running = None
+
+    def before_undo(self) -> None:
+        """Give up what the work refers to, while it is there; the operator ends with its next event."""
+        self._work.close()
+        self._undone = True
 
     def _end(self, context) -> None:
         Job.running = None
@@ -111,3 +125,19 @@ def _redraw(context) -> None:
         for area in window.screen.areas:
             if area.type in ("NODE_EDITOR", "IMAGE_EDITOR", "PROPERTIES"):
                 area.tag_redraw()
+
+
+@bpy.app.handlers.persistent
+def _before_undo(*_) -> None:
+    if Job.running is not None:
+        Job.running.before_undo()
+
+
+def register() -> None:
+    bpy.app.handlers.undo_pre.append(_before_undo)
+    bpy.app.handlers.redo_pre.append(_before_undo)
+
+
+def unregister() -> None:
+    bpy.app.handlers.redo_pre.remove(_before_undo)
+    bpy.app.handlers.undo_pre.remove(_before_undo)

@@ -26,8 +26,15 @@ def write(name: str, picture: np.ndarray):
 
 
 def show(context, name: str, picture: np.ndarray):
-    """Write the image and show it in every Image Editor of the window that shows nothing else of the artist's."""
+    """Write the image and show it in every Image Editor of the window that shows nothing else of the artist's.
+
+    A new image is a step of its own for undo, since it may come long after the operator that wanted it has been called.
+    A data-block that no step knows of would be freed by the next undo under those that point to it.
+    """
+    made = name not in bpy.data.images
     image = write(name, picture)
+    if made:
+        bpy.ops.ed.undo_push(message=f"Show {name}")
     window = context.window
     for area in window.screen.areas if window is not None else ():
         space = area.spaces.active

@@ -1,9 +1,12 @@
 """Runs inside a windowed Blender: a seeded random walk of edits, undo, views, modes, engines and renders.
 
-    blender FILE.blend --python stroll.py -- SECONDS FOLDER
+    blender FILE.blend --python stroll.py -- SECONDS [STEP ...] FOLDER
 
 Each step is one thing that an artist may do at any time, without waiting for the viewport to be ready. Memory is noted
-at every rest that the walk comes to.
+at every rest that the walk comes to. With names of steps the walk keeps to those.
+
+What a button does Blender keeps for undo by itself; what a script does it does not, and an undo past a data-block that
+no step knows of frees it under its users: Blender then crashes, with any engine. So every edit here ends with a step.
 """
 
 import random
@@ -29,7 +32,8 @@ from stage import (
     window,
 )
 
-SECONDS = float(sys.argv[-2])
+SECONDS, *ONLY = sys.argv[sys.argv.index("--") + 1 : -1]
+SECONDS = float(SECONDS)
 SEED = 6
 MEASURE_EVERY_S = 15.0
 dice = random.Random(SEED)
@@ -109,12 +113,13 @@ def redo():
 
 def edit_mode():
     thing = one("MESH")
-    if thing is None or thing.name not in window().view_layer.objects or not thing.visible_get():
-        return
-    window().view_layer.objects.active = thing
     with there():
-        if bpy.ops.object.mode_set.poll():
-            bpy.ops.object.mode_set(mode="EDIT" if bpy.context.mode == "OBJECT" else "OBJECT")
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        elif thing is not None and thing.name in window().view_layer.objects and thing.visible_get():
+            window().view_layer.objects.active = thing
+            bpy.ops.object.mode_set(mode="EDIT")
+    push("mode")
 
 
 def turn_view():
@@ -129,12 +134,14 @@ def shading():
 
 def engine():
     window().scene.render.engine = dice.choice(("BLENDER_WORKBENCH", ENGINE, ENGINE))
+    push("engine")
 
 
 def settings():
     candela = window().scene.candela
     candela.seed = dice.randrange(4)
     candela.viewport_samples = dice.choice((1, 2, 4))
+    push("settings")
 
 
 def frame():
@@ -145,6 +152,7 @@ def border():
     scene = window().scene
     scene.render.use_border = not scene.render.use_border
     scene.render.border_min_x, scene.render.border_max_x = 0.2, dice.uniform(0.3, 1.0)
+    push("border")
 
 
 def tree():
@@ -154,17 +162,29 @@ def tree():
     elif window().scene.camera is not None:
         with there():
             bpy.ops.candela.passes_from_auto()
+    push("tree")
+
+
+def run_tree():
+    """Starts the job; what comes next, undo among it, comes while it runs."""
+    tree = window().scene.candela.pass_tree
+    if tree is not None and window().scene.camera is not None:
+        tree.samples, tree.percentage = 2, 100
+        push("samples")
+        with there():
+            if bpy.ops.candela.passes_run.poll():
+                bpy.ops.candela.passes_run("INVOKE_DEFAULT")
 
 
 STEPS = (
     *(move_object, change_light, change_material, add_object, delete_object, undo, undo, redo, edit_mode, turn_view),
-    *(turn_view, shading, engine, settings, frame, border, tree),
+    *(turn_view, shading, engine, settings, frame, border, tree, run_tree),
 )
+CHOSEN = [step for step in STEPS if step.__name__ in ONLY or not ONLY]
 
 
 def steps():
-    show()
-    yield from wait_for_rest()
+    yield from rest()
     started = measured = time.monotonic()
     while time.monotonic() - started < SECONDS:
         if dice.random() < 0.03:
@@ -172,25 +192,26 @@ def steps():
             ended = yield from render()
             result.setdefault("renders", []).append(ended)
         else:
-            step = dice.choice(STEPS)
+            step = dice.choice(CHOSEN)
             count(step.__name__)
             step()
         yield dice.choice((0.01, 0.05, 0.2, 0.5))
         if time.monotonic() - measured > MEASURE_EVERY_S:
-            with there():
-                if bpy.context.mode != "OBJECT":
-                    bpy.ops.object.mode_set(mode="OBJECT")
-            show()
-            yield from wait_for_rest()
+            yield from rest()
             result["memory_mib"].append(resident_mib())
             measured = time.monotonic()
+    yield from rest()
+    result["viewports"] = len(viewports())
+    picture("strolled.png")
+
+
+def rest():
     with there():
         if bpy.context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
     show()
+    push("rest")
     yield from wait_for_rest()
-    result["viewports"] = len(viewports())
-    picture("strolled.png")
 
 
 def count(name):
