@@ -287,6 +287,7 @@ def changed(engine, context, depsgraph) -> None:
     viewport.error = ""
     if viewport.frame is not None:
         viewport.cache.invalidate(depsgraph.updates)
+    engine.tag_redraw()  # Blender draws again after an artist's change, not after one by a script
 
 
 def draw(engine, context, depsgraph) -> None:

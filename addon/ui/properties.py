@@ -12,9 +12,19 @@ from .pass_tree import TREE, order_of
 PREVIEW_SAMPLES = 8  # of material icons, which are drafts
 
 
+def _redraw(group, context) -> None:
+    """Tell Blender that the scene differs, whoever has changed it.
+
+    A button's change does so by itself. One by a script does not, for a property that an extension declares and that has
+    no `update`: the picture in the viewport would stay as it is until something else changes.
+    """
+    group.id_data.update_tag()
+
+
 def _property(param: Param, **changes):
     """A bpy property for a declared parameter."""
-    common = {"name": param.label, "description": param.description, "default": param.default, **changes}
+    common = {"name": param.label, "description": param.description, "default": param.default, "update": _redraw}
+    common |= changes
     if isinstance(param.default, bool):
         return bpy.props.BoolProperty(**common)
     if isinstance(param.default, str):
@@ -57,12 +67,16 @@ def _annotations() -> dict:
         "bounces": _property(BOUNCES),
     }
     out["pass_tree"] = bpy.props.PointerProperty(
-        type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE,
+        type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE, update=_redraw,
         description="Render the passes of this tree; without one, Candela chooses them by slot and scene",
     )  # fmt: skip
     for slot in slots():
         out[f"slot_{slot}"] = bpy.props.EnumProperty(
-            name=slot.capitalize(), description=f"Technique for the {slot} slot", items=_slot_items(slot), default=AUTO
+            name=slot.capitalize(),
+            description=f"Technique for the {slot} slot",
+            items=_slot_items(slot),
+            default=AUTO,
+            update=_redraw,
         )
     for technique in REGISTRY:
         for param in technique.params:

@@ -9,6 +9,7 @@ from addon.frame import ledger
 from addon.snapshot.scene import Note
 from addon.techniques import REGISTRY
 from addon.ui import ENGINE, blender_panels, notes, panels
+from addon.ui.pass_tree import TREE
 from addon.ui.passes import PASSES, wanted_passes
 from addon.ui.properties import identifier, slots
 
@@ -221,3 +222,30 @@ def test_every_setting_has_a_tooltip_and_can_be_keyframed(scene):
     scene.candela.keyframe_insert("samples", frame=9)
     scene.frame_set(9)
     assert scene.candela.samples == 7
+
+
+def test_a_setting_that_a_script_changes_is_a_change_of_the_scene(scene):
+    """So that the viewport draws it; a button's change is one anyway."""
+    tree = bpy.data.node_groups.new("Passes", TREE)
+    settings, told = scene.candela, []
+
+    def note(scene, depsgraph):
+        told.extend(update.id.original for update in depsgraph.updates)
+
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        for declared in settings.bl_rna.properties:
+            if declared.identifier in ("rna_type", "name"):
+                continue
+            bpy.context.view_layer.update()
+            told.clear()
+            value = tree if declared.type == "POINTER" else getattr(settings, declared.identifier)
+            setattr(settings, declared.identifier, value)
+            bpy.context.view_layer.update()
+            assert scene in told, declared.identifier
+        told.clear()
+        tree.nodes.new("CandelaPass_film")
+        bpy.context.view_layer.update()
+        assert tree in told
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)

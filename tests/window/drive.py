@@ -121,7 +121,6 @@ def orbit(bounces):
     candela().draw = timed
     settings.bounces = bounces
     while viewports()[0].frame.settings.bounces == 0 or viewports()[0].frame.samples_done == 0:
-        viewport_area().tag_redraw()  # a value that a script sets redraws nothing by itself
         yield 0.1  # programs of indirect light are compiled once
     took.clear(), scales.clear()
     started = time.monotonic()

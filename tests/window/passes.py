@@ -78,6 +78,36 @@ def steps():
     yield 0.5
     yield from wait_for_rest()
     result["viewport"] = viewports()[0].status()
+    yield from changes_by_a_script(window().scene)
+    yield from undo_while_it_runs(upper)
+
+
+def changes_by_a_script(scene):
+    """Each is drawn, without anything else that happens in the window."""
+    scene.candela.seed = 3
+    yield 0.5
+    yield from wait_for_rest()
+    result["seed_drawn"] = viewports()[0].frame.settings.seed
+    glossy = next(one for one in scene.candela.pass_tree.nodes if one.technique == "traced_glossy")
+    glossy.mute = True
+    yield 0.5
+    yield from wait_for_rest()
+    result["muted_drawn"] = "traced_glossy" in viewports()[0].frame.settings.passes
+
+
+def undo_while_it_runs(area):
+    scene = window().scene
+    with there(area):
+        scene.objects["Knot"].location.x += 1.0
+        bpy.ops.ed.undo_push(message="moved")
+        bpy.ops.candela.passes_run("INVOKE_DEFAULT")
+    while jobs.Job.running is not None and jobs.Job.progress[0] == 0.0:
+        yield 0.05
+    result["running_before_undo"] = jobs.Job.running is not None
+    with there(area):
+        bpy.ops.ed.undo()
+    yield 0.5
+    result["running_after_undo"] = jobs.Job.running is not None
 
 
 def job(name, area, operator):

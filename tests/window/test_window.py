@@ -238,6 +238,18 @@ def test_pass_tree_is_made_run_and_compared_in_the_window(passed):
     assert result["viewport"].startswith("Sample 4 of 4")
 
 
+def test_viewport_draws_what_a_script_changes(passed):
+    _, result = passed
+    assert result["seed_drawn"] == 3
+    assert not result["muted_drawn"]
+
+
+def test_undo_ends_a_job(passed):
+    """Its references would outlive what they refer to."""
+    _, result = passed
+    assert result["running_before_undo"] and not result["running_after_undo"]
+
+
 @pytest.fixture(scope="module", params=BACKENDS)
 def toured(request, installed):
     """What a new user tries."""
