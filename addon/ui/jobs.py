@@ -25,8 +25,8 @@ class Job:
     """Base of operators whose work is the generator `work(context)`.
 
     It yields (share done, sentence) and may end early with a ValueError or RuntimeError, which becomes a report. What
-    it holds must be given back in a `finally`: on Esc it is closed, and before an undo, which frees the data-blocks that
-    the work refers to. One job runs at a time.
+    it holds must be given back in a `finally`: on Esc it is closed, and before an undo, which may free the data-blocks
+    that the work refers to. One job runs at a time.
     """
 
     running: Job | None = None

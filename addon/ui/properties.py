@@ -15,8 +15,8 @@ PREVIEW_SAMPLES = 8  # of material icons, which are drafts
 def _redraw(group, context) -> None:
     """Tell Blender that the scene differs, whoever has changed it.
 
-    A button's change does so by itself. One by a script does not, for a property that an extension declares and that has
-    no `update`: the picture in the viewport would stay as it is until something else changes.
+    A button's change does so by itself. A script's does not where an extension declares the property without `update`:
+    the picture in the viewport would stay as it is until something else changes.
     """
     group.id_data.update_tag()
 
