@@ -19,9 +19,9 @@ is right); a receiver that no fitted view contains counts as lit.
 
 Bias: none for the diffuse path. On soft-edged point and spot lights the depth map is drawn from a point in the ball
 while light arrives from its projection onto the disc that faces the receiver (as in Cycles): the difference is of
-the order of (radius / distance)^2, and direct_light traces rays instead where that is more than 1/16. Where a light
-brings less than `cutoff` of the picture's median light, it is left unshadowed: at most that share of light too much,
-for views and casters that a picture with many lights need not draw.
+the order of (radius / distance)^2; where that is more than 1/16, direct_light traces rays. Where a light brings less
+than `cutoff` of the picture's median light, it is left unshadowed: at most that share of light too much, for views and
+casters that a picture with many lights need not draw.
 """
 
 from __future__ import annotations

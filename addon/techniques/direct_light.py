@@ -17,7 +17,7 @@ chance (systematic sampling); every light keeps a minimum chance.
 | passes | 1 over the screen per round of lights (a round fills the depth-map atlas) |
 | fetches per pixel | 6 surface + per light: 5 to 8 list, 4 to 6 shadow |
 
-A round light whose radius is more than a quarter of its distance to what is seen has its visibility from rays.
+Where the radius of a round light is more than a quarter of its distance, its visibility comes from rays.
 
 Bias: none that remains as samples grow. A point that stands for an area a of its light gives a receiver nearer than
 sqrt(a / pi) no more than at that distance: otherwise single points beside a surface would outshine the whole light.
@@ -50,30 +50,36 @@ TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
 # A point of a round light is drawn in its ball; the light arrives from the ball's projection towards the receiver.
 # A map from the point shows what blocks the light as long as the ball is small beside its distance.
 NEAR = 0.25  # radius / distance from which rays are traced instead
-RAYS = Lookup(
-    "rays",
-    "light/ray_visibility.glsl",
+RAYS_WHERE_NEAR = Lookup(
+    "rays where near",
+    "light/near_visibility.glsl",
     textures=(("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves")),
-    constants=(("INT", "trace_levels"), ("FLOAT", "offset_size")),
+    constants=(("INT", "trace_levels"), ("FLOAT", "offset_size"), ("FLOAT", "near_share")),
 )
 
 
 @cache
-def lighting(lookup: Lookup, soft_lobes: bool) -> Program:
-    """The lighting pass with the visibility of a technique, for scenes with or without soft lobes."""
+def lighting(lookup: Lookup, soft_lobes: bool, features: int = -1) -> Program:
+    """The lighting pass with the visibility of a technique, for scenes with or without soft lobes, and for lights of
+    these features (lights.features; -1: any light)."""
     return passes.fullscreen_program(
         f"direct light, {lookup.name}",
         "light/direct.frag.glsl",
         textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"), *lookup.textures),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
         constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
-        defines=(*TRACED_DEFINES, *SOFT_DEFINES[soft_lobes], *lookup.defines),
+        defines=(
+            *TRACED_DEFINES,
+            *SOFT_DEFINES[soft_lobes],
+            *lookup.defines,
+            ("LIGHT_FEATURES", str(features)),
+        ),
         snippets=(("generated/visibility", f'#include "{lookup.file}"\n'),),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
     )
 
 
-LIGHTING = tuple(lighting(lookup, soft_lobes) for lookup in (HARD, RAYS) for soft_lobes in (False, True))
+LIGHTING = tuple(lighting(lookup, soft_lobes) for lookup in (HARD, RAYS_WHERE_NEAR) for soft_lobes in (False, True))
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
     Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
@@ -81,9 +87,10 @@ DIRECT_WRITES = (
 
 
 def shade(
-    frame: Frame, technique: Technique, rows: list[np.ndarray], sources: lights.Sources, maps: Maps
+    frame: Frame, technique: Technique, rows: list[np.ndarray], features: int, sources: lights.Sources, maps: Maps
 ) -> Iterator[None]:
-    """Add the light of `rows` (each (TEXELS, 4)) to the radiance images, in parts."""
+    """Add the light of `rows` (each (TEXELS, 4)), which has no more than `features`, to the radiance images, in
+    parts."""
     bindings = {
         "textures": {
             **surface_bindings(frame), "depth_maps": maps.atlas, "energy_table": frame.materials.energy_table,
@@ -95,7 +102,7 @@ def shade(
             **maps.constants,
         },
     }  # fmt: skip
-    program = lighting(maps.lookup, frame.materials.soft)
+    program = lighting(maps.lookup, frame.materials.soft, features)
     target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct")
     for band in frame.bands(technique):
         passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
@@ -134,12 +141,14 @@ class DirectLight(Technique):
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             self._emitters = [emitter for emitter in found if emitter is not None]
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
+            self._features = lights.features(self._emitters)
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         service = frame.services.get("shadow")
         items: dict[AccumulatedMaps | None, list] = {}
-        near = []
+        near: dict[AccumulatedMaps, list] = {}
+        features = self._features
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
             rate = rate_of(frame, emitter.light.key)
@@ -152,26 +161,33 @@ class DirectLight(Technique):
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
                 by_rays = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
-                views = shadow.views(frame, shown, sample, number, cell) if shadow and not by_rays else []
+                views = shadow.views(frame, shown, sample, number, cell) if shadow else []
                 row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole
+                features |= whole << lights.WHOLE
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-                (near if by_rays else items.setdefault(shadow, [])).append((row, views))
+                (near if by_rays else items).setdefault(shadow, []).append((row, views))
         for shadow, own in items.items():
             resolution = shadow.resolution(frame) if shadow else 16
             for rows, views in rounds(own, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
                 maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
                 yield
-                yield from shade(frame, self, rows, self._sources, maps)
-        for rows, _ in rounds(near, 16):
-            yield from shade(frame, self, rows, self._sources, self._rays(frame))
+                yield from shade(frame, self, rows, features, self._sources, maps)
+        for shadow, own in near.items():
+            for rows, views in rounds(own, shadow.resolution(frame), shadow.atlas_texels):
+                maps = self._with_rays(frame, shadow.draw(frame, views))
+                yield
+                yield from shade(frame, self, rows, features, self._sources, maps)
 
-    def _rays(self, frame: Frame) -> Maps:
+    def _with_rays(self, frame: Frame, maps: Maps) -> Maps:
+        """The same maps, asked only where the light is small beside its distance."""
         hierarchy = frame.hierarchy("shadow")
-        nothing = self._unshadowed.draw(frame, self, [], 16)
         return replace(
-            nothing, lookup=RAYS, textures={"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves},
-            constants={"trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size},
+            maps, lookup=RAYS_WHERE_NEAR,
+            textures={"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves},
+            constants={
+                "trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size, "near_share": NEAR,
+            },
         )  # fmt: skip
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:

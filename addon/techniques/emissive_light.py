@@ -119,7 +119,7 @@ class EmissiveLight(Technique):
         for rows, views in rounds(items, resolution):
             maps = self.service.draw(frame, self, views, resolution)
             yield
-            yield from shade(frame, self, rows, self._sources, maps)
+            yield from shade(frame, self, rows, 1 << lights.SURFACE, self._sources, maps)
 
     def release(self) -> None:
         self.service.release()

@@ -49,7 +49,7 @@ void main()
   vec3 glossy = vec3(0.0);
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
-    bool whole = (light.flags & LIGHT_WHOLE) != 0;
+    bool whole = LIGHTS_HAVE(LIGHT_HAS_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
     int parts = whole ? WHOLE_PARTS : 1;
     bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;
     bool on_glossy = has_glossy && (light.flags & LIGHT_GLOSSY) != 0;

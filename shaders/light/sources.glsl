@@ -29,6 +29,17 @@
 #define LIGHT_CAMERA 16
 #define LIGHT_TRACED 32  // rays of narrow lobes look for it (light/traced.frag.glsl)
 
+// What the lights of a pass are made of, as bits: each kind by its number, then the ones below (lights.features). A pass
+// that is compiled for its lights leaves out the rest, which some drivers would compute and mask.
+#ifndef LIGHT_FEATURES
+#define LIGHT_FEATURES -1
+#endif
+#define LIGHT_HAS_SPOTS 8
+#define LIGHT_HAS_SPREAD 9
+#define LIGHT_HAS_WHOLE 10
+#define LIGHTS_HAVE(feature) ((LIGHT_FEATURES & (1 << (feature))) != 0)
+#define LIGHT_IS(light, number) (LIGHTS_HAVE(number) && (light).kind == (number))
+
 struct Light {
   int kind;
   int flags;
@@ -106,12 +117,12 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
 {
   density = 0.0;
   direction = vec3(0.0, 0.0, 1.0);
-  if (light.kind == LIGHT_DIRECTION) {
+  if (LIGHT_IS(light, LIGHT_DIRECTION)) {
     direction = light.centre;
     density = light.area;
     return light.radiance;
   }
-  if (light.kind == LIGHT_SUN) {
+  if (LIGHT_IS(light, LIGHT_SUN)) {
     direction = light.point;
     if (light.radius <= 0.0) {
       return light.radiance;
@@ -119,13 +130,13 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     density = 1.0 / light.area;
     return light.radiance * light.area;
   }
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+  if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
     vec3 to_light = light.point - position;
     float squared = max(dot(to_light, to_light), 1e-30);
     direction = to_light * inversesqrt(squared);
     squared = max(squared, sources.light[light.base + 7].w);
     float cos_light = -dot(direction, light.axis);
-    if (light.kind == LIGHT_SURFACE) {
+    if (LIGHT_IS(light, LIGHT_SURFACE)) {
       cos_light = abs(cos_light);  // meshes emit to both sides
     }
     if (cos_light <= 0.0) {
@@ -133,7 +144,11 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     }
     float solid_angle = light.area * cos_light / squared;
     density = 1.0 / max(solid_angle, 1e-30);
-    return light.radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
+    float attenuation = LIGHTS_HAVE(LIGHT_HAS_SPREAD) ? spread_attenuation(light.spread, cos_light) : 1.0;
+    return light.radiance * (solid_angle * attenuation);
+  }
+  if (!LIGHTS_HAVE(LIGHT_POINT) && !LIGHTS_HAVE(LIGHT_SPHERE)) {
+    return vec3(0.0);
   }
 
   vec3 to_centre = light.centre - position;
@@ -149,7 +164,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
   else {
     // The sample's offset is drawn in the ball such that its projection along any axis fills the disc evenly.
     vec3 across = light.point - axis * dot(light.point, axis);
-    if (light.kind == LIGHT_SPHERE) {
+    if (LIGHT_IS(light, LIGHT_SPHERE)) {
       float sin_squared = light.radius * light.radius / distance_squared;
       if (sin_squared >= 1.0) {
         direction = safe_normalize(light.point);
@@ -176,7 +191,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     }
     from_light = -direction;
   }
-  if ((light.flags & LIGHT_SPOT) != 0) {
+  if (LIGHTS_HAVE(LIGHT_HAS_SPOTS) && (light.flags & LIGHT_SPOT) != 0) {
     result *= spot_attenuation(light, from_light);
   }
   return result;

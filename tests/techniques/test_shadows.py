@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from addon import engine
+from addon.techniques import direct_light
 from tests.techniques import light_model as model
 from tests.techniques.conftest import places
 
@@ -159,6 +160,22 @@ def test_an_object_without_shadow_visibility_casts_none(floor):
     blocker.visible_shadow = False
     np.testing.assert_allclose(floor.render(1)["combined"], free, rtol=1e-6)
     assert blocked[..., :3].mean() < 0.5 * free[..., :3].mean()
+
+
+def test_a_round_light_near_a_part_of_the_floor_has_rays_there_and_maps_elsewhere(floor):
+    """Its penumbra is the clipped area on both sides of where the one kind of visibility takes over from the other."""
+    place = (-1.6, 0.0, 1.0)
+    floor.light("POINT", place, shadow_soft_size=0.4, use_soft_falloff=False)
+    floor.blocker((-EVERYWHERE, 0.4), (EVERYWHERE, EVERYWHERE), 0.4)
+    size = (32, 32)
+    source, points = model.sphere(place, 0.4, 100), receivers(size)
+    near = np.linalg.norm(points - place, axis=1) < 0.4 / direct_light.NEAR
+    assert 0.1 < near.mean() < 0.5
+    whole = model.irradiance(source, points)
+    expected = model.irradiance(source, points, [((-EVERYWHERE, 0.4), (EVERYWHERE, EVERYWHERE), 0.4)]) / whole
+    found = irradiance(floor, 64, size).ravel() / whole
+    for part in (near, ~near):
+        assert np.sqrt(np.mean((found - expected)[part] ** 2)) < 0.015
 
 
 def test_a_light_without_shadow_passes_through_everything(floor):

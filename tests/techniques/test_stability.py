@@ -264,7 +264,8 @@ PARAMETERS = {
     )
     for technique in REGISTRY
     for param in technique.params
-    for value in {param.minimum, param.maximum, *(item[0] for item in param.items)} - {None}
+    for value in dict.fromkeys((param.minimum, param.maximum, *(item[0] for item in param.items)))
+    if value is not None
 }
 CORPUS = {
     f"{group}: {name}": case

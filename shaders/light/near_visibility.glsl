@@ -1,9 +1,14 @@
-// Visibility of this sample's point of a light by a ray, for lights that no depth map can stand for.
+// Visibility of this sample's point of a round light: by its depth map where the light is small beside its distance,
+// and by a ray where no depth map can stand for it. `near_share`: the quotient of both from which rays are taken.
+#include "lib/shadow.glsl"
 #include "light/sources.glsl"
 #include "trace/hierarchy.glsl"
 
 float light_visibility(Light light, vec3 position, vec3 normal)
 {
+  if (light.radius <= near_share * length(light.centre - position)) {
+    return shadow_visibility(light.first_view, light.view_count, position, normal);
+  }
   vec3 direction;
   float density;
   light_sample(light, position, direction, density);
