@@ -64,6 +64,7 @@ class Lookup:
     name: str
     file: str
     textures: tuple[tuple[str, str], ...] = ()
+    images: tuple[tuple[str, str, str, str], ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
     defines: tuple[tuple[str, str], ...] = ()
 
@@ -76,6 +77,7 @@ class Maps:
     views: np.ndarray  # (V, VIEW_TEXELS, 4)
     lookup: Lookup
     textures: dict[str, images.Image] = field(default_factory=dict)
+    images: dict[str, images.Image] = field(default_factory=dict)
     constants: dict[str, object] = field(default_factory=dict)
 
 

@@ -45,10 +45,14 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps
+from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, LOADED_DEFINES, LOADED_IMAGES, REFINE, SoftMaps
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
 PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
+BASIS_IMAGES = {
+    PYRAMID: ("basis_means", "RGBA16F", "FLOAT_2D", "READ"),
+    TABLE: ("basis_table", "RGBA32UI", "UINT_2D", "READ"),
+}
 SEARCH_OFFSET = 0.42  # of the blocker search's tapered series, over its order: 0.105 with 4 terms
 
 
@@ -69,10 +73,11 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
     return Lookup(
         f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells",
         "cssm/visibility.glsl",
-        textures=(*LIMIT_TEXTURES, ("UINT_2D", "basis_table") if by_table else ("FLOAT_2D", "basis_means")),
+        textures=LIMIT_TEXTURES,
+        images=(*LOADED_IMAGES, BASIS_IMAGES[prefilter]),
         constants=(*LIMIT_CONSTANTS, ("IVEC2", "base_extent"), ("INT", "tile_columns"), ("INT", "basis_rows")),
         defines=(
-            ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
+            *LOADED_DEFINES, ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
             ("SERIES_OFFSET", f"{offset:.6f}"), ("SEARCH_OFFSET", f"{SEARCH_OFFSET / order:.6f}"),
             *((("PREFILTER_TABLE", "1"),) if by_table else ()),
         ),
@@ -115,6 +120,6 @@ class ConvolutionSoftShadows(SoftMaps):
         return replace(
             maps,
             lookup=_lookup(order, prefilter, self.cells(frame)),
-            textures={**maps.textures, "basis_table" if prefilter == TABLE else "basis_means": image},
+            images={**maps.images, BASIS_IMAGES[prefilter][0]: image},
             constants={**maps.constants, **basis.constants_for(*size)},
         )

@@ -66,6 +66,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, features: int = -1) -> Program:
         f"direct light, {lookup.name}",
         "light/direct.frag.glsl",
         textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"), *lookup.textures),
+        images=lookup.images,
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
         constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
         defines=(
@@ -96,6 +97,7 @@ def shade(
             **surface_bindings(frame), "depth_maps": maps.atlas, "energy_table": frame.materials.energy_table,
             **maps.textures,
         },
+        "images": maps.images,
         "blocks": {"film_view": frame.view_block, "sources": sources.set(rows, maps.views)},
         "constants": {
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),

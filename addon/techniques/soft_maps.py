@@ -32,6 +32,9 @@ FEWEST_POINTS = (
 )
 LIMIT_TEXTURES = (("FLOAT_2D", "depth_bounds"), ("FLOAT_2D", "depth_limits"))
 LIMIT_CONSTANTS = (("INT", "bounds_rows"), ("INT", "top_level"))
+# What lookups load (lib/shadow.glsl: DEPTH_IMAGE).
+LOADED_IMAGES = (("depth_image", "RGBA32F", "FLOAT_2D", "READ"), ("bounds_image", "RG32F", "FLOAT_2D", "READ"))
+LOADED_DEFINES = (("DEPTH_IMAGE", "1"),)
 BOUNDS = tables.PyramidSource(
     "depth bounds",
     "vec2 bounds_source(ivec2 texel)\n{\n  vec4 caster = texelFetch(depth_maps, texel, 0);\n"
@@ -108,7 +111,9 @@ class SoftMaps(AccumulatedMaps):
             tables.build_pyramid(BOUNDS, bounds, levels, textures={"depth_maps": maps.atlas})
         limits = images.upload(_limits(views, rectangles, (height // side, width // side), side), "RG32F")
         shared = {"depth_bounds": bounds, "depth_limits": limits}
-        return self.filtered(frame, replace(maps, textures=shared, constants=constants), (width, height), bool(views))
+        loaded = {"depth_image": maps.atlas, "bounds_image": bounds}
+        maps = replace(maps, textures=shared, images=loaded, constants=constants)
+        return self.filtered(frame, maps, (width, height), bool(views))
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
         """`maps`, whose part `size` holds views, with the lookup and what it needs; without views nothing is built."""

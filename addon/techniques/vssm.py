@@ -62,7 +62,7 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps
+from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, LOADED_DEFINES, LOADED_IMAGES, REFINE, SoftMaps
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
 MOMENTS = tables.TableSource(
@@ -78,9 +78,10 @@ def _lookup(rule: str, cells: int) -> Lookup:
     return Lookup(
         f"variance soft shadows, {rule.lower()}, {cells} cells",
         "vssm/visibility.glsl",
-        textures=(*LIMIT_TEXTURES, ("UINT_2D", "depth_table")),
+        textures=LIMIT_TEXTURES,
+        images=(*LOADED_IMAGES, ("depth_table", "RGBA32UI", "UINT_2D", "READ")),
         constants=LIMIT_CONSTANTS,
-        defines=(("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
+        defines=(*LOADED_DEFINES, ("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
     )
 
 
@@ -108,4 +109,4 @@ class VarianceSoftShadows(SoftMaps):
             bound = {"depth_maps": maps.atlas, **maps.textures}
             tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
         lookup = _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"))
-        return replace(maps, lookup=lookup, textures={**maps.textures, "depth_table": table})
+        return replace(maps, lookup=lookup, images={**maps.images, "depth_table": table})
