@@ -24,6 +24,7 @@ from .surfaces import STOCHASTIC, SURFACE_TEXTURES
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
+BANDS = 4  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 DIRECTIONS = np.array([[1.0, 0.9, 0.8], [-0.8, 1.0, 0.9]])
 VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
@@ -31,13 +32,13 @@ REFLECTANCE = passes.fullscreen_program(
     "reflectance",
     "indirect/reflectance.frag.glsl",
     textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table")),
-    constants=(("IVEC2", "cell"), ("FLOAT", "view_cosine")),
+    constants=(("IVEC2", "cell"), ("INT", "rows"), ("FLOAT", "view_cosine")),
     outputs=(("VEC4", "out_reflectance"),),
 )
 
 
 class Reflectance:
-    """The image of mean reflectances: material m stands at (m & 15, m >> 4)."""
+    """The image of mean reflectances: material m stands at (m & 15, m >> 4) of each of its bands of rows."""
 
     def __init__(self):
         self._key: object = None
@@ -51,10 +52,10 @@ class Reflectance:
             return
         self._key = key
         rows = -(-len(frame.materials.compiled) // COLUMNS)
-        if self.image is None or self.image.size != (COLUMNS, rows):
+        if self.image is None or self.image.size != (COLUMNS, BANDS * rows):
             self.release()
             self._key = key
-            self.image = images.pool.take(COLUMNS, rows, "RGBA32F")
+            self.image = images.pool.take(COLUMNS, BANDS * rows, "RGBA32F")
         size = (COLUMNS * SIDE, 2 * rows * SIDE)
         seen = [images.pool.take(*size, "RGBA32F") for _ in SURFACE_IMAGES]
         target = images.Target(tuple(seen))
@@ -70,7 +71,7 @@ class Reflectance:
                 **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
                 "energy_table": frame.materials.energy_table,
             },
-            constants={"cell": (SIDE, 2 * SIDE), "view_cosine": VIEW_COSINE},
+            constants={"cell": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE},
         )
         for image in seen:
             images.pool.give(image)

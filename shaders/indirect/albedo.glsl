@@ -1,5 +1,17 @@
-// How much of the light that meets a surface leaves it again, glossy reflection included: surfaces out of sight reflect
-// all of it evenly, which keeps the energy right where direction is second-order.
+// What surfaces reflect, reduced to what paths need: how much of the light that meets them leaves them again, and a glossy
+// lobe of few numbers.
+
+// A diffuse part and one lobe of microfacets, whose reflectance runs from `straight` at normal incidence to `grazing`.
+struct Reflection {
+  vec3 diffuse;  // albedo
+  vec3 straight;
+  vec3 grazing;
+  float alpha;
+};
+
+// Lobes of paths are at least as wide as this (roughness 0.5): a narrower one would make few points very bright, and who
+// sees them is spread by more than that anyway (path regularisation after Kaplanyan & Dachsbacher 2013).
+#define LEAST_ALPHA 0.25
 
 vec3 surface_albedo(Surface s, float mu)
 {
@@ -13,4 +25,57 @@ vec3 surface_albedo(Surface s, float mu)
                                               sqrt(sqrt(alpha.x * alpha.y)), mu);
   }
   return max(albedo, vec3(0.0));
+}
+
+// Cosine between a normal and the mean direction from which diffuse light comes and to which it goes.
+#define MEAN_COSINE 0.577
+
+float lobe_albedo(Surface s, float roughness, float mu)
+{
+  return max_component(s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness, mu));
+}
+
+// Fresnel's terms as Schlick's curve, `mu` as above. A layer leaves the more to what is below it the steeper one looks:
+// the camera's view of a floor is flat, that of what the floor lights is not.
+Reflection surface_reflection(Surface s, float mu)
+{
+  Reflection r;
+  r.diffuse = s.diffuse;
+  r.straight = vec3(0.0);
+  r.grazing = vec3(0.0);
+  r.alpha = 1.0;
+  if (s.kind > LOBE_REFRACTION) {
+    r.diffuse += s.glossy_weight;
+  }
+  else if (s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0) {
+    vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
+    r.alpha = max(sqrt(alpha.x * alpha.y), LEAST_ALPHA);
+    if (s.kind == FRESNEL_DIELECTRIC) {
+      float roughness = sqrt(sqrt(alpha.x * alpha.y));
+      r.diffuse *= (1.0 - min(lobe_albedo(s, roughness, MEAN_COSINE), 0.9)) / (1.0 - min(lobe_albedo(s, roughness, mu), 0.9));
+    }
+    vec3 scale = s.glossy_weight * multiscatter_scale(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, sqrt(r.alpha), mu);
+    r.straight = max(scale * s.glossy_tint, vec3(0.0));
+    r.grazing = (s.kind == FRESNEL_NONE) ? r.straight : max(scale, vec3(0.0));
+  }
+  r.diffuse = max(r.diffuse, vec3(0.0));
+  return r;
+}
+
+// Radiance towards `viewer` per irradiance from `light`, 1/sr.
+vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
+{
+  vec3 sum = r.diffuse / PI;
+  float nl = dot(normal, light);
+  float nv = dot(normal, viewer);
+  if (max_component(r.grazing) > 0.0 && nl > 0.0 && nv > 0.0) {
+    vec3 middle = safe_normalize(light + viewer);
+    float squared = r.alpha * r.alpha;
+    float d = dot(normal, middle);
+    d = d * d * (squared - 1.0) + 1.0;
+    float masked = nl * sqrt(nv * nv * (1.0 - squared) + squared) + nv * sqrt(nl * nl * (1.0 - squared) + squared);
+    vec3 fresnel = mix(r.straight, r.grazing, pow(clamp(1.0 - dot(light, middle), 0.0, 1.0), 5.0));
+    sum += fresnel * (squared / (PI * d * d) * 0.5 / masked);
+  }
+  return sum;
 }

@@ -30,19 +30,20 @@ void main()
   }
   out_point = vec4(vertex.position, 1.0);
   out_normal = vec4(vertex.normal, t);
-  vec3 throughput = vertex.albedo / PI;
+  vec3 throughput = vec3(1.0);
   float choice = scrambled(film_view.bits_z, bits.z);
-  vec3 radiance = throughput * direct_irradiance(vertex.position, vertex.normal, 4, choice, roll.x);
+  vec3 radiance = direct_reflected(vertex, -direction, 4, choice, roll.x);
   vec3 shorter = (bounces > 1) ? radiance : vec3(0.0);
   for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
     roll = hash3(roll);
-    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(vertex.reflection, vertex.normal, onward, -direction);
+    direction = onward;
     if (!trace_vertex(ray_origin(vertex.position, vertex.normal), direction, 1e29, roll.z, vertex, t)) {
       break;
     }
-    throughput *= vertex.albedo;
     roll = hash3(roll);
-    radiance += throughput * direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y);
+    radiance += throughput * direct_reflected(vertex, -direction, 1, to_unit(roll.x), roll.y);
     shorter = (bounce < bounces) ? radiance : shorter;
   }
   out_radiance = vec4(radiance, 0.0);

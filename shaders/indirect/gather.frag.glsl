@@ -23,18 +23,21 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
       break;
     }
     float share = (whole && bounce == 1) ? 1.0 : 1.0 - t * t / (near_radius * near_radius);
-    throughput *= share * vertex.albedo;
+    throughput *= share;
     if (max_component(throughput) <= 1e-4) {
       break;
     }
     roll = hash3(roll);
-    vec3 arriving = direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y);
+    sum += throughput * direct_reflected(vertex, -direction, 1, to_unit(roll.x), roll.y);
     if (bounce < bounces) {
-      arriving += virtual_irradiance(vertex.position, vertex.normal, to_unit(roll.z), roll.x);
+      vec3 from;
+      vec3 arriving = virtual_irradiance(vertex.position, vertex.normal, to_unit(roll.z), roll.x, from);
+      sum += throughput * arriving * reflection_of(vertex.reflection, vertex.normal, from, -direction);
     }
-    sum += throughput * arriving / PI;
     roll = hash3(roll);
-    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(vertex.reflection, vertex.normal, onward, -direction);
+    direction = onward;
     origin = ray_origin(vertex.position, vertex.normal);
   }
   return sum;

@@ -31,15 +31,15 @@ float bounded_kernel(VirtualLight light, vec3 position, out vec3 direction)
 }
 
 // Irradiance at a surface by virtual lights that may be reflected once more. Every n-th of them stands for n, such that
-// no more than PART are looked at; one of those is traced.
+// no more than PART are looked at; one of those is traced, along `direction`.
 #define PART 64
 
-vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt)
+vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt, out vec3 direction)
 {
+  direction = normal;
   int stride = (virtual_count + PART - 1) / PART;
   int first = int(hash3(uvec3(salt, 5u, uint(virtual_count))).x % uint(max(stride, 1)));
   float total = 0.0;
-  vec3 direction;
   for (int i = first; i < virtual_count; i += stride) {
     VirtualLight light = virtual_light(i);
     float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);

@@ -8,10 +8,12 @@
 #include "trace/hierarchy.glsl"
 #include "indirect/albedo.glsl"
 
+#define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
+
 struct Vertex {
   vec3 position;
   vec3 normal;  // of the triangle, on the side that the ray came from
-  vec3 albedo;
+  Reflection reflection;
 };
 
 // Away from a surface by what float32 positions of this size cannot tell apart.
@@ -51,8 +53,19 @@ vec3 mean_albedo(ivec2 hit)
   return texelFetch(reflectance, ivec2(material & 15, material >> 4), 0).rgb;
 }
 
+// The same as a diffuse part and a lobe.
+Reflection mean_reflection(ivec2 hit)
+{
+  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  ivec2 place = ivec2(material & 15, material >> 4);
+  int rows = textureSize(reflectance, 0).y / REFLECTANCE_BANDS;
+  vec4 straight = texelFetch(reflectance, place + ivec2(0, 2 * rows), 0);
+  return Reflection(texelFetch(reflectance, place + ivec2(0, rows), 0).rgb, straight.rgb,
+                    texelFetch(reflectance, place + ivec2(0, 3 * rows), 0).rgb, straight.a);
+}
+
 // What a point reflects: exactly where the camera sees it, else the mean of its material.
-vec3 albedo_at(ivec2 hit, vec3 position, vec3 normal)
+Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
 {
   ivec2 pixel;
   float slant;
@@ -62,11 +75,11 @@ vec3 albedo_at(ivec2 hit, vec3 position, vec3 normal)
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
       Surface s = SURFACE_READ(pixel);
       if (dot(s.geometric_normal, normal) > 0.9) {
-        return surface_albedo(s, slant);
+        return surface_reflection(s, slant);
       }
     }
   }
-  return mean_albedo(hit);
+  return mean_reflection(hit);
 }
 
 // The surface that a ray meets before `limit`; false if none.
@@ -82,7 +95,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   if (dot(vertex.normal, direction) > 0.0) {
     vertex.normal = -vertex.normal;
   }
-  vertex.albedo = albedo_at(hit, vertex.position, vertex.normal);
+  vertex.reflection = reflection_at(hit, vertex.position, vertex.normal);
   return true;
 }
 
@@ -120,10 +133,12 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
   return clear_path(origin, direction, reach, salt);
 }
 
-// Irradiance straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they
+// What a surface reflects towards `viewer` of light straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they
 // bring unblocked (systematic resampling): only visibility is sampled.
-vec3 direct_irradiance(vec3 position, vec3 normal, int rays, float u, uint salt)
+vec3 direct_reflected(Vertex vertex, vec3 viewer, int rays, float u, uint salt)
 {
+  vec3 position = vertex.position;
+  vec3 normal = vertex.normal;
   float total = 0.0;
   vec3 direction;
   for (int i = 0; i < light_count; i++) {
@@ -149,7 +164,7 @@ vec3 direct_irradiance(vec3 position, vec3 normal, int rays, float u, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, direction, salt + uint(i));
       }
-      sum += arriving * (visibility * marks * step_size / share);
+      sum += arriving * reflection_of(vertex.reflection, normal, direction, viewer) * (visibility * marks * step_size / share);
     }
   }
   return sum;

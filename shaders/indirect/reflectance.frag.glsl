@@ -1,22 +1,29 @@
-// Mean reflectance of a material: over a cell of pixels, each of which shows some point of it.
+// Means of what a material reflects: over a cell of pixels, each of which shows some point of it. Bands of rows hold, one
+// above the other, all of it, its diffuse part, and of its lobe the reflectance at normal incidence, with alpha, and at
+// grazing incidence.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
 
 void main()
 {
-  ivec2 corner = ivec2(gl_FragCoord.xy) * ivec2(cell);
-  vec3 sum = vec3(0.0);
+  int band = int(gl_FragCoord.y) / rows;
+  ivec2 corner = (ivec2(gl_FragCoord.xy) - ivec2(0, band * rows)) * ivec2(cell);
+  vec4 sum = vec4(0.0);
   float count = 0.0;
   for (int y = 0; y < cell.y; y++) {
     for (int x = 0; x < cell.x; x++) {
       ivec2 pixel = corner + ivec2(x, y);
       if (texelFetch(surface_position, pixel, 0).w != 0.0) {
         Surface s = SURFACE_READ(pixel);
-        sum += surface_albedo(s, view_cosine);
+        Reflection r = surface_reflection(s, view_cosine);
+        sum += (band == 0) ? vec4(surface_albedo(s, view_cosine), 0.0)
+             : (band == 1) ? vec4(r.diffuse, 0.0)
+             : (band == 2) ? vec4(r.straight, r.alpha)
+                           : vec4(r.grazing, 0.0);
         count += 1.0;
       }
     }
   }
-  out_reflectance = vec4(sum / max(count, 1.0), count);
+  out_reflectance = sum / max(count, 1.0);
 }

@@ -14,15 +14,17 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
       break;
     }
     roll = hash3(roll);
-    throughput *= vertex.albedo;
-    sum += throughput * direct_irradiance(vertex.position, vertex.normal, 1, to_unit(roll.x), roll.y) / PI;
+    sum += throughput * direct_reflected(vertex, -direction, 1, to_unit(roll.x), roll.y);
+    float choice = to_unit(roll.z);
+    roll = hash3(roll);
+    vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(vertex.reflection, vertex.normal, onward, -direction);
     float stay = min(max_component(throughput), 1.0);
-    if (to_unit(roll.z) >= stay) {
+    if (choice >= stay) {
       break;
     }
     throughput /= stay;
-    roll = hash3(roll);
-    direction = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    direction = onward;
     origin = ray_origin(vertex.position, vertex.normal);
   }
   return sum;
