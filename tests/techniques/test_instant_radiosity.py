@@ -80,6 +80,21 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(irradiance[:, 9:11].mean(axis=1), wall_irradiance(height), rtol=0.06)
 
 
+@pytest.mark.parametrize("side", [-1, 1], ids=["towards the sun", "away from it"])
+@pytest.mark.parametrize("floor_in_view", [True, False])
+def test_a_glossy_floor_lights_the_wall_that_its_lobe_meets(stage, render, side, floor_in_view):
+    """Sun from 35 degrees above the horizon on a brushed floor: a fiftieth of what the wall ahead gets goes back."""
+    brushed = stage.material("ShaderNodeBsdfAnisotropic", Color=(0.8, 0.8, 0.8, 1), Roughness=0.6)
+    stage.rectangle((-1, -1), (1, 1), material=brushed)
+    corners = [(-1, side, 0.02), (1, side, 0.02), (1, side, 0.5), (-1, side, 0.5)]
+    stage.mesh(corners, [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    stage.light("SUN", turn=(np.radians(55), 0, 0), energy=3.0, angle=0.0)
+    tilt = np.pi / 2 - (0.5 if floor_in_view else 0.0)
+    stage.camera((0, -side * 2.5, 1.8 if floor_in_view else 0.8), (tilt, 0, 0 if side == 1 else np.pi), angle=0.9)
+    expected = light_paths(stage.render(64, (24, 24), engine="CYCLES", bounces=1))["diffuse_indirect"]
+    assert render(1)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04 if side == 1 else 0.15)
+
+
 def corner(stage, albedo=0.7, energy=60.0, lamps=1):
     """A floor, a wall and a ceiling with a lamp between them."""
     material = stage.diffuse(albedo)
