@@ -35,7 +35,7 @@ Bias, in diffuse and glossy indirect light:
   light which reaches less than about a hundredth of the picture.
 - Gloss is shared evenly among the pixels that see it. Its sum is right: in the sample scene with a window, where low sun
   falls on varnished boards, the mean of the pass is 1.007 of Cycles' (1.041 while gloss counted as diffuse, since most
-  of that light goes to walls behind the camera; 0.97 with a layer's losses as the camera's flat view has them).
+  of that light goes to walls behind the camera; 0.97 with a layer's losses as the camera's view has them).
 - Normals are those of the triangles: a coarse smooth lamp shade about a lamp sends 3 % too much.
 - Alpha is taken as the material's mean opacity.
 """
