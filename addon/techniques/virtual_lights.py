@@ -33,7 +33,7 @@ Bias, in diffuse and glossy indirect light:
 
 - Points that only pixels see which no probe of a sample came near are missing in that sample. With 96 probes, that is
   light which reaches less than about a hundredth of the picture.
-- Gloss is shared evenly among the pixels that see it. Its sum is right: in the sample scene with a window, where low sun
+- Gloss is shared evenly among the pixels that see it. Its sum is right: in the sample with a window, where low sun
   falls on varnished boards, the mean of the pass is 1.007 of Cycles' (1.041 while gloss counted as diffuse, since most
   of that light goes to walls behind the camera; 0.97 with a layer's losses as the camera's view has them).
 - Normals are those of the triangles: a coarse smooth lamp shade about a lamp sends 3 % too much.
