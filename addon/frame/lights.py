@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..gfx.struct import Block, Struct
-from ..snapshot.scene import Light
+from ..snapshot.scene import Light, Snapshot
 
 TEXELS = 8
 VIEW_TEXELS = 5
@@ -119,6 +119,18 @@ def features(emitters: Iterable[Emitter]) -> int:
     for emitter in emitters:
         found |= 1 << emitter.kind | bool(emitter.flags & SPOT_FLAG) << SPOTS | (emitter.spread > 0) << SPREAD
     return found
+
+
+def emitters(snapshot: Snapshot, origin: np.ndarray) -> list[Emitter]:
+    """The scene's lights that give something, in an order of their own: choices by lot then do not depend on names and
+    on the order in the scene."""
+    found = (emitter(light, origin) for light in snapshot.lights)
+    return sorted((one for one in found if one is not None), key=_order)
+
+
+def _order(one: Emitter) -> tuple:
+    values = (one.centre, one.axis, one.radiance, one.u, one.v, one.w)
+    return (one.kind, one.flags, one.radius, one.area, one.spread, *(number for value in values for number in value))
 
 
 def emitter(light: Light, origin: np.ndarray) -> Emitter | None:

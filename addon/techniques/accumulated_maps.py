@@ -168,8 +168,7 @@ class AccumulatedMaps(Technique):
         """For each light the receivers where its shadows can be seen (see CUTOFF)."""
         self._reached = {}
         receivers = frame.receivers
-        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-        emitters = [emitter for emitter in found if emitter is not None]
+        emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
         if receivers is None or not len(receivers.distance) or not emitters:
             return
         centre = (receivers.low + receivers.high) / 2

@@ -140,8 +140,7 @@ class DirectLight(Technique):
 
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.sample == 0:
-            found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-            self._emitters = [emitter for emitter in found if emitter is not None]
+            self._emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
             self._features = lights.features(self._emitters)
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}

@@ -81,8 +81,8 @@ class Film(Technique):
 
     def run(self, frame: Frame) -> None:
         if frame.sample == 0:
-            found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-            seen = lights.traceable([e for e in found if e is not None and e.flags & lights.CAMERA_FLAG])
+            emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+            seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
             self._light_count = len(seen)
             passes.fullscreen(

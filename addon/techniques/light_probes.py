@@ -125,8 +125,7 @@ class LightProbes(Technique):
         frame.count(self, "guiding rays", rows * columns * probes)
 
     def _share_out(self, frame: Frame, lit: bool) -> None:
-        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-        emitters = [emitter for emitter in found if emitter is not None]
+        emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
         if len(emitters) > MOST_LIGHTS:
             emitters = []
         trials = [(emitter.light.key, self._points_of(frame, emitter)) for emitter in emitters]

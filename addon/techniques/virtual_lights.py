@@ -188,8 +188,8 @@ class VirtualLights:
         }  # fmt: skip
 
     def _begin(self, frame: Frame) -> None:
-        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-        self._emitters = [e for e in found if e is not None and e.light.bounces and e.light.visibility.diffuse]
+        emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+        self._emitters = [e for e in emitters if e.light.bounces and e.light.visibility.diffuse]
         self._emissive = None
         used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
