@@ -4,7 +4,7 @@ For scenes x techniques x samples: squared error (relMSE, the noise of the refer
 the technique, and its counters. With `--temporal`, the camera and the first light of each scene move slowly over some
 frames of one sample each. The table then holds, beside the mean error of a frame, what is new in it: half the mean
 square of the error's change from one frame to the next. If errors stood still, that would be 0; if every frame drew its
-own, it would be their variance.
+own, it would be their variance. With `--page` all of this, beside the other engines, becomes a page.
 """
 
 from __future__ import annotations
@@ -106,6 +106,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--size", nargs=2, type=int, default=(96, 72), metavar=("W", "H"), help="pixels, default 96 72")
     parser.add_argument("--reference", type=int, default=256, metavar="N", help="samples of each Cycles render")
+    parser.add_argument("--page", type=Path, metavar="PATH", help="all, with peers, growth and motion, as Markdown")
     parser.add_argument("--temporal", type=int, default=0, metavar="FRAMES", help="frames of slow motion instead")
 
 
@@ -117,6 +118,11 @@ def command(options: argparse.Namespace) -> int:
     addon.register()
     names = options.techniques or techniques()
     size = tuple(options.size)
+    if options.page:
+        from bench import indirect_page
+
+        indirect_page.write(options.page, options.scenes, names, size, options.reference)
+        return 0
     for name in options.scenes:
         bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
         scene = bpy.context.scene

@@ -2,11 +2,12 @@
 
 from types import SimpleNamespace
 
+import bpy  # noqa: F401 (mathutils is its)
 import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
-from bench import indirect
+from bench import indirect, indirect_page
 
 
 def test_every_technique_of_the_slot_is_measured():
@@ -35,3 +36,16 @@ def test_errors_that_stand_still_bring_nothing_new(monkeypatch):
     still, flicker = indirect.moving(scene, list(steady), 4, 1, (4, 4))
     assert (float(still[1]), float(flicker[1])) == pytest.approx((0.0, 0.02 / 1.01), abs=1e-4)
     assert float(still[2]) == pytest.approx(0.01 / 1.01, abs=1e-4)
+
+
+def test_the_page_has_every_technique_and_the_peers_and_leaves_out_what_cannot_be_compared():
+    labels = [(series.label, samples) for series, samples in indirect_page.entrants(["instant_radiosity", "ssdo"])]
+    assert labels[:3] == [("Auto", 1), ("Auto", 16), ("Auto", 64)]
+    assert {("ssdo", 16), ("EEVEE, ray traced", 16), ("Cycles, denoised", 4)} < set(labels)
+    combined = {"relmse": 0.03, "floor": 0.01, "bias": 1.0}
+    cells = indirect_page.cells({"times": [3.0, 1.0, 2.0], "errors": {"combined": combined}})
+    assert cells == ("2.00", "0.0200", "1.000", "–", "–")
+    about = {"date": "today", "blender": "5.2", "device": "GPU", "cpu": "CPU"}
+    text = indirect_page.page(about, (96, 72), 256, {"room": [("Auto", "1", *cells)]}, [], [])
+    assert "## room" in text and "| Auto | 1 | 2.00 | 0.0200 | 1.000 | – | – |" in text
+    assert "## Growth" not in text

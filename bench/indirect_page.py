@@ -1,0 +1,182 @@
+"""The page about indirect light: every technique beside EEVEE and Cycles, growth and motion, in one run.
+
+`python -m bench indirect --page docs/indirect_light.md`. In each scene Candela with each technique of the slot, EEVEE
+with ray tracing and denoised Cycles render the same picture in one process, one after the other; a time is that of a
+whole render, from Blender's call to the finished picture. Combined is compared between the engines, the diffuse
+indirect pass where an engine has one that means the same: EEVEE splits light otherwise, and denoising knows Combined
+alone. Errors are relMSE with the reference's own noise taken off.
+
+Growth is told by counters, which hold on every machine: one dial at a time, pictures of one sample.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.cells import Scene, Series
+
+BOUNCES = 16
+SAMPLES = (1, 16)
+MOST = 64  # samples of those that a final picture may be made with
+LONG = ("AUTO", "instant_radiosity", "clustered_visibility")
+MOVING_SCENE, FRAMES, MOVING_SIZE, MOVING_REFERENCE = "cornell_box", 24, (48, 36), 64
+GROWTH_SIZE = (64, 48)
+GROWN = ("multires_radiosity", "clustered_visibility", "imperfect_shadow_maps")
+HEAD = ("technique", "samples", "seconds", "Combined", "bias", "diffuse indirect", "bias")
+GROWTH_HEAD = ("technique", "dial", "value", "ms", "counters")
+MOVING_HEAD = ("technique", "new error", "error of a frame")
+
+
+def own(technique: str) -> Series:
+    """Candela with a technique in the slot, all else as it comes."""
+    label = "Auto" if technique == "AUTO" else technique
+    return Series(label, "CANDELA", (), bounces=BOUNCES, slots=(("indirect", technique),))
+
+
+PEERS = (
+    (Series("EEVEE, ray traced", "BLENDER_EEVEE", (), ray_traced=True), 16),
+    (Series("Cycles, denoised", "CYCLES", (), bounces=BOUNCES, denoised=True), 4),
+    (Series("Cycles, denoised", "CYCLES", (), bounces=BOUNCES, denoised=True), 16),
+)
+
+
+def entrants(techniques: list[str]) -> list[tuple[Series, int]]:
+    """Engines with settings and numbers of samples, in the order of the table."""
+    found = [
+        (own(name), samples)
+        for name in ("AUTO", *techniques)
+        for samples in (*SAMPLES, *((MOST,) if name in LONG else ()))
+    ]
+    return [*found, *PEERS]
+
+
+def cells(figures: dict) -> tuple[str, ...]:
+    """Seconds and errors of one measurement by bench/worker.py."""
+    times = sorted(figures["times"])
+    shown = [f"{times[len(times) // 2]:.2f}"]
+    for path in ("combined", "diffuse_indirect"):
+        error = figures["errors"].get(path)
+        if error is None or error["relmse"] is None:
+            shown += ["–", "–"]
+        else:
+            shown += [f"{max(error['relmse'] - error['floor'], 0.0):.4f}", f"{error['bias']:.3f}"]
+    return tuple(shown)
+
+
+def measured(name: str, techniques: list[str], size: tuple[int, int], reference: int) -> list[tuple[str, ...]]:
+    """The lines of one scene; what fails says so."""
+    from bench import worker
+
+    opened = worker.open_scene(Scene(name), size, reference)
+    lines = []
+    for series, samples in entrants(techniques):
+        try:
+            found = cells(worker.measure(opened, series, samples, size))
+        except Exception as error:  # one engine that does not render here leaves the rest of the table
+            found = (f"failed: {type(error).__name__}", *("–",) * 4)
+        lines.append((series.label, str(samples), *found))
+    return lines
+
+
+# -------------------------------------------------------------------------------------------------------------- growth
+
+
+@dataclass(frozen=True)
+class Dial:
+    """What is turned: name, values, the scene's family, and how a value is set."""
+
+    name: str
+    values: tuple[int, ...]
+    family: str = ""
+    size: Callable[[int], tuple[int, int]] = lambda value: GROWTH_SIZE
+    parameter: str = ""
+
+
+DIALS = (
+    Dial("virtual lights", (128, 512, 2048), parameter="virtual_lights"),
+    Dial("width", (64, 128, 256), size=lambda value: (value, value * 3 // 4)),
+    Dial("triangles", (1_000, 10_000, 100_000), family="triangles"),
+    Dial("lights", (1, 16, 256), family="lights"),
+)
+
+
+def growth(techniques=GROWN, dials=DIALS) -> Iterator[tuple[str, ...]]:
+    """Counters of one sample by technique and dial."""
+    from bench import worker
+
+    for dial in dials:
+        for value in dial.values:
+            scene = Scene(dial.family, dial.family, value) if dial.family else Scene(MOVING_SCENE)
+            size = dial.size(value)
+            opened = worker.open_scene(scene, size, 0)
+            for technique in techniques:
+                values = ((f"{technique}_{dial.parameter}", value),) if dial.parameter else ()
+                series = Series(technique, "CANDELA", (), slots=(("indirect", technique),), values=values)
+                for seed in (0, 1):  # the first compiles
+                    worker.render(opened, series, 1, seed, size)
+                row = next((row for row in worker.of_ledger()["techniques"] if row["name"] == technique), None)
+                if row:
+                    counted = ", ".join(f"{count} {what}" for what, count in row["counters"].items())
+                    yield technique, dial.name, f"{value}", f"{row['ms']:.0f}", counted
+
+
+# ---------------------------------------------------------------------------------------------------------------- page
+
+
+def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows))
+
+
+def page(about: dict, size, reference: int, by_scene: dict, grown: list, moved: list) -> str:
+    """The whole page as Markdown."""
+    made = f"{about['date']}, Blender {about['blender']}, {about['device']}, {about['cpu']}."
+    intro = f"""Written by `python -m bench indirect --page PATH`; do not edit. {made}
+
+{size[0]} x {size[1]} pixels, {BOUNCES} bounces, against two renders of {reference} samples by Cycles, whose noise is
+taken off the errors (relMSE). Seconds are those of a whole render. EEVEE splits light into other passes, and denoised
+Cycles has none: of both Combined is compared."""
+    parts = ["# Indirect light: error and time", intro]
+    parts += [f"## {name}\n\n{markdown(HEAD, rows)}" for name, rows in by_scene.items()]
+    if grown:
+        parts.append(
+            "## Growth\n\nOne sample; the dials of the picture and of virtual lights in the Cornell box, those of"
+            f" triangles and lights\nin bench/families.py at {GROWTH_SIZE[0]} x {GROWTH_SIZE[1]}.\n\n"
+            + markdown(GROWTH_HEAD, grown)
+        )
+    if moved:
+        parts.append(
+            f"## Motion\n\n{FRAMES} frames of one sample of the Cornell box while camera and lamp move slowly, at"
+            f" {MOVING_SIZE[0]} x {MOVING_SIZE[1]}.\nNew error is half the mean square of the error's change from one"
+            " frame to the next: 0 where errors stand still,\ntheir variance where every frame draws its own.\n\n"
+            + markdown(MOVING_HEAD, moved)
+        )
+    return "\n\n".join(parts) + "\n"
+
+
+def write(path: Path, scenes, techniques: list[str], size: tuple[int, int], reference: int) -> None:
+    """Measure all and write the page; after each scene, so that what is measured stays when the run is ended."""
+    import bpy
+
+    from bench import indirect, worker
+    from bench.quick import table
+
+    about = worker.about() | {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d")}
+    by_scene: dict[str, list] = {}
+    grown: list[tuple[str, ...]] = []
+    moved: list[tuple[str, ...]] = []
+
+    def save(title: str, head, rows) -> None:
+        print(f"\n{title}\n{table([head, *rows])}", flush=True)
+        path.write_text(page(about, size, reference, by_scene, grown, moved), encoding="utf-8")
+
+    for name in scenes:
+        by_scene[name] = measured(name, techniques, size, reference)
+        save(name, HEAD, by_scene[name])
+    grown += growth()
+    save("growth", GROWTH_HEAD, grown)
+    bpy.ops.wm.open_mainfile(filepath=str(indirect.SCENES / f"{MOVING_SCENE}.blend"))
+    moved += indirect.moving(bpy.context.scene, techniques, FRAMES, MOVING_REFERENCE, MOVING_SIZE)
+    save("motion", MOVING_HEAD, moved)
