@@ -77,16 +77,16 @@ class Frame:
         """The same with a third number."""
         return *self.random(use), third(self.sample, use, self.settings.seed)
 
-    def look(self, lens: tuple[float, float] | None = None) -> None:
+    def look(self, lens: tuple[float, float] | None = None, film: tuple[float, float] | None = None) -> None:
         """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
         point of the aperture. The first sample looks through the middle of both: as in Cycles depth is taken from it,
-        and a picture that just began is sharp.
+        and a picture that just began is sharp. `film`: another point of the pixel filter, each number in 0..1.
         """
         jitter, settings = (0.0, 0.0), self.settings
         aperture = self.snapshot.camera.aperture
-        if self.sample > 0:
+        if self.sample > 0 or film is not None:
             width = self.snapshot.film.filter_width
-            jitter = tuple(blackman_harris_offset(u, width) for u in self.random("film"))
+            jitter = tuple(blackman_harris_offset(u, width) for u in film or self.random("film"))
         if lens is None:
             lens = point_of(aperture, *self.random("lens")) if self.sample > 0 and aperture else (0.0, 0.0)
         values = self.view.values(self.sample, settings.seed, jitter, self.geometry.size, lens)

@@ -13,9 +13,15 @@ fifths of their squared error: relMSE over the reference's noise at 96x72, mean 
 
     reflected = albedo * mean over neighbours on the surface of  arriving
 
+A picture of one sample has one point of the film per pixel, and its edges and textures are ragged: beside a filtered
+picture that alone is a relMSE of 0.08 of the window, 0.03 of the Cornell box, 0.02 of the hall. Light that is as smooth
+as this needs no more points, but what reflects it does: so surfaces are drawn again for eight points of the pixel
+filter, and each reflects the light of those pixels around it that lie on the same surface.
+
 | cost | per pass |
 |---|---|
 | fetches per pixel | 16 x 4 |
+| of a picture of one sample | 8 more draws of all surfaces, 9 x 4 fetches each |
 
 A viewport at rest shows its first samples in the same way: there the sums are filtered on their way to the screen, with
 the mean colours of their samples, and stay as they are.
@@ -29,11 +35,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from .surfaces import STOCHASTIC, SURFACES, draw_surfaces
 
+POINTS = 8  # of the pixel filter, for a picture of one sample
 FEW = 8  # samples at rest in a viewport: up to here it shows indirect light filtered
 MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
     passes.fullscreen_program(
@@ -61,6 +70,22 @@ REFLECT = passes.fullscreen_program(
     outputs=(("VEC4", "out_diffuse"),),
 )
 
+BETWEEN = passes.fullscreen_program(
+    "reflected light between pixels",
+    "neighbours/between.frag.glsl",
+    textures=tuple(
+        ("FLOAT_2D", name)
+        for name in (
+            "surface_position", "surface_normal", "surface_diffuse", "known_position", "known_normal", "known_diffuse",
+            "arriving",
+        )
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "share"),),
+    outputs=(("VEC4", "out_diffuse"),),
+)  # fmt: skip
+GUIDES = ("position", "normal", "diffuse")
+
 
 def shown_alone(frame: Frame) -> bool:
     """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples."""
@@ -71,26 +96,52 @@ def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: st
     """Add what surfaces reflect of `arriving` to an image of radiance. If the sample is shown alone, of its mean over
     4x4 pixels, or 16x16 where it is `noisy`.
     """
-    blend = "ADDITIVE_PREMULT"
-    if shown_alone(frame):
-        _reflect_mean(frame, technique, MEAN, arriving, path, blend, noisy)
-    else:
-        _reflect(frame, arriving, path, blend)
+    if not shown_alone(frame):
+        _reflect(frame, arriving, path, "ADDITIVE_PREMULT")
+        return
+    with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
+        _mean(frame, MEAN, arriving, near, 1)
+        if noisy:
+            _mean(frame, MEAN_AGAIN, near.colors[0], far, 4)
+        _reflect(frame, (far if noisy else near).colors[0], path, "ADDITIVE_PREMULT")
+    frame.count(technique, "filtered samples")
 
 
 def smooth(frame: Frame, technique: Technique, path: str) -> None:
     """Filter an image of diffuse radiance that holds this sample alone over 16x16 pixels, if it is shown alone."""
-    if shown_alone(frame):
-        _reflect_mean(frame, technique, MEAN_OF_REFLECTED, frame.images[path], path, "NONE", True)
-
-
-def _reflect_mean(frame: Frame, technique: Technique, program, light, path: str, blend: str, noisy: bool) -> None:
+    if not shown_alone(frame):
+        return
     with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
-        _mean(frame, program, light, near, 1)
-        if noisy:
-            _mean(frame, MEAN_AGAIN, near.colors[0], far, 4)
-        _reflect(frame, (far if noisy else near).colors[0], path, blend)
+        _mean(frame, MEAN_OF_REFLECTED, frame.images[path], near, 1)
+        _mean(frame, MEAN_AGAIN, near.colors[0], far, 4)
+        if frame.settings.draft or any(material.tinted for material in frame.materials.compiled):
+            _reflect(frame, far.colors[0], path, "NONE")
+        else:
+            _reflect_between(frame, technique, far.colors[0], path)
     frame.count(technique, "filtered samples")
+
+
+def _reflect_between(frame: Frame, technique: Technique, arriving: images.Image, path: str) -> None:
+    """What is reflected of `arriving` at several points of each pixel's filter, into an image of radiance."""
+    refracts = any(one.slot == "transmission" for one in frame.plan.techniques)
+    known = {f"known_{name}": frame.images[f"surface.{name}"] for name in GUIDES}
+    target = frame.target(path)
+    target.clear()
+    drawn = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
+    depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
+    surfaces = images.Target(tuple(drawn), depth)
+    for number in range(POINTS):
+        frame.look(film=frame.random_at(number, "film/between"))
+        draw_surfaces(frame, technique, surfaces, STOCHASTIC, refracts)
+        passes.fullscreen(
+            BETWEEN, target, blend="ADDITIVE_PREMULT", blocks={"film_view": frame.view_block},
+            textures={**{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, drawn) if name in GUIDES},
+                      **known, "arriving": arriving},
+            constants={"share": 1.0 / POINTS},
+        )  # fmt: skip
+    frame.look()
+    for image in (*drawn, depth):
+        images.pool.give(image)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from addon.compare.passes import light_paths
 from addon.frame.view import VIEW
 from addon.gfx import images
 from addon.gfx.struct import Block
@@ -34,7 +35,7 @@ def frame_of(gpu_context):
         values |= {"eye": (0, 0, 5, 1), "frame": (-SPAN / 2, SPAN / 2) * 2, "film": (SIZE, SIZE, 0.1, 100)}
         frame = SimpleNamespace(
             size=(SIZE, SIZE), sample=0, samples_done=1,
-            settings=SimpleNamespace(samples=samples, draft=False, whole=whole),
+            settings=SimpleNamespace(samples=samples, draft=samples == 1, whole=whole),
             images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
             view_block=Block(VIEW, **values), count=lambda *counter: None,
         )  # fmt: skip
@@ -120,3 +121,26 @@ def test_a_picture_of_one_sample_is_filtered_and_the_ledger_says_so(stage, techn
     many = stage.render(16, (24, 24), bounces=2)["diffuse_indirect"]
     assert "filtered samples" not in stage.ledger.row(technique).counters
     assert one.mean() == pytest.approx(many.mean(), rel=0.2)
+
+
+def test_a_picture_of_one_sample_shows_indirect_light_on_stripes_as_smooth_as_many_samples_do(stage):
+    """Slanting stripes, a pixel and a half wide, before a wall in the sun: one point per pixel would tear them."""
+    stage.scene.render.filter_size = 1.5
+    dark, bright = stage.diffuse(0.1), stage.diffuse(0.9)
+    for k in range(-24, 24):
+        x = k / 8
+        stage.mesh(
+            [(x, -2, 0), (x + 1 / 8, -2, 0), (x + 9 / 8, 2, 0), (x + 1, 2, 0)], [(0, 1, 2, 3)],
+            material=(dark, bright)[k % 2],
+        )  # fmt: skip
+    wall = stage.mesh([(-3, 1, 0), (3, 1, 0), (3, 1, 2), (-3, 1, 2)], [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    wall.visible_camera = False
+    stage.light("SUN", turn=(0.9, 0, 0), energy=3.0)
+    stage.camera_above(2.0)
+    stage.scene.candela.slot_indirect = "multires_radiosity"
+    many, one = (stage.render(samples, (24, 24), bounces=1) for samples in (64, 1))
+    torn = one["diffuse_color"] / many["diffuse_color"]
+    light = [light_paths(picture)["diffuse_indirect"][..., :3] for picture in (one, many)]
+    smooth_light = light[0] / light[1]
+    assert smooth_light.mean() == pytest.approx(1.0, abs=0.15)
+    assert (smooth_light / smooth_light.mean()).std() < 0.5 * torn.std()
