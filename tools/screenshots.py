@@ -21,6 +21,8 @@ PICTURES = (
     ("viewport_moving", "drive", "viewport_moving", LEFT),
     ("panel_render", "drive", "panel_render", "properties"),
     ("panel_frame", "drive", "panel_frame", "properties"),
+    ("panel_tune", "tune", "tune_found", "properties"),
+    ("panel_tune_apply", "tune", "tune_apply", "properties"),
     ("panel_view_layer", "drive", "panel_view_layer", "properties"),
     ("panel_world", "drive", "panel_world", "properties"),
     ("panel_light", "drive", "panel_data", "properties"),

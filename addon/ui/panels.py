@@ -18,6 +18,7 @@ from .properties import identifier, slots
 from .quality import CANDELA_PT_quality_presets
 
 MOST_NOTES = 12  # more than these are counted only
+_PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
 _STATE_ICONS = {ledgers.RAN: "CHECKMARK", ledgers.REUSED: "LOOP_BACK", ledgers.SKIPPED: "REMOVE"}
 
 
@@ -94,8 +95,8 @@ def _technique_panel(technique) -> type:
         "__doc__": f"Parameters of {technique.label}",
         "__module__": __name__,
         "bl_label": technique.label,
-        "bl_parent_id": "CANDELA_RENDER_PT_parameters",
-        "bl_options": {"DEFAULT_CLOSED"},
+        "bl_parent_id": _PARENTS.get(technique.name, "CANDELA_RENDER_PT_parameters"),
+        "bl_options": set() if technique.name in _PARENTS else {"DEFAULT_CLOSED"},
         "poll": poll,
         "draw": draw,
     }

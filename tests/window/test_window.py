@@ -274,6 +274,20 @@ def test_comparison_in_the_image_editor_swaps_and_is_cancelled(toured):
 
 
 @pytest.fixture(scope="module", params=BACKENDS)
+def tuned(request, installed):
+    return run_script(request.param, "tune")
+
+
+def test_tune_measures_in_the_panel_and_applies_when_confirmed(tuned):
+    folder, result = tuned
+    assert result.get("error") is None
+    assert not complaints(folder)
+    assert result["trials"] > 1
+    assert any(name == "Samples" and now == "1000" for name, now, _ in result["changes"])
+    assert result["samples"] == result["proposed"] < 1000
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
 def strolled(request, installed):
     """A random walk of STROLL_SECONDS; `make window-walk` takes ten minutes."""
     return run_script(request.param, "stroll", os.environ.get("STROLL_SECONDS", "60"))
