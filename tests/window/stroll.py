@@ -129,7 +129,9 @@ def turn_view():
 
 
 def shading():
-    viewport_area().spaces.active.shading.type = dice.choice(("SOLID", "RENDERED", "RENDERED", "MATERIAL"))
+    workbench = window().scene.render.engine == "BLENDER_WORKBENCH"  # has no preview of materials
+    kinds = ("SOLID", "RENDERED", "RENDERED") if workbench else ("SOLID", "RENDERED", "RENDERED", "MATERIAL")
+    viewport_area().spaces.active.shading.type = dice.choice(kinds)
 
 
 def engine():
