@@ -93,6 +93,7 @@ def add_object():
 
 
 def delete_object():
+    object_mode()  # as Blender's own operators do: it never frees a mesh whose object is removed while it is edited
     added = [thing for thing in window().scene.objects if thing.name.startswith("Cube")]
     if added:
         bpy.data.objects.remove(dice.choice(added))
@@ -111,15 +112,22 @@ def redo():
             bpy.ops.ed.redo()
 
 
+def object_mode():
+    with there():
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+            push("mode")
+
+
 def edit_mode():
     thing = one("MESH")
     with there():
         if bpy.context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
+            object_mode()
         elif thing is not None and thing.name in window().view_layer.objects and thing.visible_get():
             window().view_layer.objects.active = thing
             bpy.ops.object.mode_set(mode="EDIT")
-    push("mode")
+            push("mode")
 
 
 def turn_view():
@@ -208,9 +216,7 @@ def steps():
 
 
 def rest():
-    with there():
-        if bpy.context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
+    object_mode()
     show()
     push("rest")
     yield from wait_for_rest()
