@@ -4,6 +4,8 @@
 BLENDER ?= 5.2
 PYTHON3 ?= python3
 STRESS ?= 2000
+# Two processes: while one compiles shaders or runs Python, the other draws. More would only share a software GPU.
+PARALLEL := -n 2 --dist worksteal
 
 ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
@@ -30,15 +32,15 @@ samples: ## write the sample scenes anew, with Blender 4.5, so that every suppor
 	.venv-4.5/bin/python sample_blends/make.py
 
 test: environment ## every test that needs no window
-	$(PYTHON) -m pytest -m "not window"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window"
 
 test-fast: environment ## the tests that take seconds
-	$(PYTHON) -m pytest -m "not window and not slow"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not slow"
 
 check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff format --check --quiet .
 	$(PYTHON) -m ruff check --quiet .
-	$(PYTHON) -m pytest -q -m "not window and not slow"
+	$(PYTHON) -m pytest -q $(PARALLEL) -m "not window and not slow"
 
 package: environment ## the extension as a zip, in build/
 	$(PYTHON) tools/package.py --output build

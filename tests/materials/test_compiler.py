@@ -202,9 +202,9 @@ def test_300_nodes_compile_in_a_fifth_of_a_second():
     chain = [math(f"M{k}", "MULTIPLY_ADD", (f"M{k - 1}", "Value") if k else 1.0) for k in range(300)]
     tree = graph(*chain, principled(Base_Color=("M299", "Value")), surface=("Principled", "BSDF"))
     compile_material("Warm", tree)
-    start = time.perf_counter()
+    start = time.process_time()
     compile_material("Test", tree)
-    assert time.perf_counter() - start < 0.2
+    assert time.process_time() - start < 0.2
 
 
 def test_cycles_in_a_graph_made_by_hand_end():
