@@ -51,3 +51,14 @@ float shuffled(int index, uvec2 salt)
 {
   return to_unit(owen_scramble(reverse_bits(owen_scramble(uint(index), salt.y)), salt.x));
 }
+
+// Draws one of many in proportion to their weights, as they come: whether this one replaces the one kept so far. What
+// is left of the uniform number `choice` decides on the next (weighted reservoir sampling, Chao 1982).
+bool reservoir_takes(float weight, inout float total, inout float choice)
+{
+  total += weight;
+  float p = weight / total;
+  bool taken = choice < p;
+  choice = taken ? choice / p : (choice - p) / max(1.0 - p, 1e-7);
+  return taken;
+}

@@ -33,19 +33,11 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
       light_arriving *= power_share(light.rate * density, lobe_density);
     }
     float importance = dot(abs(light_arriving), vec3(1.0));
-    if (importance > 0.0 && is_finite(importance)) {
-      total += importance;
-      float p = importance / total;
-      if (choice < p) {
-        choice /= p;
-        kept = i;
-        kept_importance = importance;
-        kept_direction = direction;
-        kept_light = light_arriving;
-      }
-      else {
-        choice = (choice - p) / max(1.0 - p, 1e-7);
-      }
+    if (importance > 0.0 && is_finite(importance) && reservoir_takes(importance, total, choice)) {
+      kept = i;
+      kept_importance = importance;
+      kept_direction = direction;
+      kept_light = light_arriving;
     }
   }
   if (kept < 0) {

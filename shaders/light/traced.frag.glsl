@@ -85,21 +85,12 @@ void main()
     vec2 span;
     vec3 light = arriving(s.position, direction, density, mirror, 1e29, span);
     float importance = dot(abs(weight * light), vec3(1.0));
-    if (!(importance > 0.0)) {
-      continue;
-    }
-    total += importance;
-    float p = importance / total;
-    if (choice < p) {
-      choice /= p;
+    if (importance > 0.0 && reservoir_takes(importance, total, choice)) {
       kept_importance = importance;
       kept_direction = direction;
       kept_weight = weight;
       kept_density = density;
       kept_span = span;
-    }
-    else {
-      choice = (choice - p) / max(1.0 - p, 1e-7);
     }
   }
   // Away from the surface by what float32 positions of this size cannot tell apart.
