@@ -1,36 +1,21 @@
 """The comparison in the Image Editor, run as an operator without a window."""
 
-import warnings
-
 import bpy
 import numpy as np
 import pytest
 
-from addon import engine
 from addon.compare import pictures
-from addon.ui import ENGINE, compare_editor
+from addon.ui import compare_editor
 
 
 @pytest.fixture
-def compared(registered, gpu_context, empty_scene, tmp_path, monkeypatch):
-    """A lit floor, compared."""
-    monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        bpy.ops.mesh.primitive_plane_add(size=8)
-        bpy.ops.object.light_add(type="POINT", location=(0, 0, 4))
-        bpy.context.object.data.energy = 400
-        bpy.ops.object.camera_add(location=(0, 0, 8))
-    scene = empty_scene
-    scene.camera, scene.render.engine = bpy.context.object, ENGINE
-    scene.render.resolution_x, scene.render.resolution_y = 64, 48
-    scene.candela.bounces = 0
+def compared(lit_floor):
+    """The options of the comparison, after it was made."""
     options = bpy.context.window_manager.candela_comparison
     options.samples, options.reference_samples, options.percentage = 8, 16, 50
     options.row, options.view = 0, "CANDELA"
     assert bpy.ops.candela.compare() == {"FINISHED"}
-    yield options
-    engine.free_sessions()
+    return options
 
 
 def shown():
