@@ -9,6 +9,7 @@ many what its error is made of: noise falls to a quarter or less, a bias would s
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from bench.quick import size_of, table
@@ -53,9 +54,14 @@ def page(rows: list[tuple[str, ...]], samples: int, size: tuple[int, int], refer
     ])  # fmt: skip
 
 
+def scene_names() -> list[str]:
+    return sorted(path.stem for path in SCENES.glob("*.blend"))
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
-    names = sorted(path.stem for path in SCENES.glob("*.blend"))
-    parser.add_argument("--scenes", nargs="+", default=names, metavar="NAME", help="default: all of sample_blends")
+    parser.add_argument(
+        "--scenes", nargs="+", default=scene_names(), metavar="NAME", help="default: all of sample_blends"
+    )
     parser.add_argument("--samples", type=int, default=64, metavar="N", help="default 64")
     parser.add_argument("--size", type=size_of, default=(256, 192), metavar="WxH", help="default 256x192")
     parser.add_argument("--reference", type=int, default=512, metavar="N", help="of each of two (default 512)")
@@ -63,6 +69,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> int:
+    missing = [name for name in options.scenes if not (SCENES / f"{name}.blend").is_file()]
+    if missing:
+        print(
+            f"There is no scene '{missing[0]}' in {SCENES.name}; it holds {', '.join(scene_names())}.", file=sys.stderr
+        )
+        return 2
     import bpy
 
     import addon

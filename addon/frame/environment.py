@@ -66,6 +66,26 @@ class Environment:
             if self.density is not self._by_radiance:
                 self._set_density(self._by_radiance)
             return
+        row, column = self._guide_cells()
+        usefulness = np.maximum(usefulness, 0.5 * _largest_nearby(usefulness))
+        guided = self._by_radiance * usefulness[row, column]
+        solid_angle = self._cell_solid_angle(*self._by_radiance.shape)
+        total = float((guided * solid_angle).sum())
+        self._set_density(0.9 * guided / total + 0.1 * self._by_radiance if total > 0 else self._by_radiance)
+
+    def guide_moments(self) -> np.ndarray:
+        """(3, GUIDE_ROWS, GUIDE_COLUMNS): for cells as of `guide` the means of the world's luminance (in any unit), of
+        its square, and of its square over the density with which directions are drawn."""
+        light = self._by_radiance
+        place, solid_angle = self._guide_cells(), np.broadcast_to(self._cell_solid_angle(*light.shape), light.shape)
+        sums = np.zeros((4, GUIDE_ROWS, GUIDE_COLUMNS))
+        for total, values in zip(sums, (np.ones_like(light), light, light**2, light**2 / self.density)):
+            np.add.at(total, place, values * solid_angle)
+        means = sums[1:].sum(axis=(1, 2), keepdims=True) / sums[0].sum()  # where a turned map has no cell of its own
+        return np.where(sums[0] > 0, sums[1:] / np.maximum(sums[0], 1e-300), means)
+
+    def _guide_cells(self) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column of the guiding cell that holds each cell of the density."""
         height, width = self._by_radiance.shape
         z = np.sin(((np.arange(height) + 0.5) / height - 0.5) * np.pi)
         azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2 * np.pi
@@ -74,14 +94,10 @@ class Environment:
             [ring * np.cos(azimuth), ring * np.sin(azimuth), np.repeat(z[:, None], width, axis=1)], axis=-1
         )
         world = in_map @ np.linalg.inv(self.rotation).T
-        row = np.clip((world[..., 2] + 1) / 2 * GUIDE_ROWS, 0, GUIDE_ROWS - 1).astype(int)
+        rows = np.clip((world[..., 2] + 1) / 2 * GUIDE_ROWS, 0, GUIDE_ROWS - 1).astype(int)
         turn = np.arctan2(world[..., 1], world[..., 0]) / (2 * np.pi) + 0.5
-        column = np.clip(turn * GUIDE_COLUMNS, 0, GUIDE_COLUMNS - 1).astype(int)
-        usefulness = np.maximum(usefulness, 0.5 * _largest_nearby(usefulness))
-        guided = self._by_radiance * usefulness[row, column]
-        solid_angle = self._cell_solid_angle(height, width)
-        total = float((guided * solid_angle).sum())
-        self._set_density(0.9 * guided / total + 0.1 * self._by_radiance if total > 0 else self._by_radiance)
+        columns = np.clip(turn * GUIDE_COLUMNS, 0, GUIDE_COLUMNS - 1).astype(int)
+        return rows, columns
 
     @staticmethod
     def _cell_solid_angle(height: int, width: int) -> np.ndarray:

@@ -36,6 +36,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
+from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Snapshot
 
 RESOLUTION = Param(
@@ -67,6 +68,7 @@ class Lookup:
     images: tuple[tuple[str, str, str, str], ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
     defines: tuple[tuple[str, str], ...] = ()
+    blocks: tuple[tuple[Struct, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ class Maps:
     textures: dict[str, images.Image] = field(default_factory=dict)
     images: dict[str, images.Image] = field(default_factory=dict)
     constants: dict[str, object] = field(default_factory=dict)
+    blocks: dict[str, Block] = field(default_factory=dict)
 
 
 HARD = Lookup("hard", "lib/hard_visibility.glsl")

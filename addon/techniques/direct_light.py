@@ -67,7 +67,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, features: int = -1) -> Program:
         "light/direct.frag.glsl",
         textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"), *lookup.textures),
         images=lookup.images,
-        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
         constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
         defines=(
             *TRACED_DEFINES,
@@ -98,7 +98,7 @@ def shade(
             **maps.textures,
         },
         "images": maps.images,
-        "blocks": {"film_view": frame.view_block, "sources": sources.set(rows, maps.views)},
+        "blocks": {"film_view": frame.view_block, "sources": sources.set(rows, maps.views), **maps.blocks},
         "constants": {
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
             **maps.constants,

@@ -8,10 +8,17 @@ and no scene spends them on the ground below it.
 Directions w come from a low-discrepancy set warped by the world's luminance (addon/frame/environment.py); V is an
 orthographic depth map along w over what the camera sees, so it converges to the truth with any occluder.
 
+Where many pixels see little of the world (a gallery behind columns), most of the shared directions bring them nothing.
+There each pixel of a final picture traces one ray per sample, in a direction drawn from a table of its tile
+(addon/frame/world_tiles.py). The probes tell beforehand which of the two leaves less: an open sky and a sun in a
+picture of the sky are shared. The noise of rays differs from pixel to pixel, so Denoise takes out more of it.
+relMSE at 64 samples of 256x192, shared directions and rays, denoised: hall .0217 and .0133, courtyard .0110 and .0041.
+
 | cost | per sample |
 |---|---|
 | maps | `directions` orthographic views (more where the picture reaches from near to far) |
 | passes | 1 over the screen |
+| rays | 1 per pixel instead of the maps |
 
 Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (see traced_glossy).
 Few samples under an even sky show faint overlapping hard shadows.
@@ -23,16 +30,34 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frame import depth_maps, lights
+from ..frame import depth_maps, environment, lights, world_tiles
 from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
+from ..gfx import images
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import RESOLUTION, DepthMapService, map_resolution, rounds
-from .direct_light import DIRECT_WRITES, shade
+from .accumulated_maps import RESOLUTION, DepthMapService, Lookup, Maps, map_resolution, rounds
+from .direct_light import DIRECT_WRITES, lighting, shade
 from .light_probes import WORLD
 from .surfaces import SURFACES
+
+WORLD_RAYS = Lookup(
+    "world rays",
+    "light/world_rays.glsl",
+    textures=(
+        ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"), ("FLOAT_2D", "environment_map"),
+        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "world_edges"),
+    ),
+    constants=(
+        ("INT", "trace_levels"), ("FLOAT", "offset_size"), ("IVEC2", "world_tiles"), ("IVEC2", "world_grid"),
+    ),
+    defines=(("OWN_POINTS", "1"),),
+    blocks=((environment.WORLD, "world_light"),),
+)  # fmt: skip
+RAY_LIGHTING = tuple(lighting(WORLD_RAYS, soft_lobes, 1 << lights.DIRECTION) for soft_lobes in (False, True))
+UNSHARED = 1.5  # times less of the noise of rays than of shared directions remains after denoising
+FRAGMENTED = 3.0  # variance of a single shared direction below which a low-discrepancy set of them does better still
 
 
 def directions_rate(frame: Frame) -> Rate:
@@ -77,6 +102,7 @@ class EnvironmentLight(Technique):
     def __init__(self):
         self.service = DepthMapService()
         self._sources = lights.Sources()
+        self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_environment_light(snapshot)
@@ -93,6 +119,14 @@ class EnvironmentLight(Technique):
         )
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         rate = directions_rate(frame)
+        if frame.sample == 0:
+            self._edges = self._tables(frame, rate)
+        if self._edges is not None:
+            # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
+            row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
+            yield from shade(frame, self, [row], 1 << lights.DIRECTION, self._sources, self._rays(frame))
+            frame.count(self, "rays per pixel")
+            return
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
         items = []
         for number in rate.points(frame.sample):
@@ -110,6 +144,41 @@ class EnvironmentLight(Technique):
             yield
             yield from shade(frame, self, rows, 1 << lights.DIRECTION, self._sources, maps)
 
+    def _tables(self, frame: Frame, rate: Rate) -> images.Image | None:
+        """Tables of directions by tile, where rays by them leave less noise than `rate` shared directions."""
+        useful = frame.services.get("world_seen")
+        asked = frame.settings.values.get((self.name, "directions"), 0)
+        denoised = any(technique.name == "denoise" for technique in frame.plan.techniques)
+        layered = any(
+            material.transparent for material in frame.materials.compiled
+        )  # rays know their mean opacity alone
+        if useful is None or asked or layered or not denoised or frame.hierarchy("shadow") is None:
+            return None
+        moments = frame.environment.guide_moments()
+        by_rays, by_shared = world_tiles.variances(useful, moments)
+        if by_shared < FRAGMENTED or by_rays >= UNSHARED * by_shared / rate.per_sample:
+            return None
+        chance = world_tiles.tables(world_tiles.arriving(useful, moments[0]), moments[0])
+        self._tiles = (useful.shape[1], useful.shape[0])
+        return images.upload(world_tiles.lower_edges(chance), "R32F")
+
+    def _rays(self, frame: Frame) -> Maps:
+        hierarchy, world = frame.hierarchy("shadow"), frame.environment
+        nothing = self.service.draw(frame, self, [], 16)
+        return Maps(
+            nothing.atlas, nothing.views, WORLD_RAYS,
+            textures={
+                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves, "environment_map": world.map,
+                "environment_density_map": world.density_map, "world_edges": self._edges,
+            },
+            constants={
+                "trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size,
+                "world_tiles": self._tiles, "world_grid": (environment.GUIDE_COLUMNS, environment.GUIDE_ROWS),
+            },
+            blocks={"world_light": world.block},
+        )  # fmt: skip
+
     def release(self) -> None:
+        self._edges = None
         self.service.release()
         self._sources.release()

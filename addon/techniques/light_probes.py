@@ -2,15 +2,16 @@
 
 Two questions are asked at pixels of a coarse grid, by rays through the hierarchy of all triangles:
 
-- From which directions does the world's light arrive? (108 probes, 512 directions.) Directions of the world are then
-  drawn in proportion to radiance times usefulness: a room lit through a window spends them on the window.
+- From which directions does the world's light arrive? (108 probes, or 432 where that is little beside the picture; 512
+  directions.) Directions of the world are then drawn in proportion to radiance times usefulness: a room lit through a
+  window spends them on the window. What each probe sees is also left for tables of single tiles (environment_light.py).
 - How much do single points of a light differ in what they bring? (432 probes, 8 points per light.) Their variance, in
   units of the light that the probe gets, is the error that one point leaves; frame/rates.py turns it into the number of
   points per sample. Only for pictures whose samples are shown together: otherwise every sample has one point per light.
 
 | cost | once per picture |
 |---|---|
-| rays | 55,296 for the world, 3,456 per light |
+| rays | 55,296 or 221,184 for the world, 3,456 per light |
 | readback | 4 bytes per probe and direction, 16 per probe and light |
 
 Bias: none; only the density of samples depends on it. Fails: where the scene has too many triangles for a hierarchy,
@@ -33,6 +34,8 @@ from ..snapshot.scene import Snapshot, World
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
+FINE_PROBES = (24, 18)  # for guiding, where the picture asks for many more rays than these
+FEW = 1 / 8  # guiding rays per pixel and sample
 POINTS = 8  # of each light
 MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
 WORLD = "world"  # its name among the rates
@@ -111,17 +114,21 @@ class LightProbes(Technique):
             return
         rays = self._rays(frame)
         rows, columns = environment.GUIDE_ROWS, environment.GUIDE_COLUMNS
-        probes = GUIDE_PROBES[0] * GUIDE_PROBES[1]
+        affordable = FEW * frame.size[0] * frame.size[1] * frame.settings.samples / (rows * columns)
+        fine = frame.settings.whole and affordable >= FINE_PROBES[0] * FINE_PROBES[1]
+        grid = FINE_PROBES if fine else GUIDE_PROBES
+        probes = grid[0] * grid[1]
         with images.borrowed(rows * columns, probes, "R32F") as target:
             passes.fullscreen(
                 GUIDE,
                 target,
                 textures=rays["textures"],
                 blocks={"film_view": frame.view_block},
-                constants={**rays["constants"], "columns": columns, "rows": rows, "probes": GUIDE_PROBES},
+                constants={**rays["constants"], "columns": columns, "rows": rows, "probes": grid},
             )
-            useful = images.read(target.colors[0]).mean(axis=(0, 2))
-        frame.environment.guide(useful.reshape(rows, columns))
+            useful = images.read(target.colors[0]).reshape(grid[1], grid[0], rows, columns)
+        frame.environment.guide(useful.mean(axis=(0, 1)))
+        frame.services["world_seen"] = useful
         frame.count(self, "guiding rays", rows * columns * probes)
 
     def _share_out(self, frame: Frame, lit: bool) -> None:

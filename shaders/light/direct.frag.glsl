@@ -1,6 +1,7 @@
 // Direct light of this sample: one point on each light, or the light as a whole; visibility from depth maps.
 //
-// `generated/visibility` is the lookup of the technique in the shadow slot.
+// `generated/visibility` is the lookup of the technique in the shadow slot. With OWN_POINTS it also gives each pixel a
+// point of its own (light/world_rays.glsl).
 // The point is the same for all pixels, so a narrow glossy lobe would see a few bright dots. Where rays are traced
 // (light/traced.frag.glsl) such lobes take part of their light from there; both are weighted by the balance of squared
 // densities (Veach's power heuristic), so the sum has the same mean.
@@ -49,6 +50,9 @@ void main()
   vec3 glossy = vec3(0.0);
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
+#ifdef OWN_POINTS
+    light = own_point(light);
+#endif
     bool whole = LIGHTS_HAVE(LIGHT_HAS_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
     int parts = whole ? WHOLE_PARTS : 1;
     bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;

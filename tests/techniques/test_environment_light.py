@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.techniques import environment_light
 from tests.techniques.conftest import places
 
 SPAN = 4.0
@@ -138,3 +139,28 @@ def test_a_transparent_film_shows_the_world_as_alpha_and_in_its_own_pass(stage):
     assert (images["combined"][outside] == 0).all()
     assert (images["environment"][outside] == [0.25, 0.5, 1.0]).all()
     assert (images["combined"][~outside & (np.abs(places((32, 32), SPAN)[0]) < 0.9), 3] == 1).all()
+
+
+def gallery(stage):
+    """A floor below a low roof with holes far apart: each place sees the sky through another one."""
+    stage.floor(6.0)
+    stage.camera_above(SPAN)
+    stage.world((0.3, 0.6, 1.0))
+    for x in range(-3, 3):
+        for y in range(-3, 3):
+            stage.rectangle((x, y), (x + 1, y + 0.6), z=0.4).visible_camera = False
+            stage.rectangle((x, y + 0.6), (x + 0.6, y + 1), z=0.4).visible_camera = False
+
+
+@pytest.mark.slow
+def test_rays_by_tiles_have_the_mean_of_shared_directions(stage, monkeypatch):
+    monkeypatch.setattr(environment_light, "UNSHARED", np.inf)  # rays, whatever they leave
+    gallery(stage)
+    by_rays = stage.render(64, (64, 48))["diffuse_direct"].astype(float)
+    assert stage.ledger.row("environment_light").counters["rays per pixel"] == 64
+    stage.scene.candela.environment_light_directions = 16
+    shared = stage.render(64, (64, 48))["diffuse_direct"].astype(float)
+    assert "rays per pixel" not in stage.ledger.row("environment_light").counters
+    np.testing.assert_allclose(by_rays.mean(axis=(0, 1)), shared.mean(axis=(0, 1)), rtol=0.01)
+    halves = [picture.reshape(4, 12, 4, 16, 3).mean(axis=(1, 3)) for picture in (by_rays, shared)]
+    np.testing.assert_allclose(halves[0], halves[1], rtol=0.06)
