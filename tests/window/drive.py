@@ -170,7 +170,7 @@ def panels():
         picture(f"panel_{tab.lower()}.png")
         if tab == "RENDER":
             with bpy.context.temp_override(window=window(), area=right, region=main_region(right)):
-                bpy.ops.view2d.scroll_down(deltay=560)
+                bpy.ops.view2d.scroll_down(page=True)
             yield 0.5
             picture("panel_frame.png")
     material = mesh.active_material
