@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 BACKEND = "opengl"
 LEFT = (0, 26, 1058, 694)  # the large area of the Layout workspace
 HALF = (0, 26, 636, 694)
+DIALOG = (480, 240, 578, 340)  # around the middle of the properties
 # Picture in docs/images, script, picture of the window, what is cut out: a box or a name in the script's result.
 PICTURES = (
     ("viewport_rest", "tour", "tour_engine", HALF),
@@ -22,7 +23,7 @@ PICTURES = (
     ("panel_render", "drive", "panel_render", "properties"),
     ("panel_frame", "drive", "panel_frame", "properties"),
     ("panel_tune", "tune", "tune_found", "properties"),
-    ("panel_tune_apply", "tune", "tune_apply", "properties"),
+    ("panel_tune_apply", "tune", "tune_apply", DIALOG),
     ("panel_view_layer", "drive", "panel_view_layer", "properties"),
     ("panel_world", "drive", "panel_world", "properties"),
     ("panel_light", "drive", "panel_data", "properties"),

@@ -44,6 +44,8 @@ def steps():
             shown = True
             yield 0.5
             picture("tune_running.png")
+    with properties:
+        bpy.ops.view2d.scroll_down(page=True)
     yield 1.0
     picture("tune_found.png")
     found = tuning.latest(scene)
