@@ -51,7 +51,7 @@ void main()
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
 #ifdef OWN_POINTS
-    light = own_point(light);
+    light = own_point(light, i);
 #endif
     bool whole = LIGHTS_HAVE(LIGHT_HAS_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
     int parts = whole ? WHOLE_PARTS : 1;

@@ -1,5 +1,5 @@
-// A direction of the world of each pixel's own, drawn from the table of its tile (addon/frame/world_tiles.py), and its
-// visibility by a ray. In place of the direction that the other lookups share among all pixels.
+// Directions of the world of each pixel's own, drawn from the table of its tile (addon/frame/world_tiles.py), and their
+// visibility by rays. In place of the directions that the other lookups share among all pixels.
 #include "light/sources.glsl"
 #include "lib/environment.glsl"
 #include "trace/hierarchy.glsl"
@@ -21,24 +21,26 @@ int world_cell(int tile, int cells, float x)
   return low;
 }
 
-Light own_point(Light light)
+// `number`: of the `light_count` rays of this sample, which divide the cells among them.
+Light own_point(Light light, int number)
 {
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) + 23u));
-  vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
+  vec2 u = vec2((scrambled(film_view.bits_x, salt.x) + float(number)) / float(light_count),
+                scrambled(film_view.bits_y, salt.y));
   ivec2 tile = ivec2(gl_FragCoord.xy / vec2(textureSize(surface_position, 0)) * vec2(world_tiles));
   int row = tile.y * world_tiles.x + tile.x;
   int cells = world_grid.x * world_grid.y;
-  int number = world_cell(row, cells, u.x);
-  float from = texelFetch(world_edges, ivec2(number, row), 0).r;
-  float to = (number + 1 < cells) ? texelFetch(world_edges, ivec2(number + 1, row), 0).r : 1.0;
+  int place = world_cell(row, cells, u.x);
+  float from = texelFetch(world_edges, ivec2(place, row), 0).r;
+  float to = (place + 1 < cells) ? texelFetch(world_edges, ivec2(place + 1, row), 0).r : 1.0;
   float chance = max(to - from, 1e-9);
-  vec2 cell = vec2(float(number % world_grid.x) + clamp((u.x - from) / chance, 0.0, 1.0),
-                   float(number / world_grid.x) + u.y);
+  vec2 cell = vec2(float(place % world_grid.x) + clamp((u.x - from) / chance, 0.0, 1.0),
+                   float(place / world_grid.x) + u.y);
   float z = 2.0 * cell.y / float(world_grid.y) - 1.0;
   float azimuth = (cell.x / float(world_grid.x) - 0.5) * 2.0 * PI;
   float ring = sqrt(max(1.0 - z * z, 0.0));
   light.centre = vec3(ring * cos(azimuth), ring * sin(azimuth), z);
-  light.radiance = environment_radiance(light.centre) * (4.0 * PI / (chance * float(cells)));
+  light.radiance = environment_radiance(light.centre) * (4.0 * PI / (chance * float(cells * light_count)));
   // Lobes that trace rays share their light with the world's directions by this density; any that both sides name alike
   // keeps the sum, and narrow lobes know this one.
   light.area = environment_density(light.centre);
