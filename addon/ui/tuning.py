@@ -208,7 +208,7 @@ class CANDELA_OT_tune_apply(bpy.types.Operator):
         return (curve[self.number] if 0 <= self.number < len(curve) else found.best).candidate
 
     def invoke(self, context, event):
-        return context.window_manager.invoke_props_dialog(self, width=360, confirm_text="Apply")
+        return context.window_manager.invoke_props_dialog(self, width=420, confirm_text="Apply")
 
     def draw(self, context):
         table = changes(context.scene, self._candidate(context))
@@ -216,7 +216,7 @@ class CANDELA_OT_tune_apply(bpy.types.Operator):
             self.layout.label(text="Nothing changes: the scene is set like this.")
         column = self.layout.column(align=True)
         for name, now, then in table:
-            row = column.split(factor=0.5)
+            row = column.split(factor=0.4)
             row.label(text=name)
             row.label(text=f"{now} → {then}")
 
