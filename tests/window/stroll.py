@@ -46,6 +46,7 @@ def show():
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
     scene.candela.samples = scene.candela.viewport_samples = 2
     scene.candela.bounces = 0
+    scene.render.use_border = False  # a smaller picture takes less memory
     space = viewport_area().spaces.active
     space.region_3d.view_perspective = "CAMERA"
     space.shading.type = "RENDERED"
