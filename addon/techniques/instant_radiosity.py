@@ -9,7 +9,7 @@ has no bound. So the integral is split by a share s(d) = min(1, d^2 / r^2):
 The first kernel is bounded by cos_x cos_y / r^2. The second needs rays of length r only (Kollig & Keller 2004: bias
 compensation), and both shares add to one at every distance: nothing is doubled, nothing is lost. L at the end of a ray
 is estimated on the spot: sources by one traced point, the virtual lights by one of them, and what is nearer than r to
-*that* point by another short ray, and so on. r is a tenth of the median distance of what is seen.
+*that* point by another short ray, and so on. r is 7 % of the median distance of what is seen.
 
 Per pixel and sample, `rays` virtual lights are traced out of all, drawn in proportion to what they would bring: noise
 comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose end is shaded in the same way.
@@ -20,8 +20,11 @@ comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose 
 | rays per pixel | `rays` + 1 short one, + 2 for each surface within r, + 1 to 3 for glossy surfaces |
 | arithmetic per pixel | 2 kernels per virtual light |
 
+256 virtual lights and 8 rays cost an eighth more than 128 and 4 in the hall at 256x192, and leave 0.82 of the squared
+error there and 0.69 beyond a door ajar (16 samples): what a sample costs before it looks at any pixel stays.
+
 Fails: with few samples, grain where virtual lights are partly hidden; a sample that is shown alone is filtered
-(neighbours.py). Light that reached a diffuse surface over mirrors (caustics) is spread evenly from the mirror.
+(neighbours.py). Light that reached a diffuse surface over mirrors (caustics) is spread as by roughness 0.5 and more.
 No hierarchy for more than 4 million triangles: no indirect light then.
 
 Bias, all in the diffuse and glossy indirect paths: what virtual_lights.py names; of light that is reflected near a
@@ -112,10 +115,10 @@ class InstantRadiosity(Technique):
     slot = "indirect"
     params = (
         Param(
-            "virtual_lights", "Virtual lights", 128, "Points of surfaces that light the picture in a sample", 1, 1024,
+            "virtual_lights", "Virtual lights", 256, "Points of surfaces that light the picture in a sample", 1, 1024,
             draft=32,
         ),
-        Param("rays", "Rays", 4, "How many of the virtual lights each pixel traces in a sample", 1, 64, draft=1),
+        Param("rays", "Rays", 8, "How many of the virtual lights each pixel traces in a sample", 1, 64, draft=1),
     )  # fmt: skip
     reads = SURFACES
     writes = INDIRECT_WRITES
