@@ -49,9 +49,9 @@ visibility are taken as independent. Against tracing the same virtual lights, on
 Cornell box 7 % with 64 clusters (11 % with 8, 24 % with 2; unshadowed 25 %), mean + 0.7 %, with 8 rays - 0.8 %; beyond
 a door ajar, mean + 16 % without rays, - 0.1 % with 8.
 
-Measured at 96x72 against Cycles' diffuse indirect pass, 16 bounces: relMSE over the reference's noise of one sample (mean
-of three seeds, filtered) and of 64 (denoised; - : not measured so); processor time over that of instant radiosity with
-half of its present virtual lights and rays:
+Measured at 96x72 against Cycles' diffuse indirect pass, 16 bounces: relMSE over the reference's noise of one sample
+(mean of three seeds, filtered) and of 64 (denoised); processor time over that of instant radiosity with half of its
+present virtual lights and rays; -: not measured in this way.
 
 | | Cornell box | courtyard | lamp | hall | door | window |
 |---|---|---|---|---|---|---|
