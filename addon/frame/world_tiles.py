@@ -19,8 +19,8 @@ import numpy as np
 
 TILES = 0.3  # weight of each of the two neighbouring tiles along an axis
 CELLS = 0.25  # of each of the two neighbouring cells
-SHARED = 0.2
-POWER = 1.5
+SHARED = 0.35
+POWER = 2.0
 BLIND = 0.05
 
 

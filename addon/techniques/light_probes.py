@@ -34,8 +34,8 @@ from ..snapshot.scene import Snapshot, World
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
-FINE_PROBES = (24, 18)  # for guiding, where the picture asks for many more rays than these
-FEW = 1 / 8  # guiding rays per pixel and sample
+FINE_PROBES = (24, 18)  # for guiding, where their rays are few
+FEW = 0.3  # guiding rays per pixel and sample
 POINTS = 8  # of each light
 MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
 WORLD = "world"  # its name among the rates
