@@ -24,9 +24,9 @@ classification by bounds and the plane-relative moments are ours.
 
 | cost | per map of N x N texels |
 |---|---|
-| pyramid, table | log2 N + 4 dispatches, 20 bytes per texel written |
-| lookup, lit or all blocked pixels | up to 45 fetches |
-| lookup, penumbra | 2 grids: up to 130 fetches of 16 bytes and 450 of 8, usually a third; 9 more per mixed cell |
+| pyramid, table | log2 N dispatches, 4 log8 N + 3 passes; 20 bytes per texel kept |
+| lookup, lit or all blocked pixels | up to 27 loads |
+| lookup, penumbra | 2 grids: up to 130 loads of 16 bytes and 450 of 8, usually a third; 9 more per mixed cell |
 | bytes | 36 per texel and 16 borrowed, beside the map's 20 |
 
 Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the

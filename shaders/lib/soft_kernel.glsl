@@ -109,7 +109,7 @@ void kernel_texels(Light light, ShadowReceiver r, vec2 half_size, out ivec2 firs
   last = ivec2(clamp(ceil(r.texel + half_size) - 1.0, low, high));
 }
 
-#define KERNEL_SEARCHES 4
+#define KERNEL_SEARCHES 2
 
 // How high above the receiver (in q) blockers can stand that the kernel reaches: 0 = lit, below 0 = all of the kernel
 // is blocked whatever its size.

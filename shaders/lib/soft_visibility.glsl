@@ -1,6 +1,6 @@
 // Visibility of a light with extent, or of the part of it that a map stands for, in two steps: the mean height of the
 // blockers in the largest kernel that matters, then the share of blockers in the kernel of that height. The same is asked
-// of ever smaller windows, and the darkest answer counts: each is what the blockers of some height hide at least.
+// of a smaller window, and the darker answer counts: each is what the blockers of some height hide at least.
 //
 // The technique that includes this file last brings `kernel_cells`, which adds what it finds in a box. A texel at the
 // offset d in the kernel of height h stands for one point of the light (lib/soft_kernel.glsl). It counts by the cosine
@@ -78,10 +78,9 @@ vec3 kernel_towards(Light light, vec3 position)
 }
 
 // A blocker much lower than the mean is a small part of the window, and hides all of the light where its own kernel is
-// full: a wire that touches another. Such blockers are looked for, texel by texel, in windows that shrink by NEAR_RATIO.
-#define NEAR_WINDOWS 3
+// full: a wire that touches another. Such blockers are looked for, texel by texel, in a window that is smaller by NEAR_RATIO.
 #define NEAR_RATIO 0.25
-#define NEAR_TEXELS 6  // along each side of a window, at most
+#define NEAR_TEXELS 4  // along each side of a window, at most
 
 // Blockers in the box r.texel -+ half_size. One that stands higher than `most_height` hides, with a texel of this box, a
 // smaller part of the light.
@@ -120,26 +119,23 @@ float kernel_lit(Blockers kernel)
 // Visibility past blockers that stand lower than `height`.
 float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, float most, float height)
 {
-  float visibility = 1.0;
-  for (int k = 0; k < NEAR_WINDOWS; k++) {
-    height *= NEAR_RATIO;
-    vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
-    ivec2 first;
-    ivec2 last;
-    kernel_texels(light, r, window, first, last);
-    float deepest;
-    if (kernel_bounds(r, first, last, deepest).y <= deepest) {
-      break;  // nothing stands above the receiver here, nor in what is left of the window
-    }
-    Blockers search = kernel_near(light, r, normal, window, height, vec2(0.0));
-    if (search.blocked > 0.0) {
-      float blocker = min(search.height / search.blocked, height);
-      vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
-      // Heights scatter around their mean, hence twice: else a slanted blocker would count in part.
-      visibility = min(visibility, kernel_lit(kernel_near(light, r, normal, size, 2.0 * blocker, r.gradient / blocker)));
-    }
+  height *= NEAR_RATIO;
+  vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
+  ivec2 first;
+  ivec2 last;
+  kernel_texels(light, r, window, first, last);
+  float deepest;
+  if (kernel_bounds(r, first, last, deepest).y <= deepest) {
+    return 1.0;  // nothing stands above the receiver here
   }
-  return visibility;
+  Blockers search = kernel_near(light, r, normal, window, height, vec2(0.0));
+  if (search.blocked <= 0.0) {
+    return 1.0;
+  }
+  float blocker = min(search.height / search.blocked, height);
+  vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
+  // Heights scatter around their mean, hence twice: else a slanted blocker would count in part.
+  return kernel_lit(kernel_near(light, r, normal, size, 2.0 * blocker, r.gradient / blocker));
 }
 
 float light_visibility(Light light, vec3 position, vec3 normal)
