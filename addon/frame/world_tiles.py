@@ -7,8 +7,7 @@ cosine x radiance in cells of equal solid angle, normalised per probe, the table
     m = (1 - BLIND) ((1 - SHARED) (smoothed f^p)^(1/p) + SHARED (mean of f^p)^(1/p)) + BLIND radiance,   p = POWER
 
 smoothed over neighbouring tiles and cells, since a probe is one pixel of its tile and one direction of each cell; the
-mean is over all probes. The density that leaves least variance to a group of pixels is the root of the mean of f^2;
-a smaller power does better where the probe's neighbours are told from the rest.
+mean is over all probes. With p = 2 that is the density which leaves least variance to a group of pixels.
 Within a cell directions are even, so the density is m / (solid angle of a cell) and never zero where light may come
 from. Bright spots smaller than a cell are what such a table cannot know; `variances` says what that costs.
 """

@@ -156,14 +156,15 @@ class EnvironmentLight(Technique):
         useful = frame.services.get("world_seen")
         asked = frame.settings.values.get((self.name, "directions"), 0)
         denoised = any(technique.name == "denoise" for technique in frame.plan.techniques)
-        layered = any(
-            material.transparent for material in frame.materials.compiled
-        )  # rays know their mean opacity alone
-        if useful is None or asked or layered or not denoised or frame.hierarchy("shadow") is None:
+        # Rays know only the mean opacity of a layer.
+        layered = any(material.transparent for material in frame.materials.compiled)
+        if useful is None or asked or layered or not denoised or not frame.settings.whole:
             return None
         moments = frame.environment.guide_moments()
         by_rays, by_shared = world_tiles.variances(useful, moments)
         if by_shared < FRAGMENTED or by_rays >= UNSHARED * by_shared / rate.per_sample:
+            return None
+        if frame.hierarchy("shadow") is None:
             return None
         chance = world_tiles.tables(world_tiles.arriving(useful, moments[0]), moments[0])
         self._tiles = (useful.shape[1], useful.shape[0])
