@@ -20,8 +20,7 @@ from bench.cells import Scene, Series
 
 BOUNCES = 16
 SAMPLES = (1, 16)
-MOST = 64  # samples of those that a final picture may be made with
-LONG = ("AUTO", "instant_radiosity", "clustered_visibility")
+MOST, LONG = 64, ("instant_radiosity",)  # what Auto takes for final pictures; the others cost several times as much
 MOVING_SCENE, FRAMES, MOVING_SIZE, MOVING_REFERENCE = "cornell_box", 24, (48, 36), 64
 GROWTH_SIZE = (64, 48)
 GROWN = ("multires_radiosity", "clustered_visibility", "imperfect_shadow_maps")
@@ -45,12 +44,9 @@ PEERS = (
 
 def entrants(techniques: list[str]) -> list[tuple[Series, int]]:
     """Engines with settings and numbers of samples, in the order of the table."""
-    found = [
-        (own(name), samples)
-        for name in ("AUTO", *techniques)
-        for samples in (*SAMPLES, *((MOST,) if name in LONG else ()))
-    ]
-    return [*found, *PEERS]
+    counts = {name: (*SAMPLES, MOST) if name in LONG else SAMPLES for name in techniques}
+    found = [(own(name), samples) for name, some in counts.items() for samples in some]
+    return [(own("AUTO"), SAMPLES[-1]), *found, *PEERS]
 
 
 def cells(figures: dict) -> tuple[str, ...]:
