@@ -59,6 +59,7 @@ present virtual lights and rays; -: not measured in this way.
 | this, 1 sample | 0.062 | 0.027 | 0.021 | 0.065 | 0.086 | 0.104 |
 | its bias | 0.994 | 1.050 | 1.028 | 0.955 | 0.914 | 0.957 |
 | instant radiosity with half the rays, 64 samples | 0.0027 | - | - | 0.0113 | 0.0149 | 0.0149 |
+| instant radiosity, 64 samples | - | - | - | 0.0103 | 0.0120 | 0.0197 |
 | multires radiosity, 64 samples | - | - | - | 0.0060 | 0.0081 | 0.0086 |
 | this, 64 samples | 0.0016 | - | - | 0.0083 | 0.0217 | - |
 | time at 256x192, 4 samples | 1.3 | - | - | 1.8 | - | - |
