@@ -252,13 +252,20 @@ class Atlas:
 
     def __init__(self):
         self.target: images.Target | None = None
+        self._resolution = 0
 
     def prepare(self, views: list[MapView], resolution: int) -> tuple[list[tuple[int, int, int]], np.ndarray]:
         """Cells (x, y, size) for the views, and what shaders must know of them, (V, VIEW_TEXELS, 4).
 
-        The image only grows: the number of views varies from sample to sample, and a new size costs an allocation.
+        The image holds the views and, at one resolution, only grows: the number of views varies from sample to sample,
+        and a new size costs an allocation. A single view does not clear a row of four.
         """
-        columns = max(1, min(4, 8192 // resolution))
+        if resolution != self._resolution:
+            self.release()
+            self._resolution = resolution
+        whole = sum(view.scale == 1 for view in views)
+        needed = whole + -(-(len(views) - whole) // 4)
+        columns = max(1, min(4, 8192 // resolution, needed))
         quarters = sorted(range(len(views)), key=lambda k: views[k].scale)  # four half-size views share a cell
         cells, taken, quarter = [(0, 0, 0)] * len(views), 0, 0
         for k in quarters:
@@ -270,8 +277,10 @@ class Atlas:
             quarter += views[k].scale > 1
             cells[k] = (corner[0] + place[0], corner[1] + place[1], side)
         size = (columns * resolution, -(-taken // columns) * resolution)
-        if self.target is None or self.target.size[0] != size[0] or self.target.size[1] < size[1]:
-            self.release()
+        if self.target is None or self.target.size[0] < size[0] or self.target.size[1] < size[1]:
+            if self.target is not None:
+                size = tuple(max(wanted, had) for wanted, had in zip(size, self.target.size))
+                self.release()
             self.target = images.Target(
                 (images.pool.take(*size, "RGBA32F"),), images.pool.take(*size, "DEPTH_COMPONENT32F")
             )
