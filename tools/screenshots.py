@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 BACKEND = "opengl"
 LEFT = (0, 26, 1058, 694)  # the large area of the Layout workspace
 HALF = (0, 26, 636, 694)
-DIALOG = (480, 240, 578, 340)  # around the middle of the properties
+DIALOG = (430, 240, 628, 340)  # around the middle of the properties
 # Picture in docs/images, script, picture of the window, what is cut out: a box or a name in the script's result.
 PICTURES = (
     ("viewport_rest", "tour", "tour_engine", HALF),

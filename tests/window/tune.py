@@ -45,7 +45,8 @@ def steps():
             yield 0.5
             picture("tune_running.png")
     with properties:
-        bpy.ops.view2d.scroll_down(page=True)
+        for _ in range(12):  # 40 pixels each
+            bpy.ops.view2d.scroll_down()
     yield 1.0
     picture("tune_found.png")
     found = tuning.latest(scene)
