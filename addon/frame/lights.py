@@ -5,7 +5,6 @@ Radiance follows Cycles' conventions for every kind. All points inside a light c
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +17,10 @@ VIEW_TEXELS = 5
 MOST_LIGHTS, MOST_VIEWS = 64, 96  # together just below the 16 KiB that every GPU grants a uniform block
 SOURCES = Struct("Sources", ("vec4", f"light[{MOST_LIGHTS * TEXELS}]"), ("vec4", f"view[{MOST_VIEWS * VIEW_TEXELS}]"))
 POINT, SPHERE, SUN, RECTANGLE, ELLIPSE, DIRECTION, SURFACE = range(7)
-SPOTS, SPREAD, WHOLE = 8, 9, 10  # bits of `features` besides the kinds
+# What the lights of a pass may be, as bits: each kind, and WHOLE for those that are not sampled by a point. A lighting
+# pass is compiled for one of few sets, so that it leaves out the rest and a change of a lamp compiles nothing.
+WHOLE = 8
+LAMPS = sum(1 << kind for kind in (POINT, SPHERE, SUN, RECTANGLE, ELLIPSE))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
 NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
@@ -111,14 +113,6 @@ class Emitter:
             rows[5 + k, : len(row)] = row
         rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
         return rows
-
-
-def features(emitters: Iterable[Emitter]) -> int:
-    """What lights are made of, as bits: a lighting pass that is compiled for them leaves out the rest."""
-    found = 0
-    for emitter in emitters:
-        found |= 1 << emitter.kind | bool(emitter.flags & SPOT_FLAG) << SPOTS | (emitter.spread > 0) << SPREAD
-    return found
 
 
 def emitters(snapshot: Snapshot, origin: np.ndarray) -> list[Emitter]:

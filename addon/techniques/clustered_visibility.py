@@ -73,7 +73,7 @@ of a pixel).
 At 160x120 the time is 1.7 to 2.4 times that of instant radiosity, since the maps cost the same, and at 640x360 0.9
 (Cornell box) and 1.2 (hall). Auto takes this technique for pictures of one sample from 60 000 pixels on, where the
 error falls by more than the time rises in all scenes but the window. With more samples it takes instant radiosity: the
-same time spent on more of its samples leaves less error than multires radiosity everywhere and than this beyond the
+same time spent on more of its samples leaves less error than multires radiosity in the hall and than this beyond the
 door and in the hall; multires radiosity is the one that has less per sample.
 """
 

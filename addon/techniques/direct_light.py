@@ -59,9 +59,9 @@ RAYS_WHERE_NEAR = Lookup(
 
 
 @cache
-def lighting(lookup: Lookup, soft_lobes: bool, features: int = -1) -> Program:
+def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
     """The lighting pass with the visibility of a technique, for scenes with or without soft lobes, and for lights of
-    these features (lights.features; -1: any light)."""
+    these kinds (bits as in lights.LAMPS; -1: any light)."""
     return passes.fullscreen_program(
         f"direct light, {lookup.name}",
         "light/direct.frag.glsl",
@@ -73,7 +73,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, features: int = -1) -> Program:
             *TRACED_DEFINES,
             *SOFT_DEFINES[soft_lobes],
             *lookup.defines,
-            ("LIGHT_FEATURES", str(features)),
+            ("LIGHT_KINDS", str(kinds)),
         ),
         snippets=(("generated/visibility", f'#include "{lookup.file}"\n'),),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
@@ -88,9 +88,9 @@ DIRECT_WRITES = (
 
 
 def shade(
-    frame: Frame, technique: Technique, rows: list[np.ndarray], features: int, sources: lights.Sources, maps: Maps
+    frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps
 ) -> Iterator[None]:
-    """Add the light of `rows` (each (TEXELS, 4)), which has no more than `features`, to the radiance images, in
+    """Add the light of `rows` (each (TEXELS, 4)), of these `kinds`, to the radiance images, in
     parts."""
     bindings = {
         "textures": {
@@ -104,7 +104,7 @@ def shade(
             **maps.constants,
         },
     }  # fmt: skip
-    program = lighting(maps.lookup, frame.materials.soft, features)
+    program = lighting(maps.lookup, frame.materials.soft, kinds)
     target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct")
     for band in frame.bands(technique):
         passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
@@ -142,14 +142,13 @@ class DirectLight(Technique):
         if frame.sample == 0:
             self._emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
-            self._features = lights.features(self._emitters)
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         service = frame.services.get("shadow")
         items: dict[AccumulatedMaps | None, list] = {}
         near: dict[AccumulatedMaps, list] = {}
-        features = self._features
+        kinds = lights.LAMPS
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
             rate = rate_of(frame, emitter.light.key)
@@ -165,7 +164,7 @@ class DirectLight(Technique):
                 views = shadow.views(frame, shown, sample, number, cell) if shadow else []
                 row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole
-                features |= whole << lights.WHOLE
+                kinds |= whole << lights.WHOLE
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
                 (near if by_rays else items).setdefault(shadow, []).append((row, views))
         for shadow, own in items.items():
@@ -173,12 +172,12 @@ class DirectLight(Technique):
             for rows, views in rounds(own, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
                 maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
                 yield
-                yield from shade(frame, self, rows, features, self._sources, maps)
+                yield from shade(frame, self, rows, kinds, self._sources, maps)
         for shadow, own in near.items():
             for rows, views in rounds(own, shadow.resolution(frame), shadow.atlas_texels):
                 maps = self._with_rays(frame, shadow.draw(frame, views))
                 yield
-                yield from shade(frame, self, rows, features, self._sources, maps)
+                yield from shade(frame, self, rows, kinds, self._sources, maps)
 
     def _with_rays(self, frame: Frame, maps: Maps) -> Maps:
         """The same maps, asked only where the light is small beside its distance."""

@@ -98,7 +98,7 @@ class EnvironmentAreaLights(Technique):
         cell = maps_of.cell(frame, frame.sample, frame.settings.samples)
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
         jitter = (*frame.random("map/environment"), *frame.random("map/environment/turn"))
-        features = 1 << lights.SUN | (cell >= 1.0) << lights.WHOLE
+        kinds = 1 << lights.SUN | (cell >= 1.0) << lights.WHOLE
         items = []
         for light in self._lights(frame):
             emitter = _emitter(light, flags)
@@ -116,7 +116,7 @@ class EnvironmentAreaLights(Technique):
             maps = maps_of.draw(frame, views)
             frame.count(self, "maps", len(views))
             yield
-            yield from shade(frame, self, rows, features, self._sources, maps)
+            yield from shade(frame, self, rows, kinds, self._sources, maps)
 
     def _lights(self, frame: Frame) -> list[area_fit.AreaLight]:
         """Fitted anew when the world or the number of lights has changed."""

@@ -29,15 +29,13 @@
 #define LIGHT_CAMERA 16
 #define LIGHT_TRACED 32  // rays of narrow lobes look for it (light/traced.frag.glsl)
 
-// What the lights of a pass are made of, as bits: each kind by its number, then the ones below (lights.features). A pass
-// that is compiled for its lights leaves out the rest, which some drivers would compute and mask.
-#ifndef LIGHT_FEATURES
-#define LIGHT_FEATURES -1
+// What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/frame/lights.py). What
+// is left out some drivers would compute and mask.
+#ifndef LIGHT_KINDS
+#define LIGHT_KINDS -1
 #endif
-#define LIGHT_HAS_SPOTS 8
-#define LIGHT_HAS_SPREAD 9
-#define LIGHT_HAS_WHOLE 10
-#define LIGHTS_HAVE(feature) ((LIGHT_FEATURES & (1 << (feature))) != 0)
+#define LIGHTS_AS_A_WHOLE 8
+#define LIGHTS_HAVE(kind_number) ((LIGHT_KINDS & (1 << (kind_number))) != 0)
 #define LIGHT_IS(light, number) (LIGHTS_HAVE(number) && (light).kind == (number))
 
 struct Light {
@@ -144,8 +142,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     }
     float solid_angle = light.area * cos_light / squared;
     density = 1.0 / max(solid_angle, 1e-30);
-    float attenuation = LIGHTS_HAVE(LIGHT_HAS_SPREAD) ? spread_attenuation(light.spread, cos_light) : 1.0;
-    return light.radiance * (solid_angle * attenuation);
+    return light.radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
   }
   if (!LIGHTS_HAVE(LIGHT_POINT) && !LIGHTS_HAVE(LIGHT_SPHERE)) {
     return vec3(0.0);
@@ -191,7 +188,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     }
     from_light = -direction;
   }
-  if (LIGHTS_HAVE(LIGHT_HAS_SPOTS) && (light.flags & LIGHT_SPOT) != 0) {
+  if ((light.flags & LIGHT_SPOT) != 0) {
     result *= spot_attenuation(light, from_light);
   }
   return result;
