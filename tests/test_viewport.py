@@ -469,11 +469,12 @@ def test_update_draws_nothing(window):
 def test_error_is_told_once_and_ends_with_the_next_change(window, monkeypatch):
     made = Engine()
     window.update(made)
+    asked = made.redraws  # by the change
     monkeypatch.setattr(viewport, "take", lambda *_, **__: 1 / 0)
     for _ in range(3):
         window.draw(made)
     assert "division by zero" in made.stats
-    assert len(made.reports) == 1 and made.redraws == 0
+    assert len(made.reports) == 1 and made.redraws == asked
     monkeypatch.undo()
     window.update(made)
     window.draw(made)
