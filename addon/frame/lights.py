@@ -25,6 +25,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
 NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
+NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for it
 
 
 @dataclass(frozen=True)

@@ -147,7 +147,6 @@ class DirectLight(Technique):
             return
         service = frame.services.get("shadow")
         items: dict[AccumulatedMaps | None, list] = {}
-        near: dict[AccumulatedMaps, list] = {}
         kinds = lights.LAMPS
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
@@ -165,19 +164,19 @@ class DirectLight(Technique):
                 row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole
                 kinds |= whole << lights.WHOLE
-                row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-                (near if by_rays else items).setdefault(shadow, []).append((row, views))
+                row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced) + lights.NEAR_FLAG * by_rays
+                items.setdefault(shadow, []).append((row, views))
         for shadow, own in items.items():
             resolution = shadow.resolution(frame) if shadow else 16
             for rows, views in rounds(own, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
                 maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
                 yield
-                yield from shade(frame, self, rows, kinds, self._sources, maps)
-        for shadow, own in near.items():
-            for rows, views in rounds(own, shadow.resolution(frame), shadow.atlas_texels):
-                maps = self._with_rays(frame, shadow.draw(frame, views))
-                yield
-                yield from shade(frame, self, rows, kinds, self._sources, maps)
+                near = [row for row in rows if int(row[0, 1]) & lights.NEAR_FLAG]
+                others = [row for row in rows if not int(row[0, 1]) & lights.NEAR_FLAG]
+                if others:
+                    yield from shade(frame, self, others, kinds, self._sources, maps)
+                if near:
+                    yield from shade(frame, self, near, kinds, self._sources, self._with_rays(frame, maps))
 
     def _with_rays(self, frame: Frame, maps: Maps) -> Maps:
         """The same maps, asked only where the light is small beside its distance."""
