@@ -11,6 +11,7 @@ Sources: Lauterbach et al. 2009 (linear BVH); the implicit four-wide layout is o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..snapshot.scene import Instance, Mesh
 from .morton import morton_codes
 
 LARGEST = 4_000_000  # triangles
+AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
 LEAF = 4
 NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children on it
 # Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
@@ -53,18 +55,20 @@ def world_triangles(
         (_opacity(m), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
         for k, m in enumerate(materials)
     ])  # fmt: skip
-    for instance in instances:
-        mesh = meshes[instance.mesh]
-        if not getattr(instance.visibility, path) or not mesh.triangle_count:
-            continue
-        matrix = instance.matrix.copy()
-        matrix[:3, 3] -= origin
-        world = mesh.positions @ matrix[:3, :3].T.astype(np.float32) + matrix[:3, 3].astype(np.float32)
-        corners.append(world[mesh.corner_vertices[mesh.triangle_corners]])
-        slots = np.asarray(instance.materials)
-        normals = _packed_normals(mesh.corner_normals @ _cofactors(matrix[:3, :3]).T)
-        shown = look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
-        looks.append(np.concatenate([shown, normals[mesh.triangle_corners]], axis=1))
+    shown = [one for one in instances if getattr(one.visibility, path) and meshes[one.mesh].triangle_count]
+    for (key, slots), group in groupby(shown, lambda one: (one.mesh, one.materials)):
+        mesh, slots = meshes[key], np.asarray(slots)
+        look_of_triangle = look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        copies, at_once = list(group), max(AT_ONCE // mesh.triangle_count, 1)
+        for first in range(0, len(copies), at_once):
+            some = copies[first : first + at_once]
+            matrices = np.stack([one.matrix[:3] for one in some])
+            turned, moved = matrices[:, :, :3], (matrices[:, :, 3] - origin).astype(np.float32)
+            world = mesh.positions @ turned.transpose(0, 2, 1).astype(np.float32) + moved[:, None]
+            corners.append(world[:, mesh.corner_vertices[mesh.triangle_corners]].reshape(-1, 3, 3))
+            normals = _packed_normals(mesh.corner_normals @ _cofactors(turned).transpose(0, 2, 1))
+            of_triangle = np.broadcast_to(look_of_triangle, (len(some), *look_of_triangle.shape))
+            looks.append(np.concatenate([of_triangle, normals[:, mesh.triangle_corners]], axis=2).reshape(-1, 8))
     if not corners:
         return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
     return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
@@ -76,21 +80,21 @@ def _opacity(material: CompiledMaterial) -> float:
     return -max(opacity, 1e-3) if material.glass else opacity
 
 
-def _cofactors(matrix: np.ndarray) -> np.ndarray:
-    """Takes normals to world space, outwards where the object is mirrored; also where it is flattened."""
-    a, b, c = matrix.T
-    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1) * (
-        -1.0 if a @ np.cross(b, c) < 0 else 1.0
-    )
+def _cofactors(matrices: np.ndarray) -> np.ndarray:
+    """(K, 3, 3) that take normals to world space, outwards where an object is mirrored; also where it is flattened."""
+    a, b, c = np.moveaxis(matrices, 2, 0)
+    columns = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+    mirrored = (a * columns[0]).sum(axis=1) < 0
+    return np.stack(columns, axis=2) * np.where(mirrored, -1.0, 1.0)[:, None, None]
 
 
 def _packed_normals(normals: np.ndarray) -> np.ndarray:
-    """(N, 3) of any length as (N,) numbers: octahedral coordinates side by side; unpacked in shaders/trace."""
-    flat = normals / np.maximum(np.abs(normals).sum(axis=1, keepdims=True), 1e-30)
-    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
-    square = np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)
+    """(..., 3) of any length as (...) numbers: octahedral coordinates side by side; unpacked in shaders/trace."""
+    flat = normals / np.maximum(np.abs(normals).sum(axis=-1, keepdims=True), 1e-30)
+    folded = (1.0 - np.abs(flat[..., 1::-1])) * np.where(flat[..., :2] >= 0.0, 1.0, -1.0)
+    square = np.where(flat[..., 2:] >= 0.0, flat[..., :2], folded)
     steps = np.floor((square * 0.5 + 0.5) * NORMAL_STEPS + 0.5)
-    return np.nan_to_num(steps[:, 0] + (NORMAL_STEPS + 1) * steps[:, 1])
+    return np.nan_to_num(steps[..., 0] + (NORMAL_STEPS + 1) * steps[..., 1])
 
 
 def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
