@@ -212,7 +212,7 @@ class Viewport:
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Bring `self.frame` to what is asked: kept if nothing changed, else begun anew at a fitting scale."""
         asked = (_view_key(camera), size, border, replace(settings, samples=0))
-        moved = asked != self._asked
+        moved, begun = asked != self._asked, False
         if self.dirty:
             self._snapshot = source(camera, *size)
             self.dirty = False
@@ -220,14 +220,15 @@ class Viewport:
                 before = self.frame
                 if self._begin(camera, size, border, settings, self.scale) is before:
                     return
-                moved = True
+                moved = begun = True
         if not moved and settings.samples != self.frame.settings.samples:  # more or less of the same picture
             self._begin(camera, size, border, settings, self.scale)
         if moved:
             self._asked = asked
             self._changed_at = clock()
-            before = self.frame
-            if self._begin(camera, size, border, settings, self.pace.scale()) is not before:
+            before, scale = self.frame, self.pace.scale()
+            begun = begun and scale == self.scale
+            if begun or self._begin(camera, size, border, settings, scale) is not before:
                 self._waits = False
         elif self.scale > 1 and clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses)):
             self._begin(camera, size, border, settings, 1)

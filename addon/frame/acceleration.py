@@ -191,7 +191,7 @@ class HierarchyCache:
 
 def too_many(snapshot) -> str | None:
     """Why this scene has no hierarchy, as a sentence; None if it has."""
-    count = sum(snapshot.meshes[instance.mesh].triangle_count for instance in snapshot.instances)
+    count = snapshot.triangle_count
     if count > LARGEST:
         return f"{count} triangles with all instances are more than the {LARGEST} that can be traced"
     return None

@@ -8,6 +8,7 @@ Arrays are C-contiguous and read-only by agreement: whoever wants a change makes
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -214,3 +215,8 @@ class Snapshot:
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
+
+    @cached_property
+    def triangle_count(self) -> int:
+        """Triangles of all instances together."""
+        return sum(self.meshes[instance.mesh].triangle_count for instance in self.instances)
