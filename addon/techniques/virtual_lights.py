@@ -160,7 +160,8 @@ class VirtualLights:
         if len(keep):
             packed[0, :, :3], packed[1, :, :3], packed[2, :, :3] = point[keep], normal[keep], intensity
             whole = np.abs(radiance[keep]) @ lights.LUMINANCE
-            packed[2, :, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
+            packed[0, :, 3] = np.abs(intensity) @ lights.LUMINANCE
+            packed[1, :, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
         frame.count(technique, "virtual lights", len(keep))
         return VirtualLightSet(point[keep], normal[keep], intensity, images.upload(packed))
 

@@ -31,8 +31,7 @@ void main()
   out_point = vec4(vertex.position, 1.0);
   out_normal = vec4(vertex.normal, t);
   vec3 throughput = vec3(1.0);
-  float choice = scrambled(film_view.bits_z, bits.z);
-  vec3 radiance = direct_reflected(vertex, -direction, 4, choice, roll.x);
+  vec3 radiance = direct_reflected(vertex, -direction, 4, roll.x);
   vec3 shorter = (bounces > 1) ? radiance : vec3(0.0);
   for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
     roll = hash3(roll);
@@ -43,7 +42,7 @@ void main()
       break;
     }
     roll = hash3(roll);
-    radiance += throughput * direct_reflected(vertex, -direction, 1, to_unit(roll.x), roll.y);
+    radiance += throughput * direct_reflected(vertex, -direction, 1, roll.x);
     shorter = (bounce < bounces) ? radiance : shorter;
   }
   out_radiance = vec4(radiance, 0.0);

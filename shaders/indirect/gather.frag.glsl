@@ -28,10 +28,10 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
       break;
     }
     roll = hash3(roll);
-    sum += throughput * direct_reflected(vertex, -direction, 1, to_unit(roll.x), roll.y);
+    sum += throughput * direct_reflected(vertex, -direction, 1, roll.x);
     if (bounce < bounces) {
       vec3 from;
-      vec3 arriving = virtual_irradiance(vertex.position, vertex.normal, to_unit(roll.z), roll.x, from);
+      vec3 arriving = virtual_irradiance(vertex.position, vertex.normal, roll.z, from);
       sum += throughput * arriving * reflection_of(vertex.reflection, vertex.normal, from, -direction);
     }
     roll = hash3(roll);

@@ -1,13 +1,12 @@
 // Virtual lights: points of surfaces that stand for the light which those reflect (`virtual_lights`, a column each):
-//   row 0: position
-//   row 1: normal of the surface
-//   row 2: radiance over density, W/sr/m2 x m2; w: the share of it that was reflected at least once less than allowed
+//   row 0: position; w: luminance of row 2
+//   row 1: normal of the surface; w: the share of row 2 that was reflected at least once less than allowed
+//   row 2: radiance over density, W/sr/m2 x m2
 
 struct VirtualLight {
   vec3 position;
   vec3 normal;
   vec3 intensity;
-  float shorter;
 };
 
 VirtualLight virtual_light(int index)
@@ -15,9 +14,7 @@ VirtualLight virtual_light(int index)
   VirtualLight light;
   light.position = texelFetch(virtual_lights, ivec2(index, 0), 0).xyz;
   light.normal = texelFetch(virtual_lights, ivec2(index, 1), 0).xyz;
-  vec4 c = texelFetch(virtual_lights, ivec2(index, 2), 0);
-  light.intensity = c.xyz;
-  light.shorter = c.w;
+  light.intensity = texelFetch(virtual_lights, ivec2(index, 2), 0).xyz;
   return light;
 }
 
@@ -30,37 +27,53 @@ float bounded_kernel(VirtualLight light, vec3 position, out vec3 direction)
   return max(-dot(light.normal, direction), 0.0) / max(squared, near_radius * near_radius);
 }
 
+// Luminance of the irradiance by a virtual light if nothing is between; `shorter`: by the light in it that may be
+// reflected once more.
+float unblocked_share(int index, vec3 position, vec3 normal, bool shorter)
+{
+  vec4 a = texelFetch(virtual_lights, ivec2(index, 0), 0);
+  vec4 b = texelFetch(virtual_lights, ivec2(index, 1), 0);
+  vec3 path = a.xyz - position;
+  float squared = max(dot(path, path), 1e-30);
+  float cosines = max(-dot(b.xyz, path), 0.0) * max(dot(normal, path), 0.0) / squared;
+  return cosines / max(squared, near_radius * near_radius) * a.w * (shorter ? b.w : 1.0);
+}
+
+// Whether nothing is between a place beside a surface and a virtual light: 1 or 0.
+float virtual_light_seen(VirtualLight light, vec3 origin, uint salt)
+{
+  vec3 path = ray_origin(light.position, light.normal) - origin;
+  float reach = length(path);
+  return clear_path(origin, path / max(reach, 1e-30), reach, salt);
+}
+
 // Irradiance at a surface by virtual lights that may be reflected once more. Every n-th of them stands for n, such that
 // no more than PART are looked at; one of those is traced, along `direction`.
 #define PART 64
 
-vec3 virtual_irradiance(vec3 position, vec3 normal, float u, uint salt, out vec3 direction)
+vec3 virtual_irradiance(vec3 position, vec3 normal, uint salt, out vec3 direction)
 {
   direction = normal;
   int stride = (virtual_count + PART - 1) / PART;
   int first = int(hash3(uvec3(salt, 5u, uint(virtual_count))).x % uint(max(stride, 1)));
   float total = 0.0;
+  float chosen_share = 0.0;
+  int chosen = 0;
+  uint roll = salt;
   for (int i = first; i < virtual_count; i += stride) {
-    VirtualLight light = virtual_light(i);
-    float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
-    total += kernel * luminance(abs(light.intensity)) * light.shorter;
-  }
-  if (!(total > DARK)) {
-    return vec3(0.0);
-  }
-  float passed = 0.0;
-  for (int i = first; i < virtual_count; i += stride) {
-    VirtualLight light = virtual_light(i);
-    float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
-    float share = kernel * luminance(abs(light.intensity)) * light.shorter;
-    passed += share;
-    if (share > 0.0 && u * total < passed) {
-      vec3 origin = ray_origin(position, normal);
-      vec3 path = ray_origin(light.position, light.normal) - origin;
-      float reach = length(path);
-      float visible = clear_path(origin, path / max(reach, 1e-30), reach, salt);
-      return light.intensity * light.shorter * kernel * (float(stride) * total / share) * visible;
+    float share = unblocked_share(i, position, normal, true);
+    total += share;
+    if (draw_passing(share, total, roll)) {
+      chosen_share = share;
+      chosen = i;
     }
   }
-  return vec3(0.0);
+  if (!(total > DARK) || !(chosen_share > 0.0)) {
+    return vec3(0.0);
+  }
+  VirtualLight light = virtual_light(chosen);
+  float shorter = texelFetch(virtual_lights, ivec2(chosen, 1), 0).w;
+  float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
+  float visible = virtual_light_seen(light, ray_origin(position, normal), salt);
+  return light.intensity * (shorter * kernel * (float(stride) * total / chosen_share) * visible);
 }

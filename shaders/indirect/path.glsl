@@ -99,6 +99,17 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   return true;
 }
 
+// Whether the entry that has just raised the `total` to what it is takes the place of the one drawn so far, such that of
+// all that have passed each stays in proportion to its share (Chao 1982). `roll` is another random number for each entry:
+// one number stretched over all of them would run out of digits where shares differ by powers of ten.
+bool draw_passing(float share, float total, inout uint roll)
+{
+  roll = roll * 747796405u + 2891336453u;
+  uint word = ((roll >> ((roll >> 28u) + 4u)) ^ roll) * 277803737u;
+  float u = (float(((word >> 22u) ^ word) >> 9u) + 0.5) * (1.0 / 8388608.0);
+  return u * total < share;
+}
+
 float clear_path(vec3 origin, vec3 direction, float reach, uint salt)
 {
   ivec2 hit;
@@ -133,38 +144,43 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
   return clear_path(origin, direction, reach, salt);
 }
 
-// What a surface reflects towards `viewer` of light straight from the sources of this sample. Of all of them `rays` are traced, drawn in proportion to what they
-// bring unblocked (systematic resampling): only visibility is sampled.
-vec3 direct_reflected(Vertex vertex, vec3 viewer, int rays, float u, uint salt)
+// What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `rays`-th of them
+// one is traced, drawn in proportion to what it brings unblocked: only visibility is sampled. All are weighed before any
+// is traced: pixels that a processor runs together then trace together.
+vec3 direct_reflected(Vertex vertex, vec3 viewer, int rays, uint salt)
 {
   vec3 position = vertex.position;
   vec3 normal = vertex.normal;
-  float total = 0.0;
-  vec3 direction;
-  for (int i = 0; i < light_count; i++) {
-    total += luminance(abs(unblocked_irradiance(light_read(i), position, normal, direction)));
-  }
-  if (!(total > DARK)) {
-    return vec3(0.0);
-  }
   vec3 origin = ray_origin(position, normal);
-  float step_size = total / float(rays);
-  float mark = u * step_size;
-  float passed = 0.0;
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < light_count; i++) {
-    Light light = light_read(i);
-    vec3 arriving = unblocked_irradiance(light, position, normal, direction);
-    float share = luminance(abs(arriving));
-    passed += share;
-    if (share > 0.0 && mark < passed) {
-      float marks = ceil((passed - mark) / step_size);
-      mark += marks * step_size;
+  uint roll = salt;
+  for (int group = 0; group < min(rays, light_count); group++) {
+    float total = 0.0;
+    float chosen_share = 0.0;
+    int chosen = 0;
+    vec3 chosen_light = vec3(0.0);
+    vec3 chosen_direction = normal;
+    for (int i = group; i < light_count; i += rays) {
+      vec3 direction;
+      vec3 arriving = unblocked_irradiance(light_read(i), position, normal, direction);
+      float share = luminance(abs(arriving));
+      total += share;
+      if (draw_passing(share, total, roll)) {
+        chosen_share = share;
+        chosen = i;
+        chosen_light = arriving;
+        chosen_direction = direction;
+      }
+    }
+    if (total > DARK && chosen_share > 0.0) {
+      Light light = light_read(chosen);
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        visibility = light_visibility(light, origin, direction, salt + uint(i));
+        vec3 towards = chosen_direction;
+        visibility = light_visibility(light, origin, towards, salt + uint(chosen));
       }
-      sum += arriving * reflection_of(vertex.reflection, normal, direction, viewer) * (visibility * marks * step_size / share);
+      sum += chosen_light * reflection_of(vertex.reflection, normal, chosen_direction, viewer)
+             * (visibility * total / chosen_share);
     }
   }
   return sum;

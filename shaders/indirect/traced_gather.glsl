@@ -1,45 +1,73 @@
 // Virtual lights that are seen along rays.
 #include "indirect/lights.glsl"
 
+#define PARTS 32  // of all virtual lights: a choice looks for its part, then within
+
 // Irradiance at a surface by all virtual lights, and, given the surface's diffuse closure, what it reflects of it. Of all
 // of them `rays` are traced, drawn in proportion to what they bring unblocked (systematic resampling); 0: none is, and
 // walls let all light pass.
+//
+// A ray is traced where all pixels that a processor runs together have made their choice: each looks through as many
+// virtual lights as the others. If every pixel traced as soon as its light has passed, each ray would be traced alone.
 vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, float u, uint salt)
 {
-  float total = 0.0;
-  vec3 unblocked = vec3(0.0);
   vec3 direction;
-  for (int i = 0; i < virtual_count; i++) {
-    VirtualLight light = virtual_light(i);
-    float kernel = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
-    total += kernel * luminance(abs(light.intensity));
-    unblocked += kernel * light.intensity;
+  vec3 sum = vec3(0.0);
+  if (rays == 0) {
+    for (int i = 0; i < virtual_count; i++) {
+      VirtualLight light = virtual_light(i);
+      float kernel = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+      sum += kernel * light.intensity;
+    }
+    return reflected ? sum * s.diffuse / PI : sum;
   }
-  if (!(total > DARK) || rays == 0) {
-    return reflected ? unblocked * s.diffuse / PI : unblocked;
+  float passed[PARTS];  // what the parts up to each one bring
+  int part_size = (virtual_count + PARTS - 1) / PARTS;
+  float total = 0.0;
+  for (int part = 0; part < PARTS; part++) {
+    for (int i = part * part_size; i < min((part + 1) * part_size, virtual_count); i++) {
+      total += unblocked_share(i, s.position, s.normal, false);
+    }
+    passed[part] = total;
+  }
+  if (!(total > DARK)) {
+    return sum;
   }
   float step_size = total / float(rays);
-  float mark = u * step_size;
-  float passed = 0.0;
-  vec3 sum = vec3(0.0);
-  for (int i = 0; i < virtual_count; i++) {
-    VirtualLight light = virtual_light(i);
-    float kernel = bounded_kernel(light, s.position, direction);
-    float cosine = max(dot(s.normal, direction), 0.0);
-    float share = kernel * cosine * luminance(abs(light.intensity));
-    passed += share;
-    if (share > 0.0 && mark < passed) {
-      float marks = ceil((passed - mark) / step_size);
-      mark += marks * step_size;
-      if (dot(direction, s.geometric_normal) > 0.0) {
-        vec3 path = ray_origin(light.position, light.normal) - origin;
-        float reach = length(path);
-        vec3 arriving = light.intensity * (kernel * marks * step_size / share);
-        arriving *= clear_path(origin, path / max(reach, 1e-30), reach, salt + uint(i));
-        sum += arriving * (reflected ? diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction)
-                                     : vec3(cosine));
-      }
+  int part = 0;
+  int traced = -1;
+  float visible = 0.0;
+  for (int ray = 0; ray < rays; ray++) {
+    float mark = (u + float(ray)) * step_size;
+    while (part < PARTS - 1 && passed[part] <= mark) {
+      part++;
     }
+    float before = (part > 0) ? passed[part - 1] : 0.0;
+    float chosen_share = 0.0;
+    int chosen = -1;
+    for (int i = part * part_size; i < min((part + 1) * part_size, virtual_count); i++) {
+      float share = unblocked_share(i, s.position, s.normal, false);
+      if (share > 0.0 && (chosen < 0 || before <= mark)) {
+        chosen = i;
+        chosen_share = share;
+      }
+      before += share;
+    }
+    if (chosen < 0) {
+      continue;
+    }
+    VirtualLight light = virtual_light(chosen);
+    float kernel = bounded_kernel(light, s.position, direction);
+    if (dot(direction, s.geometric_normal) <= 0.0) {
+      continue;
+    }
+    if (chosen != traced) {
+      visible = virtual_light_seen(light, origin, salt + uint(chosen));
+      traced = chosen;
+    }
+    vec3 arriving = light.intensity * (kernel * step_size / chosen_share * visible);
+    sum += arriving * (reflected ? diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction)
+                                 : vec3(max(dot(s.normal, direction), 0.0)));
   }
   return sum;
 }

@@ -163,7 +163,7 @@ void main()
     if (to_unit(roll.x) >= shape.y) {
       vec3 albedo = albedo_behind(hit, position, geometric_normal);
       Vertex end = Vertex(position, geometric_normal, Reflection(albedo, vec3(0.0), vec3(0.0), 1.0));
-      out_indirect.rgb += throughput * direct_reflected(end, -direction, 1, to_unit(roll.y), roll.z);
+      out_indirect.rgb += throughput * direct_reflected(end, -direction, 1, roll.z);
       break;
     }
     smooth_normal = leaves ? -smooth_normal : smooth_normal;

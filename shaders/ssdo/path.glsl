@@ -14,7 +14,7 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
       break;
     }
     roll = hash3(roll);
-    sum += throughput * direct_reflected(vertex, -direction, 1, to_unit(roll.x), roll.y);
+    sum += throughput * direct_reflected(vertex, -direction, 1, roll.x);
     float choice = to_unit(roll.z);
     roll = hash3(roll);
     vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
