@@ -8,6 +8,7 @@ viewport.py. All of it is freed in `free_sessions`.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -15,6 +16,7 @@ import numpy as np
 
 from . import viewport
 from .frame import ledger as ledgers
+from .frame.bands import samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
@@ -123,16 +125,12 @@ class CandelaEngine(bpy.types.RenderEngine):
             frame.ledger.times["sync"] = self._sync_seconds
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name)
-            while frame.samples_done < settings.samples:
+            for _ in self._drawn(shared.renderer, frame):
                 if self.test_break():
                     self.end_result(result, cancel=True)
                     with context.turn:
                         shared.renderer.finish(frame, ())
                     return
-                with context.turn:
-                    shared.renderer.advance(frame)
-                self.update_stats("Candela", f"Sample {frame.samples_done} of {settings.samples}")
-                self.update_progress(frame.samples_done / settings.samples)
             wanted = wanted_passes(layer)
             with context.turn:
                 pixels = _finished(shared.renderer, frame, wanted)
@@ -164,6 +162,17 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
+    def _drawn(self, renderer: Renderer, frame: Frame) -> Iterator[None]:
+        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile."""
+        parts = _whole_samples if bpy.app.background else samples_in_parts
+        shown = -1
+        for _ in parts(renderer, frame):
+            if frame.samples_done != shown:
+                shown = frame.samples_done
+                self.update_stats("Candela", f"Sample {shown} of {frame.settings.samples}")
+                self.update_progress(shown / frame.settings.samples)
+            yield
+
     def _compiling(self, done: int, total: int) -> bool:
         self.update_stats("Candela", f"Compiling shaders {done} of {total}")
         return self.test_break()
@@ -171,6 +180,13 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _fail(self, sentence: str) -> None:
         self.error_set(sentence)
         self.report({"ERROR"}, sentence)
+
+
+def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
+    while frame.samples_done < frame.settings.samples:
+        yield
+        with context.turn:
+            renderer.advance(frame)
 
 
 # ------------------------------------------------------------------------------------------------------------- passes

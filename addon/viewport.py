@@ -44,7 +44,7 @@ REST_S = 0.25  # without a change for so long, or for two redraws, the picture i
 SCALES = (1, 2, 4, 8, 16)  # screen pixels per side of a drawn pixel; all but the first are drafts
 FREE_AFTER_S = 1.0  # a mode or frame change makes the next engine instance well within this time
 
-TURN_WAIT_S = 0.02  # for the GPU, while a final render draws a sample
+TURN_WAIT_S = 0.1  # for the GPU, while a final render draws a part of a sample
 
 
 @dataclass
@@ -303,7 +303,7 @@ def draw(engine, context, depsgraph) -> None:
             finally:
                 turn.release()
         else:
-            engine.tag_redraw()  # a final render is drawing a sample
+            engine.tag_redraw()  # a final render draws
     if viewport.picture is not None:
         _show(engine, scene, viewport)
     engine.update_stats("Candela", viewport.status())
@@ -404,7 +404,7 @@ def _free_orphans() -> float | None:
     orphans = [key for key, viewport in _viewports.items() if viewport.owner() is None]
     if not orphans:
         return None
-    if not gpu_context.available() or not turn.acquire(blocking=False):
+    if not gpu_context.available() or not turn.acquire(timeout=0.0):
         return FREE_AFTER_S  # later
     try:
         for key in orphans:

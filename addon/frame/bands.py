@@ -7,8 +7,12 @@ a whole pass in time there is soon one band again.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
+from ..gfx.context import turn
+
+PART_S = 0.05  # of a sample, between which Blender answers
 FIRST = 16  # rows of a technique's first band: even rays of all its pixels end soon
 MOST_GROWTH = 4.0
 MOST_ROWS = 1 << 16
@@ -41,3 +45,24 @@ class Bands:
         if growth > 1.0:
             rows = max(rows, self._rows.get(name, FIRST))  # the last band of a picture may be thin
         self._rows[name] = min(max(rows, 1), MOST_ROWS)
+
+
+def samples_in_parts(renderer, frame) -> Iterator[None]:
+    """Draw all samples of a frame, in parts short enough for a window that goes on answering; yields after each.
+
+    Each part takes a turn. That a part has ended is known by waiting for the GPU, which costs it some of its speed: a
+    GPU that draws whole samples in the time of a part is not waited for any more.
+    """
+    end = object()
+    frame.shared_out = bands = Bands()
+    frame.profiler.wait = True
+    while frame.samples_done < frame.settings.samples:
+        parts, part, began = renderer.steps(frame), None, time.perf_counter()
+        while part is not end:
+            with turn:
+                started = time.perf_counter()
+                part = next(parts, end)
+                bands.learn(time.perf_counter() - started, PART_S)
+            yield
+        if time.perf_counter() - began < PART_S:
+            frame.shared_out, frame.profiler.wait = None, frame.settings.profile

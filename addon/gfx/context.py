@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import threading
+import time
 import weakref
 from collections.abc import Callable
 
@@ -17,9 +18,38 @@ import gpu
 _releases: list[Callable[[], Callable[[], None] | None]] = []  # each gives the function, or None once it has gone
 
 
-# GPU programs hold the constants of their next draw, for all contexts together. A final render draws from a thread of
-# its own, so whoever draws takes a turn; the longest turn is one sample.
-turn = threading.Lock()
+class Turn:
+    """A lock for whoever draws: who waits for it gets it before its last holder does again.
+
+    GPU programs hold the constants of their next draw, for all contexts together, and a final render draws from a
+    thread of its own. With a plain lock a thread that gives it back and takes it again at once leaves the others none.
+    """
+
+    def __init__(self):
+        self._held, self._next = threading.Lock(), threading.Lock()
+
+    def acquire(self, timeout: float = -1.0) -> bool:
+        """Wait for `timeout` seconds at most, by default for as long as it takes; whether the turn has come."""
+        started = time.monotonic()
+        if not self._next.acquire(timeout=timeout):
+            return False
+        left = -1.0 if timeout < 0.0 else max(timeout - (time.monotonic() - started), 0.0)
+        try:
+            return self._held.acquire(timeout=left)
+        finally:
+            self._next.release()
+
+    def release(self) -> None:
+        self._held.release()
+
+    def __enter__(self):
+        self.acquire()
+
+    def __exit__(self, *_):
+        self.release()
+
+
+turn = Turn()
 
 
 def available() -> bool:

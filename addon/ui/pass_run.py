@@ -6,7 +6,6 @@ that has changed a little does little.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
@@ -15,9 +14,9 @@ import numpy as np
 
 from ..compare.cache import Reference
 from ..compare.passes import IMAGE_OF_PASS, Passes
-from ..frame.bands import Bands
+from ..frame.bands import samples_in_parts
 from ..frame.ledger import Ledger
-from ..frame.run import Frame, Renderer
+from ..frame.run import Renderer
 from ..frame.settings import Settings
 from ..gfx import context as gpu_context
 from ..gfx import images
@@ -26,9 +25,6 @@ from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import make_registry
 from ..techniques.film import Film, resolve
 from .passes import PASSES
-
-PART_S = 0.05  # of a sample, between which Blender answers
-_END = object()
 
 
 @dataclass
@@ -80,7 +76,9 @@ def render_steps(
     yield 0.0, "compiling shaders"
     with turn:
         frame = kept.renderer.begin(snapshot, replace(settings, profile=profile))
-    yield from _samples(kept.renderer, frame)
+    for _ in samples_in_parts(kept.renderer, frame):
+        drawing = min(frame.samples_done + 1, settings.samples)
+        yield frame.samples_done / settings.samples, f"sample {drawing} of {settings.samples}"
     with turn:
         if any(technique.name == Film.name for technique in frame.plan.techniques):
             resolve(frame)
@@ -89,21 +87,6 @@ def render_steps(
     ledger = frame.ledger
     ledger.times["total"] = sum(ledger.times.values())
     return Rendered(arrays, ledger, settings.samples, settings.seed, snapshot.film.exposure, snapshot.film.transparent)
-
-
-def _samples(renderer: Renderer, frame: Frame) -> Iterator[tuple[float, str]]:
-    """All samples of a frame, in parts short enough for a window that goes on answering."""
-    frame.shared_out = bands = Bands()
-    total = frame.settings.samples
-    while frame.samples_done < total:
-        sentence = f"sample {frame.samples_done + 1} of {total}"
-        parts, more = renderer.steps(frame), True
-        while more:
-            with turn:
-                started = time.perf_counter()
-                more = next(parts, _END) is not _END
-                bands.learn(time.perf_counter() - started, PART_S)
-            yield frame.samples_done / total, sentence
 
 
 def reference_images(reference: Reference) -> dict[str, np.ndarray]:
