@@ -56,7 +56,7 @@ screenshots: package ## the manual's pictures, taken in a real Blender with a wi
 	$(PYTHON) tools/screenshots.py
 
 window-walk: package ## ten minutes of random edits in a real Blender with a window
-	STROLL_SECONDS=600 $(PYTHON) -m pytest -m window tests/window -k random_walk
+	STROLL_SECONDS=600 $(PYTHON) -m pytest -m window tests/window -rP -k random_walk
 
 nodes: environment ## every shader node beside Cycles: docs/nodes.md
 	$(PYTHON) -m bench.nodes

@@ -117,9 +117,3 @@ def picture(name):
     bpy.data.images.remove(image)
     if black and shutil.which("import"):  # ImageMagick's
         subprocess.run(["import", "-window", "root", str(path)], check=True)
-
-
-def resident_mib():
-    """Memory of this process, where the system tells."""
-    status = Path("/proc/self/statm")
-    return int(status.read_text().split()[1]) * 4 / 1024 if status.exists() else 0.0

@@ -1,9 +1,13 @@
 """Runs inside a windowed Blender: a seeded random walk of edits, undo, views, modes, engines and renders.
 
-    blender FILE.blend --python stroll.py -- SECONDS [STEP ...] FOLDER
+    blender FILE.blend --python stroll.py -- SECONDS ENGINE [STEP ...] FOLDER
 
-Each step is one thing that an artist may do at any time, without waiting for the viewport to be ready. Memory is noted
-at every rest that the walk comes to. With names of steps the walk keeps to those.
+Each step is one thing that an artist may do at any time, without waiting for the viewport to be ready. With names of
+steps the walk keeps to those. With one of Blender's own engines in place of Candela (BLENDER_EEVEE) it does the same
+without any of Candela's code: what happens then too, is Blender's or the driver's.
+
+Every LEG_S the file is opened anew and memory is noted when the viewport is at rest, so that all measurements are of
+the same state: what an artist's edits add to a scene, and the steps that Blender keeps for undo, are gone by then.
 
 What a button does Blender keeps for undo by itself; what a script does it does not, and an undo past a data-block that
 no step knows of frees it under its users: Blender then crashes, with any engine. So every edit here ends with a step.
@@ -18,11 +22,12 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import memory
 from stage import (
     ENGINE,
+    FOLDER,
     picture,
     render,
-    resident_mib,
     result,
     run,
     there,
@@ -32,20 +37,23 @@ from stage import (
     window,
 )
 
-SECONDS, *ONLY = sys.argv[sys.argv.index("--") + 1 : -1]
+SECONDS, WALKED, *ONLY = sys.argv[sys.argv.index("--") + 1 : -1]
 SECONDS = float(SECONDS)
 SEED = 6
-MEASURE_EVERY_S = 15.0
+LEG_S = 20.0
+CONTROL_REST_S = 3.0  # other engines do not tell when they rest
+FILE = str(FOLDER / "walked.blend")
 dice = random.Random(SEED)
-result.update(steps={}, memory_mib=[], seconds=SECONDS, seed=SEED)
+result.update(steps={}, memory=[], seconds=SECONDS, engine=WALKED, seed=SEED)
 
 
 def show():
     scene = window().scene
-    scene.render.engine = ENGINE
+    scene.render.engine = WALKED
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
     scene.candela.samples = scene.candela.viewport_samples = 2
     scene.candela.bounces = 0
+    scene.eevee.taa_samples = scene.eevee.taa_render_samples = 2
     scene.render.use_border = False  # a smaller picture takes less memory
     space = viewport_area().spaces.active
     space.region_3d.view_perspective = "CAMERA"
@@ -144,7 +152,7 @@ def shading():
 
 
 def engine():
-    window().scene.render.engine = dice.choice(("BLENDER_WORKBENCH", ENGINE, ENGINE))
+    window().scene.render.engine = dice.choice(("BLENDER_WORKBENCH", WALKED, WALKED))
     push("engine")
 
 
@@ -191,10 +199,13 @@ STEPS = (
     *(move_object, change_light, change_material, add_object, delete_object, undo, undo, redo, edit_mode, turn_view),
     *(turn_view, shading, engine, settings, frame, border, tree, run_tree),
 )
-CHOSEN = [step for step in STEPS if step.__name__ in ONLY or not ONLY]
+CANDELAS = (settings, tree, run_tree)
+CHOSEN = [step for step in STEPS if (step.__name__ in ONLY or not ONLY) and (WALKED == ENGINE or step not in CANDELAS)]
 
 
 def steps():
+    show()
+    bpy.ops.wm.save_as_mainfile(filepath=FILE)  # with the engine in it: undo goes back to what was opened
     yield from rest()
     started = measured = time.monotonic()
     while time.monotonic() - started < SECONDS:
@@ -207,9 +218,12 @@ def steps():
             count(step.__name__)
             step()
         yield dice.choice((0.01, 0.05, 0.2, 0.5))
-        if time.monotonic() - measured > MEASURE_EVERY_S:
+        if time.monotonic() - measured > LEG_S:
+            bpy.ops.wm.open_mainfile(filepath=FILE)
+            yield 0.5
             yield from rest()
-            result["memory_mib"].append(resident_mib())
+            result["memory"].append({"s": time.monotonic() - started, **memory.now()})
+            print(result["memory"][-1], flush=True)
             measured = time.monotonic()
     yield from rest()
     result["viewports"] = len(viewports())
@@ -220,7 +234,10 @@ def rest():
     object_mode()
     show()
     push("rest")
-    yield from wait_for_rest()
+    if WALKED == ENGINE:
+        yield from wait_for_rest()
+    else:
+        yield CONTROL_REST_S
 
 
 def count(name):

@@ -28,6 +28,7 @@ OUTPUT = ROOT / "build" / "window"
 SAMPLE = ROOT / "sample_blends" / "soft_shadow_garden.blend"
 FRAME = 20  # pixels at the edge of a region, where Blender draws round corners and tabs
 BACKENDS = ("opengl", "vulkan")
+LEAST_NOTES = 6  # of memory, to tell a rise from chance
 
 
 def blender(*arguments, log, timeout_s):
@@ -172,7 +173,8 @@ def test_nothing_fails_while_the_viewport_runs(walked):
     assert result.get("error") is None
     assert not complaints(folder)
     assert result["done"] == [
-        "move and undo", "light", "edit mode", "views", "frames", "engines", "shading", "render", "window", "files",
+        "move and undo", "light", "edit mode", "views", "frames", "engines", "shading", "render", "window",
+        "scenes", "files",
     ]  # fmt: skip
     assert result["render_meanwhile"] == "complete"
 
@@ -180,7 +182,7 @@ def test_nothing_fails_while_the_viewport_runs(walked):
 def test_viewports_come_and_go_with_their_regions(walked):
     _, result = walked
     assert result["viewports_while_solid"] == 0
-    assert result["freed_mib"] > 0
+    assert result["images_while_solid"] == 0
     assert result["viewports_after_split"] == 2
     assert result["viewports_after_load"] == 1
     assert result["viewports_at_home"] == 0
@@ -290,18 +292,40 @@ def test_tune_measures_in_the_panel_and_applies_when_confirmed(tuned):
 @pytest.fixture(scope="module", params=BACKENDS)
 def strolled(request, installed):
     """A random walk of STROLL_SECONDS; `make window-walk` takes ten minutes."""
-    return run_script(request.param, "stroll", os.environ.get("STROLL_SECONDS", "60"))
+    return run_script(request.param, "stroll", os.environ.get("STROLL_SECONDS", "60"), "CANDELA")
 
 
-def test_random_walk_ends_without_an_error_and_with_its_memory_flat(strolled):
+def test_random_walk_ends_without_an_error(strolled):
     folder, result = strolled
     assert result.get("error") is None, result
     assert not complaints(folder)
     assert sum(result["steps"].values()) > result["seconds"] / 10
     assert set(result.get("renders", ())) <= {"complete"}
-    memory = result["memory_mib"]
-    # The first rests still load what later ones reuse: programs, undo steps, the other shading modes.
-    later = memory[len(memory) // 3 :]
-    if len(later) >= 6:
-        half = len(later) // 2
-        assert np.mean(later[half:]) - np.mean(later[:half]) < 100, memory
+
+
+def rise(notes, what):
+    """How much `what` rises from the first to the last note, by the line of least squares through all."""
+    seconds, values = (np.array([note[key] for note in notes]) for key in ("s", what))
+    return float(np.polyfit(seconds, values, 1)[0] * np.ptp(seconds))
+
+
+def test_memory_stays_flat_on_a_random_walk(strolled):
+    """In the last two thirds of the measurements; in the first, programs and Blender's other modes are still loaded.
+
+    What Candela holds is counted and must not change. What the process holds jumps by some hundred megabytes with what
+    the driver keeps: there the line through all measurements may rise by a twentieth of their mean at most.
+    """
+    _, result = strolled
+    notes = result["memory"]
+    later = notes[len(notes) // 3 :]
+    if len(later) < LEAST_NOTES:
+        pytest.skip(f"{len(later)} measurements are too few: STROLL_SECONDS=600")
+    resident = [note["resident_mib"] for note in later]
+    print(
+        f"{len(later)} measurements in {later[-1]['s'] - later[0]['s']:.0f} s: resident {min(resident):.0f} to "
+        f"{max(resident):.0f} MiB, rise {rise(later, 'resident_mib'):+.0f} MiB; Blender's allocations "
+        f"{rise(later, 'blender_mib'):+.1f} MiB; Candela's images {later[0]['images']}, then {later[-1]['images']}"
+    )
+    assert len({(note["images"], note["images_mib"]) for note in later}) == 1
+    assert rise(later, "blender_mib") < 0.05 * np.mean([note["blender_mib"] for note in later])
+    assert rise(later, "resident_mib") < 0.05 * np.mean(resident)

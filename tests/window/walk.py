@@ -1,17 +1,20 @@
 """Runs inside a windowed Blender: what artists do while the viewport renders. Nothing may fail or be left over."""
 
+import itertools
 import sys
+import time
 from pathlib import Path
 
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import memory
 from stage import (
     ENGINE,
+    candela,
     picture,
     render,
-    resident_mib,
     result,
     run,
     there,
@@ -22,6 +25,7 @@ from stage import (
 )
 
 SAMPLES = 2
+CANCEL_AFTER_S = 4.0
 SAMPLE_BLENDS = Path(bpy.data.filepath).parent
 result["done"] = []
 
@@ -48,6 +52,7 @@ def steps():
     yield from switches()
     yield from render_meanwhile()
     yield from more_viewports()
+    yield from two_scenes()
     yield from other_files()
 
 
@@ -105,17 +110,20 @@ def switches():
     yield from wait_for_rest()
     done("engines")
     space = viewport_area().spaces.active
-    before = resident_mib()
+    before = memory.now()
     space.shading.type = "SOLID"
     yield 3.0
     result["viewports_while_solid"] = len(viewports())
-    result["freed_mib"] = before - resident_mib()
+    after = memory.now()
+    result["freed"] = {name: before[name] - after[name] for name in before}
+    result["images_while_solid"] = after["images"]
     space.shading.type = "RENDERED"
     yield from wait_for_rest()
     done("shading")
 
 
 def render_meanwhile():
+    """F12 while the viewport turns, then while it rests, and Esc: the times between two steps of this script tell."""
     scene = window().scene
     scene.render.resolution_percentage = 25
     scene.candela.samples = 8
@@ -128,7 +136,36 @@ def render_meanwhile():
     result["render_meanwhile"] = yield from render(turn)
     scene.candela.viewport_samples = SAMPLES
     yield from wait_for_rest()
+    answers = []
+    scene.candela.samples, scene.candela.seed = 100, 1
+    yield from wait_for_rest()
+    started = time.monotonic()
+    result["render_at_rest"] = yield from render(lambda: answers.append(time.monotonic()))
+    pauses = sorted(after - before for before, after in itertools.pairwise(answers))
+    result["answers"] = {"s": time.monotonic() - started, "count": len(answers), "longest_s": pauses[-1]}
+    yield from cancelled_render(scene)
     done("render")
+
+
+def cancelled_render(scene):
+    scene.candela.samples = 10000
+    area = viewport_area()
+    x, y = area.x + area.width // 2, area.y + area.height // 2
+    started = time.monotonic()
+    pressed = []
+
+    def escape():
+        if not pressed:
+            window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+            if time.monotonic() - started > CANCEL_AFTER_S:
+                pressed.append(time.monotonic())
+                for value in ("PRESS", "RELEASE"):
+                    window().event_simulate(type="ESC", value=value, x=x, y=y)
+
+    result["escaped"] = yield from render(escape)
+    result["escape_s"] = time.monotonic() - pressed[0]
+    scene.candela.samples = 8
+    yield from wait_for_rest()
 
 
 def more_viewports():
@@ -149,6 +186,33 @@ def more_viewports():
         bpy.ops.wm.window_close()
     yield 3.0
     done("window")
+
+
+def two_scenes():
+    """Each window shows a scene of its own; a change of one leaves the other at rest."""
+    bpy.ops.wm.window_new_main()
+    other = bpy.context.window_manager.windows[-1]
+    other.scene = copy = window().scene.copy()
+    area = max((one for one in other.screen.areas if one.type == "VIEW_3D"), key=lambda one: one.width * one.height)
+    area.spaces.active.shading.type = "RENDERED"
+    yield 1.0
+    yield from wait_for_rest()
+    shown = {scene: viewport.frame for (_, scene), viewport in candela()._viewports.items()}
+    result["scenes_shown"] = len(shown)
+    copy.candela.seed += 1
+    copy.candela.viewport_samples = 64
+    yield 0.5
+    later = {scene: viewport.frame for (_, scene), viewport in candela()._viewports.items()}
+    result["scenes_drawn_anew"] = [
+        window().scene.session_uid != scene for scene in shown if later[scene] is not shown[scene]
+    ]
+    with bpy.context.temp_override(window=other):  # while it refines
+        bpy.ops.wm.window_close()
+    yield 2.0
+    bpy.data.scenes.remove(copy)
+    yield from wait_for_rest()
+    result["viewports_after_window"] = len(viewports())
+    done("scenes")
 
 
 def other_files():
