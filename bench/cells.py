@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cache
@@ -52,7 +53,15 @@ class Series:
         return self.engine != "BLENDER_EEVEE" and not self.denoised
 
 
+def preset(name: str) -> tuple[tuple[str, float], ...]:
+    """What a quality preset of Candela sets by property; samples are swept and left out."""
+    text = (ROOT / "addon" / "ui" / "presets" / "candela" / "quality" / f"{name}.py").read_text(encoding="utf-8")
+    found = re.findall(r"^candela\.(\w+) = (\S+)$", text, re.MULTILINE)
+    return tuple((key, json.loads(value)) for key, value in found if not key.endswith("samples"))
+
+
 OWN = Series("Candela", "CANDELA", SWEEP, main=True)
+FAST = Series("Candela, Fast preset", "CANDELA", (4, 1, 16), main=True, values=preset("Fast"))
 RAW = Series("Candela, raw", "CANDELA", (16, 4, 8, 32, 64), main=True, values=(("denoise_strength", 0.0),))
 PEERS = (
     Series("EEVEE", "BLENDER_EEVEE", EEVEE_SWEEP),
@@ -76,11 +85,12 @@ def choices(registry: Iterable) -> dict[str, list]:
 
 
 def own_series(registry: Iterable) -> tuple[Series, ...]:
-    """Candela as it comes, raw, without bounces, with the first technique of every slot, and with each other instead.
+    """Candela as it comes, by its Fast preset, raw, without bounces, with the first technique of every slot, and with
+    each other instead.
 
     What is set by hand is set in every slot that has a choice, so that those series do not depend on what Auto knows.
     """
-    found = [OWN, Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
+    found = [OWN, FAST, Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
     if any(technique.name == "denoise" for technique in registry):
         found.append(RAW)
     slots = choices(registry)

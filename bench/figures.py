@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-OWN = "Candela"
+OWN, FAST = "Candela", "Candela, Fast preset"
 MIDDLE = 16  # samples of Candela at which figures are quoted
 FLAT = (
     0.5  # log error over log samples: noise falls at least like 1 / n, so what falls more slowly than this has a floor
@@ -66,6 +66,10 @@ class Results:
                     quoted = max(error["relmse"], self.floor(scene, path))
                     found.append(Point(cell["samples"], float(np.median(cell["times"])), quoted))
         return sorted(found, key=lambda point: point.samples)
+
+    def own_curve(self, scene: str) -> list[Point]:
+        """Combined by Candela with its defaults, then by its Fast preset: what a peer is held against."""
+        return self.curve(scene, OWN) + self.curve(scene, FAST)
 
     def floor(self, scene: str, path: str = "combined") -> float:
         """relMSE of the reference's own noise."""

@@ -75,7 +75,8 @@ $left_out
 READING = (
     "Seconds of a whole render to the right, relMSE of the picture upwards, both logarithmic: lower left is better. "
     "A marker is one setting, its line the staircase of settings that no other of its series beats. The grey band is "
-    "the noise of the reference, below which no error is quoted; a dotted line is the error that a series tends to."
+    "the noise of the reference, below which no error is quoted; a dotted line is the error that a series tends to. "
+    "Peers are held against Candela's two curves together, by its defaults and by its Fast preset."
 )
 PROFILE = (
     "A render of 16 samples: cold, with compiled programs, and again with nothing changed; shares of a render under "
@@ -102,7 +103,7 @@ def summary(results: Results) -> Table:
     columns: list[list[float]] = [[] for _ in range(2 * len(PEERS))]
     for scene in results.scenes:
         cells = [scene.replace("_", " ")]
-        own = results.curve(scene, OWN)
+        own = results.own_curve(scene)
         for number, peer in enumerate(PEERS):
             found = against(own, results.curve(scene, peer), peer)
             for place, value, bound in ((2 * number, found.speed_up, found.bound), (2 * number + 1, found.gain, "")):
@@ -125,7 +126,7 @@ def claims(results: Results) -> list[str]:
     scenes = results.scenes
     tenth = []
     for scene in scenes:
-        own, peer = results.curve(scene, OWN), results.curve(scene, "EEVEE, ray traced")
+        own, peer = results.own_curve(scene), results.curve(scene, "EEVEE, ray traced")
         sixteen = next((point for point in peer if point.samples == MIDDLE), None)
         if own and sixteen:
             first = min((p.seconds for p in own if p.error <= sixteen.error), default=None)
@@ -140,7 +141,7 @@ def claims(results: Results) -> list[str]:
         )
     gains = []
     for scene in scenes:
-        found = against(results.curve(scene, OWN), results.curve(scene, "Cycles, denoised"), "")
+        found = against(results.own_curve(scene), results.curve(scene, "Cycles, denoised"), "")
         if found.gain is not None:
             gains.append((scene, found.gain))
     if gains:

@@ -40,7 +40,7 @@ def time_error(axes, results: Results, scene: str, labels: list[str], path: str 
         points = results.curve(scene, label, path)
         if not points:
             continue
-        look, front = style(label, own), label in ("Candela", "Candela, raw")
+        look, front = style(label, own), label in ("Candela", "Candela, Fast preset", "Candela, raw")
         steps = staircase(points)
         axes.step(
             [step.seconds for step in steps], [step.error for step in steps], where="post", color=look["color"],
@@ -69,7 +69,12 @@ def time_error(axes, results: Results, scene: str, labels: list[str], path: str 
 
 def overview(results: Results, path: Path) -> None:
     """All scenes, Combined: Candela as it comes and the peers."""
-    labels = ["Candela", "Candela, raw", *(name for name in STYLES if name != "Cycles, no bounces")]
+    labels = [
+        "Candela",
+        "Candela, Fast preset",
+        "Candela, raw",
+        *(name for name in STYLES if name != "Cycles, no bounces"),
+    ]
     columns = 4 if len(results.scenes) > 6 else 3
     rows = -(-len(results.scenes) // columns)
     figure, grid = plt.subplots(

@@ -24,7 +24,22 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from bench.cells import EXTRA, MAIN, NEEDED, NEEDED_SAMPLES, OWN, PEERS, RAW, ROOT, Cell, Scene, Series, Store, in_turns
+from bench.cells import (
+    EXTRA,
+    FAST,
+    MAIN,
+    NEEDED,
+    NEEDED_SAMPLES,
+    OWN,
+    PEERS,
+    RAW,
+    ROOT,
+    Cell,
+    Scene,
+    Series,
+    Store,
+    in_turns,
+)
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
@@ -109,7 +124,7 @@ def guess(series: Series, samples: int, size: tuple[int, int]) -> float:
 
 def needed_seconds(scenes: int, size: tuple[int, int]) -> float:
     """Guessed seconds of what a page needs of so many scenes; without their references."""
-    main = [one for one in (OWN, RAW, *PEERS) if one.main]
+    main = [one for one in (OWN, FAST, RAW, *PEERS) if one.main]
     needed = [(one, samples) for one in main for samples in one.samples if samples in NEEDED_SAMPLES[one.engine]]
     return scenes * (OPENING + sum(guess(one, samples, size) for one, samples in needed))
 

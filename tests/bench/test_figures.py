@@ -87,6 +87,16 @@ def test_error_below_the_noise_is_quoted_as_the_noise():
     assert min(point.error for point in found.curve("room", "Candela")) == 0.05
 
 
+def test_peers_are_held_against_the_defaults_and_the_fast_preset_together():
+    data = results()
+    assert "10 ×" in page.markdown(page.summary(data)).splitlines()[2]
+    for point in OWN:
+        cell = data.cell("room", "Candela", point.samples)
+        data.cells.append({**cell, "series": {"label": "Candela, Fast preset"}, "times": [point.seconds / 2]})
+    column = page.summary(data)[0].index("EEVEE, ray traced: speed-up")
+    assert page.summary(data)[1][column] == "20 ×"
+
+
 def test_path_at_fault_weighs_error_by_the_square_of_its_light():
     assert figures.at_fault(results(), "room")[0] == ("diffuse_direct", pytest.approx(0.64 / 0.68))
 

@@ -95,9 +95,15 @@ def test_choice_of_techniques_comes_from_the_registry():
 
     series = cells.own_series([One, Two, Alone])
     assert [(one.label, one.slots) for one in series] == [
-        ("Candela", ()), ("Candela, no bounces", ()), (cells.FIRST, (("shadow", "one"),)),
+        ("Candela", ()), ("Candela, Fast preset", ()), ("Candela, no bounces", ()), (cells.FIRST, (("shadow", "one"),)),
         ("Candela, two", (("shadow", "two"),)),
     ]  # fmt: skip
+
+
+def test_the_fast_series_sets_what_the_preset_sets_and_sweeps_its_samples():
+    values = dict(cells.FAST.values)
+    assert values["instant_radiosity_virtual_lights"] < 256 and values["accumulated_maps_texels_per_pixel"] == 1.0
+    assert not any(name.endswith("samples") for name in values)
 
 
 def test_what_auto_knows_is_part_of_the_key_only_where_auto_chooses(monkeypatch):

@@ -19,7 +19,15 @@ def values(scene, name):
     assert bpy.ops.script.execute_preset(filepath=str(files()[name]), menu_idname="CANDELA_PT_quality_presets") == {
         "FINISHED"
     }
-    return scene.candela.samples, scene.candela.viewport_samples, scene.candela.accumulated_maps_texels_per_pixel
+    return set_by_presets(scene)
+
+
+def set_by_presets(scene):
+    own = scene.candela
+    return (
+        own.samples, own.viewport_samples, own.accumulated_maps_texels_per_pixel, own.instant_radiosity_virtual_lights,
+        own.instant_radiosity_rays,
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -37,7 +45,7 @@ def test_finer_presets_take_more_of_everything(scene):
 
 
 def test_balanced_is_what_a_new_scene_has(scene):
-    new = scene.candela.samples, scene.candela.viewport_samples, scene.candela.accumulated_maps_texels_per_pixel
+    new = set_by_presets(scene)
     assert values(scene, "Balanced") == new
 
 

@@ -5,3 +5,5 @@ candela = bpy.context.scene.candela
 candela.samples = 16
 candela.viewport_samples = 8
 candela.accumulated_maps_texels_per_pixel = 1.0
+candela.instant_radiosity_virtual_lights = 128
+candela.instant_radiosity_rays = 2
