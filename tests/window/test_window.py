@@ -28,6 +28,7 @@ OUTPUT = ROOT / "build" / "window"
 SAMPLE = ROOT / "sample_blends" / "soft_shadow_garden.blend"
 FRAME = 20  # pixels at the edge of a region, where Blender draws round corners and tabs
 BACKENDS = ("opengl", "vulkan")
+SIMULATED = ("tour", "tune")  # scripts whose keys are simulated: Blender takes no others then
 LEAST_NOTES = 6  # of memory, to tell a rise from chance
 
 
@@ -64,7 +65,8 @@ def run_script(backend, script, *arguments, _done={}):  # noqa: B006 - a cache: 
     if (backend, script) not in _done:
         folder = OUTPUT / f"{script}-{backend}"
         folder.mkdir()
-        display = ("--gpu-backend", backend, "--enable-event-simulate", "--window-geometry", "0", "0", "1280", "800")
+        display = ("--gpu-backend", backend, "--window-geometry", "0", "0", "1280", "800")
+        display += ("--enable-event-simulate",) if script in SIMULATED else ()
         path = Path(__file__).with_name(f"{script}.py")
         blender(
             *display, SAMPLE, "--python", path, "--", *arguments, folder, log=folder / "blender.log", timeout_s=1800
@@ -176,13 +178,31 @@ def test_nothing_fails_while_the_viewport_runs(walked):
         "move and undo", "light", "edit mode", "views", "frames", "engines", "shading", "render", "window",
         "scenes", "files",
     ]  # fmt: skip
-    assert result["render_meanwhile"] == "complete"
+    assert result["render_meanwhile"] == result["render_at_rest"] == "complete"
+
+
+def test_interface_answers_while_a_final_render_runs_and_esc_ends_it(walked):
+    """The bounds are for two cores that also draw."""
+    _, result = walked
+    assert result["answers"]["longest_s"] < 2.0
+    if "escaped" not in result:
+        pytest.skip("Esc is pressed by xdotool, which is not installed")
+    assert result["escaped"] == "cancelled"
+    assert result["escape_s"] < 5.0
+
+
+def test_scenes_in_two_windows_are_drawn_apart(walked):
+    _, result = walked
+    assert result["scenes_shown"] == 2
+    assert result["scenes_drawn_anew"] == [True]
+    assert result["viewports_after_window"] == result["viewports_after_split"]
 
 
 def test_viewports_come_and_go_with_their_regions(walked):
     _, result = walked
     assert result["viewports_while_solid"] == 0
     assert result["images_while_solid"] == 0
+    assert result["freed"]["resident_mib"] > 0.5 * result["freed"]["images_mib"]
     assert result["viewports_after_split"] == 2
     assert result["viewports_after_load"] == 1
     assert result["viewports_at_home"] == 0
