@@ -1,8 +1,8 @@
 """Viewport: time to the first picture and to rest, and uploads, for each edit: `python -m bench.viewport`.
 
-The viewport is driven without a window, at 640 x 360 pixels, as Blender's redraws drive it: `draw_frame` again and
-again. Blender's own part of a redraw is not in the figures; what `make test-window` noted of a real window is printed
-too.
+The figures are written into docs/viewport.md. The viewport is driven without a window, at 640 x 360 pixels, as
+Blender's redraws drive it: `draw_frame` again and again. Blender's own part of a redraw is not in the figures; what
+`make test-window` noted of a real window is told too.
 
 An edit is made several times, as by a drag, and each followed by a redraw; the first LEARNING teach the viewport how
 coarse it has to be, of the others the slowest is told. After turning the view the picture comes to rest. Uploads are
@@ -34,6 +34,9 @@ from .quick import table
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_blends"
+PAGE = ROOT / "docs" / "viewport.md"
+BEGIN, END = "<!-- written by `python -m bench.viewport` -->", "<!-- end of what is written -->"
+HEAD = "scene", "edit", "slowest, ms", "CPU ms", "pixels", "scene read", "meshes", "bytes", "the sample's"
 SIZE = (640, 360)
 FIELD = 2000  # objects in the scene of the move
 LEARNING, MOVES = 3, 12
@@ -197,8 +200,8 @@ def edits(driver: Driver) -> list[Edit]:
     ]
 
 
-def measure(name: str, samples: int, bounces: int) -> list[tuple[str, ...]]:
-    """Rows of the table for a sample scene, or for the field of objects."""
+def measure(name: str, samples: int, bounces: int) -> tuple[list[tuple[str, ...]], list[str]]:
+    """Rows of the table for a sample scene, or for the field of objects, and sentences."""
     if name == "field":
         field_of_objects()
     else:
@@ -209,40 +212,53 @@ def measure(name: str, samples: int, bounces: int) -> list[tuple[str, ...]]:
     compiled, started = library.compile_count, time.perf_counter()
     driver.draw()
     seconds, programs = time.perf_counter() - started, library.compile_count - compiled
-    print(f"{name}: the first redraw took {seconds:.1f} s and compiled {programs} programs")
+    told = [f"{name}: the first redraw took {seconds:.1f} s and compiled {programs} programs"]
     found = [driver.edit("turn the view", driver.turn, scene=False)]
-    rest = driver.rest() if samples else None
-    if rest is not None:
-        print(
-            f"{name}: at rest {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) later, after {rest.redraws} redraws; the "
-            f"slowest took {1000 * rest.slowest:.0f} ms"
+    if samples:
+        rest = driver.rest()
+        told.append(
+            f"{name}: at rest with {samples} samples {rest.seconds:.1f} s (CPU {rest.cpu:.1f} s) after the view has "
+            f"turned, in {rest.redraws} redraws; the slowest took {1000 * rest.slowest:.0f} ms"
         )
     found += edits(driver)
     driver.viewport.release()
-    return [
+    rows = [
         (
             name, one.name, f"{1000 * one.seconds:.0f}", f"{1000 * one.cpu:.0f}", f"1/{one.scale}",
             "yes" if one.read else "no", str(one.meshes), str(one.uploaded), str(one.sample),
         )
         for one in found
     ]  # fmt: skip
+    return rows, told
 
 
-def in_a_window() -> None:
-    """Print what the last `make test-window` noted of real windows."""
+def in_a_window() -> list[str]:
+    """What the last `make test-window` noted of real windows."""
+    told = []
     for path in sorted(ROOT.glob("build/window/drive-*/result.json")):
         found = json.loads(path.read_text())
         moving = found.get("moving")
         if moving is None:
             continue
         width, height = found["viewport"][2:]
-        print(
+        told.append(
             f"window, {path.parent.name.removeprefix('drive-')}, {width} x {height}: first picture after "
             f"{found['first_picture_s']:.1f} s, at rest after {found['rest_s']:.0f} s ({found['status']}); while the "
             f"view turns {moving['steps_per_s']:.1f} steps per second, of which half take less than "
-            f"{1000 * moving['median_step_s']:.0f} ms, at 1/{', 1/'.join(map(str, moving['scales']))} resolution, and "
-            f"{moving['meshes_uploaded']} meshes are uploaded"
+            f"{1000 * moving['median_step_s']:.0f} ms and all less than {1000 * moving['slowest_step_s']:.0f} ms, at "
+            f"1/{', 1/'.join(map(str, moving['scales']))} resolution, and {moving['meshes_uploaded']} meshes are "
+            "uploaded"
         )
+    return told
+
+
+def write_page(rows: list[tuple[str, ...]], told: list[str]) -> None:
+    """Replace the figures of docs/viewport.md."""
+    page = PAGE.read_text(encoding="utf-8")
+    before, after = page.split(BEGIN)[0], page.split(END)[1]
+    table_rows = ["| " + " | ".join(row) + " |" for row in (HEAD, ("---",) * len(HEAD), *rows)]
+    figures = "\n".join([*table_rows, "", *(f"- {sentence}" for sentence in told)])
+    PAGE.write_text(f"{before}{BEGIN}\n\n{figures}\n\n{END}{after}", encoding="utf-8")
 
 
 def main() -> None:
@@ -250,12 +266,19 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", default=["soft_shadow_garden", "window_interior", "field"])
     parser.add_argument("--samples", type=int, default=2, help="samples until the picture rests; 0: edits alone")
     parser.add_argument("--bounces", type=int, default=16)
+    parser.add_argument("--dry", action="store_true", help="print the figures alone")
     options = parser.parse_args()
     register()
     context.ensure()
-    head = "scene", "edit", "slowest ms", "CPU ms", "pixels", "scene read", "meshes", "bytes", "sample's bytes"
-    in_a_window()
-    print(table([head, *(row for name in options.scenes for row in measure(name, options.samples, options.bounces))]))
+    rows, told = [], []
+    for name in options.scenes:
+        found, sentences = measure(name, options.samples, options.bounces)
+        rows += found
+        told += sentences
+    told += in_a_window()
+    print(*told, table([HEAD, *rows]), sep="\n")
+    if not options.dry:
+        write_page(rows, told)
 
 
 if __name__ == "__main__":

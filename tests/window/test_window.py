@@ -29,6 +29,7 @@ SAMPLE = ROOT / "sample_blends" / "soft_shadow_garden.blend"
 FRAME = 20  # pixels at the edge of a region, where Blender draws round corners and tabs
 BACKENDS = ("opengl", "vulkan")
 SIMULATED = ("tour", "tune")  # scripts whose keys are simulated: Blender takes no others then
+MANY_RANGES = 10000  # of memory, mapped within a walk: 40 MiB of pages
 LEAST_NOTES = 6  # of memory, to tell a rise from chance
 
 
@@ -334,6 +335,9 @@ def test_memory_stays_flat_on_a_random_walk(strolled):
 
     What Candela holds is counted and must not change. What the process holds jumps by some hundred megabytes with what
     the driver keeps: there the line through all measurements may rise by a twentieth of their mean at most.
+
+    A software driver of Vulkan maps a page for each set of bindings, some hundred for each redraw of Blender's own, and
+    none is given back, with any engine (docs/viewport.md). What the process holds then says nothing about Candela.
     """
     _, result = strolled
     notes = result["memory"]
@@ -344,8 +348,10 @@ def test_memory_stays_flat_on_a_random_walk(strolled):
     print(
         f"{len(later)} measurements in {later[-1]['s'] - later[0]['s']:.0f} s: resident {min(resident):.0f} to "
         f"{max(resident):.0f} MiB, rise {rise(later, 'resident_mib'):+.0f} MiB; Blender's allocations "
-        f"{rise(later, 'blender_mib'):+.1f} MiB; Candela's images {later[0]['images']}, then {later[-1]['images']}"
+        f"{rise(later, 'blender_mib'):+.1f} MiB; mapped ranges {rise(later, 'mappings'):+.0f}; Candela's images "
+        f"{later[0]['images']}, then {later[-1]['images']}"
     )
     assert len({(note["images"], note["images_mib"]) for note in later}) == 1
     assert rise(later, "blender_mib") < 0.05 * np.mean([note["blender_mib"] for note in later])
-    assert rise(later, "resident_mib") < 0.05 * np.mean(resident)
+    if rise(later, "mappings") < MANY_RANGES:
+        assert rise(later, "resident_mib") < 0.05 * np.mean(resident)
