@@ -27,6 +27,7 @@ NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children
 # Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
 # emission r, g, b; material; shading normals of the three corners.
 LEAF_TEXELS = 17
+OPEN_TO_SHADOW, SHADOW_ALONE = 2.0, 4.0  # added to the opacity, read by shaders/trace/hierarchy.glsl
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
 
@@ -48,17 +49,19 @@ def world_triangles(
     origin: np.ndarray,
     path: str = "glossy",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All triangles that rays of `path` (a name of Visibility) can meet: corners (T, 3, 3) float32 relative to
-    `origin`, and (T, 8) opacity, mean emitted radiance, number of the material and packed corner normals."""
+    """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
+    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (what lets one of the two kinds of rays pass says so:
+    OPEN_TO_SHADOW, SHADOW_ALONE), mean emitted radiance, number of the material and packed corner normals."""
     corners, looks = [], []
     look = np.array([
         (_opacity(m), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
         for k, m in enumerate(materials)
     ])  # fmt: skip
-    shown = [one for one in instances if getattr(one.visibility, path) and meshes[one.mesh].triangle_count]
-    for (key, slots), group in groupby(shown, lambda one: (one.mesh, one.materials)):
+    shown = [one for one in instances if _met(one, path) and meshes[one.mesh].triangle_count]
+    for (key, slots, added), group in groupby(shown, lambda one: (one.mesh, one.materials, _added(one, path))):
         mesh, slots = meshes[key], np.asarray(slots)
         look_of_triangle = look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        look_of_triangle[:, 0] += np.copysign(added, look_of_triangle[:, 0])
         copies, at_once = list(group), max(AT_ONCE // mesh.triangle_count, 1)
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
@@ -72,6 +75,17 @@ def world_triangles(
     if not corners:
         return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
     return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
+
+
+def _met(instance: Instance, path: str) -> bool:
+    return getattr(instance.visibility, path) or instance.visibility.shadow
+
+
+def _added(instance: Instance, path: str) -> float:
+    """What is added to the opacity of an instance that only one kind of rays meets."""
+    if not getattr(instance.visibility, path):
+        return SHADOW_ALONE
+    return 0.0 if instance.visibility.shadow else OPEN_TO_SHADOW
 
 
 def _opacity(material: CompiledMaterial) -> float:
@@ -175,8 +189,8 @@ class HierarchyCache:
         if too_many(snapshot):
             return None
         key = (
-            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials) for i in snapshot.instances
-                  if getattr(i.visibility, path)),
+            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, _added(i, path))
+                  for i in snapshot.instances if _met(i, path)),
             tuple((_opacity(m), m.emissive and m.emission) for m in materials), tuple(origin),
         )  # fmt: skip
         if key not in self._kept:

@@ -70,7 +70,8 @@ class SurfacePoints:
         corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse")
         meshes = [snapshot.meshes[i.mesh] for i in shown]
         surfaces = Surfaces(
-            corners, np.abs(look[:, 0]), np.repeat(np.arange(len(shown)), [mesh.triangle_count for mesh in meshes]),
+            corners, np.abs(look[:, 0]) % acceleration.OPEN_TO_SHADOW,
+            np.repeat(np.arange(len(shown)), [mesh.triangle_count for mesh in meshes]),
             np.array([np.sign(np.linalg.det(i.matrix[:3, :3])) * frame.geometry.is_closed(m)
                       for i, m in zip(shown, meshes)]),
         )  # fmt: skip

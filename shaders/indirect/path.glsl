@@ -141,7 +141,8 @@ float light_reach(Light light, vec3 origin, inout vec3 direction)
 float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
 {
   float reach = light_reach(light, origin, direction);
-  return clear_path(origin, direction, reach, salt);
+  ivec2 hit;
+  return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? 1.0 : 0.0;
 }
 
 // What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `rays`-th of them

@@ -49,7 +49,7 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   float reach = light_reach(light, origin, kept_direction);
   ivec2 hit;
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
-                 && trace_layers(origin, kept_direction, reach, reach, salt, true, hit) < reach;
+                 && trace_layers(origin, kept_direction, reach, reach, salt, true, true, hit) < reach;
   return blocked ? vec3(0.0) : kept_light * (total / kept_importance);
 }
 
@@ -130,7 +130,7 @@ void main()
     bool goes_on = max_component(throughput) > 1e-4;
     vec3 normal = vec3(0.0);
     if (goes_on) {
-      t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, hit);
+      t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, false, hit);
       gained += throughput * light_found(origin, direction, lobe_density, t);
       goes_on = t < 1e29;
     }

@@ -7,7 +7,8 @@
 
 #define NODE_TEXELS 3
 #define LEAF_TEXELS 17
-#define OPACITY_TEXEL 9  // negative: the triangle may also bend what meets it
+// Negative: the triangle may also bend what meets it. By 2 more: rays that look for a light pass; by 4: only they do not.
+#define OPACITY_TEXEL 9
 #define MATERIAL_TEXEL 13
 #define NORMAL_TEXEL 14
 
@@ -101,8 +102,9 @@ uint node_meets(int node, vec3 origin, vec3 inverse, float farthest, out vec4 en
 // Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
 // number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
 // Triangles with an opacity below one are passed at random, the same way for the same `salt`; those that may bend light
-// are met for certain where `bent`.
-float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint salt, bool bent, out ivec2 hit)
+// are met for certain where `bent`. `shadow`: the ray looks for a light.
+float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint salt, bool bent, bool shadow,
+                   out ivec2 hit)
 {
   hit = ivec2(-1);
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
@@ -143,7 +145,11 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
       vec4 opacity = leaf_texel(node * LEAF_TEXELS + OPACITY_TEXEL);
-      opacity = bent ? mix(opacity, vec4(1.0), lessThan(opacity, vec4(0.0))) : abs(opacity);
+      vec4 blocks = floor(abs(opacity) * 0.5);  // 0: all rays, 1: not those that look for a light, 2: only those
+      bvec4 passed = equal(blocks, vec4(shadow ? 1.0 : 2.0));
+      opacity = (bent ? mix(abs(opacity) - 2.0 * blocks, vec4(1.0), lessThan(opacity, vec4(0.0)))
+                      : abs(opacity) - 2.0 * blocks);
+      opacity = mix(opacity, vec4(0.0), passed);
       uint roll = hash3(uvec3(uint(node), salt, 77u)).x;
       vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                          to_unit(roll * 277803737u + 7u));
@@ -163,7 +169,13 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
 
 float trace_until(vec3 origin, vec3 direction, float limit, float enough, uint salt, out ivec2 hit)
 {
-  return trace_layers(origin, direction, limit, enough, salt, false, hit);
+  return trace_layers(origin, direction, limit, enough, salt, false, false, hit);
+}
+
+// The same for a ray that looks for a light.
+float trace_shadow(vec3 origin, vec3 direction, float limit, uint salt, out ivec2 hit)
+{
+  return trace_layers(origin, direction, limit, limit, salt, false, true, hit);
 }
 
 float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ivec2 hit)

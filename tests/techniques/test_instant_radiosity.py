@@ -177,3 +177,14 @@ def test_light_of_a_small_thing_out_of_sight_does_not_depend_on_how_wide_the_sce
 def test_a_half_transparent_card_reflects_half_of_the_light(stage):
     whole = light_of_a_card_out_of_sight(stage, 3.0, 1.0)
     assert light_of_a_card_out_of_sight(stage, 3.0, 0.5) == pytest.approx(whole / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("switched_off", ["visible_shadow", "visible_diffuse"])
+def test_a_card_that_some_rays_pass_dims_the_bounce_as_in_cycles(stage, render, switched_off):
+    """Between a lamp and the floor below: without shadow the floor is lit and the card, too, reflects; unseen by
+    diffuse rays the card casts its shadow and reflects nothing."""
+    corner(stage)
+    card = stage.rectangle((-0.5, -0.5), (0.5, 0.5), z=0.8, material=stage.diffuse(0.7))
+    setattr(card, switched_off, False)
+    expected = light_paths(stage.render(256, (24, 24), engine="CYCLES", bounces=3))["diffuse_indirect"]
+    assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
