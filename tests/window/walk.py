@@ -34,6 +34,7 @@ result["done"] = []
 
 def done(what):
     result["done"].append(what)
+    print(f"walk: {what}", flush=True)
 
 
 def show():
@@ -143,7 +144,7 @@ def render_meanwhile():
     scene.candela.viewport_samples = SAMPLES
     yield from wait_for_rest()
     answers = []
-    scene.candela.samples, scene.candela.seed = 100, 1
+    scene.candela.samples, scene.candela.seed = 16, 1
     yield from wait_for_rest()
     started = time.monotonic()
     result["render_at_rest"] = yield from render(lambda: answers.append(time.monotonic()))
