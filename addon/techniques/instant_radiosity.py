@@ -23,7 +23,7 @@ comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose 
 A pixel first chooses all virtual lights that it traces, then traces them: where every pixel traced as soon as its light
 had passed, the rays of neighbours ran one by one. At 128x96 that divides the time of the gather by 3.8 in the Cornell
 box and by 2.5 beyond a door ajar, at the same error. 512 virtual lights cost a third more than 256 in the sample with a
-window (96x72, 64 samples) and leave 0.66 of its squared error: mostly since twice as many candidates are looked at.
+window (96x72, 64 samples) and leave 0.66 of its squared error (one seed); they look at twice as many candidates, too.
 
 Fails: with few samples, grain where virtual lights are partly hidden; a sample that is shown alone is filtered
 (neighbours.py). Light that reached a diffuse surface over mirrors (caustics) is spread as by roughness 0.5 and more.
