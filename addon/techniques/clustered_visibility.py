@@ -284,6 +284,7 @@ def _packed(found: VirtualLightSet, label: np.ndarray, areas: np.ndarray) -> np.
     order = np.argsort(label, kind="stable")
     for row, values in enumerate((found.positions, found.normals, found.intensities)):
         packed[row, : len(found), :3] = values[order]
+    packed[2, : len(found), 3] = found.footprints[order]
     counts = np.bincount(label, minlength=len(areas))
     packed[3:, : len(areas)] = areas.transpose(1, 0, 2)
     packed[6, : len(areas), 3] = np.cumsum(counts) - counts

@@ -33,6 +33,9 @@ Bias, in diffuse and glossy indirect light:
 
 - Points that only pixels see which no probe of a sample came near are missing in that sample. With 96 probes, that is
   light which reaches less than about a hundredth of the picture.
+- A virtual light that stands for the area A in one of n samples is no brighter at any distance than at
+  sqrt(A / (pi n)), the radius of a disc of its part: what a wall seen at a grazing angle sends to what lies beside it
+  is otherwise without bound. The loss is a share of a single sample and falls with n.
 - Gloss is shared evenly among the pixels that see it. Its sum is right: in the sample with a window, where low sun
   falls on varnished boards, the mean of the pass is 1.007 of Cycles' (1.041 while gloss counted as diffuse, since most
   of that light goes to walls behind the camera; 0.97 with a layer's losses as the camera's view has them).
@@ -123,6 +126,7 @@ class VirtualLightSet:
     positions: np.ndarray  # (N, 3) relative to the render origin
     normals: np.ndarray  # (N, 3) unit; a virtual light shines to this side, Lambertian
     intensities: np.ndarray  # (N, 3) along the normal, W/sr
+    footprints: np.ndarray  # (N,) least squared distance, m2, at which it stands for its area
     image: images.Image
 
     def __len__(self) -> int:
@@ -156,14 +160,16 @@ class VirtualLights:
         frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
         frame.count(technique, "density rays", len(density) * PROBES[0] * PROBES[1])
         intensity = radiance[keep] * weight[:, None]
+        footprints = lights.footprint(weight, frame.settings.samples)
         packed = np.zeros((3, max(len(keep), 1), 4), np.float32)
         if len(keep):
             packed[0, :, :3], packed[1, :, :3], packed[2, :, :3] = point[keep], normal[keep], intensity
             whole = np.abs(radiance[keep]) @ lights.LUMINANCE
             packed[0, :, 3] = np.abs(intensity) @ lights.LUMINANCE
+            packed[2, :, 3] = footprints
             packed[1, :, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
         frame.count(technique, "virtual lights", len(keep))
-        return VirtualLightSet(point[keep], normal[keep], intensity, images.upload(packed))
+        return VirtualLightSet(point[keep], normal[keep], intensity, footprints, images.upload(packed))
 
     def draw_sources(self, frame: Frame) -> None:
         """Points on light sources for this sample's paths, and what materials reflect: what `path_bindings` needs."""

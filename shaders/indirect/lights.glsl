@@ -1,12 +1,13 @@
 // Virtual lights: points of surfaces that stand for the light which those reflect (`virtual_lights`, a column each):
 //   row 0: position; w: luminance of row 2
 //   row 1: normal of the surface; w: the share of row 2 that was reflected at least once less than allowed
-//   row 2: radiance over density, W/sr/m2 x m2
+//   row 2: radiance over density, W/sr/m2 x m2; w: least squared distance at which it stands for its area
 
 struct VirtualLight {
   vec3 position;
   vec3 normal;
   vec3 intensity;
+  float footprint;
 };
 
 VirtualLight virtual_light(int index)
@@ -14,17 +15,20 @@ VirtualLight virtual_light(int index)
   VirtualLight light;
   light.position = texelFetch(virtual_lights, ivec2(index, 0), 0).xyz;
   light.normal = texelFetch(virtual_lights, ivec2(index, 1), 0).xyz;
-  light.intensity = texelFetch(virtual_lights, ivec2(index, 2), 0).xyz;
+  vec4 sent = texelFetch(virtual_lights, ivec2(index, 2), 0);
+  light.intensity = sent.xyz;
+  light.footprint = sent.w;
   return light;
 }
 
-// Geometry term without the receiver's cosine, bounded: cos / max(d2, r2).
+// Geometry term without the receiver's cosine, bounded: cos / max(d2, r2). Nor is a virtual light brighter than its area
+// would be: one that its finder saw at a grazing angle stands for a large area, and beside it may lie what faces it.
 float bounded_kernel(VirtualLight light, vec3 position, out vec3 direction)
 {
   vec3 path = light.position - position;
   float squared = max(dot(path, path), 1e-30);
   direction = path * inversesqrt(squared);
-  return max(-dot(light.normal, direction), 0.0) / max(squared, near_radius * near_radius);
+  return max(-dot(light.normal, direction), 0.0) / max(squared, max(near_radius * near_radius, light.footprint));
 }
 
 // Luminance of the irradiance by a virtual light if nothing is between; `shorter`: by the light in it that may be
