@@ -15,6 +15,7 @@ import pytest
 from addon.compare.metrics import compare_radiance
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
+from addon.frame import sequence
 
 SCENES = Path(__file__).resolve().parents[2] / "sample_blends"
 SIZE, SAMPLES, REFERENCE_SAMPLES, BOUNCES = (64, 48), 64, 128, 16
@@ -45,3 +46,15 @@ def test_diffuse_indirect_light_is_cycles_pass(scene, registered, request):
     assert error.not_finite == error.negative == 0
     assert error.bias == pytest.approx(1.0, abs=BIAS + error.bias_floor), error
     assert error.relmse - error.floor <= RELMSE, error
+
+
+def test_walls_seen_edge_on_do_not_outshine_themselves(registered, monkeypatch):
+    """Rays that graze a wall stand for areas larger than the town. What faces such a wall from nearby was lit by all of
+    it: with these film points one pixel has four hundred thousand times the light of Cycles' brightest."""
+    monkeypatch.setattr(sequence, "_FILM_DIRECTIONS", sequence._DIRECTIONS[3:5])
+    sequence._block.cache_clear()
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / "instances.blend"))
+    images = render_passes(bpy.context.scene, "CANDELA", 8, 2, size=(128, 96), bounces=16).images
+    sequence._block.cache_clear()
+    light = light_paths(images)["diffuse_indirect"]
+    assert light.max() < 100 * light.mean()
