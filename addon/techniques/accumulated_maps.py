@@ -50,6 +50,7 @@ CUTOFF = Param(
     "FACTOR",
 )  # fmt: skip
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
+PART_TEXELS = 2**21  # the same for samples that are drawn in parts: a window answers between rounds
 
 
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
@@ -122,9 +123,11 @@ _NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
 
 
 def rounds(
-    items: list[tuple[np.ndarray, list]], resolution: int, most_texels: int = ATLAS_TEXELS
+    frame: Frame, items: list[tuple[np.ndarray, list]], resolution: int, most_texels: int = ATLAS_TEXELS
 ) -> Iterator[tuple[list[np.ndarray], list]]:
     """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers."""
+    if frame.shared_out is not None:
+        most_texels = min(most_texels, PART_TEXELS)
     rows, views, texels = [], [], 0
     for row, own in items:
         size = sum((resolution // view.scale) ** 2 for view in own)

@@ -116,7 +116,7 @@ class EmissiveLight(Technique):
                 point, normal, radiance, density * count, flags, 0, len(views), frame.settings.samples
             )
             items.append((row, views))
-        for rows, views in rounds(items, resolution):
+        for rows, views in rounds(frame, items, resolution):
             maps = self.service.draw(frame, self, views, resolution)
             yield
             yield from shade(frame, self, rows, 1 << lights.SURFACE, self._sources, maps)

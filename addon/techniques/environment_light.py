@@ -146,7 +146,7 @@ class EnvironmentLight(Technique):
                 views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, jitter, resolution)
             row = lights.direction_row(direction, radiance / density, density, flags, 0, len(views), rate.per_sample)
             items.append((row, views))
-        for rows, views in rounds(items, resolution):
+        for rows, views in rounds(frame, items, resolution):
             maps = self.service.draw(frame, self, views, resolution)
             yield
             yield from shade(frame, self, rows, 1 << lights.DIRECTION, self._sources, maps)
