@@ -23,10 +23,7 @@ vec3 traced_member(Cluster c, Surface s, vec3 origin, float total, float u, uint
     float share = luminance(abs(light));
     passed += share;
     if (share > 0.0 && u * total < passed) {
-      VirtualLight member = virtual_light(i);
-      vec3 path = ray_origin(member.position, member.normal) - origin;
-      float reach = length(path);
-      return light * (total / share * clear_path(origin, path / max(reach, 1e-30), reach, salt));
+      return light * (total / share * virtual_light_seen(virtual_light(i), origin, salt));
     }
   }
   return vec3(0.0);

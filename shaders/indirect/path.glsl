@@ -177,8 +177,7 @@ vec3 direct_reflected(Vertex vertex, vec3 viewer, int rays, uint salt)
       Light light = light_read(chosen);
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        vec3 towards = chosen_direction;
-        visibility = light_visibility(light, origin, towards, salt + uint(chosen));
+        visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
       sum += chosen_light * reflection_of(vertex.reflection, normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);

@@ -71,10 +71,7 @@ vec3 traced(Pick from, vec3 origin, bool hidden, uint salt)
       clear[channel] = clear[known];
     }
     else if (index >= 0) {
-      VirtualLight light = virtual_light(index);
-      vec3 path = ray_origin(light.position, light.normal) - origin;
-      float reach = length(path);
-      clear[channel] = clear_path(origin, path / max(reach, 1e-30), reach, salt);
+      clear[channel] = virtual_light_seen(virtual_light(index), origin, salt);
     }
   }
   return from.side * from.total * (hidden ? vec3(1.0) - clear : clear);
