@@ -1,7 +1,8 @@
 """A hash of a .blend file's content that is the same in every session, so that a reference render is found again.
 
 Some things in a .blend file say nothing about the scene and are taken out first. Memory addresses: every pointer is
-replaced by the number of the block it points to. Padding, time stamps and session numbers of data-blocks. The output
+replaced by the number of the block it points to. As when Blender reads the file, that is a block of the same data-block
+or another data-block: parts of two data-blocks may have stood at the same address, one after the other. Padding, time stamps and session numbers of data-blocks. The output
 format. And Candela's own settings (the property groups named `candela`), so that tuning Candela does not throw its
 reference away.
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import hashlib
 import re
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,11 +58,8 @@ def blend_hash(data: bytes) -> bytes:
     skipped = _own_settings(data, blocks, dna)
     kept = [block for block in blocks if block.address not in skipped]
 
-    # Addresses in ascending order, each with the place of its block in the file (from 1 on; 0 is "points nowhere").
-    addresses, first = np.unique(np.array([block.address for block in kept], np.uint64), return_index=True)
-    numbers = first.astype(np.uint64) + np.uint64(1)
     digest = hashlib.blake2b(digest_size=20)
-    for block in kept:
+    for block, (addresses, numbers) in zip(kept, _targets(kept), strict=True):
         content = np.frombuffer(data, np.uint8, block.length, block.start).copy()
         name, size = dna.structs[block.struct] if block.struct else ("", 0)
         if block.struct and size and block.length >= size:
@@ -76,6 +75,17 @@ def blend_hash(data: bytes) -> bytes:
         digest.update(struct.pack("<4sqi", block.code, block.length, block.struct))
         digest.update(content)
     return digest.digest()
+
+
+def _targets(blocks: list[Block]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """For each block where its pointers may point: addresses in ascending order, and for each the place of that block
+    in the file (from 1 on; 0 is "points nowhere")."""
+    starts = [k for k, block in enumerate(blocks) if block.code != b"DATA"]
+    for first, end in zip(starts, [*starts[1:], len(blocks)], strict=True):
+        own = [*range(first, end), *starts]  # of equal addresses the first counts
+        addresses, place = np.unique(np.array([blocks[k].address for k in own], np.uint64), return_index=True)
+        numbers = np.array(own, np.uint64)[place] + np.uint64(1)
+        yield from [(addresses, numbers)] * (end - first)
 
 
 # Blocks and their description ----------------------------------------------------------------------------------------

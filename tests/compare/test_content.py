@@ -1,5 +1,7 @@
 """The hash of a .blend file's content."""
 
+import struct
+
 import bpy
 import pytest
 
@@ -36,6 +38,39 @@ def test_another_order_of_memory_has_the_same_hash(room, tmp_path):
     for number in range(50):
         bpy.data.objects.remove(bpy.data.objects.new(f"Gone {number}", None))
     assert blend_hash(written(room, tmp_path / "b.blend")) == before
+
+
+def parts_of_meshes(data):
+    """The blocks of data of each mesh, in the file's order, with the bytes from the first to behind the last."""
+    meshes, last = [], b""
+    for block in read_blocks(data):
+        last = block.code if block.code != b"DATA" else last
+        if block.code == b"ME":
+            meshes.append([])
+        elif last == b"ME":
+            meshes[-1].append(block)
+    return meshes
+
+
+def moved(data, block, group, address):
+    """The file if `block` had stood at `address`; `group`: all blocks that may point to it."""
+    data, old = bytearray(data), struct.pack("<Q", block.address)
+    for start, end in [(one.start, one.start + one.length) for one in group]:
+        data[start:end] = bytes(data[start:end]).replace(old, struct.pack("<Q", address))
+    place = data.rindex(old, 0, block.start)
+    data[place : place + 8] = struct.pack("<Q", address)
+    return bytes(data)
+
+
+def test_parts_of_two_meshes_may_have_stood_at_one_address(room, tmp_path):
+    data = written(room, tmp_path / "a.blend")
+    first, second = parts_of_meshes(data)
+    pairs = [(a, b) for a in first for b in second if a.struct == b.struct and a.length == b.length]
+    whole = [block for block in read_blocks(data) if block.code == b"ME"]
+    for address in (pairs[0][0].address, 0x123456789ABCDEF0):
+        changed = moved(data, pairs[0][1], [whole[1], *second], address)
+        assert changed != data or address == pairs[0][1].address
+        assert blend_hash(changed) == blend_hash(data)
 
 
 def test_selection_does_not_matter_and_visibility_does(room, tmp_path):
