@@ -37,7 +37,7 @@ from .snapshot.scene import Camera, Snapshot
 from .techniques.film import check_tree, resolve
 from .ui.properties import settings_of
 
-STEP_S = 0.1  # what a sample may take while the picture changes: coarser pixels are drawn to stay below it
+STEP_S = 0.08  # what a step may take while the picture changes, to stay below 0.1 s: coarser pixels are drawn for it
 BUDGET_S = 0.05  # one redraw works until this is spent; what it has begun by then is finished
 MOST_BUDGET_S = 0.25  # where Blender itself takes long to draw its window, as with a software GPU, work as long as it
 REST_S = 0.25  # without a change for so long, or for two redraws, the picture is drawn in full resolution
@@ -68,11 +68,13 @@ class Pace:
             guesses += [seconds / (scale / other) ** 2 for other, seconds in self.cost.items()]
         return min(guesses, default=None)
 
-    def scale(self) -> int:
-        """The finest scale that is fast enough; the last but one for a scene never drawn."""
+    def scale(self, before: float = 0.0) -> int:
+        """The finest scale that is fast enough when `before` seconds of the step are spent already; the last but one
+        for a scene never drawn."""
         if not self.cost:
             return SCALES[-2]
-        return next((scale for scale in SCALES if (self.expected(scale) or np.inf) <= STEP_S), SCALES[-1])
+        left = STEP_S - before
+        return next((scale for scale in SCALES if (self.expected(scale) or np.inf) <= left), SCALES[-1])
 
 
 class Viewport:
@@ -98,7 +100,7 @@ class Viewport:
         self._waits = False  # what is shown is this view of this scene, only coarser
         self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
         self._sample: Iterator | None = None  # what is left of a sample that was begun
-        self._sample_seconds = 0.0
+        self._sample_seconds = self._beginning = 0.0  # `_beginning`: what the frame took before its first sample
         self._pauses = (0.0, 0.0)  # between the last redraws
         self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
         self._compiled = -1  # programs made so far, when the sample was begun
@@ -128,7 +130,7 @@ class Viewport:
     def attach(self, engine) -> None:
         """A new engine instance draws this from now on. What happened before it came is unknown: read all graphs."""
         self.owner = weakref.ref(engine)
-        self.cache.graphs.clear()
+        self.cache.doubt()
         self.dirty = True
         weakref.finalize(engine, _free_soon).atexit = False
 
@@ -149,6 +151,7 @@ class Viewport:
         """
         elsewhere = clock() - self._left_at if self._left_at is not None else 0.0
         self._pauses = self._pauses[1], elsewhere
+        called = clock()
         self._prepare(source, camera, size, border or (0, 0, *size), settings, clock)
         frame, started = self.frame, clock()
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
@@ -157,7 +160,7 @@ class Viewport:
             spent = self._work(frame, clock, budget)
             drawn |= self._sample is None
             # Only a picture of this very view and scene may wait for its next sample.
-            if (self._waits or frame.samples_done) and clock() - started + spent > budget:
+            if (self._waits or frame.samples_done) and clock() - called + spent > budget:
                 break
         if drawn:
             self._resolve(frame)
@@ -174,10 +177,13 @@ class Viewport:
     def _work(self, frame: Frame, clock, budget: float) -> float:
         """One part of a sample; the seconds that it took. `_sample` is None afterwards if the sample is whole."""
         if self._sample is None:
-            self._sample, self._sample_seconds = self.renderer.steps(frame), 0.0
+            self._sample, self._sample_seconds = self.renderer.steps(frame), self._beginning
+            self._beginning = 0.0
             self._compiled = library.compile_count
         before, end = clock(), object()
         whole = next(self._sample, end) is end
+        if whole and not frame.profiler.wait:
+            frame.profiler.finish()
         spent = clock() - before
         self.bands.learn(spent, budget / 2)
         self._sample_seconds += spent
@@ -212,35 +218,38 @@ class Viewport:
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Bring `self.frame` to what is asked: kept if nothing changed, else begun anew at a fitting scale."""
         asked = (_view_key(camera), size, border, replace(settings, samples=0))
-        moved, begun = asked != self._asked, False
+        moved, begun, reading = asked != self._asked, False, 0.0
         if self.dirty:
+            before = clock()
             self._snapshot = source(camera, *size)
-            self.dirty = False
+            self.dirty, reading = False, clock() - before
             if not moved:  # most updates change nothing that is drawn: selections, names, other scenes' settings
                 before = self.frame
-                if self._begin(camera, size, border, settings, self.scale) is before:
+                if self._begin(camera, size, border, settings, self.scale, clock) is before:
                     return
                 moved = begun = True
         if not moved and settings.samples != self.frame.settings.samples:  # more or less of the same picture
-            self._begin(camera, size, border, settings, self.scale)
+            self._begin(camera, size, border, settings, self.scale, clock)
         if moved:
             self._asked = asked
             self._changed_at = clock()
-            before, scale = self.frame, self.pace.scale()
+            before, scale = self.frame, self.pace.scale(reading)
             begun = begun and scale == self.scale
-            if begun or self._begin(camera, size, border, settings, scale) is not before:
+            if begun or self._begin(camera, size, border, settings, scale, clock) is not before:
                 self._waits = False
         elif self.scale > 1 and clock() - self._changed_at > max(REST_S, 2.0 * min(self._pauses)):
-            self._begin(camera, size, border, settings, 1)
+            self._begin(camera, size, border, settings, 1, clock)
             self._waits = True
 
-    def _begin(self, camera: Camera, size, border, settings: Settings, scale: int) -> Frame:
+    def _begin(self, camera: Camera, size, border, settings: Settings, scale: int, clock) -> Frame:
+        started = clock()
         check_tree(settings.passes)
         width, height = (max(-(-extent // scale), 1) for extent in size)
         x, y = width / size[0], height / size[1]
         border = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
         film = replace(self._snapshot.film, width=width, height=height, border=border)
-        settings = replace(settings, profile=True)  # a part is done when the GPU has done it
+        # A part is done when the GPU has done it; a draft is drawn as one, and its passes need not wait for each other.
+        settings = replace(settings, profile=scale == 1)
         if scale > 1:
             settings = settings.as_draft()
         frame = self.renderer.begin(replace(self._snapshot, camera=camera, film=film), settings)
@@ -250,6 +259,7 @@ class Viewport:
                 images.pool.trim()  # nobody will ask for the images of the old size again
             self.frame, self.scale, self._size = frame, scale, size
             self.seconds, self._finished, self._sample = 0.0, False, None
+            self._beginning = clock() - started
         elif frame.samples_done < settings.samples:
             self._finished = False
         return frame

@@ -138,14 +138,20 @@ class Driver:
         matrix[:3, 3] += 0.01 * matrix[:3, 0]
         self.camera = replace(self.camera, matrix=matrix)
 
+    def _tell(self, _scene, graph) -> None:
+        """What Blender calls a viewport for, while the updates still stand in the graph."""
+        self.viewport.cache.invalidate(graph.updates)
+        self.viewport.dirty = True
+
     def edit(self, name: str, change: Callable[[], None], scene: bool = True) -> Edit:
         """Make the change and redraw, MOVES times."""
         wall, processors = [], []
         for _ in range(MOVES):
             change()
             if scene:
-                self.viewport.cache.invalidate(self.graph.updates)
-                self.viewport.dirty = True
+                bpy.app.handlers.depsgraph_update_post.append(self._tell)
+                bpy.context.view_layer.update()
+                bpy.app.handlers.depsgraph_update_post.remove(self._tell)
             self.traffic.bytes = self.begun = 0
             uploads, reads, cpu = self.viewport.renderer.geometry.uploads, self.reads, time.process_time()
             wall.append(self.draw())

@@ -336,6 +336,24 @@ def test_moved_object_starts_anew_and_uploads_no_mesh(scene, region):
     assert region.viewport.renderer.geometry.uploads == uploads
 
 
+def test_draft_after_a_move_is_that_of_a_new_viewport(scene, region):
+    """Its rays search a tree that was refitted, and its maps are drawn of what is kept for a moving view."""
+    scene.candela.bounces = 2
+    for k in range(4):
+        bpy.ops.mesh.primitive_torus_add(location=(k - 1.5, -1.5, 0.5), major_segments=12, minor_segments=6)
+    region.rest()
+    for height in (0.4, 0.8):
+        bpy.data.objects["Cube"].location.z += height
+        region.viewport.dirty = True
+        picture = images.read(region.draw())
+    assert region.viewport.scale > 1
+    other = Region()
+    other.viewport.scale, other.viewport.pace = region.viewport.scale, region.viewport.pace
+    fresh = images.read(other.draw())
+    other.viewport.release()
+    assert np.isclose(picture, fresh, rtol=1e-3, atol=1e-4).all(axis=-1).mean() > 0.98
+
+
 def test_more_samples_continue_where_it_rested(scene, region):
     region.rest()
     frame = region.viewport.frame

@@ -2,9 +2,9 @@
 
 Some things in a .blend file say nothing about the scene and are taken out first. Memory addresses: every pointer is
 replaced by the number of the block it points to. As when Blender reads the file, that is a block of the same data-block
-or another data-block: parts of two data-blocks may have stood at the same address, one after the other. Padding, time stamps and session numbers of data-blocks. The output
-format. And Candela's own settings (the property groups named `candela`), so that tuning Candela does not throw its
-reference away.
+or another data-block: parts of two data-blocks may have stood at the same address, one after the other. Padding, time
+stamps and session numbers of data-blocks. The output format. And Candela's own settings (the property groups named
+`candela`), so that tuning Candela does not throw its reference away.
 
 Source for the file format: doc/blender_file_format in Blender's repository. A file is a header, then blocks (code,
 length, old address, struct number, count, data); the block DNA1 describes the fields of every struct.

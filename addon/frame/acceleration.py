@@ -10,7 +10,7 @@ Sources: Lauterbach et al. 2009 (linear BVH); the implicit four-wide layout is o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -22,6 +22,7 @@ from .morton import morton_codes
 
 LARGEST = 4_000_000  # triangles
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
+MOST_REFITTED = 200_000  # triangles of a tree whose parts are kept, some 100 bytes each
 LEAF = 4
 NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children on it
 # Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
@@ -111,44 +112,68 @@ def _packed_normals(normals: np.ndarray) -> np.ndarray:
     return np.nan_to_num(steps[..., 0] + (NORMAL_STEPS + 1) * steps[..., 1])
 
 
-def build(corners: np.ndarray, look: np.ndarray) -> Hierarchy:
+@dataclass
+class Tree:
+    """A hierarchy with what it was made of, so that triangles that moved can be put in their old places."""
+
+    hierarchy: Hierarchy
+    place: np.ndarray  # (T,) of each triangle among the sorted ones; -1: left out
+    leaves: np.ndarray  # (L, LEAF_TEXELS, LEAF)
+    low: np.ndarray  # (slots, 3) of each sorted triangle
+    high: np.ndarray
+    refitted: bool = False
+
+
+def build(corners: np.ndarray, look: np.ndarray) -> Tree:
     """The hierarchy of `corners` (T, 3, 3) with opacity, emission, material and normals `look` (T, 8)."""
     finite = np.isfinite(corners).all(axis=(1, 2))
-    corners, look = corners[finite], look[finite]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    order = np.argsort(morton_codes((low + high) * 0.5), kind="stable")
-    count = len(corners)
+    order = np.flatnonzero(finite)
+    low, high = corners[order].min(axis=1), corners[order].max(axis=1)
+    order = order[np.argsort(morton_codes((low + high) * 0.5), kind="stable")]
+    count = len(order)
     levels = 1
     while LEAF * 4**levels < count:
         levels += 1
     slots = LEAF * 4**levels
     used = -(-max(count, 1) // LEAF)
-    packed = np.zeros((used, LEAF_TEXELS, LEAF), np.float32)  # zero edges: never hit
-    sorted_corners = np.zeros((used * LEAF, 3, 3), np.float32)
-    sorted_corners[:count] = corners[order]
-    first = sorted_corners[:, 0]
-    edges = sorted_corners[:, 1:] - first[:, None]
-    for axis in range(3):
-        packed[:, axis] = first[:, axis].reshape(used, LEAF)
-        packed[:, 3 + axis] = edges[:, 0, axis].reshape(used, LEAF)
-        packed[:, 6 + axis] = edges[:, 1, axis].reshape(used, LEAF)
-    looks = np.zeros((used * LEAF, look.shape[1]), np.float32)
-    looks[:count] = look[order]
-    packed[:, 9:] = looks.reshape(used, LEAF, -1).transpose(0, 2, 1)
-
+    place = np.full(len(corners), -1)
+    place[order] = np.arange(count)
+    leaves = np.zeros((used, LEAF_TEXELS, LEAF), np.float32)  # zero edges: never hit
     box_low = np.full((slots, 3), EMPTY, np.float32)
     box_high = np.full((slots, 3), -EMPTY, np.float32)
-    box_low[:count], box_high[:count] = low[order], high[order]
-    box_low, box_high = box_low.reshape(-1, LEAF, 3).min(axis=1), box_high.reshape(-1, LEAF, 3).max(axis=1)
-    nodes = []
+    hierarchy = Hierarchy(None, None, levels, count)
+    return _written(Tree(hierarchy, place, leaves, box_low, box_high), np.arange(count), corners[order], look[order])
+
+
+def refit(tree: Tree, numbers: np.ndarray, corners: np.ndarray, look: np.ndarray) -> Tree | None:
+    """The tree with triangles `numbers` (N,) elsewhere, at the cost of larger boxes; `tree` itself is used up. None
+    where a triangle is not finite."""
+    place = tree.place[numbers]
+    if (place < 0).any() or not np.isfinite(corners).all():
+        return None
+    return _written(replace(tree, refitted=True), place, corners, look)
+
+
+def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarray) -> Tree:
+    """Write triangles (N, 3, 3) and their looks (N, 8) to their places (N,), and the tree to the GPU."""
+    leaf, slot = place // LEAF, place % LEAF
+    tree.leaves[leaf, :3, slot] = corners[:, 0]
+    tree.leaves[leaf, 3:6, slot] = corners[:, 1] - corners[:, 0]
+    tree.leaves[leaf, 6:9, slot] = corners[:, 2] - corners[:, 0]
+    tree.leaves[leaf, 9:, slot] = look
+    tree.low[place], tree.high[place] = corners.min(axis=1), corners.max(axis=1)
+
+    box_low, box_high = tree.low.reshape(-1, LEAF, 3).min(axis=1), tree.high.reshape(-1, LEAF, 3).max(axis=1)
+    nodes, used, old = [], len(tree.leaves), tree.hierarchy
     reach = max(np.abs(box_low[:used]).max(initial=0.0), np.abs(box_high[:used]).max(initial=0.0))
     least = max(1e-6 * float(reach), 1e-30)
-    for _ in range(levels):
+    for _ in range(old.levels):
         children_low, children_high = box_low.reshape(-1, 4, 3), box_high.reshape(-1, 4, 3)
         nodes.append(_packed_boxes(children_low, children_high, least))
         box_low, box_high = children_low.min(axis=1), children_high.max(axis=1)
     rows = np.concatenate(nodes[::-1]).reshape(-1, 4)  # root first
-    return Hierarchy(images.upload_list(rows), images.upload_list(packed.reshape(-1, 4)), levels, count)
+    leaves = images.upload_list(tree.leaves.reshape(-1, 4))
+    return replace(tree, hierarchy=Hierarchy(images.upload_list(rows), leaves, old.levels, old.triangles))
 
 
 def _packed_boxes(low: np.ndarray, high: np.ndarray, least: float) -> np.ndarray:
@@ -182,22 +207,56 @@ class HierarchyCache:
     """
 
     def __init__(self):
-        self._kept: dict[object, Hierarchy] = {}
+        self._kept: dict[object, Tree] = {}
 
-    def get(self, snapshot, materials: list[CompiledMaterial], origin: np.ndarray, path: str) -> Hierarchy | None:
-        """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`)."""
+    def get(
+        self, snapshot, materials: list[CompiledMaterial], origin: np.ndarray, path: str, draft: bool = False
+    ) -> Hierarchy | None:
+        """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`).
+
+        For a draft, of which the next may follow at once, triangles that moved keep their places in the tree.
+        """
         if too_many(snapshot):
             return None
-        key = (
-            tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, _added(i, path))
-                  for i in snapshot.instances if _met(i, path)),
+        kinds = {id(i.visibility): i for i in snapshot.instances}
+        alike = all(_met(i, path) and not _added(i, path) for i in kinds.values())
+        shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))
+        key = shown, (
+            None if alike else tuple(_added(i, path) for i in shown),
+            tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
             tuple((_opacity(m), m.emissive and m.emission) for m in materials), tuple(origin),
         )  # fmt: skip
-        if key not in self._kept:
-            triangles = world_triangles(list(snapshot.instances), snapshot.meshes, materials, origin, path)
+        tree = self._kept.get(key)
+        if tree is None and draft:
+            tree = self._moved(key, snapshot, materials, origin, path)
+        if tree is None or (tree.refitted and not draft):
+            tree = build(*world_triangles(list(shown), snapshot.meshes, materials, origin, path))
+            if tree.hierarchy.triangles > MOST_REFITTED:
+                tree.place = tree.leaves = tree.low = tree.high = None
+        if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
-            self._kept = dict([*self._kept.items()][-3:]) | {key: build(*triangles)}
-        return self._kept[key]
+            self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
+        return tree.hierarchy
+
+    def _moved(self, key, snapshot, materials: list[CompiledMaterial], origin: np.ndarray, path: str) -> Tree | None:
+        """The tree of the same instances, of which a few have moved since; None if there is none."""
+        shown, rest = key
+        for other in self._kept:
+            old, tree = other[0], self._kept[other]
+            if other[1] != rest or len(old) != len(shown) or tree.place is None:
+                continue
+            moved = [k for k, (a, b) in enumerate(zip(shown, old)) if a is not b]
+            if any((shown[k].mesh, shown[k].materials) != (old[k].mesh, old[k].materials) for k in moved):
+                continue
+            counts = np.array([snapshot.meshes[one.mesh].triangle_count for one in shown])
+            if 2 * counts[moved].sum() > len(tree.place):
+                continue
+            starts = np.cumsum(counts) - counts
+            numbers = [np.arange(starts[k], starts[k] + counts[k]) for k in moved]
+            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path)
+            del self._kept[other]
+            return refit(tree, np.concatenate(numbers), *triangles)
+        return None
 
     def release(self) -> None:
         self._kept = {}

@@ -306,12 +306,21 @@ class AlphaCasters:
 
 
 def draw_views(
-    atlas: Atlas, views: list[MapView], cells, geometry: SceneGeometry, alpha: AlphaCasters, sample: int
+    atlas: Atlas,
+    views: list[MapView],
+    cells,
+    geometry: SceneGeometry,
+    alpha: AlphaCasters,
+    sample: int,
+    lasting: bool = True,
 ) -> int:
-    """Draw all casters into every view of sample number `sample`. Returns how many triangles were sent."""
+    """Draw all casters into every view of sample number `sample`. Returns how many triangles were sent.
+
+    `lasting`: the picture has more samples to come, so that what helps them may cost this one something.
+    """
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-    # What has not moved since the first sample is worth being written out.
-    resting = geometry.resting_casters() if sample > 0 else None
+    # What has not moved since the first sample is worth being written out; a view that turns finds it so.
+    resting = geometry.resting_casters(make=sample > 0 and lasting)
     boxes, alpha_boxes = Boxes.of(geometry.opaque_casters), Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
     sent = 0

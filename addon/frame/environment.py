@@ -37,6 +37,7 @@ class Environment:
         pixels, mapping = _pixels(world) if tree is None else (_finite(tree.bake()), np.eye(3))
         self.pixels = pixels
         self.rotation = mapping[:, :3]
+        self._to_world = np.linalg.inv(self.rotation)
         luminance = np.maximum(pixels @ np.abs(LUMINANCE * np.sign(self.color)), 0.0)
         self.power = float(np.abs(self.color).max() * luminance.max())
         density = _density(luminance)
@@ -93,7 +94,7 @@ class Environment:
         in_map = np.stack(
             [ring * np.cos(azimuth), ring * np.sin(azimuth), np.repeat(z[:, None], width, axis=1)], axis=-1
         )
-        world = in_map @ np.linalg.inv(self.rotation).T
+        world = in_map @ self._to_world.T
         rows = np.clip((world[..., 2] + 1) / 2 * GUIDE_ROWS, 0, GUIDE_ROWS - 1).astype(int)
         turn = np.arctan2(world[..., 1], world[..., 0]) / (2 * np.pi) + 0.5
         columns = np.clip(turn * GUIDE_COLUMNS, 0, GUIDE_COLUMNS - 1).astype(int)
@@ -110,38 +111,44 @@ class Environment:
         edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
         mass = density * self._cell_solid_angle(height, width)
         self._edges = edges
-        self._rows = np.concatenate([[0.0], np.cumsum(mass.sum(axis=1))])
-        self._columns = np.concatenate([np.zeros((height, 1)), np.cumsum(mass, axis=1)], axis=1)
+        self._cells = np.concatenate([[0.0], np.cumsum(mass)])
+        self._rows = self._cells[::width]
 
-    def draw(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray, float]:
-        """From two uniform numbers: direction (unit, world), radiance from there, density per steradian."""
+    def draw(self, x, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """From uniform numbers of any shape: directions (..., 3), unit, in the world; radiance from there (..., 3), and
+        densities per steradian (...)."""
         height, width = self.density.shape
-        y *= self._rows[-1]
-        row = int(np.clip(np.searchsorted(self._rows, y, side="right") - 1, 0, height - 1))
-        along = (y - self._rows[row]) / max(self._rows[row + 1] - self._rows[row], 1e-300)
-        columns = self._columns[row]
-        x *= columns[-1]
-        column = int(np.clip(np.searchsorted(columns, x, side="right") - 1, 0, width - 1))
-        across = (x - columns[column]) / max(columns[column + 1] - columns[column], 1e-300)
+        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64) * self._rows[-1]
+        row = np.clip(np.searchsorted(self._rows, y, side="right") - 1, 0, height - 1)
+        low, mass = self._rows[row], self._rows[row + 1] - self._rows[row]
+        along = (y - low) / np.maximum(mass, 1e-300)
+        place = low + x * mass  # on the curve that runs through one row after the other
+        column = np.searchsorted(self._cells, place, side="right") - 1 - row * width
+        column = np.clip(column, 0, width - 1)
+        start = self._cells[row * width + column]
+        across = (place - start) / np.maximum(self._cells[row * width + column + 1] - start, 1e-300)
         z = self._edges[row] + np.clip(along, 0, 1) * (self._edges[row + 1] - self._edges[row])
         azimuth = (0.5 - (column + np.clip(across, 0, 1)) / width) * 2 * np.pi
-        ring = np.sqrt(max(1.0 - z * z, 0.0))
-        in_map = np.array([ring * np.cos(azimuth), ring * np.sin(azimuth), z])
-        direction = np.linalg.solve(self.rotation, in_map)
-        direction /= np.linalg.norm(direction)
-        return direction, self.lookup(in_map) * self.color, float(self.density[row, column])
+        ring = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+        in_map = np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), z], axis=-1)
+        direction = in_map @ self._to_world.T
+        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+        return direction, self.lookup(in_map) * self.color, self.density[row, column]
 
     def lookup(self, in_map: np.ndarray) -> np.ndarray:
-        """Bilinear radiance (without the factor) in a direction of the map's own frame."""
+        """Bilinear radiance (..., 3), without the factor, in directions (..., 3) of the map's own frame."""
         height, width = self.pixels.shape[:2]
-        u = 0.5 - np.arctan2(in_map[1], in_map[0]) / (2 * np.pi)
-        v = 0.5 + np.arcsin(np.clip(in_map[2], -1, 1)) / np.pi
+        u = 0.5 - np.arctan2(in_map[..., 1], in_map[..., 0]) / (2 * np.pi)
+        v = 0.5 + np.arcsin(np.clip(in_map[..., 2], -1, 1)) / np.pi
         px, py = u * width - 0.5, v * height - 0.5
-        x0, y0 = int(np.floor(px)), int(np.floor(py))
-        tx, ty = px - x0, py - y0
-        columns, rows = np.array([x0, x0 + 1]) % width, np.clip([y0, y0 + 1], 0, height - 1)
-        block = self.pixels[np.ix_(rows, columns)]
-        return np.einsum("ijk,i,j->k", block, [1 - ty, ty], [1 - tx, tx])
+        x0, y0 = np.floor(px).astype(int), np.floor(py).astype(int)
+        tx, ty = (px - x0)[..., None], (py - y0)[..., None]
+        left, right = x0 % width, (x0 + 1) % width
+        lower, upper = np.clip(y0, 0, height - 1), np.clip(y0 + 1, 0, height - 1)
+        pixels = self.pixels
+        below = pixels[lower, left] * (1 - tx) + pixels[lower, right] * tx
+        above = pixels[upper, left] * (1 - tx) + pixels[upper, right] * tx
+        return below * (1 - ty) + above * ty
 
 
 def _largest_nearby(cells: np.ndarray) -> np.ndarray:

@@ -83,10 +83,11 @@ class SceneGeometry:
         self._order: list[int] = []  # of the snapshot's instances with triangles
         self._kinds: tuple = ()
         self._matrices = np.zeros((0, 4, 4))
+        self._written: list[Instance] = []  # those whose facts stand in `instance_rows`
         self._moved: list[Block] = []
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
-        self._clusters: tuple[object, list[casters.Clusters] | None] = (None, None)
+        self._clusters: tuple[int, list[casters.Clusters] | None] = (-1, None)
 
     @property
     def size(self) -> float:
@@ -117,11 +118,13 @@ class SceneGeometry:
         self._make_draws(instances, snapshot.meshes, materials)
         return True
 
-    def resting_casters(self) -> list[casters.Clusters] | None:
-        """Opaque casters in world space, made when first asked for; None where there are too many."""
-        key = (self._draw_key, self.instance_rows.tobytes())
-        if self._clusters[0] != key:
-            self._clusters = (key, casters.clusters(*self._placed, self.origin))
+    def resting_casters(self, make: bool = True) -> list[casters.Clusters] | None:
+        """Opaque casters in world space; None where there are too many. They are made when first asked for; without
+        `make` None where they have not been."""
+        if self._clusters[0] != self.changes:
+            if not make:
+                return None
+            self._clusters = (self.changes, casters.clusters(*self._placed, self.origin))
         return self._clusters[1]
 
     def is_closed(self, mesh: Mesh) -> bool:
@@ -131,7 +134,7 @@ class SceneGeometry:
     def _ordered(self, instances: list[Instance]) -> list[Instance]:
         """Equal ones together, neighbours beside each other; as before while only a few have moved."""
         kinds = tuple((i.mesh, i.materials) for i in instances)
-        matrices = np.stack([i.matrix for i in instances]) if instances else np.zeros((0, 4, 4))
+        matrices = _stacked([i.matrix for i in instances], (4, 4))
         if kinds != self._kinds or (matrices != self._matrices).any(axis=(1, 2)).sum() > MOST_MOVED:
             place = _neighbourhood(instances)
             self._order = sorted(range(len(instances)), key=lambda k: (*kinds[k], place[k]))
@@ -144,11 +147,11 @@ class SceneGeometry:
             matrices = np.zeros((0, 4, 4))
             self._mirrored = np.zeros(0, bool)
         else:
-            matrices = np.stack([i.matrix for i in instances]).astype(np.float64)
+            matrices = _stacked([i.matrix for i in instances], (4, 4)).astype(np.float64)
             finite = np.isfinite(matrices).all(axis=(1, 2))
             matrices[~finite] = np.diag([0.0, 0.0, 0.0, 1.0])
-            low = np.stack([snapshot.meshes[i.mesh].bounds_min for i in instances])
-            high = np.stack([snapshot.meshes[i.mesh].bounds_max for i in instances])
+            low = _stacked([snapshot.meshes[i.mesh].bounds_min for i in instances], (3,))
+            high = _stacked([snapshot.meshes[i.mesh].bounds_max for i in instances], (3,))
             centre, half = (low + high) / 2, (high - low) / 2
             world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centre) + matrices[:, :3, 3]
             reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
@@ -159,7 +162,13 @@ class SceneGeometry:
         grid = 2.0 ** np.ceil(np.log2(self.size)) if instances else 1.0
         self.origin = np.round(camera / grid) * grid
         rows = np.zeros((max(len(instances), 1), TEXELS_PER_INSTANCE, 4), np.float32)
-        for k, instance in enumerate(instances):
+        if len(self._written) == len(instances) and len(self.instance_rows) == len(rows):
+            rows[:, 3:] = self.instance_rows[:, 3:]
+        else:
+            self._written = [None] * len(instances)
+        for k, (instance, written) in enumerate(zip(instances, self._written)):
+            if instance is written:
+                continue
             seen = instance.visibility
             flags = (
                 CAMERA_FLAG * seen.camera + SHADOW_FLAG * seen.shadow + DIFFUSE_FLAG * seen.diffuse
@@ -168,6 +177,7 @@ class SceneGeometry:
             rows[k, 3] = (instance.random, instance.pass_index, flags, 0.0)
             rows[k, 4] = instance.color
             rows[k, 5], rows[k, 6, 0] = (*instance.generated, instance.uv[0]), instance.uv[1]
+        self._written = instances
         if len(instances):
             relative = matrices[:, :3, :].copy()
             relative[:, :, 3] -= self.origin
@@ -271,6 +281,11 @@ class SceneGeometry:
 
     def release(self) -> None:
         self.__init__()
+
+
+def _stacked(arrays: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+    """np.stack, faster for thousands of small arrays."""
+    return np.concatenate(arrays).reshape(-1, *shape) if arrays else np.zeros((0, *shape))
 
 
 def _closed(mesh: Mesh) -> bool:

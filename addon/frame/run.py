@@ -98,7 +98,7 @@ class Frame:
         first call."""
         if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
             self._hierarchies[path] = self.hierarchies.get(
-                self.snapshot, self.materials.compiled, self.geometry.origin, path
+                self.snapshot, self.materials.compiled, self.geometry.origin, path, self.settings.draft
             )
         return self._hierarchies[path]
 

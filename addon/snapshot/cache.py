@@ -5,11 +5,14 @@ number means the same content, and nothing is read. A new number, or a data-bloc
 means "maybe changed": the arrays are read and compared by digest, and the mesh keeps its version when they
 are equal. (That is what happens in each F12 render, whose dependency graph evaluates everything anew.)
 
-Node graphs have no such number. They are taken over only when the caller has told all updates since the last sync
+Objects have no such number. What they say of themselves (visibility to rays, colour, name, ...) is taken over when
+all updates since the last sync were told, none was about the scene or its collections, and none names the object.
+
+Node graphs have none either. They are taken over only when the caller has told all updates since the last sync
 (`invalidate`) and none of them can concern a graph; without that news they are read again.
 
-Images have neither: Blender tells no one when an image is painted, reloaded or gets another alpha mode. What can be
-asked cheaply (file time, packed data, settings) is compared at each sync, and the pixels of an unsaved one.
+For images there is not even news: Blender tells no one when an image is painted, reloaded or gets another alpha mode.
+What can be asked cheaply (file time, packed data, settings) is compared at each sync, and the pixels of an unsaved one.
 """
 
 from __future__ import annotations
@@ -18,8 +21,10 @@ import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..materials.graph import Graph
-from .scene import Image, Mesh, Note
+from .scene import Image, Instance, Mesh, Note
 
 # Versions never repeat in this Blender session, not even across caches: a GPU mesh that is stored under
 # (key, version) by one engine instance can then never be mistaken for another content.
@@ -31,6 +36,16 @@ _UNRELATED_TO_GRAPHS = frozenset(
     (
         *("Armature", "Camera", "Collection", "Curve", "Curves", "Key", "Lattice", "Mesh", "MetaBall", "Object"),
         *("PointCloud", "Scene", "SurfaceCurve", "TextCurve", "Volume"),
+    )
+)
+
+# Updates of these types say all they mean by naming an object, its data or what surfaces show. Any other may have
+# arranged the scene anew: what is hidden, left out, or seen by indirect light alone.
+_ABOUT_THEMSELVES = frozenset(
+    (
+        *("Armature", "Camera", "Curve", "Curves", "Image", "Key", "Lattice", "Material", "Mesh", "MetaBall", "Object"),
+        *("PointCloud", "ShaderNodeTree", "SurfaceCurve", "TextCurve", "Volume", "World"),
+        *("AreaLight", "PointLight", "SpotLight", "SunLight"),
     )
 )
 
@@ -70,14 +85,28 @@ class GraphEntry:
 
 
 @dataclass
+class Placed:
+    """All mesh instances of the last sync: as places in Blender's order, and as instances in the snapshot's."""
+
+    keys: list[str]
+    matrices: np.ndarray  # (N, 4, 4)
+    facts: list  # ObjectFacts of each
+    made: list[Instance]
+    ordered: tuple[Instance, ...] = ()
+
+
+@dataclass
 class SnapshotCache:
     """Holds the parts of the last snapshot. One cache serves any number of syncs of any scenes, one at a time."""
 
     meshes: dict[str, MeshEntry] = field(default_factory=dict)
     images: dict[str, ImageEntry] = field(default_factory=dict)
     graphs: dict[str, GraphEntry] = field(default_factory=dict)
+    facts: dict[tuple[int, int, int], object] = field(default_factory=dict)  # ObjectFacts by uid, parent's, data's
+    placed: Placed | None = None
     changed: set[int] = field(default_factory=set)  # session_uids of original data-blocks
     informed: bool = False  # all updates since the last sync are in `changed`
+    arranged: bool = False  # one of them was about the scene as a whole
 
     def invalidate(self, updates: Iterable) -> None:
         """Take note of `depsgraph.updates`; call it for every update, it only records.
@@ -88,9 +117,16 @@ class SnapshotCache:
         for update in updates:
             block = update.id.original
             self.changed.add(block.session_uid)
-            if type(block).__name__ not in _UNRELATED_TO_GRAPHS:
+            kind = type(block).__name__
+            if kind not in _UNRELATED_TO_GRAPHS:
                 self.graphs.clear()
+            self.arranged |= kind not in _ABOUT_THEMSELVES
             self.informed = True
+
+    def doubt(self) -> None:
+        """Updates may have been missed: let the next sync read all that only they tell of."""
+        self.graphs.clear()
+        self.arranged = True
 
     def finish(self, meshes: Iterable[str], images: Iterable[str], graphs: Iterable[str]) -> None:
         """End a sync: forget what the scene no longer holds, and all news, which is now worked in."""
@@ -98,12 +134,14 @@ class SnapshotCache:
             for key in entries.keys() - set(used):
                 del entries[key]
         self.changed.clear()
-        self.informed = False
+        self.informed = self.arranged = False
 
     def clear(self) -> None:
         """Forget everything; the next sync reads the whole scene."""
         self.meshes.clear()
         self.images.clear()
         self.graphs.clear()
+        self.facts.clear()
+        self.placed = None
         self.changed.clear()
-        self.informed = False
+        self.informed = self.arranged = False

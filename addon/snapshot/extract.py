@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
+from contextlib import contextmanager
+from functools import reduce
+from operator import or_
 
 import numpy as np
 
 from . import camera as cameras
-from .cache import MeshEntry, SnapshotCache
+from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
-from .instances import LightPlace, MeshPlace, matrices, walk
+from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
 from .scene import Camera, Film, Instance, Light, Mesh, Note, Snapshot, Visibility, World
@@ -37,6 +41,25 @@ def take(
     viewport's local view. Raises UnsupportedScene when there is nothing to look through.
     """
     start = time.perf_counter()
+    with uncollected():
+        snapshot = _take(depsgraph, cache, width, height, camera, view, border, shown)
+    snapshot.sync_stats["seconds"] = time.perf_counter() - start
+    return snapshot
+
+
+@contextmanager
+def uncollected():
+    """Without Python's search for cycles: thousands of short-lived objects would set it off in the middle."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _take(depsgraph, cache: SnapshotCache, width: int, height: int, camera, view, border, shown) -> Snapshot:
     scene = depsgraph.scene_eval
     notes: list[Note] = []
     if view is None:
@@ -47,17 +70,16 @@ def take(
 
     images = ImageTable(cache)
     shading = ShadingTable(cache, images)
-    places, light_places, walk_notes = walk(depsgraph, shown)
+    places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
-    places, light_places = _at_a_place(places, notes), _at_a_place(light_places, notes)
-    meshes, instances, mesh_notes, stats = _meshes(places, shading, cache, depsgraph)
+    meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
-    lights = _lights(light_places, shading, notes)
+    lights = _lights(*_at_a_place(light_places, notes), shading, notes)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]
     cache.finish(meshes, images.images, shading.graphs)
-    stats.update(images_read=images.read, images_reused=images.reused, seconds=time.perf_counter() - start)
+    stats.update(images_read=images.read, images_reused=images.reused)
     return Snapshot(
         meshes=meshes,
         instances=instances,
@@ -73,32 +95,37 @@ def take(
     )
 
 
-def _at_a_place(places: list, notes: list[Note]) -> list:
-    """Without the objects whose matrix holds a NaN or infinity, as a driver or constraint may make it."""
-    finite = np.isfinite(matrices(places)).all(axis=(1, 2))
+def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np.ndarray]:
+    """With their matrices, without the objects whose matrix holds a NaN or infinity, as a driver may make it."""
+    placed = matrices(places)
+    finite = np.isfinite(placed).all(axis=(1, 2))
+    if finite.all():
+        return places, placed
     for index in np.flatnonzero(~finite):
         text = "its position is not a finite number and it is not drawn; check its drivers and constraints."
-        notes.append(Note(f"Object '{places[index].facts.name}'", text))
-    return places if finite.all() else [place for place, good in zip(places, finite, strict=True) if good]
+        notes.append(Note(f"Object '{places[index].source.facts.name}'", text))
+    return [place for place, good in zip(places, finite, strict=True) if good], placed[finite]
 
 
-def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache, depsgraph):
+def _meshes(places: list[Place], matrices: np.ndarray, shading: ShadingTable, cache: SnapshotCache, depsgraph):
     """(meshes by key, instances, notes, counts). Instances stand in order of their mesh's first appearance."""
     override = depsgraph.view_layer_eval.material_override
-    wanted: dict[int, Wanted] = {}
-    materials: dict[int, tuple[int, ...]] = {}  # by identity of the facts, which all instances share
-    first: dict[int, MeshPlace] = {}
+    shown_with: dict[int, set[int]] = {}  # materials, by address of the mesh
+    materials: dict[int, tuple[int, ...]] = {}  # by identity of the source, which all its instances share
+    first: dict[int, Place] = {}
     for place in places:
-        facts = place.facts
-        if id(facts) in materials:
+        source = place.source
+        if id(source) in materials:
             continue
-        slots = facts.materials or (None,)
-        chosen = tuple(shading.index_of(override or material) for material in slots)
-        materials[id(facts)] = chosen
-        pointer = facts.data.as_pointer()
+        slots = source.materials or (None,)
+        chosen = tuple([shading.index_of(override or material) for material in slots])
+        materials[id(source)] = chosen
+        pointer = source.pointer
         first.setdefault(pointer, place)
-        for index in chosen:
-            wanted[pointer] = wanted.get(pointer, Wanted()) | shading.wanted[index]
+        shown_with.setdefault(pointer, set()).update(chosen)
+    wanted = {
+        pointer: reduce(or_, (shading.wanted[index] for index in sorted(used))) for pointer, used in shown_with.items()
+    }
 
     meshes: dict[str, Mesh] = {}
     by_pointer: dict[int, Mesh] = {}
@@ -111,34 +138,52 @@ def _meshes(places: list[MeshPlace], shading: ShadingTable, cache: SnapshotCache
         notes += entry.notes
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
 
-    groups: dict[tuple, list[Instance]] = {}
-    resolved: dict[int, tuple[Mesh, tuple[int, ...]]] = {}
-    for place, matrix in zip(places, matrices(places), strict=True):
-        facts = place.facts
-        if id(facts) not in resolved:
-            mesh = by_pointer[facts.data.as_pointer()]
-            resolved[id(facts)] = mesh, _fitted(materials[id(facts)], mesh.slots)
-        mesh, chosen = resolved[id(facts)]
-        made = Instance(
-            facts.name,
-            mesh.key,
-            matrix,
-            chosen,
-            facts.visibility,
-            place.random,
-            facts.pass_index,
-            facts.holdout,
-            facts.color,
-            place.generated,
-            place.uv,
-            place.key,
-        )
-        groups.setdefault((mesh.key, chosen), []).append(made)
-    order = {key: number for number, key in enumerate(meshes)}
-    ordered = sorted(groups, key=lambda group: order[group[0]])
-    instances = tuple(instance for group in ordered for instance in groups[group])
+    resolved: dict[int, tuple[str, tuple[int, ...]]] = {}
+    for place in places:
+        source = place.source
+        if id(source) not in resolved:
+            mesh = by_pointer[source.pointer]
+            resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots)
+    instances = _instances(places, matrices, resolved, list(meshes), cache)
     stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
     return meshes, instances, notes, stats
+
+
+def _instances(places: list[Place], matrices: np.ndarray, resolved: dict, order: list[str], cache: SnapshotCache):
+    """The instances, by mesh in `order`; those of the last sync where nothing has changed. `resolved`: key of the mesh
+    and materials, by identity of the source."""
+    keys = [place.key for place in places]
+    before = cache.placed
+    known = before is not None and before.keys == keys
+    same = (matrices == before.matrices).all(axis=(1, 2)).tolist() if known else ()
+    made, facts = [], [place.source.facts for place in places]
+    for k, place in enumerate(places):
+        mesh, chosen = resolved[id(place.source)]
+        if known and same[k] and before.facts[k] is facts[k]:
+            old = before.made[k]
+            if (
+                old.mesh == mesh and old.materials == chosen
+                and old.random == place.random and old.generated == place.generated and old.uv == place.uv
+            ):  # fmt: skip
+                made.append(old)
+                continue
+        of_object = facts[k]
+        made.append(
+            Instance(
+                of_object.name, mesh, matrices[k], chosen, of_object.visibility, place.random, of_object.pass_index,
+                of_object.holdout, of_object.color, place.generated, place.uv, place.key,
+            )
+        )  # fmt: skip
+    groups: dict[tuple, list[Instance]] = {}
+    for one in made:
+        groups.setdefault((one.mesh, one.materials), []).append(one)
+    number = {key: k for k, key in enumerate(order)}
+    ordered = sorted(groups, key=lambda group: number[group[0]])
+    instances = tuple(instance for group in ordered for instance in groups[group])
+    if known and instances == before.ordered:
+        instances = before.ordered
+    cache.placed = Placed(keys, matrices, facts, made, instances)
+    return instances
 
 
 def _fitted(materials: tuple[int, ...], slots: int) -> tuple[int, ...]:
@@ -146,7 +191,7 @@ def _fitted(materials: tuple[int, ...], slots: int) -> tuple[int, ...]:
     return (*materials[:slots], *(0,) * (slots - len(materials)))
 
 
-def _mesh_keys(first: dict[int, MeshPlace]) -> dict[int, str]:
+def _mesh_keys(first: dict[int, Place]) -> dict[int, str]:
     """A lasting name for each evaluated mesh: its data-block where it is shown as it is, else its object.
 
     One object may own several (geometry nodes): they are numbered in Blender's order.
@@ -154,18 +199,18 @@ def _mesh_keys(first: dict[int, MeshPlace]) -> dict[int, str]:
     keys: dict[int, str] = {}
     taken: dict[str, int] = {}
     for pointer, place in first.items():
-        facts = place.facts
-        unmodified = facts.data_uid and not len(facts.owner.original.modifiers)
+        facts = place.source.facts
+        unmodified = facts.data_uid and not len(place.source.owner.original.modifiers)
         base = f"mesh {facts.data_uid}" if unmodified else f"object {facts.uid}"
         taken[base] = taken.get(base, 0) + 1
         keys[pointer] = base if taken[base] == 1 else f"{base} #{taken[base]}"
     return keys
 
 
-def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache) -> tuple[MeshEntry, bool]:
+def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> tuple[MeshEntry, bool]:
     """The mesh as it is now, and whether its content is new."""
-    facts = place.facts
-    mesh, entry = facts.data, cache.meshes.get(key)
+    source, facts = place.source, place.source.facts
+    mesh, entry = source.data, cache.meshes.get(key)
     asked = wanted.names
     named = facts.uid in cache.changed or facts.data_uid in cache.changed
     # In edit mode the evaluated mesh is a shell around the edit mesh, which changes without a new evaluation.
@@ -174,26 +219,25 @@ def _sync_mesh(key: str, place: MeshPlace, wanted: Wanted, cache: SnapshotCache)
     if known and mesh.session_uid and entry.evaluation == mesh.session_uid:
         return entry, False
     if editing:
-        mesh = facts.owner.to_mesh()  # asking it to preserve all layers would give the mesh before the edits
+        mesh = source.owner.to_mesh()  # asking it to preserve all layers would give the mesh before the edits
     try:
         raw = read_mesh(mesh, wanted)
         digest = raw.digest()
         if entry is not None and entry.digest == digest and entry.asked == asked:
-            entry.evaluation = facts.data.session_uid
+            entry.evaluation = source.data.session_uid
             return entry, False
         made, notes = build_mesh(key, raw, mesh, wanted, f"Object '{facts.name}'")
     finally:
         if editing:
-            facts.owner.to_mesh_clear()
-    entry = cache.meshes[key] = MeshEntry(made, facts.data.session_uid, digest, asked, notes)
+            source.owner.to_mesh_clear()
+    entry = cache.meshes[key] = MeshEntry(made, source.data.session_uid, digest, asked, notes)
     return entry, True
 
 
-def _lights(places: list[LightPlace], shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
+def _lights(places: list[Place], matrices: np.ndarray, shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
     made = []
-    for place, matrix in zip(places, matrices(places), strict=True):
-        facts = place.facts
-        block = facts.data
+    for place, matrix in zip(places, matrices, strict=True):
+        facts, block = place.source.facts, place.source.data
         tint = np.ones(3)
         if uses_nodes(block):
             key = f"light {(block.original or block).session_uid}"

@@ -3,7 +3,8 @@
 Blender hands out every instance of a collection, geometry node, particle system or vertex/face instancer here, and
 also the meshes of curves, texts, surfaces and metaballs, as instances of their own object. The iterator's objects
 are temporary, so nothing of them is kept but the data-block of the mesh (or of hair curves or a point cloud, which
-strands.py makes a mesh), which lives as long as the evaluation.
+strands.py makes a mesh), which lives as long as the evaluation. What an object says of itself is taken over from the
+last walk where the updates since then cannot concern it (see cache.py).
 """
 
 from __future__ import annotations
@@ -11,9 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import and_
 
+import bpy
 import numpy as np
 
+from .cache import SnapshotCache
 from .scene import Note, Visibility
 
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
@@ -26,11 +30,11 @@ _NOT_DRAWN = {
 _UNUSED_ID = 2147483647  # what Blender fills persistent_id with
 
 
-@dataclass
-class MeshPlace:
-    """A mesh instance as found; `facts` is shared by all instances of the same object in the same parent."""
+@dataclass(slots=True)
+class Place:
+    """A mesh or light as found in one place; `source` is shared by all places of the same object in the same parent."""
 
-    facts: ObjectFacts
+    source: Source
     key: str
     random: float
     matrix: object  # mathutils.Matrix, a copy; many are converted at once
@@ -38,41 +42,49 @@ class MeshPlace:
     uv: tuple[float, float] = (0.0, 0.0)
 
 
-@dataclass
-class LightPlace:
-    """A light instance as found."""
+@dataclass(slots=True)
+class Source:
+    """What is shown, as Blender has it during this walk."""
 
     facts: ObjectFacts
-    key: str
-    matrix: object
+    data: object  # evaluated mesh or light data-block
+    pointer: int  # its address
+    owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
+    materials: tuple  # evaluated bpy materials (or None), one per slot
 
 
-@dataclass
+@dataclass(frozen=True, slots=True)
 class ObjectFacts:
-    """What holds for all instances of one object's data in one parent."""
+    """What holds for all instances of one object's data in one parent; the same object as long as nothing differs."""
 
     shown: bool
     name: str
     uid: int  # of the original object
     parent_uid: int  # of the original instancer, 0 for none
-    data: object  # evaluated mesh or light data-block
     data_uid: int  # session_uid of the original data-block, 0 for generated geometry
-    owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
-    materials: tuple  # evaluated bpy materials (or None), one per slot
     visibility: Visibility
     holdout: bool
     pass_index: int
     random: float
     color: tuple[float, float, float, float]
+    notes: tuple[Note, ...]
 
 
-def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], list[LightPlace], tuple[Note, ...]]:
+def walk(
+    depsgraph, cache: SnapshotCache, shown: Callable | None = None
+) -> tuple[list[Place], list[Place], tuple[Note, ...]]:
     """All mesh and light instances in Blender's order. `shown(object)` may hide some (a viewport's local view)."""
-    meshes: list[MeshPlace] = []
-    lights: list[LightPlace] = []
+    meshes: list[Place] = []
+    lights: list[Place] = []
     notes: dict[Note, None] = {}
-    known: dict[tuple[int, int, int], ObjectFacts] = {}
+    known: dict[tuple[int, int, int], Source] = {}
+    before, kept = cache.facts, {}
+    told = cache.informed and not cache.arranged and shown is None
+    changed = cache.changed
     view_layer = depsgraph.view_layer_eval
+    hairy = len(bpy.data.particles) > 0
+    # Asked of each object only where some collection says so: these two are slower than all else.
+    indirect_only, holdout = _collections_say(view_layer.layer_collection)
     for instance in depsgraph.object_instances:
         found = instance.object
         kind = found.type
@@ -81,7 +93,7 @@ def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], lis
                 notes[_not_drawn(found, kind)] = None
             continue
         is_instance = instance.is_instance
-        if not is_instance and instance.show_particles:
+        if hairy and not is_instance and instance.show_particles:
             _hair_notes(found, notes)
         if not instance.show_self:
             continue
@@ -90,66 +102,97 @@ def walk(depsgraph, shown: Callable | None = None) -> tuple[list[MeshPlace], lis
             continue
         owner, parent = (instance.instance_object, instance.parent) if is_instance else (found, None)
         identity = (owner.as_pointer(), parent.as_pointer() if parent else 0, data.as_pointer())
-        facts = known.get(identity)
-        if facts is None:
-            facts = known[identity] = _facts(found, owner, parent, data, view_layer, shown)
-            _object_notes(owner, kind, notes)
+        source = known.get(identity)
+        if source is None:
+            original = owner.original
+            parent_uid = parent.original.session_uid if parent is not None else 0
+            own_data = original.data
+            # Geometry that a modifier instances has no data-block of its own in the file.
+            is_own = own_data is not None and (
+                not is_instance or (owner.data is not None and owner.data.as_pointer() == identity[2])
+            )
+            data_uid = own_data.session_uid if is_own else 0
+            name = original.session_uid, parent_uid, data_uid
+            facts = before.get(name)
+            if facts is None or not told or not changed.isdisjoint(name):
+                made = ObjectFacts(
+                    shown=shown is None or bool(shown(found)),
+                    name=original.name,
+                    uid=name[0],
+                    parent_uid=parent_uid,
+                    data_uid=data_uid,
+                    visibility=_visibility(owner, parent, view_layer if indirect_only else None),
+                    holdout=_is_holdout(owner, parent, view_layer if holdout else None),
+                    pass_index=owner.pass_index,
+                    random=_random_of_name(original.name),
+                    color=tuple(owner.color),
+                    notes=_object_notes(owner, kind, original.name),
+                )
+                if made != facts:
+                    facts = made
+            kept[name] = facts
+            materials = tuple([slot.material for slot in found.material_slots])
+            source = known[identity] = Source(facts, data, identity[2], owner, materials)
+            for note in facts.notes:
+                notes[note] = None
+        facts = source.facts
         if not facts.shown:
             continue
-        key = f"{facts.uid}"
-        random = facts.random
-        generated, uv = (0.0, 0.0, 0.0), (0.0, 0.0)
         if is_instance:
             ids = "-".join(str(number) for number in instance.persistent_id if number != _UNUSED_ID)
             key = f"{facts.uid}/{facts.parent_uid}/{ids}"
             random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
-            generated, uv = tuple(instance.orco), tuple(instance.uv)
-        matrix = instance.matrix_world.copy()
-        if kind in _DRAWN:
-            meshes.append(MeshPlace(facts, key, random, matrix, generated, uv))
+            place = Place(source, key, random, instance.matrix_world.copy(), tuple(instance.orco), tuple(instance.uv))
         else:
-            lights.append(LightPlace(facts, key, matrix))
+            place = Place(source, str(facts.uid), facts.random, instance.matrix_world.copy())
+        (lights if kind == "LIGHT" else meshes).append(place)
+    cache.facts = kept
     return meshes, lights, tuple(notes)
 
 
-def _facts(found, owner, parent, data, view_layer, shown) -> ObjectFacts:
-    original = owner.original
-    own_data = original.data
-    # Geometry that a modifier instances has no data-block of its own in the file.
-    is_own = own_data is not None and owner.data is not None and owner.data.as_pointer() == data.as_pointer()
-    return ObjectFacts(
-        shown=shown is None or bool(shown(found)),
-        name=original.name,
-        uid=original.session_uid,
-        parent_uid=parent.original.session_uid if parent is not None else 0,
-        data=data,
-        data_uid=own_data.session_uid if is_own else 0,
-        owner=owner,
-        materials=tuple(slot.material for slot in found.material_slots),
-        visibility=_visibility(owner, parent, view_layer),
-        holdout=any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None),
-        pass_index=owner.pass_index,
-        random=_random_of_name(original.name),
-        color=tuple(owner.color),
-    )
+def _collections_say(top) -> tuple[bool, bool]:
+    """Whether any collection of the view layer is for indirect light alone, and whether any is a holdout."""
+    indirect_only, holdout, waiting = False, False, [top]
+    while waiting:
+        one = waiting.pop()
+        indirect_only |= one.indirect_only
+        holdout |= one.holdout
+        waiting += one.children
+    return indirect_only, holdout
+
+
+def _is_holdout(owner, parent, view_layer) -> bool:
+    """Whether an object or its instancer cuts a hole. `view_layer`: None where no collection of it is a holdout."""
+    if view_layer is None:
+        return owner.is_holdout or (parent is not None and parent.is_holdout)
+    return any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None)
 
 
 def _visibility(owner, parent, view_layer) -> Visibility:
-    """Ray visibility of an object, and of what instances it: Cycles lets a ray see it only where both do."""
-    flags = [
-        (
-            one.visible_camera and not one.indirect_only_get(view_layer=view_layer),
-            one.visible_diffuse,
-            one.visible_glossy,
-            one.visible_transmission,
-            one.visible_volume_scatter,
-            one.visible_shadow,
-        )
-        for one in (owner, parent)
-        if one is not None
-    ]
-    camera, diffuse, glossy, transmission, volume, shadow = (all(column) for column in zip(*flags, strict=True))
-    return Visibility(camera, diffuse, glossy, transmission, volume, shadow)
+    """Ray visibility of an object, and of what instances it: Cycles lets a ray see it only where both do.
+
+    `view_layer`: None where no collection of it is for indirect light alone.
+    """
+    flags = _flags(owner, view_layer)
+    if parent is not None:
+        flags = tuple(map(and_, flags, _flags(parent, view_layer)))
+    return _visibility_of(flags)
+
+
+def _flags(one, view_layer) -> tuple[bool, ...]:
+    return (
+        one.visible_camera and not (view_layer is not None and one.indirect_only_get(view_layer=view_layer)),
+        one.visible_diffuse,
+        one.visible_glossy,
+        one.visible_transmission,
+        one.visible_volume_scatter,
+        one.visible_shadow,
+    )
+
+
+@lru_cache
+def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
+    return Visibility(*flags)
 
 
 def _not_drawn(found, kind: str) -> Note:
@@ -164,19 +207,20 @@ def _hair_notes(found, notes: dict) -> None:
             notes[Note(f"Object '{found.original.name}'", text)] = None
 
 
-def _object_notes(owner, kind: str, notes: dict) -> None:
-    subject = f"Object '{owner.original.name}'"
+def _object_notes(owner, kind: str, name: str) -> tuple[Note, ...]:
+    """What of the object is not drawn as Cycles draws it."""
+    said = []
     linking = getattr(owner, "light_linking", None)
     if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-        notes[Note(subject, "light linking is not followed: its light reaches and is blocked by every object.")] = None
-    if kind not in _DRAWN:
-        return
-    if owner.is_shadow_catcher:
-        notes[Note(subject, "is a shadow catcher, which is drawn as an ordinary surface.")] = None
-    for modifier in owner.modifiers:
-        domain = getattr(modifier, "domain_settings", None)
-        if domain is not None and modifier.fluid_type == "DOMAIN" and domain.domain_type == "GAS":
-            notes[Note(subject, "smoke and fire are not drawn; only the domain's surface is.")] = None
+        said.append("light linking is not followed: its light reaches and is blocked by every object.")
+    if kind in _DRAWN:
+        if owner.is_shadow_catcher:
+            said.append("is a shadow catcher, which is drawn as an ordinary surface.")
+        for modifier in owner.modifiers:
+            domain = getattr(modifier, "domain_settings", None)
+            if domain is not None and modifier.fluid_type == "DOMAIN" and domain.domain_type == "GAS":
+                said.append("smoke and fire are not drawn; only the domain's surface is.")
+    return tuple(Note(f"Object '{name}'", text) for text in said)
 
 
 @lru_cache(maxsize=1 << 16)
@@ -208,7 +252,7 @@ def _jenkins(x: int, y: int) -> int:
     return ((c ^ b) - rotated(b, 24)) & mask
 
 
-def matrices(places) -> np.ndarray:
+def matrices(places: list[Place]) -> np.ndarray:
     """(N, 4, 4) float64 of the places' matrices."""
     if not places:
         return np.zeros((0, 4, 4))

@@ -71,9 +71,12 @@ class Visibility:
     shadow: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Instance:
-    """One placement of a mesh. Instances of the same mesh and materials stand next to each other."""
+    """One placement of a mesh. Instances of the same mesh and materials stand next to each other.
+
+    A later snapshot has the same object where nothing of it has changed, so they are compared by identity.
+    """
 
     object_name: str
     mesh: str  # Mesh.key

@@ -109,8 +109,9 @@ class DepthMapService:
         cells, texels = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
         if views:
             sent = depth_maps.draw_views(
-                self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample
-            )
+                self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample,
+                lasting=not frame.settings.draft,
+            )  # fmt: skip
             frame.count(technique, "maps", len(views))
             frame.count(technique, "caster triangles", sent)
         return Maps(self._atlas.target.colors[0], texels, HARD)

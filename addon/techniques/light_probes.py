@@ -161,7 +161,8 @@ class LightProbes(Technique):
 
     def _points_of_world(self, frame: Frame) -> list[np.ndarray]:
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
-        drawn = [frame.environment.draw(*point(k, "environment", frame.settings.seed)) for k in range(POINTS)]
+        chosen = np.array([point(k, "environment", frame.settings.seed) for k in range(POINTS)])
+        drawn = zip(*frame.environment.draw(*chosen.T))
         return [lights.direction_row(d, radiance / density, density, flags, 0, 1) for d, radiance, density in drawn]
 
     def _moments(self, frame: Frame, trials: list[list[np.ndarray]]) -> np.ndarray:

@@ -6,7 +6,7 @@ from which diffuse light comes (55 degrees for the faces of a box), and the pixe
 
 | cost | once per set of materials and geometry |
 |---|---|
-| draws | 2 of each material's meshes, into 16 x 16 pixels each |
+| draws | 2 of each material's meshes (not of all of their instances), into 16 x 16 pixels each |
 
 Fails: where a texture that the camera does not see is lit in its dark parts only, its mean is too bright there.
 """
@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..frame.culling import calls
+from ..frame.geometry import Draw
 from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
 from ..frame.view import VIEW
@@ -24,6 +26,7 @@ from .surfaces import STOCHASTIC, SURFACE_TEXTURES
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
+ENOUGH = 4096  # triangles of one mesh: its instances differ by little but their place
 BANDS = 4  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 DIRECTIONS = np.array([[1.0, 0.9, 0.8], [-0.8, 1.0, 0.9]])
@@ -77,21 +80,34 @@ class Reflectance:
             images.pool.give(image)
 
     def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
-        draws = [draw for draw in frame.geometry.draws if draw.material == material]
+        all_draws = frame.geometry.draws
+        own = _some([k for k, draw in enumerate(all_draws) if draw.material == material], all_draws)
+        draws = [all_draws[k] for k in own]
         shader = passes.get(frame.materials.surface_program(material))
         bindings = frame.materials.bindings(material, frame.geometry.instances)
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
         bindings["blocks"]["film_view"] = Block(VIEW, **_view(low, high, backward))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
             shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": STOCHASTIC, "refracts": 0})
-            for draw in draws:
-                shader.set_constant("first_instance", draw.first)
-                passes.draw(shader, draw.batch, draw.count)
+            for call in calls(all_draws, own):
+                shader.set_constant("first_instance", call.first)
+                passes.draw(shader, call.draw.batch, call.count)
 
     def release(self) -> None:
         if self.image is not None:
             images.pool.give(self.image)
         self.image = self._key = None
+
+
+def _some(numbers: list[int], draws: list[Draw]) -> list[int]:
+    """Of a mesh that is shown in many groups of instances as many groups, evenly, as hold about ENOUGH triangles."""
+    by_batch: dict[int, list[int]] = {}
+    for k in numbers:
+        by_batch.setdefault(id(draws[k].batch), []).append(k)
+    chosen = []
+    for groups in by_batch.values():
+        chosen += groups[:: max(sum(draws[k].triangles for k in groups) // ENOUGH, 1)]
+    return sorted(chosen)
 
 
 def _view(low: np.ndarray, high: np.ndarray, backward: np.ndarray) -> dict:

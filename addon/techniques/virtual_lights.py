@@ -215,16 +215,16 @@ class VirtualLights:
             rows += self._light_rows(frame, share)
         seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
         total = share * frame.settings.samples
-        for k in range(share):
-            index = frame.sample * share + k
-            if self._emissive is not None:
+        numbers = range(frame.sample * share, (frame.sample + 1) * share)
+        if self._emissive is not None:
+            for index in numbers:
                 point, normal, radiance, density = self._emissive.draw(
                     *frame.random_volume_at(index, "virtual lights/emissive")
                 )
                 rows.append(lights.surface_row(point, normal, radiance, density * share, seen, 0, 1, total / share))
-            if self._world:
-                drawn = frame.environment.draw(*frame.random_at(index, "virtual lights/world"))
-                direction, radiance, density = drawn
+        if self._world:
+            chosen = np.array([frame.random_at(index, "virtual lights/world") for index in numbers])
+            for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
                 rows.append(lights.direction_row(direction, radiance / (density * share), density, seen, 0, 1))
         return rows
 

@@ -1,5 +1,7 @@
 """Instances are placed, never copied, and carry what their object and its instancer say."""
 
+from dataclasses import asdict
+
 import bpy
 import numpy as np
 import pytest
@@ -177,7 +179,7 @@ def test_ray_visibility_is_the_objects_and_the_instancers(stage, setting, flag):
     inner = bpy.data.objects.new("Inner", stage.mesh())
     setattr(collection_of(stage, inner), setting, False)
     for one in stage.take().instances:
-        flags = vars(one.visibility)
+        flags = asdict(one.visibility)
         assert flags.pop(flag) is False
         assert all(flags.values())
 

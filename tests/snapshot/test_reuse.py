@@ -189,3 +189,73 @@ def test_a_moved_object_leaves_the_graphs_unread(stage):
         placed.location.x = 1.0
     stage.take(cache)
     assert all(cache.graphs[key] is entry for key, entry in entries.items())
+
+
+# Objects
+
+
+def told(snapshot):
+    """All that a snapshot says of its instances, as plain data."""
+    return {
+        one.key: {name: value.tolist() if name == "matrix" else value for name, value in vars(one).items()}
+        for one in snapshot.instances
+    }
+
+
+def layer_of(stage, name):
+    return bpy.context.view_layer.layer_collection.children[name]
+
+
+EDITS = {
+    "nothing": lambda stage, a, b: None,
+    "move": lambda stage, a, b: setattr(a, "location", (1, 2, 3)),
+    "parent": lambda stage, a, b: setattr(a, "parent", b),
+    "move the parent": lambda stage, a, b: setattr(stage.scene.objects["Parent"], "location", (0, 0, 4)),
+    "name": lambda stage, a, b: setattr(a, "name", "Other"),
+    "color": lambda stage, a, b: setattr(a, "color", (1, 0, 0, 1)),
+    "pass index": lambda stage, a, b: setattr(a, "pass_index", 7),
+    "shadow": lambda stage, a, b: setattr(a, "visible_shadow", False),
+    "holdout": lambda stage, a, b: setattr(a, "is_holdout", True),
+    "hide": lambda stage, a, b: setattr(a, "hide_viewport", True),
+    "hide in the layer": lambda stage, a, b: a.hide_set(True),
+    "slot": lambda stage, a, b: a.data.materials.append(bpy.data.materials.new("New")),
+    "modifier": lambda stage, a, b: a.modifiers.new("Mirror", "MIRROR"),
+    "instances": lambda stage, a, b: setattr(stage.scene.objects["Parent"], "instance_type", "VERTS"),
+    "indirect only": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "indirect_only", True),
+    "holdout of the layer": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "holdout", True),
+    "exclude": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "exclude", True),
+    "removal": lambda stage, a, b: bpy.data.objects.remove(b),
+    "override": lambda stage, a, b: setattr(
+        bpy.context.view_layer, "material_override", bpy.data.materials.new("Over")
+    ),
+}
+
+
+@pytest.mark.parametrize("informed", [False, True])
+@pytest.mark.parametrize("edit", EDITS)
+def test_what_is_taken_over_is_what_would_be_read(stage, edit, informed):
+    cache = SnapshotCache()
+    one, other, parent, child = (stage.link(name, stage.mesh()) for name in ("O", "P", "Parent", "Child"))
+    child.parent = parent
+    inner = bpy.data.collections.new("Inner")
+    stage.scene.collection.children.link(inner)
+    inner.objects.link(stage.scene.objects["P"])
+    stage.scene.collection.objects.unlink(other)
+    stage.take(cache)
+    for _ in range(2):  # the second time nothing happens any more
+        with stage.telling(cache) if informed else contextlib.nullcontext():
+            EDITS[edit](stage, one, other)
+            edit = "nothing"
+        assert told(stage.take(cache)) == told(stage.take(SnapshotCache()))
+
+
+@pytest.mark.parametrize("informed", [False, True])
+def test_instances_that_did_not_change_are_the_same_objects(stage, informed):
+    cache = SnapshotCache()
+    placed = [stage.link(f"O{k}", stage.mesh()) for k in range(4)]
+    before = stage.take(cache).instances
+    with stage.telling(cache) if informed else contextlib.nullcontext():
+        placed[2].location.x = 1.0
+    after = stage.take(cache).instances
+    assert [a is b for a, b in zip(before, after)] == [True, True, False, True]
+    assert stage.take(cache).instances is after
