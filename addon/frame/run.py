@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from .environment import Environment
 from .geometry import SceneGeometry
 from .ledger import RAN, REUSED, Ledger, Row
 from .lens import point_of
+from .lights import Emitter, emitters
 from .materials import MaterialSet, compile_programs
 from .plan import Plan, make_plan
 from .rates import Rate
@@ -60,6 +62,11 @@ class Frame:
     @property
     def size(self) -> tuple[int, int]:
         return self.view.size
+
+    @cached_property
+    def emitters(self) -> list[Emitter]:
+        """The scene's lights that give something, in an order of their own."""
+        return emitters(self.snapshot, self.geometry.origin)
 
     def random(self, use: str) -> tuple[float, float]:
         """This sample's point of the sequence for `use`."""

@@ -175,7 +175,7 @@ class AccumulatedMaps(Technique):
         """For each light the receivers where its shadows can be seen (see CUTOFF)."""
         self._reached = {}
         receivers = frame.receivers
-        emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+        emitters = frame.emitters
         if receivers is None or not len(receivers.distance) or not emitters:
             return
         centre = (receivers.low + receivers.high) / 2

@@ -140,7 +140,7 @@ class DirectLight(Technique):
 
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.sample == 0:
-            self._emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+            self._emitters = frame.emitters
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):

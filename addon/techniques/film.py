@@ -81,7 +81,7 @@ class Film(Technique):
 
     def run(self, frame: Frame) -> None:
         if frame.sample == 0:
-            emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+            emitters = frame.emitters
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
             self._light_count = len(seen)

@@ -132,7 +132,7 @@ class LightProbes(Technique):
         frame.count(self, "guiding rays", rows * columns * probes)
 
     def _share_out(self, frame: Frame, lit: bool) -> None:
-        emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+        emitters = frame.emitters
         if len(emitters) > MOST_LIGHTS:
             emitters = []
         trials = [(emitter.light.key, self._points_of(frame, emitter)) for emitter in emitters]

@@ -195,7 +195,7 @@ class VirtualLights:
         }  # fmt: skip
 
     def _begin(self, frame: Frame) -> None:
-        emitters = lights.emitters(frame.snapshot, frame.geometry.origin)
+        emitters = frame.emitters
         self._emitters = [e for e in emitters if e.light.bounces and e.light.visibility.diffuse]
         self._emissive = None
         used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
