@@ -1,0 +1,144 @@
+"""Blender's side of the viewport: the engine's callbacks with a stand-in for what only a window has."""
+
+import time
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from addon import viewport
+from addon.gfx import context, images
+from tests.viewport.region import SIZE
+
+
+class Engine:
+    """What view_update and view_draw use of a RenderEngine."""
+
+    def __init__(self):
+        self.stats, self.reports, self.redraws = "", [], 0
+
+    def tag_redraw(self):
+        self.redraws += 1
+
+    def update_stats(self, _name, text):
+        self.stats = text
+
+    def report(self, kinds, text):
+        self.reports.append((kinds, text))
+
+    def bind_display_space_shader(self, scene):
+        pass
+
+    def unbind_display_space_shader(self):
+        pass
+
+
+class Window:
+    """A context with one 3D region that looks through the scene's camera."""
+
+    def __init__(self, scene):
+        self.scene, self.size = scene, SIZE
+        graph = bpy.context.evaluated_depsgraph_get()
+        self.region = type("Region", (), {"width": SIZE[0], "height": SIZE[1], "as_pointer": lambda _: id(self)})()
+        self.space_data = type("Space", (), {"local_view": None, "use_local_camera": False, "camera": None})()
+        self.region_data = type("RegionData", (), {})()
+        self.region_data.view_perspective, self.region_data.is_perspective = "CAMERA", True
+        self.region_data.view_matrix = scene.camera.matrix_world.inverted()
+        self.region_data.window_matrix = scene.camera.calc_matrix_camera(graph, x=SIZE[0], y=SIZE[1])
+        self.screen = type("Screen", (), {"areas": ()})()
+        self.target = images.Target((images.create(*SIZE, "RGBA32F"),))
+
+    def update(self, made):
+        viewport.changed(made, self, bpy.context.evaluated_depsgraph_get())
+
+    def draw(self, made):
+        to_pixels = Matrix.Translation((-1, -1, 0)) @ Matrix.Diagonal((2 / SIZE[0], 2 / SIZE[1], 1, 1))
+        with self.target.framebuffer.bind(), gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
+            gpu.matrix.load_identity()
+            gpu.matrix.load_projection_matrix(to_pixels)
+            viewport.draw(made, self, bpy.context.evaluated_depsgraph_get())
+            assert gpu.state.active_framebuffer_get() == self.target.framebuffer
+            assert tuple(gpu.state.viewport_get()) == (0, 0, *SIZE)
+            assert gpu.state.blend_get() == "NONE"
+        return images.read(self.target.colors[0])
+
+
+@pytest.fixture
+def window(scene):
+    scene.candela.viewport_samples = 2
+    yield Window(scene)
+    viewport.free_all()
+
+
+def test_region_is_redrawn_until_it_is_complete(window):
+    made = Engine()
+    window.update(made)
+    started = time.monotonic()
+    while time.monotonic() - started < 30:
+        before = made.redraws
+        pixels = window.draw(made)
+        if made.redraws == before:
+            break
+    assert made.stats.startswith("Sample 2 of 2")
+    assert not made.reports
+    (kept,) = viewport._viewports.values()
+    assert np.allclose(pixels, images.read(kept.picture), atol=1e-5)
+    assert pixels[..., :3].std() > 0.01
+
+
+def test_update_draws_nothing(window):
+    window.update(Engine())
+    (kept,) = viewport._viewports.values()
+    assert kept.frame is None and kept.picture is None and kept.dirty
+
+
+def test_error_is_told_once_and_ends_with_the_next_change(window, monkeypatch):
+    made = Engine()
+    window.update(made)
+    asked = made.redraws  # by the change
+    monkeypatch.setattr(viewport, "take", lambda *_, **__: 1 / 0)
+    for _ in range(3):
+        window.draw(made)
+    assert "division by zero" in made.stats
+    assert len(made.reports) == 1 and made.redraws == asked
+    monkeypatch.undo()
+    window.update(made)
+    window.draw(made)
+    assert made.stats.startswith("Sample")
+
+
+def test_new_engine_instance_takes_the_samples_over(window):
+    first, second = Engine(), Engine()
+    window.update(first)
+    window.draw(first)
+    (kept,) = viewport._viewports.values()
+    frame = kept.frame
+    window.update(second)
+    window.draw(second)
+    assert list(viewport._viewports.values()) == [kept]
+    assert kept.frame is frame
+
+
+def test_viewport_without_an_engine_is_freed_by_the_timer(window):
+    made = Engine()
+    window.update(made)
+    window.draw(made)
+    viewport._free_orphans()
+    assert viewport._viewports
+    del made
+    assert bpy.app.timers.is_registered(viewport._free_orphans)
+    assert viewport._free_orphans() is None
+    assert not viewport._viewports
+
+
+def test_region_shows_its_picture_while_another_renders(window):
+    made = Engine()
+    window.update(made)
+    window.draw(made)
+    with context.turn:
+        before = made.redraws
+        pixels = window.draw(made)
+    assert made.redraws > before
+    assert pixels[..., :3].std() > 0.01

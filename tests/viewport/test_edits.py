@@ -1,0 +1,108 @@
+"""What an edit costs the viewport, and what it keeps, publishes and frees."""
+
+import bpy
+import numpy as np
+
+from addon.frame import ledger
+from addon.gfx import images
+from tests.viewport.region import Region
+
+
+def test_nothing_is_done_at_rest(region):
+    region.rest()
+    frame, uploads = region.viewport.frame, region.viewport.renderer.geometry.uploads
+    before = region.reads
+    for _ in range(3):
+        region.draw()
+    assert region.viewport.frame is frame and frame.samples_done == 4
+    assert (region.reads, region.viewport.renderer.geometry.uploads) == (before, uploads)
+
+
+def test_moving_the_view_reads_and_uploads_nothing(region):
+    region.rest()
+    before = region.reads, region.viewport.renderer.geometry.uploads
+    for step in range(5):
+        region.draw(region.moved(0.01 * step))
+    assert (region.reads, region.viewport.renderer.geometry.uploads) == before
+
+
+def test_update_that_changes_nothing_keeps_the_samples(region):
+    region.rest()
+    frame = region.viewport.frame
+    region.viewport.dirty = True
+    region.draw()
+    assert region.viewport.frame is frame and region.viewport.done
+
+
+def test_moved_object_starts_anew_and_uploads_no_mesh(scene, region):
+    before = region.rest()
+    uploads = region.viewport.renderer.geometry.uploads
+    bpy.data.objects["Cube"].location.x += 0.5
+    region.viewport.dirty = True
+    after = region.rest()
+    assert np.abs(after - before).max() > 0.05
+    assert region.viewport.renderer.geometry.uploads == uploads
+
+
+def test_draft_after_a_move_is_that_of_a_new_viewport(scene, region):
+    """Its rays search a tree that was refitted, and its maps are drawn of what is kept for a moving view."""
+    scene.candela.bounces = 2
+    for k in range(4):
+        bpy.ops.mesh.primitive_torus_add(location=(k - 1.5, -1.5, 0.5), major_segments=12, minor_segments=6)
+    region.rest()
+    for height in (0.4, 0.8):
+        bpy.data.objects["Cube"].location.z += height
+        region.viewport.dirty = True
+        picture = images.read(region.draw())
+    assert region.viewport.scale > 1
+    other = Region()
+    other.viewport.scale, other.viewport.pace = region.viewport.scale, region.viewport.pace
+    fresh = images.read(other.draw())
+    other.viewport.release()
+    assert np.isclose(picture, fresh, rtol=1e-3, atol=1e-4).all(axis=-1).mean() > 0.98
+
+
+def test_more_samples_continue_where_it_rested(scene, region):
+    region.rest()
+    frame = region.viewport.frame
+    scene.candela.viewport_samples = 6
+    region.rest()
+    assert region.viewport.frame is frame and frame.samples_done == 6
+
+
+def test_ledger_is_published_at_rest(region):
+    region.rest()
+    assert ledger.latest().samples == 4
+    assert ledger.latest().row("surfaces").state == ledger.RAN
+
+
+def test_viewports_do_not_share_samples(scene, region):
+    other = Region()
+    region.rest()
+    other.camera = other.moved(1.0)
+    there = other.rest()
+    assert np.array_equal(images.read(region.draw()), region.rest())
+    assert np.abs(there - region.rest()).max() > 0.05
+    other.viewport.release()
+
+
+def test_resizing_leaves_no_images_behind(region):
+    region.rest()
+    region.draw(size=(64, 64))
+    region.rest()
+    allocated = images.pool.allocated_bytes
+    for width in range(70, 90, 5):
+        region.draw(size=(width, 64))
+    region.rest()
+    assert images.pool.allocated_bytes <= allocated
+
+
+def test_released_viewport_holds_no_image(scene):
+    images.pool.trim()
+    before = images.pool.allocated_bytes
+    made = Region()
+    made.rest()
+    assert images.pool.allocated_bytes > before
+    made.viewport.release()
+    images.pool.trim()
+    assert images.pool.allocated_bytes == before

@@ -1,0 +1,111 @@
+"""When the viewport is coarse and fine, and how long a redraw works."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import viewport
+from addon.gfx import images
+from tests.viewport.region import SIZE
+
+
+def test_moving_view_is_coarse_and_rests_in_full_resolution(region):
+    region.rest()
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    region.draw(region.moved(0.1))
+    assert region.viewport.scale == 4
+    assert region.viewport.picture.size == (24, 16)
+    region.camera = region.moved(0.1)
+    region.clock.now += 2 * viewport.REST_S
+    region.draw()
+    assert region.viewport.scale == 1
+    assert region.viewport.picture.size == SIZE
+
+
+def test_fast_scene_is_never_coarse_once_that_is_known(region):
+    region.rest()
+    region.viewport.pace.cost = {1: 0.01}
+    region.draw(region.moved(0.1))
+    assert region.viewport.scale == 1
+
+
+@pytest.mark.parametrize(
+    ("cost", "scale"),
+    [
+        ({}, 8),  # unknown: careful
+        ({1: 0.05}, 1),
+        ({1: 0.3}, 2),  # a quarter of the pixels is expected to take a quarter of the time
+        ({1: 0.3, 2: 0.2}, 4),
+        ({1: 5.0, 2: 4.0, 4: 3.0, 8: 2.0, 16: 1.0}, 16),  # nothing helps: the coarsest
+        ({1: 0.05, 2: 0.3}, 1),  # an old measure of a heavier scene
+        ({4: 0.02}, 2),
+        ({4: 0.001}, 2),  # what a draft takes tells nothing about full resolution
+    ],
+)
+def test_pace_takes_the_finest_scale_that_is_fast_enough(cost, scale):
+    assert viewport.Pace(dict(cost)).scale() == scale
+
+
+def test_one_redraw_ends_when_its_time_is_spent(region):
+    region.clock.tick = viewport.BUDGET_S
+    region.draw()
+    assert region.viewport.frame.samples_done == 1
+    region.clock.tick = 0.0
+    region.draw()
+    assert region.viewport.frame.samples_done == 4
+
+
+def test_redraws_at_rest_work_as_long_as_blender_draws_its_window(region):
+    """Up to a limit: with a software GPU, most of the time would be spent on the window otherwise."""
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    region.rest()
+    bpy.context.scene.candela.seed, bpy.context.scene.candela.viewport_samples = 3, 16
+    region.clock.tick = viewport.BUDGET_S / 4
+    region.draw()
+    region.clock.now += 2 * viewport.REST_S
+
+    def redraw(elsewhere):
+        region.clock.now += elsewhere
+        before = region.clock.now
+        region.draw()
+        return region.clock.now - before
+
+    region.draw()
+    short, long = redraw(0.0), redraw(0.2)
+    assert short < 2.5 * viewport.BUDGET_S
+    assert 0.15 < long < 2 * viewport.MOST_BUDGET_S
+
+
+def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_is_whole(region):
+    """Each redraw ends after a part; while samples of full resolution are being made, the moved view stays shown."""
+    region.rest()
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    region.camera = region.moved(0.1)
+    coarse = images.read(region.draw())
+    region.clock.now += 2 * viewport.REST_S
+    region.clock.tick = viewport.BUDGET_S
+    redraws = 0
+    while region.viewport.frame.samples_done == 0 or region.viewport.scale > 1:
+        picture = region.draw()
+        redraws += 1
+        if region.viewport.frame.samples_done == 0:
+            assert np.array_equal(images.read(picture), coarse)
+    assert redraws > 3
+    assert region.viewport.picture.size == SIZE
+
+
+def test_view_that_is_redrawn_seldom_does_not_rest_between_two_changes(region):
+    """Where Blender takes longer than REST_S for its window, a moving view is not taken for one at rest."""
+    region.rest()
+    for step in range(1, 6):
+        region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+        region.camera = region.moved(0.1)
+        region.draw()
+        region.clock.now += 1.5 * viewport.REST_S
+        region.draw()
+        region.clock.now += 1.5 * viewport.REST_S
+        assert step == 1 or region.viewport.scale == 4
+    for _ in range(3):
+        region.draw()
+        region.clock.now += 1.5 * viewport.REST_S
+    assert region.viewport.scale == 1
