@@ -16,7 +16,7 @@ import numpy as np
 
 from . import viewport
 from .frame import ledger as ledgers
-from .frame.bands import samples_in_parts
+from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
@@ -26,6 +26,8 @@ from .techniques.film import check_tree, resolve
 from .ui import ENGINE
 from .ui.passes import RenderPass, wanted_passes
 from .ui.properties import settings_of
+
+BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 
 @dataclass
@@ -183,10 +185,12 @@ class CandelaEngine(bpy.types.RenderEngine):
 
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
+    leash = Leash(frame.profiler, BEHIND_S)
     while frame.samples_done < frame.settings.samples:
         yield
         with context.turn:
             renderer.advance(frame)
+            leash.sample()
 
 
 # ------------------------------------------------------------------------------------------------------------- passes

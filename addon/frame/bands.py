@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 
 from ..gfx.context import turn
+from ..gfx.timing import Profiler
 
 PART_S = 0.05  # of a sample, between which Blender answers
 FIRST = 16  # rows of a technique's first band: even rays of all its pixels end soon
@@ -47,13 +48,38 @@ class Bands:
         self._rows[name] = min(max(rows, 1), MOST_ROWS)
 
 
+class Leash:
+    """Keeps the GPU from falling behind: waits for it after so many samples that `seconds` lie between two waits.
+
+    What is only asked of a GPU and not waited for, some drivers put off without end: it takes memory, and a render that
+    is cancelled goes on until all of it is drawn.
+    """
+
+    def __init__(self, profiler: Profiler, seconds: float):
+        self._profiler, self._seconds = profiler, seconds
+        self._samples, self._drawn, self._since = 1, 0, time.perf_counter()
+
+    def sample(self) -> None:
+        """Called after each sample, while it is this render's turn on the GPU."""
+        self._drawn += 1
+        if self._drawn < self._samples:
+            return
+        began = time.perf_counter()
+        self._profiler.finish()
+        now = time.perf_counter()
+        self._profiler.awaited += now - began
+        fitting = int(self._samples * self._seconds / max(now - self._since, 1e-9))
+        self._samples = min(max(fitting, 1), 2 * self._samples)
+        self._drawn, self._since = 0, now
+
+
 def samples_in_parts(renderer, frame) -> Iterator[None]:
     """Draw all samples of a frame, in parts short enough for a window that goes on answering; yields after each.
 
     Each part takes a turn. That a part has ended is known by waiting for the GPU, which costs it some of its speed: a
     GPU that draws whole samples in the time of a part is not waited for any more.
     """
-    end = object()
+    end, leash = object(), None
     frame.shared_out = bands = Bands()
     frame.profiler.wait = True
     while frame.samples_done < frame.settings.samples:
@@ -63,6 +89,9 @@ def samples_in_parts(renderer, frame) -> Iterator[None]:
                 started = time.perf_counter()
                 part = next(parts, end)
                 bands.learn(time.perf_counter() - started, PART_S)
+                if part is end and leash is not None:
+                    leash.sample()
             yield
-        if time.perf_counter() - began < PART_S:
+        if leash is None and time.perf_counter() - began < PART_S:
             frame.shared_out, frame.profiler.wait = None, frame.settings.profile
+            leash = Leash(frame.profiler, PART_S)

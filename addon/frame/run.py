@@ -259,7 +259,8 @@ class Renderer:
                 Row(t.name, t.label, RAN, "", 1000 * seconds.get(t.name, 0.0), t.slot, frame.counters.get(t.name, {}))
                 for t in frame.plan.techniques
             ] + list(frame.plan.skipped)
-            ledger.times["passes"] = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques) + waited - started
+            drawn = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques)
+            ledger.times["passes"] = drawn + frame.profiler.awaited + waited - started
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad

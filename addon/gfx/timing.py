@@ -18,6 +18,7 @@ class Profiler:
     def __init__(self, wait: bool = False):
         self.seconds: dict[str, float] = {}
         self.calls: dict[str, int] = {}
+        self.awaited = 0.0  # seconds between steps, for the GPU to catch up
         self.wait = wait
         self._fence: Target | None = None
 

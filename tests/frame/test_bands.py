@@ -2,7 +2,8 @@
 
 import pytest
 
-from addon.frame.bands import FIRST, Bands
+from addon.frame import bands as bands_module
+from addon.frame.bands import FIRST, Bands, Leash
 
 
 def drawn(bands, height, seconds_per_row, wanted=0.02, name="gather"):
@@ -47,3 +48,32 @@ def test_what_is_not_drawn_in_bands_teaches_nothing():
     drawn(bands, 16, 1e-3)
     bands.learn(10.0, 0.02)
     assert next(iter(bands.split("gather", 1080)))[1] >= FIRST
+
+
+class SlowGpu:
+    """Takes `seconds` for each sample that was asked of it, once it is waited for; asking takes a tenth of that."""
+
+    def __init__(self, seconds, monkeypatch):
+        self.now, self.seconds, self.asked, self.awaited = 0.0, seconds, 0, 0.0
+        self.longest = 0
+        monkeypatch.setattr(bands_module.time, "perf_counter", lambda: self.now)
+
+    def draw(self):
+        self.asked += 1
+        self.now += 0.1 * self.seconds
+
+    def finish(self):
+        self.longest = max(self.longest, self.asked)
+        self.now += 0.9 * self.seconds * self.asked
+        self.asked = 0
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(1.0, 1), (0.05, 10), (0.001, 500)])
+def test_gpu_is_behind_by_no_more_than_it_may(monkeypatch, seconds, most):
+    gpu = SlowGpu(seconds, monkeypatch)
+    leash = Leash(gpu, 0.5)
+    for _ in range(3000):
+        gpu.draw()
+        leash.sample()
+    assert most / 2 <= gpu.longest <= most
+    assert gpu.awaited == pytest.approx(0.9 * seconds * (3000 - gpu.asked))

@@ -203,7 +203,11 @@ def test_viewports_come_and_go_with_their_regions(walked):
     _, result = walked
     assert result["viewports_while_solid"] == 0
     assert result["images_while_solid"] == 0
-    assert result["freed"]["resident_mib"] > 0.5 * result["freed"]["images_mib"]
+    # A software GPU has memory for the parts of images that were drawn into: what is given back is what was taken.
+    taken, freed = result["taken_again"], result["freed_again"]
+    assert taken["images_mib"] == freed["images_mib"] > 100
+    assert taken["resident_mib"] > 0.25 * taken["images_mib"]
+    assert freed["resident_mib"] > 0.8 * taken["resident_mib"]
     assert result["viewports_after_split"] == 2
     assert result["viewports_after_load"] == 1
     assert result["viewports_at_home"] == 0

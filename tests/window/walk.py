@@ -122,6 +122,14 @@ def switches():
     result["images_while_solid"] = after["images"]
     space.shading.type = "RENDERED"
     yield from wait_for_rest()
+    again = memory.now()
+    result["taken_again"] = {name: again[name] - after[name] for name in again}
+    space.shading.type = "SOLID"
+    yield 3.0
+    last = memory.now()
+    result["freed_again"] = {name: again[name] - last[name] for name in again}
+    space.shading.type = "RENDERED"
+    yield from wait_for_rest()
     done("shading")
 
 
