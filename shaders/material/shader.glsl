@@ -52,7 +52,7 @@ vec3 default_tangent(vec3 normal)
 vec3 rotated_tangent(vec3 tangent, vec3 normal, float turns)
 {
   vec3 flat_tangent = unit_or(tangent - dot(tangent, normal) * normal, default_tangent(normal));
-  float angle = 6.283185307 * turns;
+  float angle = 6.283185307 * fract(turns);  // also of turns so many that no angle is left in a float
   return cos(angle) * flat_tangent + sin(angle) * cross(normal, flat_tangent);
 }
 

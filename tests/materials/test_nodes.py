@@ -281,8 +281,16 @@ def trees(draw):
     return Graph(nodes, draw(st.sampled_from(shaders or values)))
 
 
+def shader_alone(kind, **values):
+    """A tree of one shader, found to fail once."""
+    inputs = {name: Input("FLOAT", value, None) for name, value in values.items()}
+    return Graph({"N": Node("N", "N", kind, inputs, {"Shader": "SHADER"}, {}, "")}, ("N", "Shader"))
+
+
 @hypothesis.settings(max_examples=30, deadline=None, suppress_health_check=list(hypothesis.HealthCheck))
 @hypothesis.given(trees())
+@hypothesis.example(shader_alone("ShaderNodeBsdfAnisotropic", Rotation=float("inf")))
+@hypothesis.example(shader_alone("ShaderNodeBsdfPrincipled", **{"Anisotropic": 1.0, "Anisotropic Rotation": -1e30}))
 def test_random_trees_compile_and_stay_finite(evaluate, tree):
     material = compile_material("Test", tree, {"picture": PICTURE})
     closures = evaluate(material, points(attributes=[(0.3, 0.4, 0.0, 1.0)] * 8), {"picture": PICTURE})
