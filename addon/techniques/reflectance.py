@@ -27,6 +27,7 @@ from .surfaces import STOCHASTIC, SURFACE_TEXTURES
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
 ENOUGH = 4096  # triangles of one mesh: its instances differ by little but their place
+MOST_CELLS = 32  # that are averaged one by one
 BANDS = 4  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
 DIRECTIONS = np.array([[1.0, 0.9, 0.8], [-0.8, 1.0, 0.9]])
@@ -44,40 +45,52 @@ class Reflectance:
     """The image of mean reflectances: material m stands at (m & 15, m >> 4) of each of its bands of rows."""
 
     def __init__(self):
-        self._key: object = None
+        self._keys: dict[int, object] = {}  # by material: of what its cell shows
         self.image: images.Image | None = None
 
     def update(self, frame: Frame) -> None:
-        """Draw the materials anew if they or the geometry have changed."""
-        draws = frame.geometry.draws
-        key = (frame.materials.fingerprint(), tuple((d.material, id(d.batch), d.first, d.count) for d in draws))
-        if key == self._key:
-            return
-        self._key = key
+        """Draw anew the materials that have changed or whose surfaces have."""
+        keys = self._keys_of(frame)
         rows = -(-len(frame.materials.compiled) // COLUMNS)
         if self.image is None or self.image.size != (COLUMNS, BANDS * rows):
             self.release()
-            self._key = key
             self.image = images.pool.take(COLUMNS, BANDS * rows, "RGBA32F")
+        changed = [material for material, key in keys.items() if self._keys.get(material) != key]
+        self._keys = keys
+        if not changed:
+            return
+        few = BANDS * len(changed) <= MOST_CELLS
+        changed = changed if few else list(keys)
         size = (COLUMNS * SIDE, 2 * rows * SIDE)
         seen = [images.pool.take(*size, "RGBA32F") for _ in SURFACE_IMAGES]
         target = images.Target(tuple(seen))
         target.clear()
         for number, direction in enumerate(DIRECTIONS):
-            for material in sorted({draw.material for draw in draws}):
+            for material in changed:
                 corner = (material % COLUMNS * SIDE, (2 * (material // COLUMNS) + number) * SIDE)
                 self._draw(frame, target, (*corner, SIDE, SIDE), material, direction / np.linalg.norm(direction))
-        passes.fullscreen(
-            REFLECTANCE,
-            images.Target((self.image,)),
-            textures={
-                **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
-                "energy_table": frame.materials.energy_table,
-            },
-            constants={"cell": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE},
-        )
+        cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
+        for viewport in cells if few else [None]:
+            passes.fullscreen(
+                REFLECTANCE,
+                images.Target((self.image,)),
+                viewport=viewport,
+                textures={
+                    **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
+                    "energy_table": frame.materials.energy_table,
+                },
+                constants={"cell": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE},
+            )
         for image in seen:
             images.pool.give(image)
+
+    @staticmethod
+    def _keys_of(frame: Frame) -> dict[int, object]:
+        prints, count = frame.materials.fingerprint(), len(frame.materials.compiled)
+        shown: dict[int, list] = {}
+        for draw in frame.geometry.draws:
+            shown.setdefault(draw.material, []).append((id(draw.batch), draw.first, draw.count))
+        return {material: (prints[material], prints[count:], shown[material]) for material in sorted(shown)}
 
     def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
         all_draws = frame.geometry.draws
@@ -96,7 +109,7 @@ class Reflectance:
     def release(self) -> None:
         if self.image is not None:
             images.pool.give(self.image)
-        self.image = self._key = None
+        self.image, self._keys = None, {}
 
 
 def _some(numbers: list[int], draws: list[Draw]) -> list[int]:

@@ -2,6 +2,7 @@
 
 import bpy
 import numpy as np
+import pytest
 
 from addon.frame import ledger
 from addon.gfx import images
@@ -44,14 +45,30 @@ def test_moved_object_starts_anew_and_uploads_no_mesh(scene, region):
     assert region.viewport.renderer.geometry.uploads == uploads
 
 
-def test_draft_after_a_move_is_that_of_a_new_viewport(scene, region):
-    """Its rays search a tree that was refitted, and its maps are drawn of what is kept for a moving view."""
+def lift():
+    bpy.data.objects["Cube"].location.z += 0.4
+
+
+def redden():
+    material = bpy.data.objects["Cube"].active_material
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    red, *others = shader.inputs["Base Color"].default_value
+    shader.inputs["Base Color"].default_value = (red + 0.2, 0.2 * others[0], 0.2 * others[1], 1.0)
+
+
+@pytest.mark.parametrize("edit", [lift, redden])
+def test_draft_after_an_edit_is_that_of_a_new_viewport(scene, region, edit):
+    """Its rays search a tree that was refitted, its maps and the means of its materials are partly kept."""
     scene.candela.bounces = 2
     for k in range(4):
         bpy.ops.mesh.primitive_torus_add(location=(k - 1.5, -1.5, 0.5), major_segments=12, minor_segments=6)
+    for name in ("Plane", "Cube", "Torus"):
+        bpy.data.objects[name].active_material = made = bpy.data.materials.new(name)
+        if bpy.app.version < (5, 0):
+            made.use_nodes = True
     region.rest()
-    for height in (0.4, 0.8):
-        bpy.data.objects["Cube"].location.z += height
+    for _ in range(2):
+        edit()
         region.viewport.dirty = True
         picture = images.read(region.draw())
     assert region.viewport.scale > 1
