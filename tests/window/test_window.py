@@ -29,6 +29,7 @@ SAMPLE = ROOT / "sample_blends" / "soft_shadow_garden.blend"
 FRAME = 20  # pixels at the edge of a region, where Blender draws round corners and tabs
 BACKENDS = ("opengl", "vulkan")
 SIMULATED = ("tour", "tune")  # scripts whose keys are simulated: Blender takes no others then
+ENOUGH_RANGES = 1 << 20  # of memory, that the system allows a process
 MANY_RANGES = 10000  # of memory, mapped within a walk: 40 MiB of pages
 LEAST_NOTES = 6  # of memory, to tell a rise from chance
 
@@ -48,7 +49,15 @@ def blender(*arguments, log, timeout_s):
             stderr=subprocess.STDOUT,
             timeout=timeout_s,
         )
-    assert done.returncode == 0, log.read_text(errors="replace")[-3000:]
+    assert done.returncode == 0, hint() + log.read_text(errors="replace")[-3000:]
+
+
+def hint():
+    """What may be wrong with this machine where Blender crashes (docs/viewport.md)."""
+    limit = Path("/proc/sys/vm/max_map_count")
+    if not limit.exists() or int(limit.read_text()) >= ENOUGH_RANGES:
+        return ""
+    return f"Vulkan in software needs `sysctl -w vm.max_map_count={ENOUGH_RANGES}` after some 600 redraws. "
 
 
 @pytest.fixture(scope="module")
