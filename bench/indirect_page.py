@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,8 @@ MOST, LONG = 64, ("instant_radiosity",)  # what Auto takes for final pictures; t
 MOVING_SCENE, FRAMES, MOVING_SIZE, MOVING_REFERENCE = "cornell_box", 24, (48, 36), 64
 GROWTH_SIZE = (64, 48)
 GROWN = ("multires_radiosity", "clustered_visibility", "imperfect_shadow_maps")
+GATHER_SCENES, GATHER_SIZE, GATHER_LIGHTS = ("cornell_box", "colonnade_hall", "window_interior"), (640, 360), 256
+GATHER_HEAD = ("scene", "regions", "of pixels", "their ms", "every pixel's ms", "ratio", "RMS difference")
 HEAD = ("technique", "samples", "seconds", "Combined", "bias", "diffuse indirect", "bias")
 GROWTH_HEAD = ("technique", "dial", "value", "ms", "counters")
 MOVING_HEAD = ("technique", "new error", "error of a frame")
@@ -119,6 +122,69 @@ def growth(techniques=GROWN, dials=DIALS) -> Iterator[tuple[str, ...]]:
                     yield technique, dial.name, f"{value}", f"{row['ms']:.0f}", counted
 
 
+# ------------------------------------------------------------------------------------------------------------- gathers
+
+
+@contextmanager
+def timed_gathers() -> Iterator[list[float]]:
+    """Milliseconds of every gather over regions while this lasts: bounds, and the passes from coarse to fine."""
+    from addon.gfx.timing import Profiler
+    from addon.techniques.multires_radiosity import MultiresRadiosity
+
+    spent: list[float] = []
+
+    def timed(function):
+        def measured_call(*arguments):
+            fence = Profiler(wait=True)
+            fence.finish()
+            with fence.step("gather"):
+                result = function(*arguments)
+            spent.append(1000 * fence.seconds["gather"])
+            return result
+
+        return measured_call
+
+    parts = {name: getattr(MultiresRadiosity, name) for name in ("_bounds", "_gather")}
+    for name, function in parts.items():
+        setattr(MultiresRadiosity, name, timed(function))
+    try:
+        yield spent
+    finally:
+        for name, function in parts.items():
+            setattr(MultiresRadiosity, name, function)
+
+
+def gathers(scenes=GATHER_SCENES, size=GATHER_SIZE, virtual_lights=GATHER_LIGHTS) -> Iterator[tuple[str, ...]]:
+    """The gather of regions beside that of every pixel, of the same virtual lights, none traced: nothing is random."""
+    import numpy as np
+
+    from addon.compare.passes import light_paths
+    from addon.techniques.multires_radiosity import LEVELS
+    from bench import worker
+
+    for name in scenes:
+        opened = worker.open_scene(Scene(name), size, 0)
+        found = {}
+        for levels in (LEVELS.default, 0):
+            values = (("virtual_lights", virtual_lights), ("rays", 0), ("levels", levels))
+            series = Series(
+                "regions", "CANDELA", (), bounces=2, slots=(("indirect", "multires_radiosity"),),
+                values=tuple((f"multires_radiosity_{parameter}", value) for parameter, value in values),
+            )  # fmt: skip
+            worker.render(opened, series, 1, 0, size)  # compiles
+            with timed_gathers() as spent:
+                made = worker.render(opened, series, 1, 1, size, passes=True)
+            row = next(row for row in worker.of_ledger()["techniques"] if row["name"] == "multires_radiosity")
+            shown = light_paths(made["images"], made["transparent"])["diffuse_indirect"]
+            found[levels] = sum(spent), row["counters"]["regions"], shown
+        (of_regions, count, coarse), (of_pixels, _, fine) = found.values()
+        difference = np.sqrt(np.square(coarse - fine).mean()) / fine.mean()
+        yield (
+            name, str(count), f"{100 * count / (size[0] * size[1]):.0f} %", f"{of_regions:.0f}", f"{of_pixels:.0f}",
+            f"{of_regions / of_pixels:.2f}", f"{100 * difference:.1f} %",
+        )  # fmt: skip
+
+
 # ---------------------------------------------------------------------------------------------------------------- page
 
 
@@ -126,7 +192,7 @@ def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join("| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows))
 
 
-def page(about: dict, size, reference: int, by_scene: dict, grown: list, moved: list) -> str:
+def page(about: dict, size, reference: int, by_scene: dict, gathered: list, grown: list, moved: list) -> str:
     """The whole page as Markdown."""
     made = f"{about['date']}, Blender {about['blender']}, {about['device']}, {about['cpu']}."
     intro = f"""Written by `python -m bench indirect --page PATH`; do not edit. {made}
@@ -136,6 +202,12 @@ taken off the errors (relMSE). Seconds are those of a whole render. EEVEE splits
 Cycles has none: of both Combined is compared."""
     parts = ["# Indirect light: error and time", intro]
     parts += [f"## {name}\n\n{markdown(HEAD, rows)}" for name, rows in by_scene.items()]
+    if gathered:
+        parts.append(
+            f"## Regions\n\nThe gather of {GATHER_LIGHTS} virtual lights, none traced, once for each region (the bounds"
+            f" that find them included)\nand once for each pixel, at {GATHER_SIZE[0]} x {GATHER_SIZE[1]}; difference in"
+            " irradiance, over its mean.\n\n" + markdown(GATHER_HEAD, gathered)
+        )
     if grown:
         parts.append(
             "## Growth\n\nOne sample; the dials of the picture and of virtual lights in the Cornell box, those of"
@@ -161,16 +233,19 @@ def write(path: Path, scenes, techniques: list[str], size: tuple[int, int], refe
 
     about = worker.about() | {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d")}
     by_scene: dict[str, list] = {}
+    gathered: list[tuple[str, ...]] = []
     grown: list[tuple[str, ...]] = []
     moved: list[tuple[str, ...]] = []
 
     def save(title: str, head, rows) -> None:
         print(f"\n{title}\n{table([head, *rows])}", flush=True)
-        path.write_text(page(about, size, reference, by_scene, grown, moved), encoding="utf-8")
+        path.write_text(page(about, size, reference, by_scene, gathered, grown, moved), encoding="utf-8")
 
     for name in scenes:
         by_scene[name] = measured(name, techniques, size, reference)
         save(name, HEAD, by_scene[name])
+    gathered += gathers()
+    save("regions", GATHER_HEAD, gathered)
     grown += growth()
     save("growth", GROWTH_HEAD, grown)
     bpy.ops.wm.open_mainfile(filepath=str(indirect.SCENES / f"{MOVING_SCENE}.blend"))

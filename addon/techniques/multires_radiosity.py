@@ -21,7 +21,7 @@ Sources: Nichols & Wyman 2009 (multi-resolution splatting); Nichols, Shopf & Wym
 |---|---|
 | arithmetic | 2 kernels per region and virtual light; regions are 10 to 40 % of the pixels at 640 x 360 |
 | rays | `rays` per region; 1 short one per pixel, + 2 for each surface within the bound; glossy surfaces as there |
-| virtual lights | see virtual_lights.py: 4 candidates each, 96 rays each for the density |
+| virtual lights | see virtual_lights.py: 4 candidates each, 192 rays each for the density |
 | passes | 2 x `levels` + 2 |
 
 Fails: grass and hair split every region, and then it costs as much as gathering for every pixel. Alpha that is drawn by
@@ -49,7 +49,6 @@ from .neighbours import smooth
 from .surfaces import surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 
-LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.1  # ranges within a region: share of its depth, and of each axis of unit normals
 LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 BOUNDS_CONSTANTS = (

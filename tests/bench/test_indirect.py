@@ -46,6 +46,15 @@ def test_the_page_has_every_technique_and_the_peers_and_leaves_out_what_cannot_b
     cells = indirect_page.cells({"times": [3.0, 1.0, 2.0], "errors": {"combined": combined}})
     assert cells == ("2.00", "0.0200", "1.000", "–", "–")
     about = {"date": "today", "blender": "5.2", "device": "GPU", "cpu": "CPU"}
-    text = indirect_page.page(about, (96, 72), 256, {"room": [("Auto", "1", *cells)]}, [], [])
+    text = indirect_page.page(about, (96, 72), 256, {"room": [("Auto", "1", *cells)]}, [], [], [])
     assert "## room" in text and "| Auto | 1 | 2.00 | 0.0200 | 1.000 | – | – |" in text
     assert "## Growth" not in text
+
+
+@pytest.mark.slow
+def test_gather_of_regions_is_compared_with_that_of_every_pixel(registered):
+    (line,) = indirect_page.gathers(("cornell_box",), (96, 72), 64)
+    name, regions, share, coarse, fine, ratio, difference = line
+    assert name == "cornell_box" and 0 < int(regions) < 96 * 72
+    assert float(coarse) > 0 and float(fine) > 0 and float(ratio) > 0
+    assert share.endswith(" %") and float(difference.removesuffix(" %")) < 6.0
