@@ -14,11 +14,13 @@ TINY = ("--size", "32x24", "--samples", "2")
 
 def candela(*arguments, folder: Path) -> subprocess.CompletedProcess:
     """Run `python -m addon …` in `folder`."""
+    # Blender as a module sets OCIO for this process, and says so where it finds it set.
+    clean = {name: value for name, value in os.environ.items() if name != "OCIO"}
     return subprocess.run(
         [sys.executable, "-m", "addon", *map(str, arguments)],
         check=False,
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "CANDELA_CACHE": str(folder / "cache")},
+        env={**clean, "PYTHONPATH": str(ROOT), "CANDELA_CACHE": str(folder / "cache")},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
