@@ -22,6 +22,19 @@ from .shading import ShadingTable
 from .world import constant_world, read_world, sun_of
 
 
+@contextmanager
+def uncollected():
+    """Without Python's search for cycles: thousands of short-lived objects would set it off in the middle."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+@uncollected()
 def take(
     depsgraph,
     cache: SnapshotCache,
@@ -41,25 +54,6 @@ def take(
     viewport's local view. Raises UnsupportedScene when there is nothing to look through.
     """
     start = time.perf_counter()
-    with uncollected():
-        snapshot = _take(depsgraph, cache, width, height, camera, view, border, shown)
-    snapshot.sync_stats["seconds"] = time.perf_counter() - start
-    return snapshot
-
-
-@contextmanager
-def uncollected():
-    """Without Python's search for cycles: thousands of short-lived objects would set it off in the middle."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-def _take(depsgraph, cache: SnapshotCache, width: int, height: int, camera, view, border, shown) -> Snapshot:
     scene = depsgraph.scene_eval
     notes: list[Note] = []
     if view is None:
@@ -80,7 +74,7 @@ def _take(depsgraph, cache: SnapshotCache, width: int, height: int, camera, view
     notes += [*shading.notes, *images.notes]
     cache.finish(meshes, images.images, shading.graphs)
     stats.update(images_read=images.read, images_reused=images.reused)
-    return Snapshot(
+    snapshot = Snapshot(
         meshes=meshes,
         instances=instances,
         materials=tuple(shading.materials),
@@ -93,6 +87,8 @@ def _take(depsgraph, cache: SnapshotCache, width: int, height: int, camera, view
         scene_name=scene.name,
         sync_stats=stats,
     )
+    snapshot.sync_stats["seconds"] = time.perf_counter() - start
+    return snapshot
 
 
 def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np.ndarray]:
@@ -107,7 +103,7 @@ def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np
     return [place for place, good in zip(places, finite, strict=True) if good], placed[finite]
 
 
-def _meshes(places: list[Place], matrices: np.ndarray, shading: ShadingTable, cache: SnapshotCache, depsgraph):
+def _meshes(places: list[Place], transforms: np.ndarray, shading: ShadingTable, cache: SnapshotCache, depsgraph):
     """(meshes by key, instances, notes, counts). Instances stand in order of their mesh's first appearance."""
     override = depsgraph.view_layer_eval.material_override
     shown_with: dict[int, set[int]] = {}  # materials, by address of the mesh
@@ -144,18 +140,18 @@ def _meshes(places: list[Place], matrices: np.ndarray, shading: ShadingTable, ca
         if id(source) not in resolved:
             mesh = by_pointer[source.pointer]
             resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots)
-    instances = _instances(places, matrices, resolved, list(meshes), cache)
+    instances = _instances(places, transforms, resolved, list(meshes), cache)
     stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
     return meshes, instances, notes, stats
 
 
-def _instances(places: list[Place], matrices: np.ndarray, resolved: dict, order: list[str], cache: SnapshotCache):
+def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, order: list[str], cache: SnapshotCache):
     """The instances, by mesh in `order`; those of the last sync where nothing has changed. `resolved`: key of the mesh
     and materials, by identity of the source."""
     keys = [place.key for place in places]
     before = cache.placed
     known = before is not None and before.keys == keys
-    same = (matrices == before.matrices).all(axis=(1, 2)).tolist() if known else ()
+    same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
     made, facts = [], [place.source.facts for place in places]
     for k, place in enumerate(places):
         mesh, chosen = resolved[id(place.source)]
@@ -170,7 +166,7 @@ def _instances(places: list[Place], matrices: np.ndarray, resolved: dict, order:
         of_object = facts[k]
         made.append(
             Instance(
-                of_object.name, mesh, matrices[k], chosen, of_object.visibility, place.random, of_object.pass_index,
+                of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random, of_object.pass_index,
                 of_object.holdout, of_object.color, place.generated, place.uv, place.key,
             )
         )  # fmt: skip
@@ -182,7 +178,7 @@ def _instances(places: list[Place], matrices: np.ndarray, resolved: dict, order:
     instances = tuple(instance for group in ordered for instance in groups[group])
     if known and instances == before.ordered:
         instances = before.ordered
-    cache.placed = Placed(keys, matrices, facts, made, instances)
+    cache.placed = Placed(keys, transforms, facts, made, instances)
     return instances
 
 
@@ -234,9 +230,9 @@ def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> 
     return entry, True
 
 
-def _lights(places: list[Place], matrices: np.ndarray, shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
+def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
     made = []
-    for place, matrix in zip(places, matrices, strict=True):
+    for place, matrix in zip(places, transforms, strict=True):
         facts, block = place.source.facts, place.source.data
         tint = np.ones(3)
         if uses_nodes(block):
