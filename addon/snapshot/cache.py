@@ -30,24 +30,24 @@ from .scene import Image, Instance, Mesh, Note
 # (key, version) by one engine instance can then never be mistaken for another content.
 _versions = itertools.count(1)
 
-# Updates of these types cannot change what a node tree says. Anything else (materials, node groups, textures,
-# images, actions, scripts' own data) lets all graphs be read again: reading is cheap, a stale one is a bug.
-_UNRELATED_TO_GRAPHS = frozenset(
+# Objects and their data, but for lights, which have node trees.
+_DATA = frozenset(
     (
-        *("Armature", "Camera", "Collection", "Curve", "Curves", "Key", "Lattice", "Mesh", "MetaBall", "Object"),
-        *("PointCloud", "Scene", "SurfaceCurve", "TextCurve", "Volume"),
+        *("Armature", "Camera", "Curve", "Curves", "Key", "Lattice", "Mesh", "MetaBall", "Object", "PointCloud"),
+        *("SurfaceCurve", "TextCurve", "Volume"),
     )
 )
 
+# Updates of these types cannot change what a node tree says. Anything else (materials, node groups, textures,
+# images, actions, scripts' own data) lets all graphs be read again: reading is cheap, a stale one is a bug.
+_UNRELATED_TO_GRAPHS = _DATA | {"Collection", "Scene"}
+
 # Updates of these types say all they mean by naming an object, its data or what surfaces show. Any other may have
 # arranged the scene anew: what is hidden, left out, or seen by indirect light alone.
-_ABOUT_THEMSELVES = frozenset(
-    (
-        *("Armature", "Camera", "Curve", "Curves", "Image", "Key", "Lattice", "Material", "Mesh", "MetaBall", "Object"),
-        *("PointCloud", "ShaderNodeTree", "SurfaceCurve", "TextCurve", "Volume", "World"),
-        *("AreaLight", "PointLight", "SpotLight", "SunLight"),
-    )
-)
+_ABOUT_THEMSELVES = _DATA | {
+    *("Image", "Material", "ShaderNodeTree", "World"),
+    *("AreaLight", "PointLight", "SpotLight", "SunLight"),
+}
 
 
 def next_version() -> int:
