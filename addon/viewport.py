@@ -220,9 +220,9 @@ class Viewport:
         asked = (_view_key(camera), size, border, replace(settings, samples=0))
         moved, begun, reading = asked != self._asked, False, 0.0
         if self.dirty:
-            before = clock()
+            started = clock()
             self._snapshot = source(camera, *size)
-            self.dirty, reading = False, clock() - before
+            self.dirty, reading = False, clock() - started
             if not moved:  # most updates change nothing that is drawn: selections, names, other scenes' settings
                 before = self.frame
                 if self._begin(camera, size, border, settings, self.scale, clock) is before:
