@@ -114,13 +114,16 @@ def _packed_normals(normals: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Tree:
-    """A hierarchy with what it was made of, so that triangles that moved can be put in their old places."""
+    """A hierarchy with what it was made of, so that triangles that moved can be put in their old places.
+
+    Of a tree of more than MOST_REFITTED triangles HierarchyCache keeps the hierarchy alone: all arrays are None then.
+    """
 
     hierarchy: Hierarchy
-    place: np.ndarray  # (T,) of each triangle among the sorted ones; -1: left out
-    leaves: np.ndarray  # (L, LEAF_TEXELS, LEAF)
-    low: np.ndarray  # (slots, 3) of each sorted triangle
-    high: np.ndarray
+    place: np.ndarray | None  # (T,) of each triangle among the sorted ones; -1: left out
+    leaves: np.ndarray | None  # (L, LEAF_TEXELS, LEAF)
+    low: np.ndarray | None  # (slots, 3) of each sorted triangle
+    high: np.ndarray | None
     refitted: bool = False
 
 
