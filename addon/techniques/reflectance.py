@@ -52,14 +52,16 @@ class Reflectance:
         """Draw anew the materials that have changed or whose surfaces have."""
         keys = self._keys_of(frame)
         rows = -(-len(frame.materials.compiled) // COLUMNS)
-        if self.image is None or self.image.size != (COLUMNS, BANDS * rows):
+        kept = self.image is not None and self.image.size == (COLUMNS, BANDS * rows)
+        if not kept:
             self.release()
             self.image = images.pool.take(COLUMNS, BANDS * rows, "RGBA32F")
         changed = [material for material, key in keys.items() if self._keys.get(material) != key]
         self._keys = keys
-        if not changed:
+        if kept and not changed:
             return
-        few = BANDS * len(changed) <= MOST_CELLS
+        # A new image is undefined, also where no surface shows the material: all of it is drawn.
+        few = kept and BANDS * len(changed) <= MOST_CELLS
         changed = changed if few else list(keys)
         size = (COLUMNS * SIDE, 2 * rows * SIDE)
         seen = [images.pool.take(*size, "RGBA32F") for _ in SURFACE_IMAGES]

@@ -6,6 +6,8 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.gfx import images
+from addon.techniques.reflectance import BANDS, COLUMNS, Reflectance
 
 SAMPLES = 32
 
@@ -188,3 +190,21 @@ def test_a_card_that_some_rays_pass_dims_the_bounce_as_in_cycles(stage, render, 
     setattr(card, switched_off, False)
     expected = light_paths(stage.render(256, (24, 24), engine="CYCLES", bounces=3))["diffuse_indirect"]
     assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
+
+
+def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_before(stage, gpu_context):
+    """Material 0 stands for slots without one, of which there are none here."""
+    stage.floor(material=stage.diffuse(0.5))
+    stage.camera_above(4.0)
+    stage.render(1)
+    frame = stage.renderer.frame
+    assert len(frame.materials.compiled) == 2
+    used = images.pool.take(COLUMNS, BANDS, "RGBA32F")
+    images.Target((used,)).clear((7.0, 7.0, 7.0, 7.0))
+    images.pool.give(used)
+    means = Reflectance()
+    means.update(frame)
+    of_all = images.read(means.image)[0, :, :3]
+    assert means.image is used
+    assert of_all[1] == pytest.approx(0.5, rel=0.01) and not of_all[0].any() and not of_all[2:].any()
+    means.release()
