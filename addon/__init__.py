@@ -3,35 +3,33 @@
 
 def register():
     """Called by Blender when the extension is enabled."""
-    from . import cli, engine
-    from .ui import compare_editor, jobs, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
-
-    pass_tree.register()
-    properties.register()
-    engine.register()
-    pass_run.register()
-    jobs.register()
-    quality.register()
-    panels.register()
-    tuning.register()
-    pass_operators.register()
-    compare_editor.register()
-    cli.register()
+    for part in _parts():
+        part.register()
 
 
 def unregister():
     """Called by Blender when the extension is disabled; frees everything on the GPU."""
-    from . import cli, engine
-    from .ui import compare_editor, jobs, panels, pass_operators, pass_run, pass_tree, properties, quality, tuning
+    for part in reversed(_parts()):
+        part.unregister()
 
-    cli.unregister()
-    compare_editor.unregister()
-    pass_operators.unregister()
-    tuning.unregister()
-    panels.unregister()
-    quality.unregister()
-    jobs.unregister()
-    pass_run.unregister()
-    engine.unregister()
-    properties.unregister()
-    pass_tree.unregister()
+
+def _parts() -> tuple:
+    """The modules that register something, in order: classes come after those that they refer to."""
+    from . import cli, engine
+    from .ui import (
+        compare_editor,
+        jobs,
+        panels,
+        pass_nodes,
+        pass_operators,
+        pass_run,
+        pass_tree,
+        properties,
+        quality,
+        tuning,
+    )
+
+    return (
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, tuning, pass_operators,
+        compare_editor, cli,
+    )  # fmt: skip

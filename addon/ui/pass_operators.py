@@ -19,18 +19,9 @@ from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
 from . import ENGINE, shown_images
 from .jobs import Job, draw_progress, part
+from .pass_nodes import pictures_of
 from .pass_run import Rendered, reference_images, render_steps
-from .pass_tree import (
-    TREE,
-    Result,
-    checked,
-    fill,
-    forget_results,
-    graph_of,
-    pictures_of,
-    result,
-    set_result,
-)
+from .pass_tree import TREE, Result, checked, fill, forget_results, graph_of, result, set_result
 from .properties import settings_of
 
 

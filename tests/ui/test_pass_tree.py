@@ -11,7 +11,8 @@ from addon.frame import ledger
 from addon.frame.pass_graph import sockets
 from addon.techniques import REGISTRY
 from addon.ui import ENGINE, pass_tree, shown_images
-from addon.ui.pass_tree import NODES, SHOWING, TREE, checked, graph_of, result
+from addon.ui.pass_nodes import NODES, SHOWING
+from addon.ui.pass_tree import TREE, checked, graph_of, result
 from addon.ui.properties import settings_of
 
 
