@@ -26,7 +26,8 @@ MOVING_SCENE, FRAMES, MOVING_SIZE, MOVING_REFERENCE = "cornell_box", 24, (48, 36
 GROWTH_SIZE = (64, 48)
 GROWN = ("multires_radiosity", "clustered_visibility", "imperfect_shadow_maps")
 GATHER_SCENES, GATHER_SIZE, GATHER_LIGHTS = ("cornell_box", "colonnade_hall", "window_interior"), (640, 360), 256
-GATHER_HEAD = ("scene", "regions", "of pixels", "their ms", "every pixel's ms", "ratio", "RMS difference")
+GATHER_RAYS = (0, 64)
+GATHER_HEAD = ("scene", "rays", "regions", "of pixels", "their ms", "every pixel's ms", "ratio", "RMS difference")
 HEAD = ("technique", "samples", "seconds", "Combined", "bias", "diffuse indirect", "bias")
 GROWTH_HEAD = ("technique", "dial", "value", "ms", "counters")
 MOVING_HEAD = ("technique", "new error", "error of a frame")
@@ -127,35 +128,30 @@ def growth(techniques=GROWN, dials=DIALS) -> Iterator[tuple[str, ...]]:
 
 @contextmanager
 def timed_gathers() -> Iterator[list[float]]:
-    """Milliseconds of every gather over regions while this lasts: bounds, and the passes from coarse to fine."""
+    """Milliseconds of every gather over regions while this lasts: bounds, list, gather, and what fills the others."""
     from addon.gfx.timing import Profiler
     from addon.techniques.multires_radiosity import MultiresRadiosity
 
     spent: list[float] = []
     fence = Profiler(wait=True)
+    original = MultiresRadiosity.irradiance
 
-    def timed(function):
-        def measured_call(*arguments):
-            fence.finish()
-            with fence.step("gather"):
-                result = function(*arguments)
-            spent.append(1000 * fence.seconds.pop("gather"))
-            return result
+    def measured_call(*arguments):
+        fence.finish()
+        with fence.step("gather"):
+            found = yield from original(*arguments)
+        spent.append(1000 * fence.seconds.pop("gather"))
+        return found
 
-        return measured_call
-
-    parts = {name: getattr(MultiresRadiosity, name) for name in ("_bounds", "_gather")}
-    for name, function in parts.items():
-        setattr(MultiresRadiosity, name, timed(function))
+    MultiresRadiosity.irradiance = measured_call
     try:
         yield spent
     finally:
-        for name, function in parts.items():
-            setattr(MultiresRadiosity, name, function)
+        MultiresRadiosity.irradiance = original
 
 
 def gathers(scenes=GATHER_SCENES, size=GATHER_SIZE, virtual_lights=GATHER_LIGHTS) -> Iterator[tuple[str, ...]]:
-    """The gather of regions beside that of every pixel, of the same virtual lights, none traced: nothing is random."""
+    """The gather of regions beside that of every pixel, of the same virtual lights; none traced, nothing is random."""
     import numpy as np
 
     from addon.compare.passes import light_paths
@@ -164,25 +160,27 @@ def gathers(scenes=GATHER_SCENES, size=GATHER_SIZE, virtual_lights=GATHER_LIGHTS
 
     for name in scenes:
         opened = worker.open_scene(Scene(name), size, 0)
-        found = {}
-        for levels in (LEVELS.default, 0):
-            values = (("virtual_lights", virtual_lights), ("rays", 0), ("levels", levels))
-            series = Series(
-                "regions", "CANDELA", (), bounces=2, slots=(("indirect", "multires_radiosity"),),
-                values=tuple((f"multires_radiosity_{parameter}", value) for parameter, value in values),
+        for rays in GATHER_RAYS:
+            found = {}
+            for levels in (LEVELS.default, 0):
+                values = (("virtual_lights", virtual_lights), ("rays", rays), ("levels", levels))
+                series = Series(
+                    "regions", "CANDELA", (), bounces=2, slots=(("indirect", "multires_radiosity"),),
+                    values=tuple((f"multires_radiosity_{parameter}", value) for parameter, value in values),
+                )  # fmt: skip
+                worker.render(opened, series, 1, 0, size)  # compiles
+                with timed_gathers() as spent:
+                    made = worker.render(opened, series, 1, 1, size, passes=True)
+                row = next(row for row in worker.of_ledger()["techniques"] if row["name"] == "multires_radiosity")
+                shown = light_paths(made["images"], made["transparent"])["diffuse_indirect"]
+                found[levels] = sum(spent), row["counters"]["regions"], shown
+            (of_regions, count, coarse), (of_pixels, _, fine) = found.values()
+            difference = np.sqrt(np.square(coarse - fine).mean()) / fine.mean()
+            yield (
+                name, str(rays), str(count), f"{100 * count / (size[0] * size[1]):.0f} %", f"{of_regions:.0f}",
+                f"{of_pixels:.0f}", f"{of_regions / of_pixels:.2f}",
+                "noise" if rays else f"{100 * difference:.1f} %",
             )  # fmt: skip
-            worker.render(opened, series, 1, 0, size)  # compiles
-            with timed_gathers() as spent:
-                made = worker.render(opened, series, 1, 1, size, passes=True)
-            row = next(row for row in worker.of_ledger()["techniques"] if row["name"] == "multires_radiosity")
-            shown = light_paths(made["images"], made["transparent"])["diffuse_indirect"]
-            found[levels] = sum(spent), row["counters"]["regions"], shown
-        (of_regions, count, coarse), (of_pixels, _, fine) = found.values()
-        difference = np.sqrt(np.square(coarse - fine).mean()) / fine.mean()
-        yield (
-            name, str(count), f"{100 * count / (size[0] * size[1]):.0f} %", f"{of_regions:.0f}", f"{of_pixels:.0f}",
-            f"{of_regions / of_pixels:.2f}", f"{100 * difference:.1f} %",
-        )  # fmt: skip
 
 
 # ---------------------------------------------------------------------------------------------------------------- page
@@ -204,9 +202,10 @@ Cycles has none: of both Combined is compared."""
     parts += [f"## {name}\n\n{markdown(HEAD, rows)}" for name, rows in by_scene.items()]
     if gathered:
         parts.append(
-            f"## Regions\n\nThe gather of {GATHER_LIGHTS} virtual lights, none traced, once for each region (the bounds"
-            f" that find them included)\nand once for each pixel, at {GATHER_SIZE[0]} x {GATHER_SIZE[1]}; difference in"
-            " irradiance, over its mean.\n\n" + markdown(GATHER_HEAD, gathered)
+            f"## Regions\n\nThe gather of {GATHER_LIGHTS} virtual lights, none or some of them traced, once for each"
+            " region (all that finds regions\nand interpolates between them included) and once for each pixel, at"
+            f" {GATHER_SIZE[0]} x {GATHER_SIZE[1]}; difference in irradiance,\nover its mean.\n\n"
+            + markdown(GATHER_HEAD, gathered)
         )
     if grown:
         parts.append(

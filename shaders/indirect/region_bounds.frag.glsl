@@ -15,8 +15,8 @@ void main()
   out_high = vec4(-1e30);
   int kinds = 0;
 #ifdef PIXELS
-  for (int y = -1; y <= 2; y++) {  // one pixel around: an edge may run between two regions
-    for (int x = -1; x <= 2; x++) {
+  for (int y = -1; y <= 1; y++) {  // one pixel before: an edge may run between two regions, and splits one of them
+    for (int x = -1; x <= 1; x++) {
       ivec2 pixel = 2 * region + ivec2(x, y) - grid_offset;
       bool outside = any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, textureSize(surface_position, 0)));
       vec4 position = outside ? vec4(0.0) : texelFetch(surface_position, pixel, 0);

@@ -1,0 +1,94 @@
+// Irradiance in all regions of one level, from what some have gathered. PULL, from fine to coarse: regions that are split
+// get the mean of their quarters. Else, from coarse to fine: regions that a larger one covers interpolate between it and
+// its neighbours. Alpha tells whether there is a surface.
+#include "indirect/regions.glsl"
+
+vec3 normal_at(ivec2 pixel)
+{
+  return octahedral_decode(texelFetch(surface_normal, pixel, 0).xy);
+}
+
+// How well what is known at a pixel does for a place: by plane and normal.
+float likeness(ivec2 pixel, vec3 position, vec3 normal, float reach)
+{
+  float off_plane = dot(texelFetch(surface_position, pixel, 0).xyz - position, normal) / reach;
+  float alike = max(dot(normal_at(pixel), normal), 0.0);
+  alike *= alike;
+  alike *= alike;
+  return alike * alike * exp(-off_plane * off_plane);
+}
+
+// What a split region of level 1 has: the pixel that stands for it has gathered.
+vec4 of_split_pixels(ivec2 region)
+{
+  bool inside = 2 * region + 1 - grid_offset == region_pixel(region, 1);
+  return inside ? texelFetch(gathered, 2 * region + 1, 0) : vec4(0.0);
+}
+
+void main()
+{
+  out_irradiance = vec4(0.0);
+  ivec2 region = ivec2(gl_FragCoord.xy);
+  ivec2 pixel = region_pixel(region, level);
+  vec4 surface = texelFetch(surface_position, pixel, 0);
+  if (surface.w == 0.0) {
+    return;
+  }
+  float reach = 0.02 * ((film_view.eye.w > 0.5) ? depth_scale : max(length(surface.xyz - film_view.eye.xyz), 1e-30));
+  vec3 normal = normal_at(pixel);
+  vec3 sum = vec3(0.0);
+  float weights = 0.0;
+#ifdef PULL
+  if (texelFetch(region_flags, region, 0).x < 0.5) {
+    return;
+  }
+  for (int child = 0; child < 2; child++) {  // two diagonals: the mean of both ends is that of the middle
+    ivec2 ends[2] = ivec2[2](2 * region + ivec2(child, 0), 2 * region + ivec2(1 - child, 1));
+    vec3 pair = vec3(0.0);
+    float weight = 1.0;
+    for (int end = 0; end < 2; end++) {
+      vec2 flags = texelFetch(finer_flags, ends[end], 0).xy;
+      vec4 known = vec4(0.0);
+      if (flags.x > 0.5) {
+        known = (level == 2) ? of_split_pixels(ends[end]) : texelFetch(finer_irradiance, ends[end], 0);
+      }
+      else if (flags.y == 1.0) {
+        known = texelFetch(gathered, region_place(ends[end], level - 1), 0);
+      }
+      pair += 0.5 * known.rgb;
+      weight *= known.a * likeness(region_pixel(ends[end], level - 1), surface.xyz, normal, reach);
+    }
+    sum += weight * pair;
+    weights += weight;
+  }
+  out_irradiance = (weights > 1e-6) ? vec4(sum / weights, 1.0) : vec4(0.0);
+#else
+  vec2 flags = (level > 0) ? texelFetch(region_flags, region, 0).xy : vec2(0.0, 1.0);
+  if (flags.x > 0.5) {
+    out_irradiance = (level == 1) ? of_split_pixels(region) : texelFetch(pulled, region, 0);
+    return;
+  }
+  if (flags.y != 1.0) {
+    return;
+  }
+  if (level == levels || texelFetch(coarser_flags, region >> 1, 0).x > 0.5) {
+    out_irradiance = texelFetch(gathered, region_place(region, level), 0);
+    return;
+  }
+  ivec2 parent = region >> 1;
+  ivec2 side = 2 * (region & 1) - 1;
+  // Linear between the pixels that stand for regions; of two pixels of a region the second one stands for it.
+  vec2 near = (level > 0) ? vec2(0.75) : mix(vec2(0.5), vec2(1.0), vec2(region & 1));
+  for (int corner = 0; corner < 4; corner++) {
+    ivec2 step_to = ivec2(corner & 1, corner >> 1);
+    ivec2 coarser = clamp(parent + step_to * side, ivec2(0), textureSize(coarser_irradiance, 0) - 1);
+    vec4 known = texelFetch(coarser_irradiance, coarser, 0);
+    vec2 share = mix(near, 1.0 - near, vec2(step_to));
+    float weight = share.x * share.y * known.a;
+    weight *= likeness(region_pixel(coarser, level + 1), surface.xyz, normal, reach);
+    sum += weight * known.rgb;
+    weights += weight;
+  }
+  out_irradiance = (weights > 1e-6) ? vec4(sum / weights, 1.0) : texelFetch(coarser_irradiance, parent, 0);
+#endif
+}

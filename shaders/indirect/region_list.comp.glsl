@@ -1,0 +1,43 @@
+// The regions of one level that gather, each an entry of a list in no order; with level 1 the pixels of split regions, too.
+#include "indirect/regions.glsl"
+
+void add(int index, ivec2 region, int level_of_region)
+{
+  uint entry = uint(region.x) | (uint(region.y) << REGION_BITS) | (uint(level_of_region) << (2 * REGION_BITS));
+  imageStore(entries, entry_place(index), uvec4(entry));
+}
+
+void main()
+{
+  ivec2 region = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(region, textureSize(region_flags, 0)))) {
+    return;
+  }
+  vec2 flags = texelFetch(region_flags, region, 0).xy;
+  if (flags.x < 0.5) {
+    bool largest = level == levels || texelFetch(coarser_flags, region >> 1, 0).x > 0.5;
+    if (largest && flags.y == 1.0) {
+      add(int(imageAtomicAdd(entry_count, ivec2(0), 1u)), region, level);
+    }
+    return;
+  }
+  if (level > 1) {
+    return;
+  }
+  ivec2 pixels[4];
+  int found = 0;
+  for (int child = 0; child < 4; child++) {
+    ivec2 place = 2 * region + ivec2(child & 1, child >> 1);
+    ivec2 pixel = place - grid_offset;
+    bool outside = any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, textureSize(surface_position, 0)));
+    if (!outside && texelFetch(surface_position, pixel, 0).w != 0.0) {
+      pixels[found++] = place;
+    }
+  }
+  if (found > 0) {
+    int first = int(imageAtomicAdd(entry_count, ivec2(0), uint(found)));
+    for (int i = 0; i < found; i++) {
+      add(first + i, pixels[i], 0);
+    }
+  }
+}

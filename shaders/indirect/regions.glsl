@@ -1,0 +1,35 @@
+// Regions of pixels and where what is gathered for them lies: the programs of addon/techniques/multires_radiosity.py.
+// RUN entries of the list of regions lie side by side.
+#include "lib/math.glsl"
+
+#define REGION_BITS 14  // of each axis, in an entry of the list
+
+// Where an entry of the list lies: runs one above the other, so that some rows of the list hold their share of it.
+ivec2 entry_place(int index)
+{
+  int rows = textureSize(surface_position, 0).y;
+  int run = index / RUN;
+  return ivec2((run / rows) * RUN + index % RUN, run % rows);
+}
+
+int entry_index(ivec2 place)
+{
+  return ((place.x / RUN) * textureSize(surface_position, 0).y + place.y) * RUN + place.x % RUN;
+}
+
+// The pixel that stands for a region.
+ivec2 region_pixel(ivec2 region, int level_of_region)
+{
+  ivec2 pixel = (region << level_of_region) + ((1 << level_of_region) >> 1) - grid_offset;
+  return clamp(pixel, ivec2(0), textureSize(surface_position, 0) - 1);
+}
+
+// Where a region lies in the atlas: pixels, and right of them, one above the other, the regions of levels 1, 2, …
+ivec2 region_place(ivec2 region, int level_of_region)
+{
+  if (level_of_region == 0) {
+    return region;
+  }
+  int below = atlas_size.y - (atlas_size.y >> (level_of_region - 1));  // 1/2 + 1/4 + …
+  return region + ivec2(atlas_size.x, below);
+}
