@@ -12,9 +12,11 @@ From the coarsest level down, a region that a larger one covers interpolates bil
 neighbours, those without data left out, the others weighted by exp(-(distance off the plane / 2 % of the depth)^2) and
 (n . n')^8. A region that is split has what its quarters have, so that interpolation does not end one region before
 every edge; and weights are those between the pixels that stand for regions, which of two pixels is the second one: half
-a pixel beside, light that falls off along a wall lost 1.6 % of 32 x 32 pixels, and the difference from gathering for
-every pixel was twice what it is (Cornell box 1.5 %, window 1.1 %, hall 1.1 %). Virtual lights, their bound near surfaces, and the short rays that give back what the bound takes are those
-of instant_radiosity.py, as is glossy light; nothing is doubled and nothing is lost. As a region is gathered for many
+a pixel beside, light that falls off along a wall lost 1.6 % in 32 x 32 pixels. Both halved the difference from the
+gather of every pixel (Cornell box 1.5 %, window 1.1 %, hall 1.1 %).
+
+Virtual lights, their bound near surfaces, and the short rays that give back what the bound takes are those of
+instant_radiosity.py, as is glossy light; nothing is doubled and nothing is lost. As a region is gathered for many
 pixels, it can look at many more virtual lights and trace more of them: at one sample the error of a picture is that of
 the set of virtual lights, which falls with their number. In every sample the grid of regions is shifted. A sample that
 is shown alone is filtered over neighbouring pixels (neighbours.py), which takes the grain of the short rays.
@@ -29,8 +31,8 @@ Sources: Nichols & Wyman 2009 (multi-resolution splatting); Nichols, Shopf & Wym
 | passes | 4 x `levels` + 1 |
 
 Measured at 640x360 with 256 virtual lights on a software GPU, all that finds regions and interpolates included: Cornell
-box 52 ms beside 108 for every pixel, hall 65 beside 154, window 81 beside 150 (drawn level by level instead of from a
-list, and with each edge splitting the regions on both of its sides: 58, 108, 104), some 25 of which do not depend on the
+box 52 ms beside 108 for every pixel, hall 65 beside 154, window 81 beside 150; 58, 108 and 104 when it was drawn level
+by level instead of from a list, and each edge split the regions on both of its sides. Some 25 ms do not depend on the
 virtual lights. With 64 of the lights traced: 0.25 s beside 1.1, 1.4 beside 5.3, 2.6 beside 6.2.
 
 Fails: grass and hair split every region, and then it costs as much as gathering for every pixel. Alpha that is drawn by
