@@ -50,14 +50,15 @@ Cornell box 7 % with 64 clusters (11 % with 8, 24 % with 2; unshadowed 25 %), me
 a door ajar, mean + 16 % without rays, - 0.1 % with 8.
 
 Measured at 96x72 against Cycles' diffuse indirect pass, 16 bounces: relMSE over the reference's noise of one sample
-(mean of three seeds, filtered) and of 64 (denoised); processor time over that of instant radiosity with half of its
+(mean of six seeds, filtered) and of 64 (denoised); processor time over that of instant radiosity with half of its
 present virtual lights and rays; -: not measured in this way.
 
 | | Cornell box | courtyard | lamp | hall | door | window |
 |---|---|---|---|---|---|---|
-| instant radiosity, 1 sample | 0.110 | 0.070 | 0.027 | 0.115 | 0.117 | 0.116 |
-| this, 1 sample | 0.062 | 0.027 | 0.021 | 0.065 | 0.086 | 0.104 |
-| its bias | 0.994 | 1.050 | 1.028 | 0.955 | 0.914 | 0.957 |
+| instant radiosity, 1 sample | 0.071 | 0.037 | 0.025 | 0.063 | 0.115 | 0.095 |
+| multires radiosity, 1 sample | 0.049 | 0.037 | 0.016 | 0.050 | 0.071 | 0.079 |
+| this, 1 sample | 0.050 | 0.037 | 0.017 | 0.050 | 0.067 | 0.079 |
+| its bias | 0.995 | 1.056 | 0.987 | 0.925 | 0.955 | 0.915 |
 | instant radiosity with half the rays, 64 samples | 0.0027 | - | - | 0.0113 | 0.0149 | 0.0149 |
 | instant radiosity, 64 samples | - | - | - | 0.0103 | 0.0120 | 0.0197 |
 | multires radiosity, 64 samples | - | - | - | 0.0060 | 0.0081 | 0.0086 |
@@ -72,7 +73,8 @@ of a pixel).
 
 At 160x120 the time is 1.7 to 2.4 times that of instant radiosity, since the maps cost the same, and at 640x360 0.9
 (Cornell box) and 1.2 (hall). Auto takes this technique for pictures of one sample from 60 000 pixels on, where the
-error falls by more than the time rises in all scenes but the window. With more samples it takes instant radiosity: the
+error falls by more than the time rises in all scenes but the window (smaller ones: multires_radiosity.py, which has the
+same error in less time there). With more samples it takes instant radiosity: the
 same time spent on more of its samples leaves less error than multires radiosity in the hall and than this beyond the
 door and in the hall; multires radiosity is the one that has less per sample.
 """
@@ -95,14 +97,13 @@ from ..frame.technique import Param
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .cssm import ORDERS, SEARCH_OFFSET
-from .multires_radiosity import LEVELS, MultiresRadiosity, regions
+from .multires_radiosity import LEVELS, MANY_PIXELS, MultiresRadiosity, pixels_shown_alone, regions
 from .soft_maps import REFINE
 from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, BoundGather, Gather, VirtualLightSet
 
 TEXELS, CONVOLUTION = "TEXELS", "CONVOLUTION"
 FILTERS = ((TEXELS, "Texels", 0), (CONVOLUTION, "Convolution", 1))
 TAPS, CELLS = 4, 2  # along each side of a kernel: texels that are looked at; boxes of the filtered map
-MANY_PIXELS = 60_000  # from here on maps, which do not grow with the picture, cost less than what rays of pixels bring
 AREA_ROWS = 5  # texels of a cluster, see shaders/cluster/lights.glsl
 MAPS = passes.fullscreen_program(
     "maps of clusters",
@@ -176,8 +177,7 @@ class ClusteredVisibility(MultiresRadiosity):
         self._standing: tuple[Clusters, np.ndarray] | None = None  # of this frame's last sample that made clusters
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
-        width, height = snapshot.film.border_size
-        return settings.samples == 1 and not settings.draft and width * height >= MANY_PIXELS
+        return pixels_shown_alone(snapshot, settings) >= MANY_PIXELS
 
     def visibility(self, frame: Frame, found: VirtualLightSet) -> BoundGather:
         side, filtered = frame.settings.get(self, "map_size"), frame.settings.get(self, "shadows") == CONVOLUTION

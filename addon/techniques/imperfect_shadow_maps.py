@@ -71,10 +71,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..frame.run import Frame
+from ..frame.settings import Settings
 from ..frame.surface_points import RUNS, TEXELS, SurfacePoints
 from ..frame.technique import Param, Technique
 from ..gfx import geometry, images, passes
 from ..gfx.library import Program
+from ..snapshot.scene import Snapshot
 from .multires_radiosity import LEVELS, MultiresRadiosity, regions
 from .virtual_lights import BoundGather, Gather, VirtualLightSet
 
@@ -230,6 +232,9 @@ class ImperfectShadowMaps(MultiresRadiosity):
     def __init__(self):
         super().__init__()
         self.maps = VirtualMaps()
+
+    def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
+        return False
 
     def visibility(self, frame: Frame, lights: VirtualLightSet) -> BoundGather:
         points, side = (1 << round(np.log2(frame.settings.get(self, name))) for name in ("points", "map_size"))

@@ -35,6 +35,11 @@ box 52 ms beside 108 for every pixel, hall 65 beside 154, window 81 beside 150; 
 by level instead of from a list, and each edge split the regions on both of its sides. Some 25 ms do not depend on the
 virtual lights. With 64 of the lights traced: 0.25 s beside 1.1, 1.4 beside 5.3, 2.6 beside 6.2.
 
+Auto takes it for pictures of one sample, up to 60 000 pixels. At 96x72 their diffuse indirect light has relMSE 0.049,
+0.050, 0.071, 0.079, 0.016 and 0.037 (Cornell box, hall, door, window, lamp, courtyard; mean of six seeds), instant
+radiosity 0.071, 0.063, 0.115, 0.095, 0.025 and 0.037, clustered visibility the same as this within 6 % in more time. At
+256x192 the error is 1.5 to 2.2 times smaller than instant radiosity's in 1.2 to 2.1 times the processor time.
+
 Fails: grass and hair split every region, and then it costs as much as gathering for every pixel. Alpha that is drawn by
 lot does the same.
 
@@ -51,15 +56,20 @@ from functools import cache
 import numpy as np
 
 from ..frame.run import Frame
+from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..snapshot.scene import Snapshot
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings
 from .neighbours import smooth
 from .surfaces import surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 
+MANY_PIXELS = (
+    60_000  # from here on maps of clusters, which do not grow with the picture, cost less than rays of regions
+)
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.4  # ranges within a region: share of its depth, and of each axis of unit normals
 LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 BOUNDS_CONSTANTS = (
@@ -149,6 +159,12 @@ GATHER_SHARED = passes.fullscreen_program(
 )
 
 
+def pixels_shown_alone(snapshot: Snapshot, settings: Settings) -> int:
+    """How many pixels a picture of one sample has; 0 if more samples follow, or if it is a draft."""
+    width, height = snapshot.film.border_size
+    return width * height if settings.samples == 1 and not settings.draft else 0
+
+
 class MultiresRadiosity(InstantRadiosity):
     name = "multires_radiosity"
     label = "Multi-resolution radiosity"
@@ -163,6 +179,9 @@ class MultiresRadiosity(InstantRadiosity):
         ),
         LEVELS,
     )  # fmt: skip
+
+    def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
+        return 0 < pixels_shown_alone(snapshot, settings) < MANY_PIXELS
 
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
