@@ -21,7 +21,7 @@ from bench.cells import Scene, Series
 
 BOUNCES = 16
 SAMPLES = (1, 16)
-MOST, LONG = 64, ("instant_radiosity",)  # what Auto takes for final pictures; the others cost several times as much
+OF_AUTO = (*SAMPLES, 64)  # what it takes at 64 is told by that; others than that cost several times as much
 MOVING_SCENE, FRAMES, MOVING_SIZE, MOVING_REFERENCE = "cornell_box", 24, (48, 36), 64
 GROWTH_SIZE = (64, 48)
 GROWN = ("multires_radiosity", "clustered_visibility", "imperfect_shadow_maps")
@@ -48,9 +48,8 @@ PEERS = (
 
 def entrants(techniques: list[str]) -> list[tuple[Series, int]]:
     """Engines with settings and numbers of samples, in the order of the table."""
-    counts = {name: (*SAMPLES, MOST) if name in LONG else SAMPLES for name in techniques}
-    found = [(own(name), samples) for name, some in counts.items() for samples in some]
-    return [(own("AUTO"), SAMPLES[-1]), *found, *PEERS]
+    found = [(own(name), samples) for name in techniques for samples in SAMPLES]
+    return [*((own("AUTO"), samples) for samples in OF_AUTO), *found, *PEERS]
 
 
 def cells(figures: dict) -> tuple[str, ...]:
@@ -66,6 +65,14 @@ def cells(figures: dict) -> tuple[str, ...]:
     return tuple(shown)
 
 
+def taken(techniques: list[str]) -> str:
+    """Which of the techniques drew the last picture."""
+    from bench import worker
+
+    rows = worker.of_ledger()["techniques"]
+    return next((row["name"] for row in rows if row["name"] in techniques and row["state"] == "ran"), "none")
+
+
 def measured(name: str, techniques: list[str], size: tuple[int, int], reference: int) -> list[tuple[str, ...]]:
     """The lines of one scene; what fails says so."""
     from bench import worker
@@ -75,9 +82,10 @@ def measured(name: str, techniques: list[str], size: tuple[int, int], reference:
     for series, samples in entrants(techniques):
         try:
             found = cells(worker.measure(opened, series, samples, size))
+            label = f"{series.label}: {taken(techniques)}" if series.label == "Auto" else series.label
         except Exception as error:  # one engine that does not render here leaves the rest of the table
-            found = (f"failed: {type(error).__name__}", *("–",) * 4)
-        lines.append((series.label, str(samples), *found))
+            found, label = (f"failed: {type(error).__name__}", *("–",) * 4), series.label
+        lines.append((label, str(samples), *found))
     return lines
 
 
