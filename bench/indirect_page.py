@@ -65,12 +65,9 @@ def cells(figures: dict) -> tuple[str, ...]:
     return tuple(shown)
 
 
-def taken(techniques: list[str]) -> str:
-    """Which of the techniques drew the last picture."""
-    from bench import worker
-
-    rows = worker.of_ledger()["techniques"]
-    return next((row["name"] for row in rows if row["name"] in techniques and row["state"] == "ran"), "none")
+def taken(figures: dict, techniques: list[str]) -> str:
+    """Which of the techniques has drawn a picture of these figures."""
+    return next((row["name"] for row in figures["techniques"] if row["name"] in techniques), "none")
 
 
 def measured(name: str, techniques: list[str], size: tuple[int, int], reference: int) -> list[tuple[str, ...]]:
@@ -81,8 +78,9 @@ def measured(name: str, techniques: list[str], size: tuple[int, int], reference:
     lines = []
     for series, samples in entrants(techniques):
         try:
-            found = cells(worker.measure(opened, series, samples, size))
-            label = f"{series.label}: {taken(techniques)}" if series.label == "Auto" else series.label
+            figures = worker.measure(opened, series, samples, size)
+            found = cells(figures)
+            label = f"Auto: {taken(figures, techniques)}" if series.label == "Auto" else series.label
         except Exception as error:  # one engine that does not render here leaves the rest of the table
             found, label = (f"failed: {type(error).__name__}", *("–",) * 4), series.label
         lines.append((label, str(samples), *found))
