@@ -202,7 +202,8 @@ def page(about: dict, size, reference: int, by_scene: dict, gathered: list, grow
     intro = f"""Written by `python -m bench indirect --page PATH`; do not edit. {made}
 
 {size[0]} x {size[1]} pixels, {BOUNCES} bounces, against two renders of {reference} samples by Cycles, whose noise is
-taken off the errors (relMSE). Seconds are those of a whole render. EEVEE splits light into other passes, and denoised
+taken off the errors (relMSE); the passes of one sample are means of several seeds. Seconds are those of a whole
+render. EEVEE splits light into other passes, and denoised
 Cycles has none: of both Combined is compared."""
     parts = ["# Indirect light: error and time", intro]
     parts += [f"## {name}\n\n{markdown(HEAD, rows)}" for name, rows in by_scene.items()]

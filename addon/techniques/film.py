@@ -15,7 +15,7 @@ from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
-from .neighbours import shown_sum
+from .neighbours import COLORS_BETWEEN, shown_sum
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
 SUMS = (
@@ -105,6 +105,10 @@ class Film(Technique):
             constants={"light_count": self._light_count},
         )  # fmt: skip
         frame.count(self, "passes")
+        between = frame.services.pop(COLORS_BETWEEN, None)
+        if between is not None:
+            passes.copy(between, frame.target("color.diffuse"))
+            images.pool.give(between)
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
             frame.environment.tree.add_background(
                 frame.target("radiance.environment"), frame.view, frame.view_block, surface_bindings(frame)

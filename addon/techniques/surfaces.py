@@ -40,6 +40,7 @@ from ..frame.view import VIEW
 from ..gfx import images, passes
 
 STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
+TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
 TILE = 16
 DESCRIPTIONS = {  # the layout in full: shaders/lib/gbuffer.glsl
     "position": "Position relative to the render origin, m; whether something was hit, and held out",
@@ -87,18 +88,7 @@ class Surfaces(Technique):
             frame.receivers = self._receivers(frame, target, modes, refracts)
             if modes == (STOCHASTIC,):
                 return  # what was drawn for the receivers is the first sample
-        draw_surfaces(frame, self, target, STOCHASTIC, refracts)
-        if any(material.tinted for material in frame.materials.compiled):
-            self._tint(frame, refracts)
-
-    def _tint(self, frame: Frame, refracts: bool) -> None:
-        """Multiply what was hit by the colour of the layers before it that let this sample pass."""
-        tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
-        target = frame.target("surface.diffuse", "surface.tint", "surface.emission")
-        position = {"surface_position": frame.images["surface.position"]}
-        with passes.drawing(target, blend="MULTIPLY", depth_test="NONE", depth_write=False):
-            _submit(frame, self, frame.materials.tint_program, tinted, {"refracts": int(refracts)}, position)
-        frame.count(self, "passes")
+        draw_sample(frame, self, target, refracts)
 
     def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...], refracts: bool) -> Receivers:
         width, height = frame.size
@@ -139,6 +129,21 @@ def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mod
     constants = {"transparent_mode": mode, "refracts": int(refracts)}
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants)
+    frame.count(technique, "passes")
+
+
+def draw_sample(frame: Frame, technique: Technique, target: images.Target, refracts: bool) -> None:
+    """Draw what the camera sees in one sample into six surface images with a depth buffer."""
+    draw_surfaces(frame, technique, target, STOCHASTIC, refracts)
+    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
+    if not tinted:
+        return
+    # Multiply what was hit by the colour of the layers before it that let this sample pass.
+    drawn = dict(zip(SURFACES, target.colors))
+    colors = images.Target(tuple(drawn[name] for name in TINTED))
+    position = {"surface_position": drawn["surface.position"]}
+    with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
+        _submit(frame, technique, frame.materials.tint_program, tinted, {"refracts": int(refracts)}, position)
     frame.count(technique, "passes")
 
 

@@ -48,7 +48,7 @@ void main()
         float noise = own.w + texelFetch(light_in, other, 0).w;
         float difference = luminance(light.rgb - own.rgb);
         float equal = 0.01 * luminance(own.rgb);
-        same = same && difference * difference <= 9.0 * noise + equal * equal;
+        same = same && difference * difference <= 16.0 * noise + equal * equal;
 #endif
         float bright = luminance(light.rgb);
         on_surface += same ? light : vec4(0.0);

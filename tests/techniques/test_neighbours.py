@@ -139,8 +139,26 @@ def test_a_picture_of_one_sample_shows_indirect_light_on_stripes_as_smooth_as_ma
     stage.camera_above(2.0)
     stage.scene.candela.slot_indirect = "multires_radiosity"
     many, one = (stage.render(samples, (24, 24), bounces=1) for samples in (64, 1))
-    torn = one["diffuse_color"] / many["diffuse_color"]
+    torn = stage.render(1, (24, 24), bounces=0)["diffuse_color"] / many["diffuse_color"]
     light = [light_paths(picture)["diffuse_indirect"][..., :3] for picture in (one, many)]
     smooth_light = light[0] / light[1]
     assert smooth_light.mean() == pytest.approx(1.0, abs=0.15)
     assert (smooth_light / smooth_light.mean()).std() < 0.5 * torn.std()
+    assert (one["diffuse_color"] / many["diffuse_color"]).std() < 0.5 * torn.std()  # what the passes multiply by
+
+
+def test_light_of_what_is_thinner_than_a_pixel_is_in_the_passes_of_one_sample(stage):
+    """Wires that most pixels' own points miss: the product of colour and light has what the picture has."""
+    stage.scene.render.filter_size = 1.5
+    for k in range(-12, 13):
+        x = k / 6
+        corners = [(x, -2, 0), (x + 0.03, -2, 0), (x + 1.03, 2, 0), (x + 1, 2, 0)]
+        stage.mesh(corners, [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    wall = stage.mesh([(-3, 1, 0), (3, 1, 0), (3, 1, 2), (-3, 1, 2)], [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    wall.visible_camera = False
+    stage.light("SUN", turn=(0.9, 0, 0), energy=3.0)
+    stage.camera_above(2.0)
+    stage.scene.candela.slot_indirect = "multires_radiosity"
+    one, many = (light_paths(stage.render(n, (24, 24), bounces=1))["diffuse_indirect"][..., :3] for n in (1, 64))
+    assert (one.mean(axis=2) > 0).mean() > 0.7 * (many.mean(axis=2) > 0).mean()
+    assert one.mean() == pytest.approx(many.mean(), rel=0.25)
