@@ -18,10 +18,11 @@ float likeness(ivec2 pixel, vec3 position, vec3 normal, float reach)
   return alike * alike * exp(-off_plane * off_plane);
 }
 
-// What a split region of level 1 has: the pixel that stands for it has gathered.
+// What a split region of level 1 has: the pixel that stands for it has gathered, if it shows a surface.
 vec4 of_split_pixels(ivec2 region)
 {
-  bool inside = 2 * region + 1 - grid_offset == region_pixel(region, 1);
+  ivec2 pixel = region_pixel(region, 1);
+  bool inside = 2 * region + 1 - grid_offset == pixel && texelFetch(surface_position, pixel, 0).w != 0.0;
   return inside ? texelFetch(gathered, 2 * region + 1, 0) : vec4(0.0);
 }
 
@@ -43,20 +44,20 @@ void main()
     return;
   }
   for (int child = 0; child < 2; child++) {  // two diagonals: the mean of both ends is that of the middle
-    ivec2 ends[2] = ivec2[2](2 * region + ivec2(child, 0), 2 * region + ivec2(1 - child, 1));
     vec3 pair = vec3(0.0);
     float weight = 1.0;
     for (int end = 0; end < 2; end++) {
-      vec2 flags = texelFetch(finer_flags, ends[end], 0).xy;
+      ivec2 finer = 2 * region + ivec2((end == 0) ? child : 1 - child, end);
+      vec2 flags = texelFetch(finer_flags, finer, 0).xy;
       vec4 known = vec4(0.0);
       if (flags.x > 0.5) {
-        known = (level == 2) ? of_split_pixels(ends[end]) : texelFetch(finer_irradiance, ends[end], 0);
+        known = (level == 2) ? of_split_pixels(finer) : texelFetch(finer_irradiance, finer, 0);
       }
       else if (flags.y == 1.0) {
-        known = texelFetch(gathered, region_place(ends[end], level - 1), 0);
+        known = texelFetch(gathered, region_place(finer, level - 1), 0);
       }
       pair += 0.5 * known.rgb;
-      weight *= known.a * likeness(region_pixel(ends[end], level - 1), surface.xyz, normal, reach);
+      weight *= known.a * likeness(region_pixel(finer, level - 1), surface.xyz, normal, reach);
     }
     sum += weight * pair;
     weights += weight;
