@@ -4,6 +4,12 @@ With points from a low-discrepancy set the squared error that light k leaves in 
 V_k is the variance of one point's contribution, relative to the light in the picture. A budget of points is spent best
 if it goes, doubling by doubling, to the light whose error per added point falls most. A lamp without size or one whose
 shadows nobody sees then costs a map every few samples; the window that lights the room gets several maps in each.
+
+The budget itself grows with the samples where that does not suffice. What a sample shows of edges and textures comes
+from film points that are spread evenly and converges faster than light through small openings: the more samples, the
+larger the part of the error that points on lights could take away. As fast as the samples, it would not pay: with four
+times the points at 64 samples whole pictures of hall, window and garden took 1.18, 1.19 and 1.09 times the processor
+time and had 0.98, 0.92 and 0.93 of the error, the rest being edges and indirect light.
 """
 
 from __future__ import annotations
@@ -14,7 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 FEWEST_POINTS = 4  # of a light in a whole picture, whatever its variance: it was estimated from few probes
-MOST_EXPONENT = 3
+MOST_EXPONENT = 5
+USUAL_SAMPLES = 16  # up to here a sample has the budget that was asked for
+LITTLE = 1e-4  # squared error that is left, relative: with it a budget is enough
 
 
 @dataclass(frozen=True)
@@ -34,6 +42,20 @@ class Rate:
             return range(sample * count, (sample + 1) * count)
         every = 1 << -self.exponent
         return range(sample // every, sample // every + (sample % every == 0))
+
+
+def budget_for(variance: Sequence[float], samples: int, asked: float) -> float:
+    """Points per sample that leave LITTLE error: what was asked for, doubled at most half as often as the samples."""
+    budget = asked
+    while 2 * budget <= asked * (samples / USUAL_SAMPLES) ** 0.5 and left(variance, samples, budget) > LITTLE:
+        budget *= 2
+    return budget
+
+
+def left(variance: Sequence[float], samples: int, budget: float) -> float:
+    """Squared error of a picture of so many samples by lights of these variances, with this budget."""
+    points = np.array([rate.per_sample * samples for rate in allocate(variance, samples, budget)])
+    return float((np.nan_to_num(np.asarray(variance, np.float64), posinf=1e30) * points**-1.5).sum())
 
 
 def allocate(variance: Sequence[float], samples: int, budget: float) -> list[Rate]:

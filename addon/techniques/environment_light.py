@@ -62,6 +62,7 @@ WORLD_RAYS = Lookup(
 )  # fmt: skip
 RAY_LIGHTING = tuple(lighting(WORLD_RAYS, soft_lobes, 1 << lights.DIRECTION) for soft_lobes in (False, True))
 UNSHARED = 1.5  # times less of the noise of rays than of shared directions remains after denoising
+USUAL = 4.0  # shared directions of a sample that rays are compared with: with more of both the same one wins
 MAPS_PER_RAY = 2  # a ray of each pixel takes about the time of so many maps
 FRAGMENTED = 3.0  # variance of a single shared direction below which a low-discrepancy set of them does better still
 
@@ -162,7 +163,7 @@ class EnvironmentLight(Technique):
             return None
         moments = frame.environment.guide_moments()
         by_rays, by_shared = world_tiles.variances(useful, moments)
-        if by_shared < FRAGMENTED or by_rays >= UNSHARED * by_shared / rate.per_sample:
+        if by_shared < FRAGMENTED or by_rays >= UNSHARED * by_shared / min(rate.per_sample, USUAL):
             return None
         if frame.hierarchy("shadow") is None:
             return None

@@ -5,13 +5,14 @@ Two questions are asked at pixels of a coarse grid, by rays through the hierarch
 - From which directions does the world's light arrive? (108 probes, or 432 where that is little beside the picture; 512
   directions.) Directions of the world are then drawn in proportion to radiance times usefulness: a room lit through a
   window spends them on the window. What each probe sees is also left for tables of single tiles (environment_light.py).
-- How much do single points of a light differ in what they bring? (432 probes, 8 points per light.) Their variance, in
-  units of the light that the probe gets, is the error that one point leaves; frame/rates.py turns it into the number of
-  points per sample. Only for pictures whose samples are shown together: otherwise every sample has one point per light.
+- How much do single points of a light differ in what they bring? (432 probes, 8 to 32 points per light; beyond a door
+  ajar 8 find a quarter of the variance that 32 find.) Their variance, in units of the light that the probe gets, is the
+  error that one point leaves; frame/rates.py turns it into the number of points per sample. Only for pictures whose
+  samples are shown together: otherwise every sample has one point per light.
 
 | cost | once per picture |
 |---|---|
-| rays | 55,296 or 221,184 for the world, 3,456 per light |
+| rays | 55,296 or 221,184 for the world, 3,456 to 13,824 per light |
 | readback | 4 bytes per probe and direction, 16 per probe and light |
 
 Bias: none; only the density of samples depends on it. Fails: where the scene has too many triangles for a hierarchy,
@@ -23,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..frame import acceleration, environment, lights
-from ..frame.rates import Rate, allocate
+from ..frame.rates import Rate, allocate, budget_for
 from ..frame.run import Frame
 from ..frame.sequence import point, third
 from ..frame.settings import Settings
@@ -36,7 +37,7 @@ from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
 FINE_PROBES = (24, 18)  # for guiding, where their rays are few
 FEW = 0.3  # guiding rays per pixel and sample
-POINTS = 8  # of each light
+POINTS, FEWEST_POINTS, RAYS_OF_PROBE = 32, 8, 128  # of each light at most, at least, and of all
 MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
 WORLD = "world"  # its name among the rates
 RAYS = (*SURFACE_TEXTURES, ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
@@ -70,8 +71,8 @@ class LightProbes(Technique):
         ),
         Param(
             "maps", "Maps per sample", 6.0,
-            "Depth maps that a sample of a final picture shares out among lights and world, by the error of each; "
-            "0: one for every light", 0.0, 64.0,
+            "Depth maps that a sample of a final picture shares out among lights and world, by the error of each, "
+            "and more of them where many samples would leave too much of it; 0: one for every light", 0.0, 64.0,
         ),
     )  # fmt: skip
     reads = SURFACES
@@ -135,9 +136,10 @@ class LightProbes(Technique):
         emitters = frame.emitters
         if len(emitters) > MOST_LIGHTS:
             emitters = []
-        trials = [(emitter.light.key, self._points_of(frame, emitter)) for emitter in emitters]
+        points = int(np.clip(RAYS_OF_PROBE // max(len(emitters) + lit, 1), FEWEST_POINTS, POINTS))
+        trials = [(emitter.light.key, self._points_of(frame, emitter, points)) for emitter in emitters]
         if lit:
-            trials.append((WORLD, self._points_of_world(frame)))
+            trials.append((WORLD, self._points_of_world(frame, points)))
         if not trials:
             return
         moments = self._moments(frame, [rows for _, rows in trials])
@@ -146,22 +148,24 @@ class LightProbes(Technique):
         places = [_place(emitter) for emitter in emitters] + [WORLD] * lit
         distinct = list(dict.fromkeys(places))
         joint = [sum(np.sqrt(v) for v, place in zip(variance, places) if place == one) ** 2 for one in distinct]
-        rates = dict(zip(distinct, allocate(joint, frame.settings.samples, frame.settings.get(self, "maps"))))
+        samples = frame.settings.samples
+        budget = budget_for(joint, samples, frame.settings.get(self, "maps"))
+        rates = dict(zip(distinct, allocate(joint, samples, budget)))
         if any(material.transparent for material in frame.materials.compiled):
             # Layers are drawn by lot in each sample: a light that misses samples would see few of the draws.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
         frame.rates = {key: rates[place] for (key, _), place in zip(trials, places)}
-        frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * POINTS)
+        frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * points)
 
-    def _points_of(self, frame: Frame, emitter: lights.Emitter) -> list[np.ndarray]:
+    def _points_of(self, frame: Frame, emitter: lights.Emitter, count: int) -> list[np.ndarray]:
         seed = frame.settings.seed
-        samples = [emitter.sample(*point(k, "light", seed), third(k, "light", seed)) for k in range(POINTS)]
+        samples = [emitter.sample(*point(k, "light", seed), third(k, "light", seed)) for k in range(count)]
         shadowed, total = int(emitter.light.cast_shadow), frame.settings.samples
         return [emitter.row(sample, 0, shadowed, points=total) for sample in samples]
 
-    def _points_of_world(self, frame: Frame) -> list[np.ndarray]:
+    def _points_of_world(self, frame: Frame, count: int) -> list[np.ndarray]:
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
-        chosen = np.array([point(k, "environment", frame.settings.seed) for k in range(POINTS)])
+        chosen = np.array([point(k, "environment", frame.settings.seed) for k in range(count)])
         drawn = zip(*frame.environment.draw(*chosen.T))
         return [lights.direction_row(d, radiance / density, density, flags, 0, 1) for d, radiance, density in drawn]
 
@@ -169,7 +173,8 @@ class LightProbes(Technique):
         """(lights, probes, 2): mean and mean square of a point's irradiance at each probe that sees a surface."""
         rays = self._rays(frame)
         out = []
-        step = lights.MOST_LIGHTS // POINTS  # of one uniform block
+        points = len(trials[0])
+        step = lights.MOST_LIGHTS // points  # of one uniform block
         for first in range(0, len(trials), step):
             part = trials[first : first + step]
             with images.borrowed(SPREAD_PROBES[0] * SPREAD_PROBES[1], len(part), "RGBA32F") as target:
@@ -181,7 +186,7 @@ class LightProbes(Technique):
                         "film_view": frame.view_block,
                         "sources": self._sources.set([row for rows in part for row in rows]),
                     },
-                    constants={**rays["constants"], "probes": SPREAD_PROBES, "points": POINTS},
+                    constants={**rays["constants"], "probes": SPREAD_PROBES, "points": points},
                 )
                 out.append(images.read(target.colors[0])[..., :2].astype(np.float64))
         return np.concatenate(out)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.rates import FEWEST_POINTS, Rate, allocate
+from addon.frame.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, left
 
 
 @pytest.mark.parametrize(("exponent", "numbers"), [(0, [[0], [1], [2], [3]]), (1, [[0, 1], [2, 3], [4, 5], [6, 7]])])
@@ -46,3 +46,16 @@ def test_every_light_has_whole_rounds_of_points_and_enough_of_them(samples):
 def test_variances_that_are_no_numbers_do_no_harm():
     assert len(allocate([np.nan, np.inf, 1.0], 16, 6.0)) == 3
     assert allocate([], 16, 6.0) == []
+
+
+@pytest.mark.parametrize(("samples", "most"), [(1, 6.0), (16, 6.0), (63, 6.0), (64, 12.0), (256, 24.0)])
+def test_the_budget_grows_half_as_fast_as_the_samples_and_only_where_error_is_left(samples, most):
+    assert budget_for([100.0], samples, 6.0) == most
+    assert budget_for([1e-6], samples, 6.0) == 6.0
+    assert budget_for([], samples, 6.0) == 6.0
+
+
+def test_error_that_is_left_falls_with_the_budget():
+    errors = [left([1.0, 0.2], 64, budget) for budget in (4.0, 8.0, 16.0)]
+    assert errors[0] > errors[1] > errors[2] > 0
+    assert budget_for([1.0, 0.2], 64, 4.0) == 8.0 and errors[0] > LITTLE
