@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 FEWEST_POINTS = 4  # of a light in a whole picture, whatever its variance: it was estimated from few probes
-MOST_EXPONENT = 5
+MOST_EXPONENT = 3  # sequence.py orders the film for up to 8 points of a light per sample
 USUAL_SAMPLES = 16  # up to here a sample has the budget that was asked for
 LITTLE = 1e-4  # squared error that is left, relative: with it a budget is enough
 

@@ -1,8 +1,10 @@
 """Film: gathers the samples that need no light (emission, the visible world, colours, normals), depth, and the sum.
 
 Colours are what Cycles puts into its colour passes: diffuse albedo with all layer weights, and the estimated albedo
-of the glossy lobe. Direct light is stored with its colour; engine.py divides, after the mean, as Cycles does.
-Lights with extent that are visible to the camera are intersected analytically and land in emission.
+of the glossy lobe. A picture of one sample has the mean diffuse albedo of several points of each pixel (neighbours.py):
+direct light of its single point, divided by that, is right again only when it is multiplied. Direct light is stored
+with its colour; engine.py divides, after the mean, as Cycles does. Lights with extent that the camera may see are
+intersected analytically and land in emission.
 """
 
 from __future__ import annotations
@@ -105,10 +107,8 @@ class Film(Technique):
             constants={"light_count": self._light_count},
         )  # fmt: skip
         frame.count(self, "passes")
-        between = frame.services.pop(COLORS_BETWEEN, None)
-        if between is not None:
-            passes.copy(between, frame.target("color.diffuse"))
-            images.pool.give(between)
+        if COLORS_BETWEEN in frame.images and not frame.materials.soft:  # the colours of soft lobes are not among them
+            passes.copy(frame.images[COLORS_BETWEEN], frame.target("color.diffuse"))
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
             frame.environment.tree.add_background(
                 frame.target("radiance.environment"), frame.view, frame.view_block, surface_bindings(frame)

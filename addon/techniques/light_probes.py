@@ -38,6 +38,7 @@ GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
 FINE_PROBES = (24, 18)  # for guiding, where their rays are few
 FEW = 0.3  # guiding rays per pixel and sample
 POINTS, FEWEST_POINTS, RAYS_OF_PROBE = 32, 8, 128  # of each light at most, at least, and of all
+ROUNDING = 1e-5  # of sums of POINTS equal numbers and their squares
 MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
 WORLD = "world"  # its name among the rates
 RAYS = (*SURFACE_TEXTURES, ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
@@ -151,8 +152,8 @@ class LightProbes(Technique):
         samples = frame.settings.samples
         budget = budget_for(joint, samples, frame.settings.get(self, "maps"))
         rates = dict(zip(distinct, allocate(joint, samples, budget)))
-        if any(material.transparent for material in frame.materials.compiled):
-            # Layers are drawn by lot in each sample: a light that misses samples would see few of the draws.
+        if any(material.transparent or material.soft for material in frame.materials.compiled):
+            # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
         frame.rates = {key: rates[place] for (key, _), place in zip(trials, places)}
         frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * points)
@@ -202,7 +203,9 @@ def relative_variance(mean: np.ndarray, square: np.ndarray) -> np.ndarray:
     """
     total = mean.sum(axis=0)
     scale = total**2 + (0.1 * total.mean()) ** 2
-    return (np.maximum(square - mean**2, 0.0) / np.maximum(scale, 1e-300)).mean(axis=1)
+    # Sums of equal points in float32 differ by their rounding.
+    spread = np.where(square > (1 + ROUNDING) * mean**2, square - mean**2, 0.0)
+    return (spread / np.maximum(scale, 1e-300)).mean(axis=1)
 
 
 def _lit(world: World) -> bool:

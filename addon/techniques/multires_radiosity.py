@@ -28,7 +28,7 @@ Sources: Nichols & Wyman 2009 (multi-resolution splatting); Nichols, Shopf & Wym
 | arithmetic | 2 kernels per region and virtual light; regions are 8 to 27 % of the pixels at 640 x 360 |
 | rays | `rays` per region; 1 short one per pixel, + 2 for each surface within the bound; glossy surfaces as there |
 | virtual lights | see virtual_lights.py: 4 candidates each, 192 rays each for the density |
-| passes | 4 x `levels` + 1 |
+| passes | 4 x `levels` + 2 |
 
 Measured at 640x360 with 256 virtual lights on a software GPU, all that finds regions and interpolates included: Cornell
 box 52 ms beside 108 for every pixel, hall 65 beside 154, window 81 beside 150; 58, 108 and 104 when it was drawn level
@@ -50,9 +50,10 @@ Lambertian.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import cache
 
+import gpu
 import numpy as np
 
 from ..frame.run import Frame
@@ -67,9 +68,8 @@ from .neighbours import smooth
 from .surfaces import surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 
-MANY_PIXELS = (
-    60_000  # from here on maps of clusters, which do not grow with the picture, cost less than rays of regions
-)
+# From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
+MANY_PIXELS = 60_000
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.4  # ranges within a region: share of its depth, and of each axis of unit normals
 LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
 BOUNDS_CONSTANTS = (
@@ -97,7 +97,8 @@ BOUNDS = passes.fullscreen_program(
 
 
 RUN = 64  # entries of the list of regions that lie side by side
-RUNS = (("RUN", str(RUN)),)
+REGION_BITS = 14  # of each axis, in an entry
+RUNS = (("RUN", str(RUN)), ("REGION_BITS", str(REGION_BITS)))
 GRID = (("IVEC2", "grid_offset"), ("IVEC2", "atlas_size"))  # of what includes shaders/indirect/regions.glsl
 LIST = Program(
     name="list of regions",
@@ -131,20 +132,23 @@ FILL = _fill("regions from coarser ones", ("coarser_flags", "coarser_irradiance"
 
 @cache
 def regions(gather: Gather, listed: bool = True) -> Program:
-    """The gather of regions, or of all pixels unless they are `listed`, with what tells which lights are hidden."""
+    """The gather of regions, those of the list or those of one level, with what tells which lights are hidden."""
+    if listed:
+        textures, bound, constants = (), LISTED, (("INT", "columns"),)
+    else:
+        textures, bound = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags")), ()
+        constants = (("INT", "level"), ("INT", "levels"))
     return Program(
-        name=f"{'regions' if listed else 'every pixel'}, {gather.name}",
+        name=f"regions{'' if listed else ' of a level'}, {gather.name}",
         compute="indirect/region_gather.comp.glsl",
-        textures=(*GATHER_TEXTURES, *gather.textures),
-        images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), *(LISTED if listed else ())),
+        textures=(*GATHER_TEXTURES, *textures, *gather.textures),
+        images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), *bound),
         blocks=PATH_BLOCKS,
-        constants=(
-            *GATHER_CONSTANTS, *GRID, ("INT", "first_row"), ("INT", "columns"), *gather.constants,
-        ),
+        constants=(*GATHER_CONSTANTS, *GRID, ("INT", "first_row"), *constants, *gather.constants),
         snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
-        defines=(*RUNS, *gather.defines, *(() if listed else (("EVERY_PIXEL", ""),))),
-        group=(RUN, 1, 1) if listed else (8, 8, 1),
-    )  # fmt: skip
+        defines=(*RUNS, *gather.defines, *(() if listed else (("BY_LEVEL", ""),))),
+        group=(RUN, 1, 1),
+    )
 
 
 TRACED_REGIONS = regions(TRACED)
@@ -186,7 +190,7 @@ class MultiresRadiosity(InstantRadiosity):
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
-        levels = frame.settings.get(self, "levels")
+        levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         scale = float(np.median(frame.receivers.distance))
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
@@ -203,7 +207,7 @@ class MultiresRadiosity(InstantRadiosity):
             yield
         smooth(frame, self, "radiance.diffuse_indirect")
         images.pool.give(irradiance)
-        frame.count(self, "passes", 4 * levels + 1 if levels else 2)
+        frame.count(self, "passes", 4 * levels + 2)
 
     def visibility(self, frame: Frame, lights: VirtualLightSet) -> BoundGather:
         """What tells which of the virtual lights are hidden from a region."""
@@ -231,25 +235,38 @@ class MultiresRadiosity(InstantRadiosity):
             pyramid.append(target)
         return pyramid
 
-    def irradiance(self, frame: Frame, levels: int, offset, scale: float, bindings, bound) -> Iterator[None]:
+    def irradiance(
+        self, frame: Frame, levels: int, offset, scale: float, bindings, bound
+    ) -> Generator[None, None, images.Image]:
         """Irradiance at every pixel: an image of the picture's size or larger, whose pixel `offset` is its first."""
         grid = {"grid_offset": offset, "atlas_size": _level_size(frame.size, 0, levels)}
         atlas = images.pool.take(*_atlas_size(frame.size, levels), "RGBA32F")
-        if levels == 0:
-            yield from self._gather(frame, bindings, bound, grid, {"gathered": atlas})
-            frame.count(self, "regions", frame.size[0] * frame.size[1])
-            return atlas
         pyramid = self._bounds(frame, levels, offset, scale)
         flags = [target.colors[2] for target in pyramid]
-        listed = self._listed(frame, flags, grid)
-        yield
-        yield from self._gather(frame, bindings, bound, grid, {"gathered": atlas, **listed})
-        if frame.sample == 0:
-            frame.count(self, "regions", int(images.read(listed["entry_count"])[0, 0, 0]))
-        found = self._fill(frame, atlas, flags, {**grid, "levels": levels, "depth_scale": scale})
-        for image in (atlas, *listed.values(), *(image for target in pyramid for image in target.colors)):
-            images.pool.give(image)
-        return found
+        held = [atlas, *(image for target in pyramid for image in target.colors)]
+        try:
+            yield
+            if levels and can_list():
+                listed = self._listed(frame, flags, grid)
+                held += listed.values()
+                yield from self._gather_listed(frame, bindings, bound, grid, {"gathered": atlas, **listed})
+                if frame.sample == 0:
+                    frame.count(self, "regions", int(images.read(listed["entry_count"])[0, 0, 0]))
+            else:
+                yield from self._gather_levels(frame, bindings, bound, grid, atlas, flags)
+                if levels == 0 and frame.sample == 0:
+                    frame.count(self, "regions", frame.size[0] * frame.size[1])
+            if levels == 0:
+                held.remove(atlas)
+                return atlas
+            found = self._fill(frame, atlas, flags, {**grid, "levels": levels, "depth_scale": scale})
+            held.append(found)
+            yield
+            held.remove(found)
+            return found
+        finally:
+            for image in held:
+                images.pool.give(image)
 
     def _listed(self, frame: Frame, flags: list[images.Image], grid: dict) -> dict[str, images.Image]:
         """The list of the regions that gather, and how many they are."""
@@ -298,10 +315,11 @@ class MultiresRadiosity(InstantRadiosity):
             images.pool.give(image)
         return found
 
-    def _gather(self, frame: Frame, bindings, bound: BoundGather, grid: dict, bound_images: dict) -> Iterator[None]:
-        listed = "entries" in bound_images
-        columns = _list_size((frame.size[0] // 8, 1))[0] if listed else frame.size[0]
-        program = regions(bound.gather, listed)
+    def _gather_listed(
+        self, frame: Frame, bindings, bound: BoundGather, grid: dict, bound_images: dict
+    ) -> Iterator[None]:
+        columns = _list_size((max(frame.size[0] // 8, 1), 1))[0]
+        program = regions(bound.gather)
         textures = bindings["textures"] | bound.textures
         constants = bindings["constants"] | bound.constants | grid | {"columns": columns}
         for first, last in frame.bands(self, "regions"):
@@ -310,6 +328,38 @@ class MultiresRadiosity(InstantRadiosity):
                 constants={**constants, "first_row": first},
             )  # fmt: skip
             yield
+
+    def _gather_levels(
+        self, frame: Frame, bindings, bound: BoundGather, grid: dict, atlas: images.Image, flags: list[images.Image]
+    ) -> Iterator[None]:
+        """The same level by level, without a list; with no levels, all pixels."""
+        levels = len(flags)
+        program = regions(bound.gather, listed=False)
+        anything = bindings["textures"]["virtual_lights"]  # for what a level does not look at
+        for level in range(levels, -1, -1):
+            width, height = _level_size(frame.size, level, levels)
+            textures = bindings["textures"] | bound.textures
+            textures["region_flags"] = flags[level - 1] if level > 0 else anything
+            textures["coarser_flags"] = flags[level] if level < levels else anything
+            constants = bindings["constants"] | bound.constants | grid | {"level": level, "levels": levels}
+            for first, last in frame.bands(self, "regions") if level == 0 else ((0, height),):
+                last = height if last == frame.size[1] else last  # the grid is shifted, and has more rows
+                passes.compute(
+                    program, (width, last - first), textures=textures, images={"gathered": atlas},
+                    blocks=bindings["blocks"], constants={**constants, "first_row": first},
+                )  # fmt: skip
+                yield
+
+
+def can_list() -> bool:
+    """Whether shaders can count the entries of a list: Blender's Python cannot ask Metal for atomic images."""
+    return gpu.platform.backend_type_get() != "METAL"
+
+
+def fitting_levels(size: tuple[int, int], asked: int) -> int:
+    """No levels where the atlas of all regions would be larger than an image may be, or an entry's bits can tell."""
+    most = min(gpu.capabilities.max_texture_size_get(), 1 << REGION_BITS)
+    return asked if max(_atlas_size(size, asked)) <= most else 0
 
 
 def _level_size(size: tuple[int, int], level: int, levels: int) -> tuple[int, int]:

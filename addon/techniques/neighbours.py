@@ -26,7 +26,7 @@ window 0.081 and 0.073.
 | cost | per pass |
 |---|---|
 | fetches per pixel | 16 x 4 |
-| of a picture of one sample | 8 more draws of all surfaces, 9 x 4 fetches each |
+| of a picture of one sample | 8 more draws of all surfaces, 9 x 4 fetches each, more where all of those miss |
 
 A viewport at rest shows its first samples in the same way: there the sums are filtered on their way to the screen, with
 the mean colours of their samples, and stay as they are.
@@ -90,7 +90,7 @@ BETWEEN = passes.fullscreen_program(
     constants=(("FLOAT", "share"),),
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_color")),
 )  # fmt: skip
-COLORS_BETWEEN = "colors between pixels"  # the frame's service: an image of the pool, whose reader gives it back
+COLORS_BETWEEN = "color.between"  # image of the frame: mean colours of those points
 GUIDES = ("position", "normal", "diffuse")
 
 
@@ -135,8 +135,9 @@ def _reflect_between(frame: Frame, technique: Technique, arriving: images.Image,
     """
     refracts = any(one.slot == "transmission" for one in frame.plan.techniques)
     known = {f"known_{name}": frame.images[f"surface.{name}"] for name in GUIDES}
-    colors = frame.services[COLORS_BETWEEN] = images.pool.take(*frame.size, "RGBA32F")
-    target = images.Target((frame.images[path], colors))
+    if COLORS_BETWEEN not in frame.images:
+        frame.images[COLORS_BETWEEN] = images.pool.take(*frame.size, "RGBA32F")
+    target = images.Target((frame.images[path], frame.images[COLORS_BETWEEN]))
     target.clear()
     drawn = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
     depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")

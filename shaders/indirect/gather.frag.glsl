@@ -2,7 +2,7 @@
 //
 // Both kernels are shares of the same light: a virtual light at distance d counts min(1, d2 / r2), a ray that meets a
 // surface at distance d counts 1 - min(1, d2 / r2). With SHARED, regions of pixels have gathered the virtual lights
-// (regions.frag.glsl).
+// (region_gather.comp.glsl).
 #include "indirect/path.glsl"
 #include "indirect/lights.glsl"
 #ifndef SHARED

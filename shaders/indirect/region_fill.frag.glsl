@@ -22,7 +22,7 @@ float likeness(ivec2 pixel, vec3 position, vec3 normal, float reach)
 vec4 of_split_pixels(ivec2 region)
 {
   ivec2 pixel = region_pixel(region, 1);
-  bool inside = 2 * region + 1 - grid_offset == pixel && texelFetch(surface_position, pixel, 0).w != 0.0;
+  bool inside = all(equal(2 * region + 1 - grid_offset, pixel)) && texelFetch(surface_position, pixel, 0).w != 0.0;
   return inside ? texelFetch(gathered, 2 * region + 1, 0) : vec4(0.0);
 }
 

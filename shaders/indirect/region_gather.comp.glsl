@@ -1,11 +1,12 @@
-// Irradiance by virtual lights at the regions of the list (EVERY_PIXEL: at each pixel), into the atlas.
+// Irradiance by virtual lights at regions, into the atlas: at those of the list, or (BY_LEVEL) at those of one level that
+// gather.
 #include "indirect/path.glsl"
 #include "indirect/regions.glsl"
 #include "generated/gather"
 
-void gather(ivec2 region, int level)
+void gather(ivec2 region, int level_of_region)
 {
-  ivec2 pixel = region_pixel(region, level);
+  ivec2 pixel = region_pixel(region, level_of_region);
   vec4 irradiance = vec4(0.0);
   Surface s = SURFACE_READ(pixel);
   if (s.hit) {
@@ -15,21 +16,29 @@ void gather(ivec2 region, int level)
     float choice = scrambled(film_view.bits_w, salt.z);
     irradiance = vec4(virtual_gather(s, vec3(0.0), false, origin, choice, salt.x + roll.x), 1.0);
   }
-  imageStore(gathered, region_place(region, level), irradiance);
+  imageStore(gathered, region_place(region, level_of_region), irradiance);
 }
 
+#ifdef BY_LEVEL
+void main()
+{
+  ivec2 region = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
+  ivec2 first = (region << level) - grid_offset;
+  if (any(lessThan(first + (1 << level), ivec2(1))) || any(greaterThanEqual(first, textureSize(surface_position, 0)))) {
+    return;
+  }
+  bool split = level > 0 && texelFetch(region_flags, region, 0).x > 0.5;
+  if (!split && (level == levels || texelFetch(coarser_flags, region >> 1, 0).x > 0.5)) {
+    gather(region, level);
+  }
+}
+#else
 void main()
 {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
-  ivec2 size = textureSize(surface_position, 0);
-  if (place.y >= size.y) {
+  if (place.y >= textureSize(surface_position, 0).y) {
     return;
   }
-#ifdef EVERY_PIXEL
-  if (place.x < size.x) {
-    gather(place + grid_offset, 0);
-  }
-#else
   // Fewer threads than there is room for: the list is mostly short, and a thread without an entry is not free.
   int count = int(imageLoad(entry_count, ivec2(0)).x);
   uint axis = (1u << REGION_BITS) - 1u;
@@ -37,5 +46,5 @@ void main()
     uint entry = imageLoad(entries, place).x;
     gather(ivec2(entry & axis, (entry >> REGION_BITS) & axis), int(entry >> (2 * REGION_BITS)));
   }
-#endif
 }
+#endif

@@ -1,8 +1,6 @@
 // Regions of pixels and where what is gathered for them lies: the programs of addon/techniques/multires_radiosity.py.
-// RUN entries of the list of regions lie side by side.
+// RUN entries of the list of regions lie side by side; each has REGION_BITS for each axis.
 #include "lib/math.glsl"
-
-#define REGION_BITS 14  // of each axis, in an entry of the list
 
 // Where an entry of the list lies: runs one above the other, so that some rows of the list hold their share of it.
 ivec2 entry_place(int index)

@@ -182,7 +182,7 @@ bool fan_step(Fan fan, int index, vec2 u, inout vec2 last, out Patch found)
   float at = along.y;
   float to = along.z;
   found.texel = ivec2(fan.place + fan.course * at);
-  if (found.texel == ivec2(fan.place)) {
+  if (all(equal(found.texel, ivec2(fan.place)))) {
     return false;
   }
   vec4 position = texelFetch(surface_position, found.texel, 0);

@@ -1,11 +1,13 @@
 """Multi-resolution radiosity: closed forms whatever the regions are, and the gather of every pixel as their measure."""
 
+import gpu
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.techniques import multires_radiosity
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
 pytestmark = pytest.mark.slow
@@ -78,3 +80,28 @@ def test_every_size_of_picture_has_its_regions(stage, render):
     corner(stage)
     for size in ((1, 1), (7, 3), (33, 17)):
         assert np.isfinite(render(1, samples=2, size=size, levels=5)).all()
+
+
+def test_pictures_narrower_than_a_group_of_threads_have_their_light_in_one_sample(stage, render):
+    corner(stage)
+    for size in ((1, 1), (3, 40), (40, 3)):
+        light = render(1, samples=1, size=size)
+        assert np.isfinite(light).all() and light.mean() > 0
+
+
+def test_regions_without_a_list_gather_the_same(stage, render, monkeypatch):
+    """What Metal does."""
+    corner(stage)
+    settings = {"samples": 1, "size": (61, 47), "rays": 0}
+    listed = render(2, **settings)
+    monkeypatch.setattr(multires_radiosity, "can_list", lambda: False)
+    stage.scene.candela.multires_radiosity_levels = 2
+    render(2, **settings)  # so that the picture is not the one that was kept
+    stage.scene.candela.multires_radiosity_levels = 3
+    np.testing.assert_allclose(render(2, **settings), listed, rtol=1e-5, atol=1e-7)
+
+
+def test_a_picture_whose_atlas_is_too_large_for_an_image_gathers_every_pixel(gpu_context):
+    most = min(gpu.capabilities.max_texture_size_get(), 1 << multires_radiosity.REGION_BITS)
+    assert multires_radiosity.fitting_levels((most - 8, 4), 3) == 0
+    assert multires_radiosity.fitting_levels((most // 2, 4), 3) == 3
