@@ -85,6 +85,11 @@ def describe() -> str:
     return f"{gpu.platform.renderer_get()}, {gpu.platform.version_get()}, {backend}"
 
 
+def counts_in_images() -> bool:
+    """Whether shaders can count in an image: Blender's Python cannot ask Metal for images with atomic operations."""
+    return gpu.platform.backend_type_get() != "METAL"
+
+
 def on_release(function: Callable[[], None]) -> Callable[[], None]:
     """Register (as a decorator) what frees GPU resources. Called in reverse order of registration.
 

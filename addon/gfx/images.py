@@ -54,9 +54,14 @@ class Image:
         return self.width * self.height * _BYTES[self.format]
 
 
+def most_side() -> int:
+    """Texels along the longest side that an image may have on this GPU."""
+    return gpu.capabilities.max_texture_size_get()
+
+
 def create(width: int, height: int, image_format: str) -> Image:
     """A new image with undefined content. Raises ValueError beyond the device's limits, RuntimeError if it is full."""
-    limit = gpu.capabilities.max_texture_size_get()
+    limit = most_side()
     if not (0 < width <= limit and 0 < height <= limit):
         raise ValueError(f"An image of {width}x{height} pixels cannot be made: this GPU allows 1 to {limit}.")
     try:

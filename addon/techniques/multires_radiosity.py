@@ -53,14 +53,13 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from functools import cache
 
-import gpu
 import numpy as np
 
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..frame.view import VIEW
-from ..gfx import images, passes
+from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings
@@ -246,7 +245,7 @@ class MultiresRadiosity(InstantRadiosity):
         held = [atlas, *(image for target in pyramid for image in target.colors)]
         try:
             yield
-            if levels and can_list():
+            if levels and context.counts_in_images():
                 listed = self._listed(frame, flags, grid)
                 held += listed.values()
                 yield from self._gather_listed(frame, bindings, bound, grid, {"gathered": atlas, **listed})
@@ -351,14 +350,9 @@ class MultiresRadiosity(InstantRadiosity):
                 yield
 
 
-def can_list() -> bool:
-    """Whether shaders can count the entries of a list: Blender's Python cannot ask Metal for atomic images."""
-    return gpu.platform.backend_type_get() != "METAL"
-
-
 def fitting_levels(size: tuple[int, int], asked: int) -> int:
     """No levels where the atlas of all regions would be larger than an image may be, or an entry's bits can tell."""
-    most = min(gpu.capabilities.max_texture_size_get(), 1 << REGION_BITS)
+    most = min(images.most_side(), 1 << REGION_BITS)
     return asked if max(_atlas_size(size, asked)) <= most else 0
 
 

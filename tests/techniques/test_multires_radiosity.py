@@ -1,12 +1,12 @@
 """Multi-resolution radiosity: closed forms whatever the regions are, and the gather of every pixel as their measure."""
 
-import gpu
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.gfx import context, images
 from addon.techniques import multires_radiosity
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
@@ -94,7 +94,7 @@ def test_regions_without_a_list_gather_the_same(stage, render, monkeypatch):
     corner(stage)
     settings = {"samples": 1, "size": (61, 47), "rays": 0}
     listed = render(2, **settings)
-    monkeypatch.setattr(multires_radiosity, "can_list", lambda: False)
+    monkeypatch.setattr(context, "counts_in_images", lambda: False)
     stage.scene.candela.multires_radiosity_levels = 2
     render(2, **settings)  # so that the picture is not the one that was kept
     stage.scene.candela.multires_radiosity_levels = 3
@@ -102,6 +102,6 @@ def test_regions_without_a_list_gather_the_same(stage, render, monkeypatch):
 
 
 def test_a_picture_whose_atlas_is_too_large_for_an_image_gathers_every_pixel(gpu_context):
-    most = min(gpu.capabilities.max_texture_size_get(), 1 << multires_radiosity.REGION_BITS)
+    most = min(images.most_side(), 1 << multires_radiosity.REGION_BITS)
     assert multires_radiosity.fitting_levels((most - 8, 4), 3) == 0
     assert multires_radiosity.fitting_levels((most // 2, 4), 3) == 3
