@@ -107,7 +107,13 @@ def direct(scene, entrant: Entrant, size: tuple[int, int], seed: int = 1, shadow
         thing.visible_shadow = shadows or thing.name == "Speck"
     start = time.process_time()
     images = render_passes(scene, "CANDELA", entrant.samples, seed, direct_only=True, size=size).images
-    return images["diffuse_direct"][..., 0].astype(np.float64), time.process_time() - start
+    return light(images), time.process_time() - start
+
+
+def light(images: dict[str, np.ndarray]) -> np.ndarray:
+    """Direct diffuse light that reaches the camera, (H, W). Blender's pass alone is light by colour: a pixel of which a
+    hundredth shows a surface, and the rest nothing, has as much as a pixel full of it."""
+    return images["diffuse_direct"][..., 0].astype(np.float64) * images["diffuse_color"][..., 0]
 
 
 def visibility(scene, entrant: Entrant, size: tuple[int, int], seed: int = 1) -> np.ndarray:
@@ -176,10 +182,10 @@ def against_cycles(scene, entrants, results: list[Result], size: tuple[int, int]
     from addon.compare.reference import reference
 
     made = reference(scene, samples, True, size)
-    expected, half = made.images["diffuse_direct"], made.half["diffuse_direct"]
-    pictures = [np.repeat(direct(scene, entrant, size)[0][..., None], 3, axis=-1) for entrant in entrants]
+    one_seed = {name: made.images[name] + made.half[name] for name in ("diffuse_direct", "diffuse_color")}
+    shown = [light(made.images), *(direct(scene, entrant, size)[0] for entrant in entrants), light(one_seed)]
+    expected, *pictures = (np.repeat(one[..., None], 3, axis=-1) for one in shown)
     floor = Result(0.0)
-    pictures.append(expected + half)
     for result, picture, flip in zip([*results, floor], pictures, flips([(one, expected) for one in pictures])):
         result.relmse, result.flip = compare_radiance("direct", picture, expected).relmse, flip
     return floor

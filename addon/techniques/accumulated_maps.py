@@ -11,8 +11,15 @@ stored per texel (shaders/lib/shadow.glsl). Casters with alpha are drawn stochas
 |---|---|
 | maps | 1 view per light whose receivers lie within 68 degrees, up to 6 faces otherwise; more where depth asks for it |
 | vertices | those of all casters, once per view |
-| lookup per pixel and light | 1 texel of the map, 3 to 5 of the view list |
+| lookup per pixel and light | 1 texel of the map, 3 to 5 of the view list; with edge rays 4 texels |
+| edge rays | 1 per pixel and light where the four texels do not agree and the penumbra is narrower than 4 texels |
 | bytes | 20 per texel, (2 texels per picture pixel)^2 by default |
+
+Edge rays (shaders/lib/edge_visibility.glsl; Lauterbach, Mo, Manocha 2009) take the map's resolution out of hard edges
+and of contacts: without them a pixel just behind a blocker that it touches is lit at every resolution. relMSE of direct
+light at 64 samples, before and after: fence 0.0152 and 0.0017, poles 0.0031 and 0.0005, foliage 0.077 and 0.023, grid
+0.0058 and 0.0034 (128x96); garden 0.0017 and 0.0009, instances 0.0039 and 0.0032, hall 0.0055 and 0.0045 (256x192), in
+1.3, 0.95 and 1.06 times the processor time.
 
 Fails: with few samples penumbrae show steps; casters thinner than a texel are missed in single samples (their mean
 is right); a receiver that no fitted view contains counts as lit.
@@ -27,11 +34,11 @@ casters that a picture with many lights need not draw.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..frame import depth_maps, lights
+from ..frame import acceleration, depth_maps, lights
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
@@ -48,6 +55,11 @@ CUTOFF = Param(
     "cutoff", "Shadow cutoff", 0.001,
     "Where a light can bring less than this share of the picture's median light, its shadows are left out", 0.0, 0.1,
     "FACTOR",
+)  # fmt: skip
+EDGE_RAYS = Param(
+    "edge_rays", "Edge rays", True,
+    "Where the texels of a map do not agree and the penumbra is narrow, a ray tells whether a point is in shadow",
+    draft=False,
 )  # fmt: skip
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
 PART_TEXELS = 2**21  # the same for samples that are drawn in parts: a window answers between rounds
@@ -85,7 +97,25 @@ class Maps:
     blocks: dict[str, Block] = field(default_factory=dict)
 
 
+# What lookups by rays bind.
+RAY_TEXTURES = (("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
+RAY_CONSTANTS = (("INT", "trace_levels"), ("FLOAT", "offset_size"))
 HARD = Lookup("hard", "lib/hard_visibility.glsl")
+EDGES = Lookup(
+    "edge rays",
+    "lib/edge_visibility.glsl",
+    textures=RAY_TEXTURES,
+    images=(("depth_image", "RGBA32F", "FLOAT_2D", "READ"),),
+    constants=RAY_CONSTANTS,
+    defines=(("DEPTH_IMAGE", "1"),),
+)
+
+
+def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, object]]:
+    """Textures and constants of RAY_TEXTURES and RAY_CONSTANTS: what casts shadows, for rays."""
+    hierarchy = frame.hierarchy("shadow")
+    textures = {"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves}
+    return textures, {"trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size}
 
 
 class DepthMapService:
@@ -148,7 +178,7 @@ class AccumulatedMaps(Technique):
     name = "accumulated_maps"
     label = "Accumulated shadow maps"
     slot = "shadow"
-    params = (RESOLUTION, CUTOFF)
+    params = (RESOLUTION, CUTOFF, EDGE_RAYS)
     atlas_texels = ATLAS_TEXELS
 
     def __init__(self):
@@ -242,7 +272,11 @@ class AccumulatedMaps(Technique):
         return (*frame.random_at(number, "map"), *frame.random_at(number, "map/turn"))
 
     def draw(self, frame: Frame, views: list) -> Maps:
-        return self.service.draw(frame, self, views, self.resolution(frame))
+        maps = self.service.draw(frame, self, views, self.resolution(frame))
+        if not (views and frame.settings.get(self, "edge_rays")) or acceleration.too_many(frame.snapshot):
+            return maps
+        textures, constants = ray_bindings(frame)
+        return replace(maps, lookup=EDGES, textures=textures, images={"depth_image": maps.atlas}, constants=constants)
 
     def release(self) -> None:
         self.service.release()

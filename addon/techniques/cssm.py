@@ -43,9 +43,18 @@ from ..frame import tables
 from ..frame.convolution import PYRAMID, TABLE, Basis, series
 from ..frame.run import Frame
 from ..frame.technique import Param
-from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
+from .accumulated_maps import CUTOFF, RAY_TEXTURES, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, LOADED_DEFINES, LOADED_IMAGES, REFINE, SoftMaps
+from .soft_maps import (
+    CONTACT_CONSTANTS,
+    CONTACTS,
+    LIMIT_CONSTANTS,
+    LIMIT_TEXTURES,
+    LOADED_DEFINES,
+    LOADED_IMAGES,
+    REFINE,
+    SoftMaps,
+)
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
 PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
@@ -67,26 +76,31 @@ def _basis(order: int, prefilter: str) -> Basis:
     )
 
 
-def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
+def _lookup(order: int, prefilter: str, cells: int, contacts: bool) -> Lookup:
     scale, offset = series(order)
     by_table = prefilter == TABLE
     return Lookup(
-        f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells",
+        f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells{', contact rays' * contacts}",
         "cssm/visibility.glsl",
-        textures=LIMIT_TEXTURES,
+        textures=LIMIT_TEXTURES + RAY_TEXTURES * contacts,
         images=(*LOADED_IMAGES, BASIS_IMAGES[prefilter]),
-        constants=(*LIMIT_CONSTANTS, ("IVEC2", "base_extent"), ("INT", "tile_columns"), ("INT", "basis_rows")),
+        constants=(
+            *LIMIT_CONSTANTS, *CONTACT_CONSTANTS * contacts, ("IVEC2", "base_extent"), ("INT", "tile_columns"),
+            ("INT", "basis_rows"),
+        ),
         defines=(
             *LOADED_DEFINES, ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
             ("SERIES_OFFSET", f"{offset:.6f}"), ("SEARCH_OFFSET", f"{SEARCH_OFFSET / order:.6f}"),
-            *((("PREFILTER_TABLE", "1"),) if by_table else ()),
+            *((("PREFILTER_TABLE", "1"),) if by_table else ()), *((("CONTACT_RAYS", "1"),) * contacts),
         ),
     )  # fmt: skip
 
 
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
 BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
-LOOKUPS = tuple(lighting(_lookup(8, prefilter, 4), False) for prefilter, _, _ in PREFILTERS)
+LOOKUPS = tuple(
+    lighting(_lookup(8, prefilter, 4, contacts), False) for prefilter, _, _ in PREFILTERS for contacts in (False, True)
+)
 
 
 class ConvolutionSoftShadows(SoftMaps):
@@ -100,6 +114,7 @@ class ConvolutionSoftShadows(SoftMaps):
         Param("prefilter", "Prefilter", PYRAMID, "How means over boxes of texels are made", items=PREFILTERS),
         Param("cells", "Cells", 4, "Boxes along each side of a kernel", 1, 6),
         REFINE,
+        CONTACTS,
     )  # fmt: skip
 
     def resolution(self, frame: Frame) -> int:
@@ -117,9 +132,10 @@ class ConvolutionSoftShadows(SoftMaps):
         if drawn:
             bound = {"depth_maps": maps.atlas, **maps.textures}
             basis.build(image, size, maps.constants["top_level"], bound, maps.constants)
-        return replace(
+        maps = replace(
             maps,
-            lookup=_lookup(order, prefilter, self.cells(frame)),
+            lookup=_lookup(order, prefilter, self.cells(frame), self.contacts(frame)),
             images={**maps.images, BASIS_IMAGES[prefilter][0]: image},
             constants={**maps.constants, **basis.constants_for(*size)},
         )
+        return self.with_contacts(frame, maps)

@@ -39,7 +39,19 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import ATLAS_TEXELS, HARD, AccumulatedMaps, DepthMapService, Lookup, Maps, rounds
+from .accumulated_maps import (
+    ATLAS_TEXELS,
+    EDGES,
+    HARD,
+    RAY_CONSTANTS,
+    RAY_TEXTURES,
+    AccumulatedMaps,
+    DepthMapService,
+    Lookup,
+    Maps,
+    ray_bindings,
+    rounds,
+)
 from .light_probes import rate_of
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
 
@@ -53,8 +65,8 @@ NEAR = 0.25  # radius / distance from which rays are traced instead
 RAYS_WHERE_NEAR = Lookup(
     "rays where near",
     "light/near_visibility.glsl",
-    textures=(("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves")),
-    constants=(("INT", "trace_levels"), ("FLOAT", "offset_size"), ("FLOAT", "near_share")),
+    textures=RAY_TEXTURES,
+    constants=(*RAY_CONSTANTS, ("FLOAT", "near_share")),
 )
 
 
@@ -80,7 +92,9 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
     )
 
 
-LIGHTING = tuple(lighting(lookup, soft_lobes) for lookup in (HARD, RAYS_WHERE_NEAR) for soft_lobes in (False, True))
+LIGHTING = tuple(
+    lighting(lookup, soft_lobes) for lookup in (HARD, EDGES, RAYS_WHERE_NEAR) for soft_lobes in (False, True)
+)
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
     Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
@@ -180,14 +194,9 @@ class DirectLight(Technique):
 
     def _with_rays(self, frame: Frame, maps: Maps) -> Maps:
         """The same maps, asked only where the light is small beside its distance."""
-        hierarchy = frame.hierarchy("shadow")
-        return replace(
-            maps, lookup=RAYS_WHERE_NEAR,
-            textures={"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves},
-            constants={
-                "trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size, "near_share": NEAR,
-            },
-        )  # fmt: skip
+        textures, constants = ray_bindings(frame)
+        constants["near_share"] = NEAR
+        return replace(maps, lookup=RAYS_WHERE_NEAR, textures=textures, images={}, constants=constants)
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
         """Lights of this sample with the inverse of their chance."""

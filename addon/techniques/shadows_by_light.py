@@ -42,11 +42,23 @@ PLAIN = "lights without penumbra: plain maps"
 VARIANCE, CONVOLUTION = "important soft lights: variance maps", "other soft lights: convolution maps"
 
 
+LEAST_SIDE = 512  # of soft maps, texels: in small pictures a finer map costs little beside its lookups
+
+
 class FewBoxes(ConvolutionSoftShadows):
     """Convolution maps for lights that matter little each."""
 
+    least_side = LEAST_SIDE
+    contact_side = 1
+
     def cells(self, frame: Frame) -> int:
         return min(super().cells(frame), 2)
+
+
+class FineVariance(VarianceSoftShadows):
+    """Variance maps for important lights."""
+
+    least_side = LEAST_SIDE
 
 
 class ShadowsByLight(AccumulatedMaps):
@@ -61,7 +73,7 @@ class ShadowsByLight(AccumulatedMaps):
     )  # fmt: skip
 
     def __init__(self):
-        self._services = {PLAIN: AccumulatedMaps(), VARIANCE: VarianceSoftShadows(), CONVOLUTION: FewBoxes()}
+        self._services = {PLAIN: AccumulatedMaps(), VARIANCE: FineVariance(), CONVOLUTION: FewBoxes()}
         self._kinds: dict[str, str] = {}
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
@@ -87,7 +99,7 @@ class ShadowsByLight(AccumulatedMaps):
             return {}
         kinds, soft = {}, []
         for emitter in emitters:
-            if penumbra(frame, emitter) * self._services[VARIANCE].resolution(frame) < 1.0:
+            if penumbra(frame, emitter) * self._services[PLAIN].resolution(frame) < 1.0:
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)

@@ -8,6 +8,12 @@ and what they are seen from are the same: a light may change its power or colour
 How a kernel follows from the light and a blocker's height stands in shaders/lib/soft_kernel.glsl, the two steps
 (blocker search, penumbra) in shaders/lib/soft_visibility.glsl; a technique brings what it filters the map to, and how
 it asks a box of the filtered map for blockers.
+
+What one map cannot tell, blockers that touch the receiver or that others hide from the light's middle, short rays see
+(`contacts`, shaders/lib/contact.glsl): without them a handful of pixels in a hundred thousand, lit where two leaves
+meet, had nearly all of foliage's relMSE. Scenes with too many triangles for a hierarchy look into smaller windows of
+the map instead. relMSE of one-sample light by Auto, windows and rays (`python -m bench.soft --cycles 256`): poles
+0.0066 and 0.0006, fence 0.077 and 0.013, foliage 0.092 and 0.007; one ray per part instead of four leaves noise.
 """
 
 from __future__ import annotations
@@ -16,17 +22,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame import depth_maps, lights, tables
+from ..frame import acceleration, depth_maps, lights, tables
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images
-from .accumulated_maps import AccumulatedMaps, Maps, map_resolution
+from .accumulated_maps import RAY_CONSTANTS, AccumulatedMaps, Maps, map_resolution, ray_bindings
 
 REFINE = Param(
     "refine", "Refine", True,
     "With more samples, each stands for a smaller part of the light, so that the error goes to zero; else every sample "
     "shows the whole light from its middle",
 )  # fmt: skip
+CONTACTS = Param(
+    "contacts", "Contact rays", True,
+    "Short rays look for blockers close to the receiver, where a depth map cannot tell", draft=False,
+)  # fmt: skip
+CONTACT_CONSTANTS = (*RAY_CONSTANTS, ("INT", "contact_side"))
 FEWEST_POINTS = (
     16  # fewer parts that do not tile the light, at points of a low-discrepancy set, are worse than all of it
 )
@@ -48,6 +59,8 @@ class SoftMaps(AccumulatedMaps):
     """Base of the techniques; `filtered` is theirs."""
 
     atlas_texels = 2**22  # filtered maps take several times the bytes of plain ones
+    least_side = 32  # of a map, texels
+    contact_side = 2  # squared: rays by which a picture of one sample looks for contacts of a map; with more, one
 
     def __init__(self):
         super().__init__()
@@ -69,7 +82,8 @@ class SoftMaps(AccumulatedMaps):
 
     def resolution(self, frame: Frame) -> int:
         """A power of two, so that no entry of the pyramid lies in two views."""
-        return 1 << round(np.log2(map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))))
+        wished = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+        return max(1 << round(np.log2(wished)), self.least_side)
 
     def jitter(self, frame: Frame, emitter: lights.Emitter, number: int) -> tuple[float, float, float, float]:
         if not frame.settings.get(self, "refine"):
@@ -95,7 +109,7 @@ class SoftMaps(AccumulatedMaps):
         if not varies and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
             return self._drawn[1]
-        maps = self._with_bounds(frame, views, super().draw(frame, views))
+        maps = self._with_bounds(frame, views, self.service.draw(frame, self, views, self.resolution(frame)))
         self._drawn = (key, maps)
         return maps
 
@@ -118,6 +132,19 @@ class SoftMaps(AccumulatedMaps):
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
         """`maps`, whose part `size` holds views, with the lookup and what it needs; without views nothing is built."""
         raise NotImplementedError
+
+    def contacts(self, frame: Frame) -> bool:
+        """Whether short rays look for near blockers."""
+        asked = self.contact_side > 0 and frame.settings.get(self, "contacts")
+        return asked and not acceleration.too_many(frame.snapshot)
+
+    def with_contacts(self, frame: Frame, maps: Maps) -> Maps:
+        """`maps` with what the rays bind, where they are traced."""
+        if not self.contacts(frame):
+            return maps
+        textures, constants = ray_bindings(frame)
+        constants["contact_side"] = self.contact_side if frame.settings.samples == 1 else 1
+        return replace(maps, textures=maps.textures | textures, constants=maps.constants | constants)
 
     def kept(self, name: str, size: tuple[int, int], image_format: str) -> images.Image:
         """The technique's image of this name, another one of the pool if size or format differ."""

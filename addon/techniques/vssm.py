@@ -60,9 +60,18 @@ from dataclasses import replace
 from ..frame import tables
 from ..frame.run import Frame
 from ..frame.technique import Param
-from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
+from .accumulated_maps import CUTOFF, RAY_TEXTURES, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import LIMIT_CONSTANTS, LIMIT_TEXTURES, LOADED_DEFINES, LOADED_IMAGES, REFINE, SoftMaps
+from .soft_maps import (
+    CONTACT_CONSTANTS,
+    CONTACTS,
+    LIMIT_CONSTANTS,
+    LIMIT_TEXTURES,
+    LOADED_DEFINES,
+    LOADED_IMAGES,
+    REFINE,
+    SoftMaps,
+)
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
 MOMENTS = tables.TableSource(
@@ -74,18 +83,21 @@ MOMENTS = tables.TableSource(
 )
 
 
-def _lookup(rule: str, cells: int) -> Lookup:
+def _lookup(rule: str, cells: int, contacts: bool) -> Lookup:
     return Lookup(
-        f"variance soft shadows, {rule.lower()}, {cells} cells",
+        f"variance soft shadows, {rule.lower()}, {cells} cells{', contact rays' * contacts}",
         "vssm/visibility.glsl",
-        textures=LIMIT_TEXTURES,
+        textures=LIMIT_TEXTURES + RAY_TEXTURES * contacts,
         images=(*LOADED_IMAGES, ("depth_table", "RGBA32UI", "UINT_2D", "READ")),
-        constants=LIMIT_CONSTANTS,
-        defines=(*LOADED_DEFINES, ("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
-    )
+        constants=LIMIT_CONSTANTS + CONTACT_CONSTANTS * contacts,
+        defines=(
+            *LOADED_DEFINES, ("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ()),
+            *((("CONTACT_RAYS", "1"),) * contacts),
+        ),
+    )  # fmt: skip
 
 
-LOOKUPS = tuple(lighting(_lookup(rule, 5), False) for rule, _, _ in RULES)
+LOOKUPS = tuple(lighting(_lookup(rule, 3, contacts), False) for rule, _, _ in RULES for contacts in (False, True))
 MOMENT_VALUES = tables.values_program(MOMENTS)
 
 
@@ -96,11 +108,12 @@ class VarianceSoftShadows(SoftMaps):
     params = (
         RESOLUTION,
         CUTOFF,
-        Param("cells", "Cells", 5, "Cells along each side of the kernel in which blockers are looked for", 2, 8),
+        Param("cells", "Cells", 3, "Cells along each side of the kernel in which blockers are looked for", 2, 8),
         Param(
             "rule", "Rule", "BOUNDS", "What tells whether the moments of a cell can be trusted", items=RULES,
         ),
         REFINE,
+        CONTACTS,
     )  # fmt: skip
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
@@ -108,5 +121,6 @@ class VarianceSoftShadows(SoftMaps):
         if drawn:
             bound = {"depth_maps": maps.atlas, **maps.textures}
             tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
-        lookup = _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"))
-        return replace(maps, lookup=lookup, images={**maps.images, "depth_table": table})
+        lookup = _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"), self.contacts(frame))
+        maps = replace(maps, lookup=lookup, images={**maps.images, "depth_table": table})
+        return self.with_contacts(frame, maps)

@@ -1,4 +1,4 @@
-// Casters with alpha: each layer casts with the probability of its opacity, so that the mean transmits the product.
+// Casters with alpha (see opaque.frag.glsl): each layer casts with the probability of its opacity, so that the mean transmits the product.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "lib/closure.glsl"
@@ -23,5 +23,5 @@ void main()
   if (to_unit(bits.x) < dot(c.transparency, vec3(1.0 / 3.0))) {
     discard;
   }
-  out_depth = vec4(q, q_dx, q_dy, 1.0);
+  out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn by lot
 }

@@ -1,6 +1,7 @@
 // Visibility of a light with extent, or of the part of it that a map stands for, in two steps: the mean height of the
 // blockers in the largest kernel that matters, then the share of blockers in the kernel of that height. The same is asked
-// of a smaller window, and the darker answer counts: each is what the blockers of some height hide at least.
+// of what stands close to the receiver, by rays (lib/contact.glsl) or of a smaller window, and the darker answer counts:
+// each is what the blockers of some height hide at least.
 //
 // The technique that includes this file last brings `kernel_cells`, which adds what it finds in a box. A texel at the
 // offset d in the kernel of height h stands for one point of the light (lib/soft_kernel.glsl). It counts by the cosine
@@ -77,6 +78,14 @@ vec3 kernel_towards(Light light, vec3 position)
   return light.point + (offset ? light.centre : vec3(0.0)) - position;
 }
 
+float kernel_lit(Blockers kernel)
+{
+  return (kernel.whole > 0.0) ? clamp(1.0 - kernel.blocked / kernel.whole, 0.0, 1.0) : 1.0;
+}
+
+#ifdef CONTACT_RAYS
+#include "lib/contact.glsl"
+#else
 // A blocker much lower than the mean is a small part of the window, and hides all of the light where its own kernel is
 // full: a wire that touches another. Such blockers are looked for, texel by texel, in a window that is smaller by NEAR_RATIO.
 #define NEAR_RATIO 0.25
@@ -111,11 +120,6 @@ Blockers kernel_near(Light light, ShadowReceiver r, vec3 normal, vec2 half_size,
   return found;
 }
 
-float kernel_lit(Blockers kernel)
-{
-  return (kernel.whole > 0.0) ? clamp(1.0 - kernel.blocked / kernel.whole, 0.0, 1.0) : 1.0;
-}
-
 // Visibility past blockers that stand lower than `height`.
 float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, float most, float height)
 {
@@ -137,22 +141,11 @@ float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, f
   // Heights scatter around their mean, hence twice: else a slanted blocker would count in part.
   return kernel_lit(kernel_near(light, r, normal, size, 2.0 * blocker, r.gradient / blocker));
 }
+#endif
 
-float light_visibility(Light light, vec3 position, vec3 normal)
+// Share of the light that passes blockers of up to `height` above the receiver.
+float kernel_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, vec2 extent, float most, float height)
 {
-  ShadowReceiver r;
-  if (!shadow_find(light.first_view, light.view_count, position, normal, r)) {
-    return 1.0;
-  }
-  if (r.rectangle.w <= 0.0) {
-    return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
-  }
-  vec2 extent = kernel_extent(light, r);
-  float most = min(0.5 * r.rectangle.z, MOST_HALF_SIZE);
-  float height = kernel_height(light, r, extent, most);
-  if (height <= 0.0) {
-    return 1.0 + height;
-  }
   vec3 towards = safe_normalize(kernel_towards(light, position));
   bool back = dot(normal, towards) < 0.0;
   if (abs(dot(normal, towards)) < EDGE_ON) {
@@ -169,18 +162,49 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   else {
     search = kernel_box(light, r, normal, window, within, vec2(0.0));
   }
-  if (search.blocked <= 0.0) {
-    return back ? 1.0 : near_visibility(light, r, normal, extent, most, height);
+  float blocker = height;
+  float lit = 1.0;
+  if (search.blocked > 0.0) {
+    blocker = min(search.height / search.blocked, height);
+    vec2 horizon = r.gradient / blocker;
+    vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
+    Blockers kernel;
+    if (back) {
+      kernel = kernel_back(light, r, size, Blockers(0.0, 0.0, 0.0, vec2(0.0), horizon));
+    }
+    else {
+      kernel = kernel_box(light, r, normal, size, vec2(0.0), horizon);
+    }
+    lit = kernel_lit(kernel);
   }
-  float blocker = min(search.height / search.blocked, height);
-  vec2 horizon = r.gradient / blocker;
-  vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
-  Blockers kernel;
-  if (back) {
-    kernel = kernel_back(light, r, size, Blockers(0.0, 0.0, 0.0, vec2(0.0), horizon));
+#ifndef CONTACT_RAYS
+  if (!back) {
+    lit = min(lit, near_visibility(light, r, normal, extent, most, blocker));
   }
-  else {
-    kernel = kernel_box(light, r, normal, size, vec2(0.0), horizon);
+#endif
+  return lit;
+}
+
+float light_visibility(Light light, vec3 position, vec3 normal)
+{
+  ShadowReceiver r;
+  if (!shadow_find(light.first_view, light.view_count, position, normal, r)) {
+    return 1.0;
   }
-  return back ? kernel_lit(kernel) : min(kernel_lit(kernel), near_visibility(light, r, normal, extent, most, blocker));
+  if (r.rectangle.w <= 0.0) {
+    return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
+  }
+  vec2 extent = kernel_extent(light, r, r.rectangle.w);
+  float most = min(0.5 * r.rectangle.z, MOST_HALF_SIZE);
+  float height = kernel_height(light, r, extent, most);
+  if (height <= 0.0) {
+    return 1.0 + height;
+  }
+  float lit = kernel_visibility(light, r, position, normal, extent, most, height);
+#ifdef CONTACT_RAYS
+  if (lit > 0.0) {
+    lit = min(lit, contact_visibility(light, r, position, normal));
+  }
+#endif
+  return lit;
 }

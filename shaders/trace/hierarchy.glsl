@@ -102,7 +102,8 @@ uint node_meets(int node, vec3 origin, vec3 inverse, float farthest, out vec4 en
 // Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
 // number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
 // Triangles with an opacity below one are passed at random, the same way for the same `salt`; those that may bend light
-// are met for certain where `bent`. `shadow`: the ray looks for a light.
+// are met for certain where `bent`. `shadow`: the ray looks for a light. With OPAQUE_ONLY what is not opaque is passed:
+// for lookups whose depth maps already drew lots for it.
 float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint salt, bool bent, bool shadow,
                    out ivec2 hit)
 {
@@ -150,6 +151,9 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
       opacity = (bent ? mix(abs(opacity) - 2.0 * blocks, vec4(1.0), lessThan(opacity, vec4(0.0)))
                       : abs(opacity) - 2.0 * blocks);
       opacity = mix(opacity, vec4(0.0), passed);
+#ifdef OPAQUE_ONLY
+      opacity = floor(opacity);
+#endif
       uint roll = hash3(uvec3(uint(node), salt, 77u)).x;
       vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                          to_unit(roll * 277803737u + 7u));

@@ -9,7 +9,7 @@
 #include "lib/soft_kernel.glsl"
 #include "vssm/range.glsl"
 
-#define CELL_LINES 9  // of a grid of up to 8 x 8 cells
+#define CELL_LINES 10  // of a grid of up to 9 x 9 cells
 #define CELL_TEXELS 64  // widest cell whose sums fit into 32 bits
 
 uvec4 vssm_sum(ivec2 texel)
@@ -85,7 +85,9 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec3 norm
   vec2 high = min(r.texel + half_size, vec2(last + 1));
   ivec2 count = last - first + 1;
   // Lines of the grid: with smooth edges, the first and the last cell are one texel wide.
-  int cells = (max(count.x, count.y) > 4 * CELL_TEXELS) ? 8 : (smooth_edges ? 6 : CELLS);
+  // The outline of a round light takes more of them.
+  int wished = smooth_edges ? ((light.kind == LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
+  int cells = (max(count.x, count.y) > 4 * CELL_TEXELS) ? 8 : wished;
   int border = smooth_edges ? 1 : 0;
   ivec2 inner_low = first + border;
   ivec2 inner = count - 2 * border;

@@ -26,6 +26,23 @@ def test_one_soft_map_leaves_less_error_than_four_points_of_the_light(registered
     assert errors[soft.CSSM, 1] < errors[soft.POINTS, 4]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("technique", [soft.VSSM, soft.CSSM])
+def test_short_rays_see_blockers_that_the_middle_of_the_light_does_not(registered, technique):
+    """Wires of a fence, two layers close together: pixels that get hardly any light are what goes wrong."""
+    from addon.compare.metrics import compare_radiance
+    from bench import soft_scenes
+
+    scene = soft_scenes.build("chain fence")
+    expected, _ = soft.direct(scene, soft.Entrant("truth", soft.POINTS, samples=64), SIZE)
+    error = {}
+    for contacts in (True, False):
+        found, _ = soft.direct(scene, soft.Entrant("", technique, (("contacts", contacts),)), SIZE)
+        pictures = (np.repeat(one[..., None], 3, axis=-1) for one in (found, expected))
+        error[contacts] = compare_radiance("direct", *pictures).relmse
+    assert error[True] < 0.5 * error[False]
+
+
 def test_the_table_has_a_row_per_technique():
     entrants = (soft.Entrant("one", soft.VSSM), soft.Entrant("map", soft.POINTS))
     results = [soft.Result(0.25, [3.0, 2.5], [0.5]), soft.Result(0.5, [1.5, 1.6], [0.5])]

@@ -72,6 +72,7 @@ def test_the_error_falls_with_the_order(strip):
     kind, settings, source = LIGHTS["square"]
     strip.scene.candela.cssm_texels_per_pixel = 4.0
     strip.scene.candela.cssm_prefilter = "TABLE"
+    strip.scene.candela.cssm_contacts = False  # rays would see most of the plate
     strip.light(kind, (0, 0, HEIGHT), **settings)
     blockers = [((-EVERYWHERE, -EVERYWHERE), (0.0, EVERYWHERE), 0.2), ((0.9, -0.1), (0.95, 0.1), 1.5)]
     for blocker in blockers:

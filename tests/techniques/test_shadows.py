@@ -65,6 +65,21 @@ def test_the_penumbra_of_an_edge_is_the_clipped_area_of_the_light(floor, name):
     assert (found[expected == 0] == 0).all()
 
 
+@pytest.mark.parametrize("kind", ["POINT", "SUN"])
+def test_rays_make_hard_edges_exact_whatever_the_resolution_of_the_map(floor, kind):
+    floor.light(kind, (0.3, 0, HEIGHT), **({"angle": 0.0} if kind == "SUN" else {"shadow_soft_size": 0.0}))
+    for x in np.arange(-1.5, 1.6, 0.5):
+        floor.blocker((x, -EVERYWHERE), (x + 0.21, EVERYWHERE), 0.3)
+    settings, size = floor.scene.candela, (64, 16)
+    shown = {}
+    for texels, rays in ((16.0, True), (1.0, True), (1.0, False)):
+        settings.accumulated_maps_texels_per_pixel, settings.accumulated_maps_edge_rays = texels, rays
+        shown[texels, rays] = irradiance(floor, 1, size) > 0
+    differ = {case: (shadow != shown[16.0, True]).mean() for case, shadow in shown.items()}
+    assert differ[1.0, True] == 0.0
+    assert differ[1.0, False] > 0.02
+
+
 @pytest.mark.slow
 def test_the_width_of_a_penumbra_follows_from_similar_triangles(floor):
     """A light of width w at height H over an edge at height h: w h / (H - h)."""

@@ -62,6 +62,9 @@ def test_auto_takes_it_for_one_sample_of_soft_lights_alone(plate):
 def test_lights_of_all_kinds_add_up_to_what_each_brings_alone(plate):
     plate.scene.candela.shadows_by_light_important = 1
     plate.scene.candela.slot_shadow = NAME
+    for kind in ("vssm", "cssm"):  # as fine as maps by light are at least
+        setattr(plate.scene.candela, f"{kind}_texels_per_pixel", 16.0)
+        setattr(plate.scene.candela, f"{kind}_contacts", False)
     lamps = [
         plate.light("POINT", (0.3, 0, HEIGHT), shadow_soft_size=0.0),
         plate.light("AREA", (0, 0, HEIGHT), size=1.0, energy=200.0),

@@ -30,7 +30,7 @@ def test_a_light_that_only_changes_its_power_keeps_its_map(lit):
     lit.lamp.data.energy *= 2
     assert irradiance(lit, 1, SIZE) == pytest.approx(2 * before, rel=1e-5)
     assert (counters(lit).get("maps", 0), counters(lit)["maps kept"]) == (0, 1)
-    setattr(lit.scene.candela, f"{lit.kind}_cells", 3)
+    setattr(lit.scene.candela, f"{lit.kind}_cells", 5)
     irradiance(lit, 1, SIZE)
     assert counters(lit)["maps"] == 1
     blocker.location.x += 0.5

@@ -1,0 +1,57 @@
+// What stands closer to a receiver than a depth map can tell, by short rays to points of the light.
+//
+// A texel knows one plane: along the line where two surfaces meet it holds either the receiver or the blocker, and of two
+// wires that touch the light's middle sees one. Rays see both. They end where blockers cast penumbrae that the map
+// resolves, so that they meet few boxes of the hierarchy, and their noise stays within some texels of a contact.
+// Casters with alpha are left to the map, which drew lots for them.
+#define OPAQUE_ONLY
+#include "trace/hierarchy.glsl"
+
+#define CONTACT_SHARE 0.04  // length of the rays beside what the map spans at the receiver
+
+// A point of what the map stands for: all of the light or a part around the map's point. `place` in [0, 1)^2.
+Light contact_point(Light light, vec2 place, float share, vec3 position)
+{
+  vec2 square = 2.0 * place - 1.0;
+  float turn = 2.0 * PI * place.x;
+  vec2 disc = sqrt(place.y) * vec2(cos(turn), sin(turn));
+  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+    vec2 within = ((light.kind == LIGHT_RECTANGLE) ? square : disc) * share;
+    light.point += within.x * sources.light[light.base + 5].xyz + within.y * sources.light[light.base + 6].xyz;
+    return light;
+  }
+  bool sun = light.kind == LIGHT_SUN;
+  vec3 axis = sun ? light.point : safe_normalize(light.centre - position);
+  vec3 u;
+  vec3 v;
+  orthonormal_basis(axis, u, v);
+  vec3 offset = (disc.x * u + disc.y * v) * share;
+  light.point = sun ? safe_normalize(axis + offset * tan(min(light.radius, 1.5))) : light.point + offset * light.radius;
+  return light;
+}
+
+// Share of the light that no near caster hides, by contact_side^2 rays.
+float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal)
+{
+  float spanned = 2.0 * r.w / max(length(sources.view[r.view * VIEW_TEXELS].xyz), 1e-30);
+  vec3 origin = position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index * 1024 + r.view)));
+  float open = 0.0;
+  float all = 0.0;
+  for (int k = 0; k < contact_side * contact_side; k++) {
+    uvec3 lot = hash3(salt + uvec3(k, 0, 0));
+    vec2 place = (vec2(k % contact_side, k / contact_side) + vec2(to_unit(lot.x), to_unit(lot.y))) / float(contact_side);
+    Light source = contact_point(light, place, r.rectangle.w, position);
+    vec3 direction;
+    float density;
+    vec3 arriving = light_sample(source, position, direction, density);
+    float weight = max_component(arriving) * dot(direction, normal);
+    if (weight > 0.0) {
+      float reach = min(CONTACT_SHARE * spanned, 0.9999 * light_distance(source, origin, direction));
+      ivec2 hit;
+      all += weight;
+      open += (trace_until(origin, direction, reach, reach, salt.z, hit) >= reach) ? weight : 0.0;
+    }
+  }
+  return (all > 0.0) ? open / all : 1.0;
+}
