@@ -12,6 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from bench import markdown
 from bench.quick import size_of, table
 
 SCENES = Path(__file__).resolve().parent.parent / "sample_blends"
@@ -45,12 +46,11 @@ def lines(scene, name: str, samples: int, size: tuple[int, int], reference_sampl
 
 def page(rows: list[tuple[str, ...]], samples: int, size: tuple[int, int], reference_samples: int) -> str:
     """The rows as a page of the documentation."""
-    cells = ["| " + " | ".join(row) + " |" for row in (HEAD, ("---",) * len(HEAD), *rows)]
     return "\n".join([
         f"# Direct light at {samples} samples", "",
         f"Written by `python -m bench direct --page PATH`; do not edit. Pictures of {size[0]} x {size[1]} pixels",
         f"without bounces against two renders of {reference_samples} samples by Cycles, whose noise is taken off the",
-        "errors (relMSE).", "", *cells, "",
+        "errors (relMSE).", "", markdown.table([HEAD, *rows]), "",
     ])  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench import markdown
 from bench.cells import Scene, Series
 
 BOUNCES = 16
@@ -192,10 +193,6 @@ def gathers(scenes=GATHER_SCENES, size=GATHER_SIZE, virtual_lights=GATHER_LIGHTS
 # ---------------------------------------------------------------------------------------------------------------- page
 
 
-def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows))
-
-
 def page(about: dict, size, reference: int, by_scene: dict, gathered: list, grown: list, moved: list) -> str:
     """The whole page as Markdown."""
     made = f"{about['date']}, Blender {about['blender']}, {about['device']}, {about['cpu']}."
@@ -206,26 +203,26 @@ taken off the errors (relMSE); the passes of one sample are means of several see
 render. EEVEE splits light into other passes, and denoised
 Cycles has none: of both Combined is compared."""
     parts = ["# Indirect light: error and time", intro]
-    parts += [f"## {name}\n\n{markdown(HEAD, rows)}" for name, rows in by_scene.items()]
+    parts += [f"## {name}\n\n{markdown.table([HEAD, *rows])}" for name, rows in by_scene.items()]
     if gathered:
         parts.append(
             f"## Regions\n\nThe gather of {GATHER_LIGHTS} virtual lights, none or some of them traced, once for each"
             " region (all that finds regions\nand interpolates between them included) and once for each pixel, at"
             f" {GATHER_SIZE[0]} x {GATHER_SIZE[1]}; difference in irradiance,\nover its mean.\n\n"
-            + markdown(GATHER_HEAD, gathered)
+            + markdown.table([GATHER_HEAD, *gathered])
         )
     if grown:
         parts.append(
             "## Growth\n\nOne sample; the dials of the picture and of virtual lights in the Cornell box, those of"
             f" triangles and lights\nin bench/families.py at {GROWTH_SIZE[0]} x {GROWTH_SIZE[1]}.\n\n"
-            + markdown(GROWTH_HEAD, grown)
+            + markdown.table([GROWTH_HEAD, *grown])
         )
     if moved:
         parts.append(
             f"## Motion\n\n{FRAMES} frames of one sample of the Cornell box while camera and lamp move slowly, at"
             f" {MOVING_SIZE[0]} x {MOVING_SIZE[1]}.\nNew error is half the mean square of the error's change from one"
             " frame to the next: 0 where errors stand still,\ntheir variance where every frame draws its own.\n\n"
-            + markdown(MOVING_HEAD, moved)
+            + markdown.table([MOVING_HEAD, *moved])
         )
     return "\n\n".join(parts) + "\n"
 

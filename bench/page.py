@@ -13,7 +13,7 @@ import statistics
 from pathlib import Path
 from string import Template
 
-from bench import again, plots, profile
+from bench import again, markdown, plots, profile
 from bench import growth as growth_of_cost
 from bench.cells import RAW, ROOT
 from bench.figures import (
@@ -41,7 +41,7 @@ BUSY = 2.0  # processes that want each thread, from which on times say little; t
 PEERS = ("EEVEE", "EEVEE, ray traced", "Cycles", "Cycles, denoised")
 README, PERFORMANCE = ROOT / "README.md", ROOT / "docs" / "performance.md"
 PICTURE = ROOT / "docs" / "images" / "bench.png"
-BEGIN, END = "<!-- written by `python -m bench page` -->", "<!-- end of what is written -->"
+COMMAND = "python -m bench page"  # whose part of a document is written
 
 PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -248,12 +248,6 @@ def scientific(value: float | None) -> str:
 # --------------------------------------------------------------------------------------------------------------- texts
 
 
-def markdown(table: Table) -> str:
-    head, *rows = table
-    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
-
-
 def as_html(table: Table) -> str:
     if not table:
         return ""
@@ -374,14 +368,14 @@ def generated_part(results: Results, grown: list[dict], profiled: list[dict], re
         READING,
         *said(results, repeated),
         ratios,
-        markdown(summary(results)),
+        markdown.table(summary(results)),
         rest,
     ]
-    parts.append(markdown(faults(results)))
+    parts.append(markdown.table(faults(results)))
     if profiled:
-        parts += ["### Where a render's time goes", PROFILE, markdown(profile.table(profiled))]
+        parts += ["### Where a render's time goes", PROFILE, markdown.table(profile.table(profiled))]
     if grown:
-        parts += ["### Growth of cost", GROWTH, markdown(growth_of_cost.table(grown))]
+        parts += ["### Growth of cost", GROWTH, markdown.table(growth_of_cost.table(grown))]
     return "\n\n".join(parts)
 
 
@@ -394,16 +388,7 @@ def readme_part(results: Results) -> str:
             rows.append((f"{peer}, over Candela", means[1 + 2 * number], means[2 + 2 * number]))
     picture = "![Time against error of every sample scene](docs/images/bench.png)"
     more = "More than 1 is in favour of Candela; [docs/performance.md](docs/performance.md) has every scene."
-    return "\n\n".join([facts(results), *reserve(results), picture, markdown(rows), more])
-
-
-def put_between(path: Path, part: str) -> None:
-    """Replace what stands between the two marks of a file. ValueError when it has none."""
-    before, begin, rest = path.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end):
-        raise ValueError(f"{path.name} lacks the marks '{BEGIN}' and '{END}'.")
-    path.write_text(f"{before}{BEGIN}\n\n{part}\n\n{END}{after}", encoding="utf-8")
+    return "\n\n".join([facts(results), *reserve(results), picture, markdown.table(rows), more])
 
 
 # ------------------------------------------------------------------------------------------------------------- command
@@ -428,7 +413,7 @@ def command(options: argparse.Namespace) -> int:
     print(page)
     if not options.no_docs:
         plots.overview(results, PICTURE)
-        put_between(PERFORMANCE, generated_part(results, *beside))
-        put_between(README, readme_part(results))
+        markdown.put_between(PERFORMANCE, COMMAND, generated_part(results, *beside))
+        markdown.put_between(README, COMMAND, readme_part(results))
         print(f"{PERFORMANCE}\n{README}")
     return 0

@@ -7,7 +7,7 @@ blocking is compared. The time is the processor time of a whole render on a soft
 turns, less that of the same picture without shadows, as a ratio to that of one accumulated map.
 
 With `--cycles N` relMSE and FLIP of the direct diffuse light against Cycles with twice N samples follow, and what of
-both is the reference's own noise.
+both is the reference's own noise. With `--page` the tables become a part of docs/soft_shadows.md.
 
 References are kept in the cache folder of the comparison with Cycles, one small file per family and size.
 """
@@ -24,10 +24,12 @@ from pathlib import Path
 
 import numpy as np
 
-from . import soft_scenes
+from . import markdown, soft_scenes
 from .quick import size_of, table
 
 REFERENCE_MAPS, REFERENCE_TEXELS = 1024, 4.0
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "soft_shadows.md"
+COMMAND = "python -m bench.soft --page"
 LEAST_LIGHT = 0.05  # of the brightest pixel
 
 
@@ -132,13 +134,13 @@ def truth(family: str, scene, size: tuple[int, int], maps: int = REFERENCE_MAPS)
     """Visibility by the mean of `maps` accumulated maps, from the cache where it was made before."""
     from addon.compare.reference import cache_folder
 
-    made_of = (
-        Path(soft_scenes.__file__).read_bytes() + repr((family, size, maps, REFERENCE_TEXELS, LEAST_LIGHT)).encode()
-    )
+    values = (("texels_per_pixel", REFERENCE_TEXELS), ("edge_rays", False))  # what needs no hierarchy to be right
+    entrant = Entrant("truth", POINTS, values, maps)
+    made_of = Path(soft_scenes.__file__).read_bytes() + repr((family, size, entrant, LEAST_LIGHT)).encode()
     path = cache_folder() / f"soft_{hashlib.sha256(made_of).hexdigest()[:16]}.npy"
     if path.exists():
         return np.load(path)
-    found = visibility(scene, Entrant("truth", POINTS, (("texels_per_pixel", REFERENCE_TEXELS),), maps), size)
+    found = visibility(scene, entrant, size)
     path.parent.mkdir(parents=True, exist_ok=True)
     np.save(path, found)
     return found
@@ -191,17 +193,17 @@ def against_cycles(scene, entrants, results: list[Result], size: tuple[int, int]
     return floor
 
 
-def report_cycles(found: dict[str, list[Result]], labels: list[str], figure: str) -> str:
+def rows_against_cycles(found: dict[str, list[Result]], labels: list[str], figure: str) -> list[tuple[str, ...]]:
     """A row per label: `figure` (relmse, flip) on each family."""
     families = list(found)
     rows = [(figure, *families)]
     for k, label in enumerate(labels):
         values = [getattr(found[family][k], figure) for family in families]
         rows.append((label, *("–" if value is None else f"{value:.4f}" for value in values)))
-    return table(rows)
+    return rows
 
 
-def report(found: dict[str, list[Result]], entrants) -> str:
+def rows_of(found: dict[str, list[Result]], entrants) -> list[tuple[str, ...]]:
     """A row per entrant: RMS error on each family, and its time over all families by that of one map."""
     families = list(found)
     base = next((k for k, entrant in enumerate(entrants) if entrant.technique == POINTS and entrant.samples == 1), 0)
@@ -213,7 +215,26 @@ def report(found: dict[str, list[Result]], entrants) -> str:
         )
         shown = f"{ratio:.1f}" if np.isfinite(ratio) else "–"
         rows.append((entrant.label, *(f"{error:.4f}" for error in errors), f"{np.mean(errors):.4f}", shown))
-    return table(rows)
+    return rows
+
+
+def written(options: argparse.Namespace, rms_rows, cycles_rows: list) -> str:
+    """The tables as a part of the page."""
+    width, height = options.size
+    parts = [
+        f"{width}x{height} pixels.",
+        f"### RMS of the visibility against {options.maps:,} accumulated maps",
+        markdown.table(rms_rows),
+    ]
+    for rows, aim in zip(cycles_rows, (0.02, 0.05)):
+        auto = [float(value) for value in rows[1][1:]]
+        held = sum(value <= aim for value in auto)
+        parts += [
+            f"### {rows[0][0]} of one-sample direct diffuse light against Cycles (2 x {options.cycles} samples)",
+            f"The aim is {aim}: Auto holds it in {held} of {len(auto)} families; its worst is {max(auto):.4f}.",
+            markdown.table(rows),
+        ]
+    return "\n\n".join(parts)
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
@@ -225,6 +246,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--runs", default=3, type=int, metavar="N", help="for the times (default 3)")
     parser.add_argument("--maps", default=REFERENCE_MAPS, type=int, metavar="N", help="of the reference")
     parser.add_argument("--cycles", default=0, type=int, metavar="N", help="samples of each seed of Cycles' reference")
+    parser.add_argument("--page", action="store_true", help="write the tables into docs/soft_shadows.md")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write visibilities and errors there")
     return parser.parse_args(arguments)
 
@@ -247,9 +269,12 @@ def main(arguments: list[str]) -> int:
                 floor = against_cycles(scene, entrants, found[family], options.size, options.cycles)
                 cycles[family] = [*found[family], floor]
         print(f"{family} done", flush=True)
-    print(report(found, entrants))
-    for figure in ("relmse", "flip") if cycles else ():
-        print(report_cycles(cycles, [*(entrant.label for entrant in entrants), "noise of the reference"], figure))
+    labels = [*(entrant.label for entrant in entrants), "noise of the reference"]
+    of_cycles = [rows_against_cycles(cycles, labels, figure) for figure in ("relmse", "flip") if cycles]
+    for rows in (rows_of(found, entrants), *of_cycles):
+        print(table(rows))
+    if options.page:
+        markdown.put_between(PAGE, COMMAND, written(options, rows_of(found, entrants), of_cycles))
     return 0
 
 

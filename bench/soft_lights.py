@@ -6,11 +6,15 @@ of 1024x1024. Times are processor time of whole renders on a software GPU less t
 no shadow, the least of some that take turns: what is left are maps, tables and lookups. A further sample of accumulated
 maps is the difference between some samples and one. The number of samples with the same error is read off the errors
 under one light at 128x96 against 1,024 maps, between powers of four on logarithmic scales.
+
+`--levels` cuts every face of the blockers into four so many times, which changes no picture: what maps cost grows with
+the casters, what lookups cost does not.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import sys
 import time
@@ -18,9 +22,10 @@ import time
 import bpy
 import numpy as np
 
-from . import soft, soft_scenes
+from . import markdown, soft, soft_scenes
 from .quick import size_of, table
 
+COMMAND = "python -m bench.soft_lights --page"
 LIGHTS = (1, 4, 16, 64)
 SAMPLES = (4, 16, 64)
 MORE = 4  # samples between which the cost of one is taken
@@ -50,6 +55,16 @@ def put_lights(scene, count: int) -> None:
         light.location = middle + (RING * np.array([np.cos(turn), np.sin(turn), 0.0]) if count > 1 else 0.0)
         if k:
             scene.collection.objects.link(light)
+
+
+def put_triangles(scene, level: int) -> int:
+    """Cut the blockers' faces into four `level` times; the number of triangles then."""
+    blockers = scene.objects["Blockers"]
+    blockers.modifiers.clear()
+    if level:
+        cut = blockers.modifiers.new("Cut", "SUBSURF")
+        cut.subdivision_type, cut.levels, cut.render_levels = "SIMPLE", level, level
+    return 2 * len(blockers.data.polygons) * 4**level
 
 
 def seconds(scene, entrant: soft.Entrant, samples: int, size: tuple[int, int], seed: int, shadows: bool) -> float:
@@ -86,8 +101,10 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.soft_lights", description=__doc__.splitlines()[0])
     parser.add_argument("--family", default="foliage", choices=list(soft_scenes.FAMILIES))
     parser.add_argument("--lights", nargs="+", type=int, default=LIGHTS, metavar="N")
+    parser.add_argument("--levels", nargs="+", type=int, default=[0], metavar="N", help="of finer blockers (default 0)")
     parser.add_argument("--size", default="640x360", type=size_of, metavar="WxH")
     parser.add_argument("--runs", default=3, type=int, metavar="N")
+    parser.add_argument("--page", action="store_true", help="write the table into docs/soft_shadows.md")
     parser.add_argument("--maps", default=soft.REFERENCE_MAPS, type=int, metavar="N", help="of the reference")
     options = parser.parse_args(arguments)
     import addon
@@ -95,7 +112,7 @@ def main(arguments: list[str]) -> int:
     from addon.gfx import context
 
     addon.register()
-    rows = [("lights", "one map", *(f"{kind.label} / map" for kind in KINDS),
+    rows = [("lights", "triangles", "one map", *(f"{kind.label} / map" for kind in KINDS),
              *(f"{kind.label}: {word}" for kind in KINDS for word in ("samples", "faster")))]  # fmt: skip
     with quiet():
         context.ensure()
@@ -107,17 +124,29 @@ def main(arguments: list[str]) -> int:
 
         errors = [error(soft.Entrant("maps", soft.POINTS, samples=n)) for n in SAMPLES]
         equal = {kind.label: equal_samples(error(kind), SAMPLES, errors) for kind in KINDS}
-    for count in options.lights:
+    for count, level in itertools.product(options.lights, options.levels):
         with quiet():
             put_lights(scene, count)
+            triangles = put_triangles(scene, level)
             spent = shadow_seconds(scene, options.size, options.runs)
         ratios = {kind.label: spent[kind.label] / spent["maps"] for kind in KINDS}
-        row = [str(count), f"{1000 * spent['maps']:.0f} ms", *(f"{ratio:.1f}" for ratio in ratios.values())]
+        row = [
+            str(count),
+            str(triangles),
+            f"{1000 * spent['maps']:.0f} ms",
+            *(f"{ratio:.1f}" for ratio in ratios.values()),
+        ]
         for label, ratio in ratios.items():
             row += [f"{equal[label]:.1f}", f"{equal[label] / ratio:.1f}"]
         rows.append(tuple(row))
         print(", ".join(f"{name} {value}" for name, value in zip(rows[0], row)), flush=True)
     print(table(rows))
+    if options.page:
+        markdown.put_between(
+            soft.PAGE,
+            COMMAND,
+            f"{options.family}, {'x'.join(map(str, options.size))} pixels.\n\n" + markdown.table(rows),
+        )
     print("samples: of accumulated maps that leave the same error; faster: than those")
     return 0
 

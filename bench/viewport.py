@@ -30,12 +30,12 @@ from addon.gfx.struct import Block
 from addon.snapshot import camera_of_scene, take
 from addon.ui.properties import settings_of
 
+from . import markdown
 from .quick import table
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_blends"
 PAGE = ROOT / "docs" / "viewport.md"
-BEGIN, END = "<!-- written by `python -m bench.viewport` -->", "<!-- end of what is written -->"
 HEAD = "scene", "edit", "slowest, ms", "CPU ms", "pixels", "scene read", "meshes", "bytes", "the sample's"
 SIZE = (640, 360)
 FIELD = 2000  # objects in the scene of the move
@@ -260,11 +260,8 @@ def in_a_window() -> list[str]:
 
 def write_page(rows: list[tuple[str, ...]], told: list[str]) -> None:
     """Replace the figures of docs/viewport.md."""
-    page = PAGE.read_text(encoding="utf-8")
-    before, after = page.split(BEGIN)[0], page.split(END)[1]
-    table_rows = ["| " + " | ".join(row) + " |" for row in (HEAD, ("---",) * len(HEAD), *rows)]
-    figures = "\n".join([*table_rows, "", *(f"- {sentence}" for sentence in told)])
-    PAGE.write_text(f"{before}{BEGIN}\n\n{figures}\n\n{END}{after}", encoding="utf-8")
+    figures = "\n".join([markdown.table([HEAD, *rows]), "", *(f"- {sentence}" for sentence in told)])
+    markdown.put_between(PAGE, "python -m bench.viewport", figures)
 
 
 def main() -> None:

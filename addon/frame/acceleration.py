@@ -90,8 +90,8 @@ def _added(instance: Instance, path: str) -> float:
 
 
 def _opacity(material: CompiledMaterial) -> float:
-    """Mean coverage for rays that pass at random; negative where rays may also be bent."""
-    opacity = material.opacity if material.transparent else 1.0
+    """Mean coverage for rays that pass at random, below 1 where some may; negative where rays may also be bent."""
+    opacity = min(material.opacity, 0.999) if material.transparent else 1.0
     return -max(opacity, 1e-3) if material.glass else opacity
 
 

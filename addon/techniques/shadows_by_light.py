@@ -3,9 +3,9 @@
 | light | kind | why |
 |---|---|---|
 | without extent | plain | nothing to filter |
-| widest penumbra below one texel | plain | filtered or not, the map shows the same |
+| widest penumbra below one texel of a plain map | plain | filtered or not, the map shows the same |
 | the `important` strongest of the others | variance (vssm.py) | the least error of one map |
-| all others | convolution (cssm.py) with 2 x 2 boxes | a lookup that costs two thirds and never branches |
+| all others | convolution (cssm.py) with 2 x 2 boxes and one contact ray | a lookup that costs less |
 
 The widest penumbra of a light is bounded by its angle a from the nearest receiver and the space s that a blocker can
 stand in: 2 a s, s the light's distance or the scene's size, whichever is less. A light's strength is the median of its
@@ -15,8 +15,8 @@ Auto takes this technique for pictures of one sample in which a light has extent
 points of the lights (accumulated_maps.py) converge, and which is better is left to what the benchmark measured. Drafts
 of a moving view keep points too: their maps are drawn in half the time.
 
-Each kind keeps its own parameters. Cost and bias (direct diffuse and glossy light) are those of the kinds; lights of
-one kind share atlas and pass.
+Few lights have soft maps of at least 512 texels a side. Each kind keeps its own parameters. Cost and bias (direct
+diffuse and glossy light) are those of the kinds; lights of one kind share atlas and pass.
 
 Measured with one sample at 128x96 against Cycles, relMSE of the direct diffuse light, by this technique and by points
 with the same 6 maps per sample: Cornell box 0.036 and 0.059, door ajar 0.066 and 0.63, garden 0.19 and 0.24, window
@@ -36,29 +36,24 @@ from ..frame.technique import Param
 from ..snapshot.scene import Light, Snapshot
 from .accumulated_maps import AccumulatedMaps
 from .cssm import ConvolutionSoftShadows
+from .soft_maps import SoftMaps
 from .vssm import VarianceSoftShadows
 
 PLAIN = "lights without penumbra: plain maps"
 VARIANCE, CONVOLUTION = "important soft lights: variance maps", "other soft lights: convolution maps"
 
 
-LEAST_SIDE = 512  # of soft maps, texels: in small pictures a finer map costs little beside its lookups
+# Of soft maps, texels, where few lights have some: in small pictures a finer map costs little beside its lookups.
+LEAST_SIDE, FEW_LIGHTS = 512, 4
 
 
 class FewBoxes(ConvolutionSoftShadows):
     """Convolution maps for lights that matter little each."""
 
-    least_side = LEAST_SIDE
     contact_side = 1
 
     def cells(self, frame: Frame) -> int:
         return min(super().cells(frame), 2)
-
-
-class FineVariance(VarianceSoftShadows):
-    """Variance maps for important lights."""
-
-    least_side = LEAST_SIDE
 
 
 class ShadowsByLight(AccumulatedMaps):
@@ -73,7 +68,7 @@ class ShadowsByLight(AccumulatedMaps):
     )  # fmt: skip
 
     def __init__(self):
-        self._services = {PLAIN: AccumulatedMaps(), VARIANCE: FineVariance(), CONVOLUTION: FewBoxes()}
+        self._services = {PLAIN: AccumulatedMaps(), VARIANCE: VarianceSoftShadows(), CONVOLUTION: FewBoxes()}
         self._kinds: dict[str, str] = {}
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
@@ -104,6 +99,8 @@ class ShadowsByLight(AccumulatedMaps):
             else:
                 soft.append(emitter)
         soft.sort(key=lambda emitter: -strength(frame, emitter))
+        for kind in (VARIANCE, CONVOLUTION):
+            self._services[kind].least_side = LEAST_SIDE if len(soft) <= FEW_LIGHTS else SoftMaps.least_side
         most = frame.settings.get(self, "important")
         kinds |= {emitter.light.key: VARIANCE for emitter in soft[:most]}
         return kinds | {emitter.light.key: CONVOLUTION for emitter in soft[most:]}

@@ -10,10 +10,10 @@ How a kernel follows from the light and a blocker's height stands in shaders/lib
 it asks a box of the filtered map for blockers.
 
 What one map cannot tell, blockers that touch the receiver or that others hide from the light's middle, short rays see
-(`contacts`, shaders/lib/contact.glsl): without them a handful of pixels in a hundred thousand, lit where two leaves
-meet, had nearly all of foliage's relMSE. Scenes with too many triangles for a hierarchy look into smaller windows of
-the map instead. relMSE of one-sample light by Auto, windows and rays (`python -m bench.soft --cycles 256`): poles
-0.0066 and 0.0006, fence 0.077 and 0.013, foliage 0.092 and 0.007; one ray per part instead of four leaves noise.
+(`contacts`, shaders/lib/contact.glsl): without them a handful of pixels, lit where two leaves meet, had nearly all of
+foliage's relMSE. Scenes with too many triangles for a hierarchy look into smaller windows of the map instead. relMSE of
+one-sample light by Auto, windows and rays (`python -m bench.soft --cycles 256`): poles 0.0066 and 0.0006, fence 0.077
+and 0.008, foliage 0.092 and 0.005.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..frame import acceleration, depth_maps, lights, tables
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images
-from .accumulated_maps import RAY_CONSTANTS, AccumulatedMaps, Maps, map_resolution, ray_bindings
+from .accumulated_maps import RAY_CONSTANTS, AccumulatedMaps, Lookup, Maps, map_resolution, ray_bindings
 
 REFINE = Param(
     "refine", "Refine", True,
@@ -108,10 +108,22 @@ class SoftMaps(AccumulatedMaps):
         varies = any(compiled[draw.material].transparent for draw in frame.geometry.draws)  # alpha is drawn by lot
         if not varies and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
-            return self._drawn[1]
+            return self._to_ask(frame, self._drawn[1])
         maps = self._with_bounds(frame, views, self.service.draw(frame, self, views, self.resolution(frame)))
         self._drawn = (key, maps)
-        return maps
+        return self._to_ask(frame, maps)
+
+    def _to_ask(self, frame: Frame, maps: Maps) -> Maps:
+        """`maps` with the lookup, and with what its rays bind where short rays look for near blockers."""
+        contacts = self.contact_side > 0 and frame.settings.get(self, "contacts") and len(maps.views) > 0
+        if not contacts or acceleration.too_many(frame.snapshot):
+            return replace(maps, lookup=self.lookup(frame, False))
+        textures, constants = ray_bindings(frame)
+        constants["contact_side"] = self.contact_side if frame.settings.samples == 1 else 1
+        return replace(
+            maps, lookup=self.lookup(frame, True), textures=maps.textures | textures,
+            constants=maps.constants | constants,
+        )  # fmt: skip
 
     def _with_bounds(self, frame: Frame, views: list, maps: Maps) -> Maps:
         """Pyramid, limits and filtered maps of the part of the atlas that holds views."""
@@ -130,21 +142,12 @@ class SoftMaps(AccumulatedMaps):
         return self.filtered(frame, maps, (width, height), bool(views))
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
-        """`maps`, whose part `size` holds views, with the lookup and what it needs; without views nothing is built."""
+        """`maps`, whose part `size` holds views, with what the lookup needs; without views nothing is built."""
         raise NotImplementedError
 
-    def contacts(self, frame: Frame) -> bool:
-        """Whether short rays look for near blockers."""
-        asked = self.contact_side > 0 and frame.settings.get(self, "contacts")
-        return asked and not acceleration.too_many(frame.snapshot)
-
-    def with_contacts(self, frame: Frame, maps: Maps) -> Maps:
-        """`maps` with what the rays bind, where they are traced."""
-        if not self.contacts(frame):
-            return maps
-        textures, constants = ray_bindings(frame)
-        constants["contact_side"] = self.contact_side if frame.settings.samples == 1 else 1
-        return replace(maps, textures=maps.textures | textures, constants=maps.constants | constants)
+    def lookup(self, frame: Frame, contacts: bool) -> Lookup:
+        """How the filtered maps are asked, with or without rays for near blockers."""
+        raise NotImplementedError
 
     def kept(self, name: str, size: tuple[int, int], image_format: str) -> images.Image:
         """The technique's image of this name, another one of the pool if size or format differ."""

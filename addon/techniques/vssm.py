@@ -17,7 +17,8 @@ few texels look at every texel and see the caster's plane too, so contacts stay 
 With n samples of the light, the map of each stands for 1 / n of it: the kernel's extents shrink by sqrt(n), steps
 between the points are filled, and the error goes to that of accumulated maps and to zero. Rectangles are cut into 2^k
 parts that tile them. With one sample, and for each such part, the point is the middle, and the unblocked light has a
-closed form (shaders/light/whole.glsl). Blockers much lower than the mean are looked for in smaller windows.
+closed form (shaders/light/whole.glsl). Blockers much lower than the mean are looked for by short rays, or, without
+them, in smaller windows.
 
 Source: Yang, Dong, Feng, Seidel, Kautz, "Variance soft shadow mapping", Computer Graphics Forum 29(7), 2010; the
 classification by bounds and the plane-relative moments are ours.
@@ -26,31 +27,23 @@ classification by bounds and the plane-relative moments are ours.
 |---|---|
 | pyramid, table | log2 N dispatches, 4 log8 N + 3 passes; 20 bytes per texel kept |
 | lookup, lit or all blocked pixels | up to 27 loads |
-| lookup, penumbra | 2 grids: up to 130 loads of 16 bytes and 450 of 8, usually a third; 9 more per mixed cell |
+| lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 41 loads of 16 bytes, up to 225 of 8; 9 more per mixed cell |
+| contact rays | 4 per pixel that is not settled and map, with several samples 1 |
 | bytes | 36 per texel and 16 borrowed, beside the map's 20 |
 
-Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the
-light's middle does not see blocks nothing; visibility multiplies the unblocked light, as if every part of the light
-counted the same for the receiver; parts of a refined light reach beyond its edge by half their width. All of it goes
-to zero with the samples. Parts of the light below a receiver's horizon count neither as lit nor as blocked, also where
-the map's own point is among them. Fails: blockers so close to a wide light that the kernel is larger than the view (a
-lamp right behind muntins: half of the light is lost at one sample); kernels wider than 512 texels are cut to that.
+Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the light's
+middle does not see, beyond the reach of contact rays, blocks nothing; visibility multiplies the unblocked light, as if
+every part of the light counted the same for the receiver; parts of a refined light reach beyond its edge by half their
+width. All of it goes to zero with the samples, where they refine. Parts of the light below a receiver's horizon count
+neither as lit nor as blocked, also where the map's own point is among them. Fails: blockers so close to a wide light
+that the kernel is larger than the view (a lamp right behind muntins: half of the light is lost at one sample); kernels
+wider than 512 texels are cut to that.
 
 Measured, RMS of the visibility behind an edge half way to the light, one map: square 0.012, rectangle 5:1 0.029, disc
 0.021, sphere 0.003, sun 0.005. Refined, 16 and 64 points: square 0.0024 and 0.0007, where points alone leave 0.014 and
 0.0031.
 
-RMS of the visibility on the families of `python -m bench.soft` at 128x96, against 1,024 accumulated maps; all
-parameters, relMSE and FLIP against Cycles, and time stand in docs/soft_shadows.md:
-
-| | poles | fence | foliage | grid | far background | plates | mean |
-|---|---|---|---|---|---|---|---|
-| one map | 0.026 | 0.067 | 0.053 | 0.057 | 0.048 | 0.020 | 0.045 |
-| one map, twice the texels per side | 0.019 | 0.066 | 0.048 | 0.038 | 0.027 | 0.018 | 0.036 |
-| 4 parts | 0.014 | 0.034 | 0.033 | 0.035 | 0.032 | 0.006 | 0.026 |
-| 16 parts | 0.010 | 0.019 | 0.021 | 0.018 | 0.015 | 0.004 | 0.014 |
-| 4 plain maps | 0.058 | 0.055 | 0.125 | 0.139 | 0.107 | 0.055 | 0.090 |
-| 16 plain maps | 0.025 | 0.029 | 0.055 | 0.052 | 0.039 | 0.016 | 0.036 |
+Errors and times on six families of blockers, with every parameter, stand in docs/soft_shadows.md.
 """
 
 from __future__ import annotations
@@ -121,6 +114,7 @@ class VarianceSoftShadows(SoftMaps):
         if drawn:
             bound = {"depth_maps": maps.atlas, **maps.textures}
             tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
-        lookup = _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"), self.contacts(frame))
-        maps = replace(maps, lookup=lookup, images={**maps.images, "depth_table": table})
-        return self.with_contacts(frame, maps)
+        return replace(maps, images={**maps.images, "depth_table": table})
+
+    def lookup(self, frame: Frame, contacts: bool) -> Lookup:
+        return _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"), contacts)

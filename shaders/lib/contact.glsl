@@ -7,7 +7,7 @@
 #define OPAQUE_ONLY
 #include "trace/hierarchy.glsl"
 
-#define CONTACT_SHARE 0.04  // length of the rays beside what the map spans at the receiver
+#define CONTACT_SHARE 0.06  // length of the rays beside what the map spans at the receiver
 
 // A point of what the map stands for: all of the light or a part around the map's point. `place` in [0, 1)^2.
 Light contact_point(Light light, vec2 place, float share, vec3 position)
@@ -30,12 +30,23 @@ Light contact_point(Light light, vec2 place, float share, vec3 position)
   return light;
 }
 
-// Share of the light that no near caster hides, by contact_side^2 rays.
-float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal)
+float contact_reach(ShadowReceiver r)
 {
-  float spanned = 2.0 * r.w / max(length(sources.view[r.view * VIEW_TEXELS].xyz), 1e-30);
-  vec3 origin = position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index * 1024 + r.view)));
+  float across = length(sources.view[r.view * VIEW_TEXELS].xyz);
+  float along = length(sources.view[r.view * VIEW_TEXELS + 1].xyz);
+  return CONTACT_SHARE * 2.0 * r.w / max(min(across, along), 1e-30);
+}
+
+// Share of the light that no caster nearer than `reach` hides, by contact_side^2 rays.
+float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, float reach)
+{
+  float offset = max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
+  if (offset > 0.1 * reach) {
+    return 1.0;  // beside so large a scene rays would start beyond what they look for
+  }
+  vec3 origin = position + normal * offset;
+  // The same lots for all lights, so that two half lights are one.
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)) + uvec3(0, 0, uint(film_view.seed) << 16));
   float open = 0.0;
   float all = 0.0;
   for (int k = 0; k < contact_side * contact_side; k++) {
@@ -45,12 +56,12 @@ float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 norm
     vec3 direction;
     float density;
     vec3 arriving = light_sample(source, position, direction, density);
-    float weight = max_component(arriving) * dot(direction, normal);
+    float weight = max_component(abs(arriving)) * dot(direction, normal);
     if (weight > 0.0) {
-      float reach = min(CONTACT_SHARE * spanned, 0.9999 * light_distance(source, origin, direction));
+      float limit = min(reach, 0.9999 * light_distance(source, origin, direction));
       ivec2 hit;
       all += weight;
-      open += (trace_until(origin, direction, reach, reach, salt.z, hit) >= reach) ? weight : 0.0;
+      open += (trace_until(origin, direction, limit, limit, salt.z, hit) >= limit) ? weight : 0.0;
     }
   }
   return (all > 0.0) ? open / all : 1.0;

@@ -84,6 +84,16 @@ bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out
   return false;
 }
 
+// Distance from `position` along the unit `direction` to where the view's depth measure is q; 1e29 if it never is.
+float shadow_distance(int view, vec3 position, vec3 direction, float q)
+{
+  vec4 row_w = sources.view[view * VIEW_TEXELS + 2];
+  vec4 row_q = sources.view[view * VIEW_TEXELS + 3];
+  float rise = dot(row_q.xyz, direction) - q * dot(row_w.xyz, direction);
+  float t = (q * dot(row_w, vec4(position, 1.0)) - dot(row_q, vec4(position, 1.0))) / ((rise == 0.0) ? 1e-30 : rise);
+  return (t > 0.0) ? t : 1e29;
+}
+
 // Unit direction in the map in which the receiver's normal points.
 vec2 shadow_outward(ShadowReceiver r, vec3 normal)
 {

@@ -143,8 +143,9 @@ float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, f
 }
 #endif
 
-// Share of the light that passes blockers of up to `height` above the receiver.
-float kernel_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, vec2 extent, float most, float height)
+// Share of the light that passes blockers of up to `height` above the receiver; `blocker`: their mean height, 0 without.
+float kernel_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, vec2 extent, float most, float height,
+                        out float blocker)
 {
   vec3 towards = safe_normalize(kernel_towards(light, position));
   bool back = dot(normal, towards) < 0.0;
@@ -162,7 +163,7 @@ float kernel_visibility(Light light, ShadowReceiver r, vec3 position, vec3 norma
   else {
     search = kernel_box(light, r, normal, window, within, vec2(0.0));
   }
-  float blocker = height;
+  blocker = 0.0;
   float lit = 1.0;
   if (search.blocked > 0.0) {
     blocker = min(search.height / search.blocked, height);
@@ -179,7 +180,7 @@ float kernel_visibility(Light light, ShadowReceiver r, vec3 position, vec3 norma
   }
 #ifndef CONTACT_RAYS
   if (!back) {
-    lit = min(lit, near_visibility(light, r, normal, extent, most, blocker));
+    lit = min(lit, near_visibility(light, r, normal, extent, most, (blocker > 0.0) ? blocker : height));
   }
 #endif
   return lit;
@@ -200,10 +201,16 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   if (height <= 0.0) {
     return 1.0 + height;
   }
-  float lit = kernel_visibility(light, r, position, normal, extent, most, height);
+  float blocker;
+  float lit = kernel_visibility(light, r, position, normal, extent, most, height, blocker);
 #ifdef CONTACT_RAYS
   if (lit > 0.0) {
-    lit = min(lit, contact_visibility(light, r, position, normal));
+    float reach = contact_reach(r);
+    float near = contact_visibility(light, r, position, normal, reach);
+    vec3 towards = safe_normalize(kernel_towards(light, position));
+    // Of blockers that both see the rays alone tell: the darker of a mean and of noise around it would be too dark.
+    bool same = blocker > 0.0 && shadow_distance(r.view, position, towards, r.q + blocker) < 0.5 * reach;
+    lit = same ? near : min(lit, near);
   }
 #endif
   return lit;

@@ -9,7 +9,7 @@
 #include "lib/soft_kernel.glsl"
 #include "vssm/range.glsl"
 
-#define CELL_LINES 10  // of a grid of up to 9 x 9 cells
+#define CELL_LINES 11  // of a grid of up to 10 x 10 cells: a kernel of 2 MOST_HALF_SIZE texels
 #define CELL_TEXELS 64  // widest cell whose sums fit into 32 bits
 
 uvec4 vssm_sum(ivec2 texel)
@@ -85,10 +85,11 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec3 norm
   vec2 high = min(r.texel + half_size, vec2(last + 1));
   ivec2 count = last - first + 1;
   // Lines of the grid: with smooth edges, the first and the last cell are one texel wide.
-  // The outline of a round light takes more of them.
-  int wished = smooth_edges ? ((light.kind == LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
-  int cells = (max(count.x, count.y) > 4 * CELL_TEXELS) ? 8 : wished;
+  // The outline of a round light takes more of them, and so do sums that have to fit into 32 bits.
   int border = smooth_edges ? 1 : 0;
+  int wished = smooth_edges ? ((light.kind == LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
+  int longest = max(count.x, count.y) - 2 * border;
+  int cells = max(wished, (longest + CELL_TEXELS - 1) / CELL_TEXELS + 2 * border);
   ivec2 inner_low = first + border;
   ivec2 inner = count - 2 * border;
   int inner_cells = cells - 2 * border;

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from bench import again, figures, page, plots
+from bench import again, figures, markdown, page, plots
 from bench.figures import Point, Results, against, bias_floor, error_after, seconds_for, staircase
 
 
@@ -89,7 +89,7 @@ def test_error_below_the_noise_is_quoted_as_the_noise():
 
 def test_peers_are_held_against_the_defaults_and_the_fast_preset_together():
     data = results()
-    assert "10 ×" in page.markdown(page.summary(data)).splitlines()[2]
+    assert "10 ×" in markdown.table(page.summary(data)).splitlines()[2]
     for point in OWN:
         cell = data.cell("room", "Candela", point.samples)
         data.cells.append({**cell, "series": {"label": "Candela, Fast preset"}, "times": [point.seconds / 2]})
@@ -105,19 +105,19 @@ def test_page_and_table_say_what_was_found(tmp_path):
     data = results()
     text = page.make_page(data, [], [], [], tmp_path).read_text(encoding="utf-8")
     assert "room" in text and "10 ×" in text and "room, Cycles, 256" in text
-    table = page.markdown(page.summary(data)).splitlines()
+    table = markdown.table(page.summary(data)).splitlines()
     assert len(table) == 4 and "| 10 × | 10 × |" in table[2]
     assert "1 of 1 scenes" in page.claims(data)[0]
 
 
 def test_generated_part_replaces_only_what_stands_between_the_marks(tmp_path):
-    path = tmp_path / "page.md"
-    path.write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
-    page.put_between(path, "new")
-    assert path.read_text() == f"before\n{page.BEGIN}\n\nnew\n\n{page.END}\nafter\n"
+    path, begin = tmp_path / "page.md", markdown.begin("command")
+    path.write_text(f"before\n{begin}\nold\n{markdown.END}\nafter\n")
+    markdown.put_between(path, "command", "new")
+    assert path.read_text() == f"before\n{begin}\n\nnew\n\n{markdown.END}\nafter\n"
     path.write_text("nothing")
     with pytest.raises(ValueError, match=r"page\.md lacks the marks"):
-        page.put_between(path, "new")
+        markdown.put_between(path, "command", "new")
 
 
 def test_readme_shows_the_means_of_every_peer():
@@ -129,7 +129,7 @@ def test_readme_shows_the_means_of_every_peer():
 @pytest.mark.parametrize("path", [page.README, page.PERFORMANCE], ids=lambda path: path.name)
 def test_pages_have_the_marks(path):
     text = path.read_text(encoding="utf-8")
-    assert text.count(page.BEGIN) == text.count(page.END) == 1
+    assert text.count(markdown.begin(page.COMMAND)) == text.count(markdown.END) == 1
 
 
 def test_what_denoising_brings_is_told_where_both_were_measured():

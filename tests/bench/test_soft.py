@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench import soft
+from bench import markdown, soft, soft_lights
 
 SIZE = (48, 36)
 
@@ -46,9 +46,14 @@ def test_short_rays_see_blockers_that_the_middle_of_the_light_does_not(registere
 def test_the_table_has_a_row_per_technique():
     entrants = (soft.Entrant("one", soft.VSSM), soft.Entrant("map", soft.POINTS))
     results = [soft.Result(0.25, [3.0, 2.5], [0.5]), soft.Result(0.5, [1.5, 1.6], [0.5])]
-    lines = soft.report({"grid": results, "foliage": results}, entrants).splitlines()
-    assert lines[1].split() == ["one", "0.2500", "0.2500", "0.2500", "2.0"]
-    assert lines[2].split() == ["map", "0.5000", "0.5000", "0.5000", "1.0"]
+    rows = soft.rows_of({"grid": results, "foliage": results}, entrants)
+    assert rows[1] == ("one", "0.2500", "0.2500", "0.2500", "2.0")
+    assert rows[2] == ("map", "0.5000", "0.5000", "0.5000", "1.0")
+
+
+@pytest.mark.parametrize("command", [soft.COMMAND, soft_lights.COMMAND])
+def test_the_page_has_marks_for_what_is_written(command):
+    assert soft.PAGE.read_text(encoding="utf-8").count(markdown.begin(command)) == 1
 
 
 def test_dark_pixels_count_as_lit():

@@ -7,3 +7,7 @@ candela.viewport_samples = 32
 candela.accumulated_maps_texels_per_pixel = 2.0
 candela.instant_radiosity_virtual_lights = 384
 candela.instant_radiosity_rays = 8
+candela.light_probes_maps = 6.0
+candela.multires_radiosity_virtual_lights = 1024
+candela.multires_radiosity_rays = 64
+candela.clustered_visibility_virtual_lights = 1024

@@ -7,3 +7,7 @@ candela.viewport_samples = 8
 candela.accumulated_maps_texels_per_pixel = 1.0
 candela.instant_radiosity_virtual_lights = 128
 candela.instant_radiosity_rays = 2
+candela.light_probes_maps = 3.0
+candela.multires_radiosity_virtual_lights = 128
+candela.multires_radiosity_rays = 4
+candela.clustered_visibility_virtual_lights = 256

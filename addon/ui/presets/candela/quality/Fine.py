@@ -7,3 +7,7 @@ candela.viewport_samples = 128
 candela.accumulated_maps_texels_per_pixel = 4.0
 candela.instant_radiosity_virtual_lights = 512
 candela.instant_radiosity_rays = 16
+candela.light_probes_maps = 12.0
+candela.multires_radiosity_virtual_lights = 2048
+candela.multires_radiosity_rays = 128
+candela.clustered_visibility_virtual_lights = 2048

@@ -1,0 +1,29 @@
+"""Tables and parts of documents that commands write."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+END = "<!-- end of what is written -->"
+
+
+def begin(command: str) -> str:
+    """The mark before what `command` writes."""
+    return f"<!-- written by `{command}` -->"
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """The first row is the head."""
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
+
+
+def put_between(path: Path, command: str, part: str) -> None:
+    """Replace what stands between the mark of `command` and the next end. ValueError when the file has none."""
+    mark = begin(command)
+    before, found, rest = path.read_text(encoding="utf-8").partition(mark)
+    _, end, after = rest.partition(END)
+    if not (found and end):
+        raise ValueError(f"{path.name} lacks the marks '{mark}' and '{END}'.")
+    path.write_text(f"{before}{mark}\n\n{part}\n\n{END}{after}", encoding="utf-8")
