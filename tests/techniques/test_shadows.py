@@ -80,6 +80,15 @@ def test_rays_make_hard_edges_exact_whatever_the_resolution_of_the_map(floor, ki
     assert differ[1.0, False] > 0.02
 
 
+def test_a_huge_scene_around_them_opens_no_contact(floor):
+    """Where a ray would start beyond the blocker that it looks for, the map decides."""
+    floor.light("POINT", (0, 0, HEIGHT), shadow_soft_size=0.0)
+    floor.blocker((-0.5, -EVERYWHERE), (0.5, EVERYWHERE), 0.01)
+    before = irradiance(floor, 1, (32, 8)) > 0
+    floor.rectangle((-1e6, -1e6), (1e6, 1e6), -1.0)
+    assert (irradiance(floor, 1, (32, 8)) > 0).tolist() == before.tolist()
+
+
 @pytest.mark.slow
 def test_the_width_of_a_penumbra_follows_from_similar_triangles(floor):
     """A light of width w at height H over an edge at height h: w h / (H - h)."""

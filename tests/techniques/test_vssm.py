@@ -98,6 +98,17 @@ def test_few_samples_of_a_light_that_parts_do_not_tile_leave_no_more_error_than_
     assert rms(visibility(floor, source, 4), expected) < PENUMBRA_RMS[name]
 
 
+def test_sums_over_the_widest_kernels_fit_into_their_integers(floor):
+    """A penumbra of some 256 texels, with a caster close to the lamp, which the table's range is made for."""
+    kind, settings, source = LIGHTS["square"]
+    floor.scene.candela.vssm_texels_per_pixel = 16.0
+    floor.light(kind, (0, 0, HEIGHT), **settings)
+    blockers = [EDGE, ((1.2, -0.1), (1.25, 0.1), 1.8)]
+    for blocker in blockers:
+        floor.blocker(*blocker)
+    assert rms(visibility(floor, source), expected_visibility(source, blockers)) < PENUMBRA_RMS["square"]
+
+
 def test_a_low_bar_hides_the_light_whatever_else_stands_higher(floor):
     """Its shadow is closed, though it is a small part of the window in which the plate's edge is looked for."""
     kind, settings, source = LIGHTS["square"]
