@@ -14,7 +14,6 @@ the casters, what lookups cost does not.
 from __future__ import annotations
 
 import argparse
-import itertools
 import os
 import sys
 import time
@@ -101,7 +100,10 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.soft_lights", description=__doc__.splitlines()[0])
     parser.add_argument("--family", default="foliage", choices=list(soft_scenes.FAMILIES))
     parser.add_argument("--lights", nargs="+", type=int, default=LIGHTS, metavar="N")
-    parser.add_argument("--levels", nargs="+", type=int, default=[0], metavar="N", help="of finer blockers (default 0)")
+    parser.add_argument(
+        "--levels", nargs="*", type=int, default=[3, 5], metavar="N",
+        help="of finer blockers, under the first number of lights (default 3 5)",
+    )  # fmt: skip
     parser.add_argument("--size", default="640x360", type=size_of, metavar="WxH")
     parser.add_argument("--runs", default=3, type=int, metavar="N")
     parser.add_argument("--page", action="store_true", help="write the table into docs/soft_shadows.md")
@@ -124,29 +126,25 @@ def main(arguments: list[str]) -> int:
 
         errors = [error(soft.Entrant("maps", soft.POINTS, samples=n)) for n in SAMPLES]
         equal = {kind.label: equal_samples(error(kind), SAMPLES, errors) for kind in KINDS}
-    for count, level in itertools.product(options.lights, options.levels):
+    cases = [(count, 0) for count in options.lights] + [(options.lights[0], level) for level in options.levels]
+    for count, level in cases:
         with quiet():
             put_lights(scene, count)
             triangles = put_triangles(scene, level)
             spent = shadow_seconds(scene, options.size, options.runs)
         ratios = {kind.label: spent[kind.label] / spent["maps"] for kind in KINDS}
-        row = [
-            str(count),
-            str(triangles),
-            f"{1000 * spent['maps']:.0f} ms",
-            *(f"{ratio:.1f}" for ratio in ratios.values()),
-        ]
+        one_map = f"{1000 * spent['maps']:.0f} ms"
+        row = [str(count), str(triangles), one_map, *(f"{ratio:.1f}" for ratio in ratios.values())]
         for label, ratio in ratios.items():
             row += [f"{equal[label]:.1f}", f"{equal[label] / ratio:.1f}"]
         rows.append(tuple(row))
         print(", ".join(f"{name} {value}" for name, value in zip(rows[0], row)), flush=True)
     print(table(rows))
     if options.page:
-        markdown.put_between(
-            soft.PAGE,
-            COMMAND,
-            f"{options.family}, {'x'.join(map(str, options.size))} pixels.\n\n" + markdown.table(rows),
+        about = (
+            f"{options.family}, {'x'.join(map(str, options.size))} pixels; maps of as many samples as leave the error."
         )
+        markdown.put_between(soft.PAGE, COMMAND, f"{about}\n\n{markdown.table(rows)}")
     print("samples: of accumulated maps that leave the same error; faster: than those")
     return 0
 
