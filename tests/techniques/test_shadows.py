@@ -84,9 +84,11 @@ def test_a_huge_scene_around_them_opens_no_contact(floor):
     """Where a ray would start beyond the blocker that it looks for, the map decides."""
     floor.light("POINT", (0, 0, HEIGHT), shadow_soft_size=0.0)
     floor.blocker((-0.5, -EVERYWHERE), (0.5, EVERYWHERE), 0.01)
-    before = irradiance(floor, 1, (32, 8)) > 0
-    floor.rectangle((-1e6, -1e6), (1e6, 1e6), -1.0)
-    assert (irradiance(floor, 1, (32, 8)) > 0).tolist() == before.tolist()
+    x = abs(receivers((32, 8))[:, 0])
+    for _ in range(2):
+        lit = irradiance(floor, 1, (32, 8)).ravel() > 0
+        assert not lit[x < 0.4].any() and lit[x > 0.6].all()
+        floor.rectangle((-1e6, -1e6), (1e6, 1e6), -1.0)
 
 
 @pytest.mark.slow
