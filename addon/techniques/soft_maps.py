@@ -60,7 +60,7 @@ class SoftMaps(AccumulatedMaps):
 
     atlas_texels = 2**22  # filtered maps take several times the bytes of plain ones
     least_side = 32  # of a map, texels
-    contact_side = 2  # squared: rays by which a picture of one sample looks for contacts of a map; with more, one
+    contact_side = 2  # squared: rays by which a picture of few samples looks for contacts of a map; with more, one
 
     def __init__(self):
         super().__init__()
@@ -119,7 +119,7 @@ class SoftMaps(AccumulatedMaps):
         if not contacts or acceleration.too_many(frame.snapshot):
             return replace(maps, lookup=self.lookup(frame, False))
         textures, constants = ray_bindings(frame)
-        constants["contact_side"] = self.contact_side if frame.settings.samples == 1 else 1
+        constants["contact_side"] = self.contact_side if frame.settings.samples < FEWEST_POINTS else 1
         return replace(
             maps, lookup=self.lookup(frame, True), textures=maps.textures | textures,
             constants=maps.constants | constants,

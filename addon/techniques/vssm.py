@@ -28,7 +28,7 @@ classification by bounds and the plane-relative moments are ours.
 | pyramid, table | log2 N dispatches, 4 log8 N + 3 passes; 20 bytes per texel kept |
 | lookup, lit or all blocked pixels | up to 27 loads |
 | lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 41 loads of 16 bytes, up to 225 of 8; 9 more per mixed cell |
-| contact rays | 4 per pixel that is not settled and map, with several samples 1 |
+| contact rays | 4 per pixel that is not settled and map, from 16 samples on 1 |
 | bytes | 36 per texel and 16 borrowed, beside the map's 20 |
 
 Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the light's
