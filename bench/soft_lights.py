@@ -73,6 +73,7 @@ def seconds(scene, entrant: soft.Entrant, samples: int, size: tuple[int, int], s
     soft.configure(scene, entrant)
     scene.candela.direct_light_lights_per_sample = max(LIGHTS)
     for thing in scene.objects:
+        thing.visible_shadow = True  # what was left by a picture without blockers
         if thing.type == "LIGHT":
             thing.data.use_shadow = shadows
     start = time.process_time()
