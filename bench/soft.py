@@ -50,7 +50,7 @@ ENTRANTS = (
     Entrant("maps, 1 sample, 6 shared", POINTS, shared=6.0),
     Entrant("VSSM", VSSM),
     Entrant("VSSM, rule of the source", VSSM, (("rule", "MEAN"),)),
-    Entrant("VSSM, 3 cells", VSSM, (("cells", 3),)),
+    Entrant("VSSM, 5 cells", VSSM, (("cells", 5),)),
     Entrant("VSSM, 8 cells", VSSM, (("cells", 8),)),
     Entrant("VSSM, 1 texel per pixel", VSSM, (("texels_per_pixel", 1.0),)),
     Entrant("VSSM, 4 texels per pixel", VSSM, (("texels_per_pixel", 4.0),)),

@@ -16,10 +16,10 @@ stored per texel (shaders/lib/shadow.glsl). Casters with alpha are drawn stochas
 | bytes | 20 per texel, (2 texels per picture pixel)^2 by default |
 
 Edge rays (shaders/lib/edge_visibility.glsl; Lauterbach, Mo, Manocha 2009) take the map's resolution out of sharp edges
-and of contacts: without them a pixel just behind a blocker that it touches is lit at every resolution. relMSE
-of direct light at 64 samples, before and after: fence 0.0152 and 0.0016, poles 0.0031 and 0.0005, foliage 0.077 and
-0.023, grid 0.0058 and 0.0034 (128x96); garden 0.0017 and 0.0009, instances 0.0039 and 0.0032, hall 0.0055 and 0.0045
-(256x192), in 1.35, 0.95 and 1.05 times the processor time.
+and of contacts: without them a pixel just behind a blocker that it touches is lit at every resolution. relMSE of direct
+light at 64 samples, before and after: fence 0.0152 and 0.0016, poles 0.0031 and 0.0005, foliage 0.077 and 0.023, grid
+0.0058 and 0.0034 (128x96); garden 0.0017 and 0.0009, instances 0.0039 and 0.0032, hall 0.0055 and 0.0045 (256x192), in
+1.35, 0.95 and 1.05 times the processor time.
 
 Fails: with few samples penumbrae show steps; casters thinner than a texel are missed in single samples (their mean
 is right but for edge rays); a receiver that no fitted view contains counts as lit.
@@ -28,8 +28,8 @@ Bias: none for the diffuse path. On soft-edged point and spot lights the depth m
 while light arrives from its projection onto the disc that faces the receiver (as in Cycles): the difference is of
 the order of (radius / distance)^2; where that is more than 1/16, direct_light traces rays. Where a light brings less
 than `cutoff` of the picture's median light, it is left unshadowed: at most that share of light too much, for views and
-casters that a picture with many lights need not draw. Under edge rays sharp shadows of
-casters narrower than half a texel, f texels, are 2 f^2 instead of f wide: at most an eighth of a texel is missing.
+casters that a picture with many lights need not draw. Under edge rays sharp shadows of casters narrower than half a
+texel, f texels, are 2 f^2 instead of f wide: at most an eighth of a texel is missing.
 """
 
 from __future__ import annotations

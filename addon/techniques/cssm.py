@@ -6,8 +6,8 @@ The blocker search asks it for the share of nearer texels and their mean depth,
     z_avg = [W * f z] / [W * f],   f(d, z) = 1 where z < d,
 
 the second step for the share of blockers in the kernel that this depth gives. Both cost the same whatever the size of
-the kernel: for pictures with many lights. A single important light is better served by vssm,
-whose comparison has no least distance.
+the kernel: for pictures with many lights. A single important light is better served by vssm, whose comparison has no
+least distance.
 
 Ours: the kernel is cut into `cells` squared boxes, each compared with the receiver's plane at its place, so that tilted
 receivers do not shadow themselves, and blockers are asked for only above the receiver's point; kernels of a few texels
@@ -41,18 +41,9 @@ from ..frame import tables
 from ..frame.convolution import PYRAMID, TABLE, Basis, series
 from ..frame.run import Frame
 from ..frame.technique import Param
-from .accumulated_maps import CUTOFF, RAY_TEXTURES, RESOLUTION, Lookup, Maps
+from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import (
-    CONTACT_CONSTANTS,
-    CONTACTS,
-    LIMIT_CONSTANTS,
-    LIMIT_TEXTURES,
-    LOADED_DEFINES,
-    LOADED_IMAGES,
-    REFINE,
-    SoftMaps,
-)
+from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps, soft_lookup, with_contacts
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
 PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
@@ -74,26 +65,24 @@ def _basis(order: int, prefilter: str) -> Basis:
     )
 
 
-def _lookup(order: int, prefilter: str, cells: int, contacts: bool) -> Lookup:
+def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
     scale, offset = series(order)
     by_table = prefilter == TABLE
-    return Lookup(
-        f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells{', contact rays' * contacts}",
+    return soft_lookup(
+        f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells",
         "cssm/visibility.glsl",
-        textures=LIMIT_TEXTURES + RAY_TEXTURES * contacts,
-        images=(*LOADED_IMAGES, BASIS_IMAGES[prefilter]),
-        constants=(
-            *LIMIT_CONSTANTS, *CONTACT_CONSTANTS * contacts, ("IVEC2", "base_extent"), ("INT", "tile_columns"),
-            ("INT", "basis_rows"),
-        ),
+        BASIS_IMAGES[prefilter],
+        constants=(("IVEC2", "base_extent"), ("INT", "tile_columns"), ("INT", "basis_rows")),
         defines=(
-            *LOADED_DEFINES, ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
+            ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
             ("SERIES_OFFSET", f"{offset:.6f}"), ("SEARCH_OFFSET", f"{SEARCH_OFFSET / order:.6f}"),
-            *((("PREFILTER_TABLE", "1"),) if by_table else ()), *((("CONTACT_RAYS", "1"),) * contacts),
+            *((("PREFILTER_TABLE", "1"),) if by_table else ()),
         ),
     )  # fmt: skip
 
 
+DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, _, _ in PREFILTERS)
+LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
 BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
 LOOKUPS = tuple(
@@ -136,6 +125,6 @@ class ConvolutionSoftShadows(SoftMaps):
             constants={**maps.constants, **basis.constants_for(*size)},
         )
 
-    def lookup(self, frame: Frame, contacts: bool) -> Lookup:
+    def lookup(self, frame: Frame) -> Lookup:
         order, prefilter = int(frame.settings.get(self, "order")), frame.settings.get(self, "prefilter")
-        return _lookup(order, prefilter, self.cells(frame), contacts)
+        return _lookup(order, prefilter, self.cells(frame))

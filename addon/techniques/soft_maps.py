@@ -26,7 +26,15 @@ from ..frame import acceleration, depth_maps, lights, tables
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images
-from .accumulated_maps import RAY_CONSTANTS, AccumulatedMaps, Lookup, Maps, map_resolution, ray_bindings
+from .accumulated_maps import (
+    RAY_CONSTANTS,
+    RAY_TEXTURES,
+    AccumulatedMaps,
+    Lookup,
+    Maps,
+    map_resolution,
+    ray_bindings,
+)
 
 REFINE = Param(
     "refine", "Refine", True,
@@ -37,7 +45,6 @@ CONTACTS = Param(
     "contacts", "Contact rays", True,
     "Short rays look for blockers close to the receiver, where a depth map cannot tell", draft=False,
 )  # fmt: skip
-CONTACT_CONSTANTS = (*RAY_CONSTANTS, ("INT", "contact_side"))
 FEWEST_POINTS = (
     16  # fewer parts that do not tile the light, at points of a low-discrepancy set, are worse than all of it
 )
@@ -53,6 +60,29 @@ BOUNDS = tables.PyramidSource(
     textures=(("FLOAT_2D", "depth_maps"),),
 )
 DEPTH_BOUNDS = tables.level_program(BOUNDS)
+
+
+def soft_lookup(name: str, file: str, image: tuple, constants: tuple = (), defines: tuple = ()) -> Lookup:
+    """A lookup that asks the map, its pyramid and limits, and the filtered map in `image`."""
+    return Lookup(
+        name,
+        file,
+        textures=LIMIT_TEXTURES,
+        images=(*LOADED_IMAGES, image),
+        constants=(*LIMIT_CONSTANTS, *constants),
+        defines=(*LOADED_DEFINES, *defines),
+    )
+
+
+def with_contacts(lookup: Lookup) -> Lookup:
+    """The same with short rays for near blockers."""
+    return replace(
+        lookup,
+        name=f"{lookup.name}, contact rays",
+        textures=lookup.textures + RAY_TEXTURES,
+        constants=(*lookup.constants, *RAY_CONSTANTS, ("INT", "contact_side")),
+        defines=(*lookup.defines, ("CONTACT_RAYS", "1")),
+    )
 
 
 class SoftMaps(AccumulatedMaps):
@@ -115,13 +145,14 @@ class SoftMaps(AccumulatedMaps):
 
     def _to_ask(self, frame: Frame, maps: Maps) -> Maps:
         """`maps` with the lookup, and with what its rays bind where short rays look for near blockers."""
+        lookup = self.lookup(frame)
         contacts = self.contact_side > 0 and frame.settings.get(self, "contacts") and len(maps.views) > 0
         if not contacts or acceleration.too_many(frame.snapshot):
-            return replace(maps, lookup=self.lookup(frame, False))
+            return replace(maps, lookup=lookup)
         textures, constants = ray_bindings(frame)
         constants["contact_side"] = self.contact_side if frame.settings.samples < FEWEST_POINTS else 1
         return replace(
-            maps, lookup=self.lookup(frame, True), textures=maps.textures | textures,
+            maps, lookup=with_contacts(lookup), textures=maps.textures | textures,
             constants=maps.constants | constants,
         )  # fmt: skip
 
@@ -145,8 +176,8 @@ class SoftMaps(AccumulatedMaps):
         """`maps`, whose part `size` holds views, with what the lookup needs; without views nothing is built."""
         raise NotImplementedError
 
-    def lookup(self, frame: Frame, contacts: bool) -> Lookup:
-        """How the filtered maps are asked, with or without rays for near blockers."""
+    def lookup(self, frame: Frame) -> Lookup:
+        """How the filtered maps are asked; rays for near blockers apart."""
         raise NotImplementedError
 
     def kept(self, name: str, size: tuple[int, int], image_format: str) -> images.Image:

@@ -53,18 +53,9 @@ from dataclasses import replace
 from ..frame import tables
 from ..frame.run import Frame
 from ..frame.technique import Param
-from .accumulated_maps import CUTOFF, RAY_TEXTURES, RESOLUTION, Lookup, Maps
+from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import (
-    CONTACT_CONSTANTS,
-    CONTACTS,
-    LIMIT_CONSTANTS,
-    LIMIT_TEXTURES,
-    LOADED_DEFINES,
-    LOADED_IMAGES,
-    REFINE,
-    SoftMaps,
-)
+from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps, soft_lookup, with_contacts
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
 MOMENTS = tables.TableSource(
@@ -76,21 +67,17 @@ MOMENTS = tables.TableSource(
 )
 
 
-def _lookup(rule: str, cells: int, contacts: bool) -> Lookup:
-    return Lookup(
-        f"variance soft shadows, {rule.lower()}, {cells} cells{', contact rays' * contacts}",
+def _lookup(rule: str, cells: int) -> Lookup:
+    return soft_lookup(
+        f"variance soft shadows, {rule.lower()}, {cells} cells",
         "vssm/visibility.glsl",
-        textures=LIMIT_TEXTURES + RAY_TEXTURES * contacts,
-        images=(*LOADED_IMAGES, ("depth_table", "RGBA32UI", "UINT_2D", "READ")),
-        constants=LIMIT_CONSTANTS + CONTACT_CONSTANTS * contacts,
-        defines=(
-            *LOADED_DEFINES, ("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ()),
-            *((("CONTACT_RAYS", "1"),) * contacts),
-        ),
-    )  # fmt: skip
+        ("depth_table", "RGBA32UI", "UINT_2D", "READ"),
+        defines=(("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
+    )
 
 
-LOOKUPS = tuple(lighting(_lookup(rule, 3, contacts), False) for rule, _, _ in RULES for contacts in (False, True))
+DEFAULTS = tuple(_lookup(rule, 3) for rule, _, _ in RULES)
+LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 MOMENT_VALUES = tables.values_program(MOMENTS)
 
 
@@ -116,5 +103,5 @@ class VarianceSoftShadows(SoftMaps):
             tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
         return replace(maps, images={**maps.images, "depth_table": table})
 
-    def lookup(self, frame: Frame, contacts: bool) -> Lookup:
-        return _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"), contacts)
+    def lookup(self, frame: Frame) -> Lookup:
+        return _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"))

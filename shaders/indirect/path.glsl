@@ -5,7 +5,7 @@
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "light/sources.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
@@ -15,12 +15,6 @@ struct Vertex {
   vec3 normal;  // of the triangle, on the side that the ray came from
   Reflection reflection;
 };
-
-// Away from a surface by what float32 positions of this size cannot tell apart.
-vec3 ray_origin(vec3 position, vec3 normal)
-{
-  return position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
-}
 
 // Pixel of the picture in which a point of a surface lies that faces the camera; false if there is none. What the pixel
 // shows is this point if it is nearer than `footprint`, m; `slant` is the cosine between its normal and the viewer.
@@ -108,12 +102,6 @@ bool draw_passing(float share, float total, inout uint roll)
   uint word = ((roll >> ((roll >> 28u) + 4u)) ^ roll) * 277803737u;
   float u = (float(((word >> 22u) ^ word) >> 9u) + 0.5) * (1.0 / 8388608.0);
   return u * total < share;
-}
-
-float clear_path(vec3 origin, vec3 direction, float reach, uint salt)
-{
-  ivec2 hit;
-  return (trace_until(origin, direction, reach, reach, salt, hit) >= reach) ? 1.0 : 0.0;
 }
 
 // Irradiance by one source if nothing blocks it.

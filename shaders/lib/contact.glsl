@@ -5,7 +5,7 @@
 // resolves, so that they meet few boxes of the hierarchy, and their noise stays within some texels of a contact.
 // Casters with alpha are left to the map, which drew lots for them.
 #define OPAQUE_ONLY
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 #define CONTACT_SHARE 0.06  // length of the rays beside what the map spans at the receiver
 
@@ -40,11 +40,10 @@ float contact_reach(ShadowReceiver r)
 // Share of the light that no caster nearer than `reach` hides, by contact_side^2 rays.
 float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, float reach)
 {
-  float offset = max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
-  if (offset > 0.1 * reach) {
+  if (ray_offset(position) > 0.1 * reach) {
     return 1.0;  // beside so large a scene rays would start beyond what they look for
   }
-  vec3 origin = position + normal * offset;
+  vec3 origin = ray_origin(position, normal);
   // The same lots for all lights, so that two half lights are one.
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)) + uvec3(0, 0, uint(film_view.seed) << 16));
   float open = 0.0;
@@ -59,9 +58,8 @@ float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 norm
     float weight = max_component(abs(arriving)) * dot(direction, normal);
     if (weight > 0.0) {
       float limit = min(reach, 0.9999 * light_distance(source, origin, direction));
-      ivec2 hit;
       all += weight;
-      open += (trace_until(origin, direction, limit, limit, salt.z, hit) >= limit) ? weight : 0.0;
+      open += weight * clear_path(origin, direction, limit, 0u);
     }
   }
   return (all > 0.0) ? open / all : 1.0;

@@ -9,7 +9,7 @@
 // To leave casters of one texel to the map would take a quarter of a texel off those of one to two, and most of the gain.
 #define OPAQUE_ONLY
 #include "lib/kernel_extent.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 #define SHARP_TEXELS 2.0  // half width of a penumbra
 #define CLEARANCE 0.25  // most that the ray's start may be off the surface, beside the nearest caster's distance
@@ -46,17 +46,14 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   vec3 direction;
   float density;
   light_sample(light, position, direction, density);
-  float offset = max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
   vec2 penumbra = kernel_extent(light, r, 1.0) * lowest;
   bool by_map = by_lot || min(penumbra.x, penumbra.y) > SHARP_TEXELS || dot(direction, normal) <= 0.0;
-  by_map = by_map || offset > CLEARANCE * shadow_distance(r.view, position, direction, r.q + lowest);
+  by_map = by_map || ray_offset(position) > CLEARANCE * shadow_distance(r.view, position, direction, r.q + lowest);
   if (by_map) {
     return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
   }
-  vec3 origin = position + normal * offset;
+  vec3 origin = ray_origin(position, normal);
   // The ray stays at the receiver's place in the map: what the texels show does not reach higher there.
   float reach = min(1.02 * shadow_distance(r.view, position, direction, highest), 0.9999 * light_distance(light, origin, direction));
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)));
-  ivec2 hit;
-  return (trace_until(origin, direction, reach, reach, salt.x, hit) >= reach) ? 1.0 : 0.0;
+  return clear_path(origin, direction, reach, 0u);
 }

@@ -144,10 +144,9 @@ float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, f
 #endif
 
 // Share of the light that passes blockers of up to `height` above the receiver; `blocker`: their mean height, 0 without.
-float kernel_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, vec2 extent, float most, float height,
+float kernel_visibility(Light light, ShadowReceiver r, vec3 towards, vec3 normal, vec2 extent, float most, float height,
                         out float blocker)
 {
-  vec3 towards = safe_normalize(kernel_towards(light, position));
   bool back = dot(normal, towards) < 0.0;
   if (abs(dot(normal, towards)) < EDGE_ON) {
     // Seen along its plane the receiver has no gradient: it is a wall that bounds the kernel.
@@ -202,12 +201,12 @@ float light_visibility(Light light, vec3 position, vec3 normal)
     return 1.0 + height;
   }
   float blocker;
-  float lit = kernel_visibility(light, r, position, normal, extent, most, height, blocker);
+  vec3 towards = safe_normalize(kernel_towards(light, position));
+  float lit = kernel_visibility(light, r, towards, normal, extent, most, height, blocker);
 #ifdef CONTACT_RAYS
   if (lit > 0.0) {
     float reach = contact_reach(r);
     float near = contact_visibility(light, r, position, normal, reach);
-    vec3 towards = safe_normalize(kernel_towards(light, position));
     // Of blockers that both see the rays alone tell: the darker of a mean and of noise around it would be too dark.
     bool same = blocker > 0.0 && shadow_distance(r.view, position, towards, r.q + blocker) < 0.5 * reach;
     lit = same ? near : min(lit, near);

@@ -1,7 +1,7 @@
 // Guiding: does light from a cell of directions (column) arrive at a probe (row), a pixel of a coarse grid?
 // Each probe shifts its directions within the cells, so that the mean over the probes covers them.
 #include "lib/gbuffer.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 void main()
 {
@@ -29,9 +29,5 @@ void main()
     return;
   }
   float side = (dot(direction, s.geometric_normal) < 0.0 && translucent) ? -1.0 : 1.0;
-  vec3 origin = s.position + side * s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
-  ivec2 hit;
-  if (trace_until(origin, direction, 1e29, 1e29, bits.z, hit) >= 1e29) {
-    out_useful = cosine;
-  }
+  out_useful = cosine * clear_path(ray_origin(s.position, side * s.geometric_normal), direction, 1e29, bits.z);
 }

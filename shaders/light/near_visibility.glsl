@@ -2,7 +2,7 @@
 // and by a ray where no depth map can stand for it. `near_share`: the quotient of both from which rays are taken.
 #include "lib/shadow.glsl"
 #include "light/sources.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 float light_visibility(Light light, vec3 position, vec3 normal)
 {
@@ -12,9 +12,8 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   vec3 direction;
   float density;
   light_sample(light, position, direction, density);
-  vec3 origin = position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
+  vec3 origin = ray_origin(position, normal);
   float reach = 0.9999 * light_distance(light, origin, direction);
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)));
-  ivec2 hit;
-  return (trace_until(origin, direction, reach, reach, salt.x, hit) >= reach) ? 1.0 : 0.0;
+  return clear_path(origin, direction, reach, salt.x);
 }

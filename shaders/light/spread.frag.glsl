@@ -2,7 +2,7 @@
 // mean and mean square of the irradiance by single points, visibility traced.
 #include "lib/gbuffer.glsl"
 #include "light/sources.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 void main()
 {
@@ -16,7 +16,7 @@ void main()
   if (!s.hit) {
     return;
   }
-  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+  vec3 origin = ray_origin(s.position, s.geometric_normal);
   for (int k = 0; k < points; k++) {
     Light light = light_read(place.y * points + k);
     vec3 direction;
@@ -25,8 +25,7 @@ void main()
     float irradiance = luminance(abs(arriving)) * max(dot(s.normal, direction), 0.0);
     if (irradiance > 0.0 && (light.flags & LIGHT_SHADOW) != 0) {
       float reach = light_distance(light, s.position, direction);
-      ivec2 hit;
-      irradiance *= (trace_until(origin, direction, reach, reach, bits.z, hit) >= reach) ? 1.0 : 0.0;
+      irradiance *= clear_path(origin, direction, reach, bits.z);
     }
     out_moments.xy += vec2(irradiance, irradiance * irradiance) / float(points);
   }

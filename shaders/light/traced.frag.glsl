@@ -5,7 +5,7 @@
 #include "lib/brdf.glsl"
 #include "lib/environment.glsl"
 #include "light/sources.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 // Share of the lobe's samples against `light_samples` of density `light_density` (power heuristic, beta = 2).
 float lobe_share(float lobe_density, float light_density, float light_samples)
@@ -93,8 +93,7 @@ void main()
       kept_span = span;
     }
   }
-  // Away from the surface by what float32 positions of this size cannot tell apart.
-  vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
+  vec3 origin = ray_origin(s.position, s.geometric_normal);
   uint layers = salt.z + uint(film_view.sample_index);
   ivec2 hit;
   if (kept_importance > 0.0) {

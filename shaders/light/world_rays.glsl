@@ -2,7 +2,7 @@
 // visibility by rays. In place of the directions that the other lookups share among all pixels.
 #include "light/sources.glsl"
 #include "lib/environment.glsl"
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 
 // Last cell of the tile whose lower edge is not above `x`.
 int world_cell(int tile, int cells, float x)
@@ -49,8 +49,6 @@ Light own_point(Light light, int number)
 
 float light_visibility(Light light, vec3 position, vec3 normal)
 {
-  vec3 origin = position + normal * max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)));
-  ivec2 hit;
-  return (trace_until(origin, light.centre, 1e29, 1e29, salt.x, hit) >= 1e29) ? 1.0 : 0.0;
+  return clear_path(ray_origin(position, normal), light.centre, 1e29, salt.x);
 }

@@ -7,7 +7,7 @@
 #include "ssdo/fan.glsl"
 #include "lib/environment.glsl"
 #ifdef RAYS
-#include "trace/hierarchy.glsl"
+#include "trace/rays.glsl"
 #endif
 
 #define GROUP 8
@@ -43,9 +43,7 @@ vec3 fan_environment(Fan fan, Surface s, uint hidden, vec2 u, uint salt)
   }
 #ifdef RAYS
   if (max_component(abs(sum)) > 0.0) {
-    vec3 origin = s.position + s.geometric_normal * max(offset_size, 2e-5 * length(s.position - film_view.eye.xyz));
-    ivec2 hit;
-    sum *= (trace_until(origin, chosen, 1e29, 1e29, salt, hit) >= 1e29) ? 1.0 : 0.0;
+    sum *= clear_path(ray_origin(s.position, s.geometric_normal), chosen, 1e29, salt);
   }
 #endif
   return sum / 32.0;

@@ -1,0 +1,21 @@
+// Rays that leave a surface and ask whether something stands in their way.
+//
+// A program that includes this binds the hierarchy and `film_view`, and has the constants `trace_levels` and `offset_size`.
+#include "trace/hierarchy.glsl"
+
+// How far beside a surface rays begin: what float32 positions of this size cannot tell apart.
+float ray_offset(vec3 position)
+{
+  return max(offset_size, 2e-5 * length(position - film_view.eye.xyz));
+}
+
+vec3 ray_origin(vec3 position, vec3 normal)
+{
+  return position + normal * ray_offset(position);
+}
+
+float clear_path(vec3 origin, vec3 direction, float reach, uint salt)
+{
+  ivec2 hit;
+  return (trace_until(origin, direction, reach, reach, salt, hit) >= reach) ? 1.0 : 0.0;
+}
