@@ -85,9 +85,6 @@ DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, _, _ in PREFILTERS)
 LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
 BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
-LOOKUPS = tuple(
-    lighting(_lookup(8, prefilter, 4, contacts), False) for prefilter, _, _ in PREFILTERS for contacts in (False, True)
-)
 
 
 class ConvolutionSoftShadows(SoftMaps):
