@@ -56,6 +56,7 @@ def compare(cases: list[Case], pixels: int = 32) -> list[Difference]:
     """Render all cases on tiles of `pixels` x `pixels` with both engines."""
     scene, side = tile_scene(cases)
     size = (side * pixels, side * pixels)
+    scene.candela.film_points = 1  # the pixels' middles, as Cycles' first sample
     ours, theirs = (render_passes(scene, engine, 1, size=size, direct_only=True) for engine in ("CANDELA", "CYCLES"))
     found = []
     # The lens sees a little more than the grid, and pixels where only one engine meets the object do not count.

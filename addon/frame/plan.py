@@ -89,7 +89,8 @@ def _ordered(techniques: list[Technique], skipped: list[Row]) -> tuple[Technique
                 raise PlanError(f"{technique.label} reads {name}, which nothing writes (skipped: {without}).")
     while left:
         for technique in left:
-            needed = {w for name in technique.reads for w in writers[name] if w is not technique}
+            asked = (*technique.reads, *technique.closes)
+            needed = {w for name in asked for w in writers[name] if w is not technique and name not in w.closes}
             needed |= {other for other in techniques if set(other.offered()) & set(technique.uses)}
             if needed.issubset(done):
                 done.append(technique)

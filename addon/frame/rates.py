@@ -5,6 +5,9 @@ V_k is the variance of one point's contribution, relative to the light in the pi
 if it goes, doubling by doubling, to the light whose error per added point falls most. A lamp without size or one whose
 shadows nobody sees then costs a map every few samples; the window that lights the room gets several maps in each.
 
+A light that misses samples misses their points of the film, too: where it gives much of the light, edges and textures
+are as ragged as with fewer samples. That error, F_k / n_k^1.5 up to one point per sample, counts beside the other.
+
 The budget itself grows with the samples where that does not suffice. What a sample shows of edges and textures comes
 from film points that are spread evenly and converges faster than light through small openings: the more samples, the
 larger the part of the error that points on lights could take away. As fast as the samples, it would not pay: with four
@@ -44,22 +47,23 @@ class Rate:
         return range(sample // every, sample // every + (sample % every == 0))
 
 
-def budget_for(variance: Sequence[float], samples: int, asked: float) -> float:
+def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequence[float] = ()) -> float:
     """Points per sample that leave LITTLE error: what was asked for, doubled at most half as often as the samples."""
     budget = asked
-    while 2 * budget <= asked * (samples / USUAL_SAMPLES) ** 0.5 and left(variance, samples, budget) > LITTLE:
+    while 2 * budget <= asked * (samples / USUAL_SAMPLES) ** 0.5 and left(variance, samples, budget, film) > LITTLE:
         budget *= 2
     return budget
 
 
-def left(variance: Sequence[float], samples: int, budget: float) -> float:
-    """Squared error of a picture of so many samples by lights of these variances, with this budget."""
-    points = np.array([rate.per_sample * samples for rate in allocate(variance, samples, budget)])
+def left(variance: Sequence[float], samples: int, budget: float, film: Sequence[float] = ()) -> float:
+    """Squared error of a picture of so many samples by points on lights of these variances, with this budget."""
+    points = np.array([rate.per_sample * samples for rate in allocate(variance, samples, budget, film)])
     return float((np.nan_to_num(np.asarray(variance, np.float64), posinf=1e30) * points**-1.5).sum())
 
 
-def allocate(variance: Sequence[float], samples: int, budget: float) -> list[Rate]:
-    """Rates for lights of these variances that sum to about `budget` points per sample.
+def allocate(variance: Sequence[float], samples: int, budget: float, film: Sequence[float] = ()) -> list[Rate]:
+    """Rates for lights of these variances that sum to about `budget` points per sample. `film`: by light, the squared
+    error of one sample's points of the film.
 
     No light gets fewer than FEWEST_POINTS points in all, nor a rate that does not come out even over `samples`.
     """
@@ -69,9 +73,10 @@ def allocate(variance: Sequence[float], samples: int, budget: float) -> list[Rat
     exponents = [least] * len(variance)
     variance = np.nan_to_num(np.asarray(variance, np.float64), nan=0.0, posinf=1e30)
     gain = 1.0 - 2.0**-1.5
+    edges = np.asarray(film, np.float64) if len(film) else np.zeros(len(variance))
     while True:
         rates = np.exp2(exponents)
-        benefit = variance * rates**-1.5 * gain / rates
+        benefit = (variance + np.where(rates < 1.0, edges, 0.0)) * rates**-1.5 * gain / rates
         affordable = (rates.sum() + rates <= budget) & (np.asarray(exponents) < MOST_EXPONENT) & (benefit > 0)
         if not affordable.any():
             return [Rate(int(exponent)) for exponent in exponents]

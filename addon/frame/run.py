@@ -84,21 +84,25 @@ class Frame:
         """The same with a third number."""
         return *self.random(use), third(self.sample, use, self.settings.seed)
 
-    def look(self, lens: tuple[float, float] | None = None, film: tuple[float, float] | None = None) -> None:
+    def look(self, lens: tuple[float, float] | None = None, film: int | None = None) -> None:
         """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
         point of the aperture. The first sample looks through the middle of both: as in Cycles depth is taken from it,
-        and a picture that just began is sharp. `film`: another point of the pixel filter, each number in 0..1.
+        and a picture that just began is sharp. `film`: the number of another point of the film, with which layers are
+        drawn by lot anew, too.
         """
-        jitter, settings = (0.0, 0.0), self.settings
-        aperture = self.snapshot.camera.aperture
-        if self.sample > 0 or film is not None:
-            width = self.snapshot.film.filter_width
-            jitter = tuple(blackman_harris_offset(u, width) for u in film or self.random("film"))
+        settings, aperture = self.settings, self.snapshot.camera.aperture
+        number = self.sample if film is None else film
         if lens is None:
             lens = point_of(aperture, *self.random("lens")) if self.sample > 0 and aperture else (0.0, 0.0)
-        values = self.view.values(self.sample, settings.seed, jitter, self.geometry.size, lens)
+        values = self.view.values(number, settings.seed, self.film_offset(number), self.geometry.size, lens)
         self.view_block.update(**values)
         self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
+
+    def film_offset(self, number: int) -> tuple[float, float]:
+        """Where point `number` of the film lies, in pixels from a pixel's middle."""
+        width = self.snapshot.film.filter_width if number else 0.0
+        x, y = (blackman_harris_offset(u, width) for u in self.random_at(number, "film"))
+        return x, y
 
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the

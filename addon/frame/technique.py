@@ -89,6 +89,7 @@ class Technique:
     params: tuple[Param, ...] = ()
     reads: tuple[str, ...] = ()
     writes: tuple[Write, ...] = ()
+    closes: tuple[str, ...] = ()  # of what it writes, sums that are taken up by it after all others have added to them
     offers: tuple[str, ...] = ()  # what others may ask for in frame.services or frame.rates, apart from its slot
     uses: tuple[str, ...] = ()  # what it asks for there, if a technique of the plan offers it
 

@@ -119,7 +119,7 @@ class Denoise(Technique):
                     frame.target(write.name).clear()
         if done == frame.settings.samples // 2:
             for path in self._paths(frame):
-                passes.copy(frame.images[f"radiance.{path}"], frame.target(f"denoise.{path}_half"))
+                passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
             self._half_count = done
         if done == frame.settings.samples:
             for path in self._paths(frame):
@@ -133,7 +133,7 @@ class Denoise(Technique):
         return [path for path in TOLERANCE if f"radiance.{path}" in written]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
-        sums = {"sum_now": frame.images[f"radiance.{path}"], "color_sum": frame.images["color.diffuse"]}
+        sums = {"sum_now": frame.images[f"film.{path}"], "color_sum": frame.images["color.diffuse"]}
         guides = {
             "surface_position": frame.images["surface.position"], "normal_sum": frame.images["surface.normal_sum"],
         }  # fmt: skip

@@ -1,24 +1,28 @@
 """Film: gathers the samples that need no light (emission, the visible world, colours, normals), depth, and the sum.
 
 Colours are what Cycles puts into its colour passes: diffuse albedo with all layer weights, and the estimated albedo
-of the glossy lobe. A picture of one sample has the mean diffuse albedo of several points of each pixel (neighbours.py):
-direct light of its single point, divided by that, is right again only when it is multiplied. Direct light is stored
-with its colour; engine.py divides, after the mean, as Cycles does. Lights with extent that the camera may see are
-intersected analytically and land in emission.
+of the glossy lobe. Light is stored with its colour; engine.py divides, after the mean, as Cycles does. Lights with
+extent that the camera may see are intersected analytically and land in emission.
+
+Techniques add the light of one sample to the images `radiance.*`, all at one point of each pixel's filter. When all
+have done so it goes into the sums, at several such points where the picture has few samples (film_points.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 from ..frame import lights
 from ..frame.environment import WORLD
+from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
-from ..frame.technique import Technique, Write
+from ..frame.technique import Param, Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
-from .neighbours import COLORS_BETWEEN, shown_sum
-from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
+from . import film_points
+from .film_points import PATHS
+from .neighbours import shown_sum
+from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_sample, surface_bindings
 
 SUMS = (
     Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
@@ -28,7 +32,8 @@ SUMS = (
     Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
-PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in ("diffuse", "glossy", "transmission"))
+LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
+LIGHT = tuple(f"radiance.{path}" for path in PATHS)
 COLLECT = tuple(
     passes.fullscreen_program(
         "film collect",
@@ -38,7 +43,7 @@ COLLECT = tuple(
             ("FLOAT_2D", "environment_density_map"),
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"),),
+        constants=(("INT", "light_count"), ("FLOAT", "share")),
         defines=soft_defines,
         outputs=tuple(
             ("VEC4", name)
@@ -67,13 +72,18 @@ RESOLVE = passes.fullscreen_program(
 class Film(Technique):
     name = "film"
     label = "Film"
+    params = (
+        Param(
+            "points", "Film points", 64,
+            "Points of the pixel filter that a picture has at least; of fewer samples each shows its light at several",
+            1, 1024, draft=1,
+        ),
+    )  # fmt: skip
     reads = SURFACES
+    closes = LIGHT
     writes = (
         *SUMS,
-        *(
-            Write(f"radiance.{path}", "RGBA32F", "Cleared here, so that a scene without such light has it", True)
-            for path in PATHS
-        ),
+        *(Write(name, "RGBA32F", "Cleared here, so that a scene without such light has it", True) for name in LIGHT),
         Write("film.depth", "RGBA32F", "Depth along the camera axis at the pixel's centre, m; 1e10 for nothing"),
         Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
     )
@@ -81,8 +91,13 @@ class Film(Technique):
     def __init__(self):
         self._sources = lights.Sources()
 
-    def run(self, frame: Frame) -> None:
+    def run(self, frame: Frame) -> Iterator[None]:
         if frame.sample == 0:
+            self._paths = film_points.lit_paths(frame)
+            for path in self._paths:
+                if f"film.{path}" not in frame.images:
+                    frame.images[f"film.{path}"] = images.pool.take(*frame.size, "RGBA32F")
+                frame.target(f"film.{path}").clear()
             emitters = frame.emitters
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
@@ -93,25 +108,66 @@ class Film(Technique):
                 textures={"surface_position": frame.images["surface.position"]},
                 blocks={"film_view": frame.view_block},
             )
+        count = self._points(frame)
+        sums = frame.target(*(f"film.{path}" for path in self._paths))
+        self._collect(frame, surface_bindings(frame), 1.0 / count)
+        film_points.add(frame, self._paths, sums, 1.0 / count)
+        frame.count(self, "passes", 2)
+        frame.count(self, "points", count)
+        if count > 1:
+            yield
+            yield from self._between(frame, count, sums)
+        for path in self._paths:
+            frame.target(f"radiance.{path}").clear()
+            frame.shown[f"radiance.{path}"] = f"film.{path}"
+
+    def _points(self, frame: Frame) -> int:
+        """How many points of the film a sample shows: one where all of them would show the same."""
+        by_lot = any(material.transparent for material in frame.materials.compiled)
+        if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
+            return 1
+        return film_points.count_of(frame.settings.get(self, "points"), frame.settings.samples)
+
+    def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
+        """The same sample's light at other points of the film."""
+        refracts = any(one.slot == "transmission" for one in frame.plan.techniques)
+        drawn = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
+        depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
+        target = images.Target(tuple(drawn), depth)
+        surfaces = dict(zip(SURFACE_IMAGES, drawn))
+        # The first numbers are those of the samples' own points, so that all together are a prefix of the sequence.
+        first = frame.settings.samples + frame.sample * (count - 1)
+        try:
+            for point in range(first, first + count - 1):
+                frame.look(film=point)
+                draw_sample(frame, self, target, refracts)
+                self._collect(frame, {f"surface_{name}": image for name, image in surfaces.items()}, 1.0 / count)
+                film_points.add_between(frame, self._paths, sums, surfaces, 1.0 / count, point)
+                frame.count(self, "passes", 2)
+                yield
+        finally:
+            frame.look()
+            for image in (*drawn, depth):
+                images.pool.give(image)
+
+    def _collect(self, frame: Frame, surfaces: dict[str, images.Image], share: float) -> None:
+        """Add what needs no light, at the point of the film that the frame looks at."""
         passes.fullscreen(
             COLLECT[frame.materials.soft],
             frame.target(*(write.name for write in SUMS)),
             blend="ADDITIVE_PREMULT",
             textures={
-                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
+                **surfaces, "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
             },
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
-            constants={"light_count": self._light_count},
+            constants={"light_count": self._light_count, "share": share},
         )  # fmt: skip
-        frame.count(self, "passes")
-        if COLORS_BETWEEN in frame.images and not frame.materials.soft:  # the colours of soft lobes are not among them
-            passes.copy(frame.images[COLORS_BETWEEN], frame.target("color.diffuse"))
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
             frame.environment.tree.add_background(
-                frame.target("radiance.environment"), frame.view, frame.view_block, surface_bindings(frame)
+                frame.target("radiance.environment"), frame.view, frame.view_block, surfaces, share
             )
             frame.count(self, "passes")
 

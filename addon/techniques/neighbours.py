@@ -14,19 +14,11 @@ fifths of their squared error: relMSE over the reference's noise at 96x72, mean 
 
     reflected = albedo * mean over neighbours on the surface of  arriving
 
-A picture of one sample has one point of the film per pixel, and its edges and textures are ragged: beside a filtered
-picture that alone is a relMSE of 0.08 of the window, 0.03 of the Cornell box, 0.02 of the hall. Light that is as smooth
-as this needs no more points, but what reflects it does: so surfaces are drawn again for eight points of the pixel
-filter, and each reflects the light of those pixels around it that lie on the same surface. The colour pass is theirs,
-too, so that the passes multiply to that light: with the colours of the pixels' own points, what most of those miss
-(muntins, wires) had none. Single samples of multi-resolution radiosity at 96x72, mean of 12 seeds, before and with the
-wider test, the smaller mean and those colours: Cornell box 0.051 and 0.041, hall 0.050 and 0.038, door 0.074 and 0.053,
-window 0.081 and 0.073.
+Edges and textures need more points than light that is as smooth as this: film_points.py has them.
 
 | cost | per pass |
 |---|---|
 | fetches per pixel | 16 x 4 |
-| of a picture of one sample | 8 more draws of all surfaces, 9 x 4 fetches each, more where all of those miss |
 
 A viewport at rest shows its first samples in the same way: there the sums are filtered on their way to the screen, with
 the mean colours of their samples, and stay as they are.
@@ -40,15 +32,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
-from .surfaces import SURFACES, draw_sample
 
 APART = 3  # pixels, of those in the second mean
-POINTS = 8  # of the pixel filter, for a picture of one sample
 FEW = 8  # samples at rest in a viewport: up to here it shows indirect light filtered
 MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
     passes.fullscreen_program(
@@ -75,23 +64,6 @@ REFLECT = passes.fullscreen_program(
     textures=(("FLOAT_2D", "surface_diffuse"), ("FLOAT_2D", "arriving")),
     outputs=(("VEC4", "out_diffuse"),),
 )
-
-BETWEEN = passes.fullscreen_program(
-    "reflected light between pixels",
-    "neighbours/between.frag.glsl",
-    textures=tuple(
-        ("FLOAT_2D", name)
-        for name in (
-            "surface_position", "surface_normal", "surface_diffuse", "known_position", "known_normal", "known_diffuse",
-            "arriving",
-        )
-    ),
-    blocks=((VIEW, "film_view"),),
-    constants=(("FLOAT", "share"),),
-    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_color")),
-)  # fmt: skip
-COLORS_BETWEEN = "color.between"  # image of the frame: mean colours of those points
-GUIDES = ("position", "normal", "diffuse")
 
 
 def shown_alone(frame: Frame) -> bool:
@@ -121,39 +93,8 @@ def smooth(frame: Frame, technique: Technique, path: str) -> None:
     with images.borrowed(*frame.size, "RGBA32F") as near, images.borrowed(*frame.size, "RGBA32F") as far:
         _mean(frame, MEAN_OF_REFLECTED, frame.images[path], near, 1)
         _mean(frame, MEAN_AGAIN, near.colors[0], far, APART)
-        if frame.settings.draft:
-            _reflect(frame, far.colors[0], path, "NONE")
-        else:
-            _reflect_between(frame, technique, far.colors[0], path)
+        _reflect(frame, far.colors[0], path, "NONE")
     frame.count(technique, "filtered samples")
-
-
-def _reflect_between(frame: Frame, technique: Technique, arriving: images.Image, path: str) -> None:
-    """What is reflected of `arriving` at several points of each pixel's filter, into an image of radiance.
-
-    Leaves their mean colour to the film, so that what is divided by it comes back when it is multiplied again.
-    """
-    refracts = any(one.slot == "transmission" for one in frame.plan.techniques)
-    known = {f"known_{name}": frame.images[f"surface.{name}"] for name in GUIDES}
-    if COLORS_BETWEEN not in frame.images:
-        frame.images[COLORS_BETWEEN] = images.pool.take(*frame.size, "RGBA32F")
-    target = images.Target((frame.images[path], frame.images[COLORS_BETWEEN]))
-    target.clear()
-    drawn = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
-    depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
-    surfaces = images.Target(tuple(drawn), depth)
-    for number in range(POINTS):
-        frame.look(film=frame.random_at(number, "film/between"))
-        draw_sample(frame, technique, surfaces, refracts)
-        passes.fullscreen(
-            BETWEEN, target, blend="ADDITIVE_PREMULT", blocks={"film_view": frame.view_block},
-            textures={**{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, drawn) if name in GUIDES},
-                      **known, "arriving": arriving},
-            constants={"share": 1.0 / POINTS},
-        )  # fmt: skip
-    frame.look()
-    for image in (*drawn, depth):
-        images.pool.give(image)
 
 
 @contextmanager
@@ -168,7 +109,7 @@ def shown_sum(frame: Frame, path: str) -> Iterator[images.Image]:
         return
     with ExitStack() as stack:
         near, far, shown = (stack.enter_context(images.borrowed(*frame.size, "RGBA32F")) for _ in range(3))
-        _mean(frame, MEAN_OF_REFLECTED, frame.images[name], near, 1, "color.diffuse")
+        _mean(frame, MEAN_OF_REFLECTED, frame.to_show(name), near, 1, "color.diffuse")
         _mean(frame, MEAN_AGAIN, near.colors[0], far, APART, "color.diffuse")
         textures = {"surface_diffuse": frame.images["color.diffuse"], "arriving": far.colors[0]}
         passes.fullscreen(REFLECT, shown, textures=textures)

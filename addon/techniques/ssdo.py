@@ -99,7 +99,7 @@ GLOSSY = passes.fullscreen_program(
     constants=(*PATH_CONSTANTS, *FAN_CONSTANTS),
     outputs=(("VEC4", "out_glossy"),),
 )
-SENDERS_OF_SUMS, SENDERS = (
+SENDERS_OF_LIGHT, SENDERS = (
     passes.fullscreen_program(
         name,
         "ssdo/senders.frag.glsl",
@@ -109,7 +109,7 @@ SENDERS_OF_SUMS, SENDERS = (
         outputs=(("VEC4", "out_senders"),),
     )
     for name, textures, defines in (
-        ("senders of direct light", ("sum_now", "sum_before"), (("FROM_SUMS", ""),)),
+        ("senders of direct light", ("direct",), (("FROM_LIGHT", ""),)),
         ("senders of a bounce", ("arriving",), ()),
     )
 )
@@ -145,7 +145,6 @@ class ScreenSpaceBounce(Technique):
     reads = (*SURFACES, "radiance.diffuse_direct")
     writes = (
         *INDIRECT_WRITES,
-        Write("ssdo.direct", "RGBA32F", "Sum of direct diffuse light up to the sample before"),
         Write("ssdo.senders", "RGBA32F", "Radiance that surfaces send to each other in this sample"),
     )
 
@@ -158,10 +157,7 @@ class ScreenSpaceBounce(Technique):
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
-        if frame.sample == 0:
-            frame.target("ssdo.direct").clear()
-        direct = {"sum_now": frame.images["radiance.diffuse_direct"], "sum_before": frame.images["ssdo.direct"]}
-        self._send(frame, SENDERS_OF_SUMS, direct)
+        self._send(frame, SENDERS_OF_LIGHT, {"direct": frame.images["radiance.diffuse_direct"]})
         traced = frame.settings.get(self, "rays") and frame.settings.get(self, "visibility") == BITS
         traced = traced and not acceleration.too_many(frame.snapshot)
         if traced:
@@ -177,8 +173,7 @@ class ScreenSpaceBounce(Technique):
                 with_rays = traced and not bounce
                 yield from self._gather(frame, arriving, fans, with_rays)
                 reflect(frame, self, arriving.colors[0], "radiance.diffuse_indirect", noisy=with_rays)
-        passes.copy(direct["sum_now"], frame.target("ssdo.direct"))
-        frame.count(self, "passes", 2 + traced + 3 * bounces)
+        frame.count(self, "passes", 1 + traced + 3 * bounces)
         if traced:
             frame.count(self, "paths", frame.size[0] * frame.size[1])
 

@@ -19,6 +19,7 @@ from .quality import CANDELA_PT_quality_presets
 
 MOST_NOTES = 12  # more than these are counted only
 _PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
+_WITH_OTHERS = {"film"}  # techniques whose parameters stand in a panel of Blender's settings
 _STATE_ICONS = {ledgers.RAN: "CHECKMARK", ledgers.REUSED: "LOOP_BACK", ledgers.SKIPPED: "REMOVE"}
 
 
@@ -111,6 +112,7 @@ class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
         column = _columns(self)
         column.prop(context.scene.render, "filter_size", text="Filter Size")
         column.prop(context.scene.render, "film_transparent", text="Transparent")
+        column.prop(context.scene.candela, "film_points")
 
 
 class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
@@ -300,7 +302,7 @@ _CLASSES = (
     CANDELA_RENDER_PT_sampling,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_parameters,
-    *(_technique_panel(technique) for technique in REGISTRY if technique.params),
+    *(_technique_panel(technique) for technique in REGISTRY if technique.params and technique.name not in _WITH_OTHERS),
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_notes,

@@ -76,4 +76,10 @@ void main()
       }
     }
   }
+  out_emission *= share;
+  out_environment *= share;
+  out_diffuse_color *= share;
+  out_glossy_color *= share;
+  out_transmission_color *= share;
+  out_normal *= share;
 }

@@ -13,9 +13,9 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   vec3 whole = surface_albedo(s, max(dot(s.geometric_normal, viewer), 0.0));
-#ifdef FROM_SUMS
+#ifdef FROM_LIGHT
   // Sums over the samples; their difference is what this sample brought. Glossy reflection is added as even.
-  vec3 reflected = texelFetch(sum_now, pixel, 0).rgb - texelFetch(sum_before, pixel, 0).rgb;
+  vec3 reflected = texelFetch(direct, pixel, 0).rgb;
   float diffuse = luminance(s.diffuse);
   bool microfacets = s.kind <= FRESNEL_F82;
   out_senders.rgb = reflected * ((microfacets && diffuse > 0.0) ? luminance(whole) / diffuse : 1.0);

@@ -59,3 +59,12 @@ def test_error_that_is_left_falls_with_the_budget():
     errors = [left([1.0, 0.2], 64, budget) for budget in (4.0, 8.0, 16.0)]
     assert errors[0] > errors[1] > errors[2] > 0
     assert budget_for([1.0, 0.2], 64, 4.0) == 8.0 and errors[0] > LITTLE
+
+
+def test_a_light_that_gives_most_of_the_picture_is_in_every_sample_though_its_shadows_are_sharp():
+    assert [rate.exponent for rate in allocate([0.0, 0.0], 64, 6.0)] == [-3, -3]
+    assert [rate.exponent for rate in allocate([0.0, 0.0], 64, 1.2, film=[0.04, 1e-6])] == [0, -3]
+
+
+def test_points_of_the_film_ask_for_no_more_than_one_point_in_a_sample():
+    assert [rate.exponent for rate in allocate([0.0], 64, 16.0, film=[1.0])] == [0]

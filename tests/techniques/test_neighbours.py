@@ -139,6 +139,7 @@ def test_a_picture_of_one_sample_shows_indirect_light_on_stripes_as_smooth_as_ma
     stage.camera_above(2.0)
     stage.scene.candela.slot_indirect = "multires_radiosity"
     many, one = (stage.render(samples, (24, 24), bounces=1) for samples in (64, 1))
+    stage.scene.candela.film_points = 1
     torn = stage.render(1, (24, 24), bounces=0)["diffuse_color"] / many["diffuse_color"]
     light = [light_paths(picture)["diffuse_indirect"][..., :3] for picture in (one, many)]
     smooth_light = light[0] / light[1]

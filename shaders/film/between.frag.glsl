@@ -1,0 +1,169 @@
+// What a surface seen at another point of the film sends to the eye, of the light that was found at the pixels' own
+// points (`known`): light arrives there as at the pixel's own point where that lies on the same surface, else as at the
+// pixels around it that do, else as nearby; and leaves by the colours of the surface that is seen.
+#include "lib/gbuffer.glsl"
+#include "neighbours/pixel_size.glsl"
+
+#define REACH 4  // pixels to look at, on each side: until some have light (wires)
+#define LEAST_COLOR 1e-5  // what is darker tells nothing of the light that arrives
+
+struct Seen {
+  bool hit;
+  vec3 position;
+  vec3 normal;
+  vec3 color;   // of all that is diffuse
+  bool soft;    // with a diffuse lobe in it
+  int kind;     // of the other lobe
+  vec3 weight;  // of it; 0: there is none
+};
+
+#define SEEN(images, pixel) \
+  seen_decode(texelFetch(images##_position, pixel, 0), texelFetch(images##_normal, pixel, 0), \
+              texelFetch(images##_diffuse, pixel, 0), texelFetch(images##_tint, pixel, 0), \
+              texelFetch(images##_lobe, pixel, 0))
+
+Seen seen_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe)
+{
+  Seen s;
+  s.hit = position.w != 0.0;
+  s.position = position.xyz;
+  s.normal = octahedral_decode(normal.xy);
+  s.color = max(diffuse.rgb, vec3(0.0));
+  s.weight = tint.rgb;
+  s.kind = int(floor(lobe.z / 2097152.0));
+  float edge = lobe.z - float(s.kind) * 2097152.0;
+  bool lobe_exists = max_component(s.weight) > 0.0;
+  s.soft = lobe_exists && (s.kind == LOBE_SHEEN || s.kind == LOBE_TRANSLUCENT || (s.kind == LOBE_TOON && edge < 1.0));
+  if (s.soft) {
+    s.color += s.weight;
+    s.weight = vec3(0.0);
+  }
+  return s;
+}
+
+vec3 known_part(vec3 color)
+{
+  return step(vec3(LEAST_COLOR), color);
+}
+
+// Sums over pixels of one kind of light, and of the colours by which their surfaces show it.
+struct Arriving {
+  vec3 direct;
+  vec3 indirect;
+  vec3 whole;
+};
+
+// `weight` of the light, and of what it is divided by: where they differ, less light is left.
+void arriving_add(inout Arriving sum, vec3 direct, vec3 indirect, vec3 color, float weight, float whole)
+{
+  vec3 known = known_part(color);
+  sum.direct += known * direct * weight;
+  sum.indirect += known * indirect * weight;
+  sum.whole += known * color * whole;
+}
+
+bool arriving_enough(Arriving sum, vec3 color)
+{
+  vec3 missing = known_part(color) * (1.0 - step(vec3(1e-20), sum.whole));
+  return max_component(missing) <= 0.0;
+}
+
+// Of `same` where it is known, else of `nearby`.
+vec3 arriving_mean(vec3 same, vec3 same_whole, vec3 nearby, vec3 nearby_whole)
+{
+  return mix(nearby / max(nearby_whole, vec3(1e-20)), same / max(same_whole, vec3(1e-20)), step(vec3(1e-20), same_whole));
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 size = textureSize(known_position, 0);
+  out_diffuse_direct = vec4(0.0);
+  out_diffuse_indirect = vec4(0.0);
+  out_glossy_direct = vec4(0.0);
+  out_glossy_indirect = vec4(0.0);
+#ifdef TRANSMISSION
+  out_transmission_direct = vec4(0.0);
+  out_transmission_indirect = vec4(0.0);
+#endif
+  Seen here = SEEN(surface, pixel);
+  if (!here.hit) {
+    return;
+  }
+  float tolerance = 2.0 * pixel_size_at(here.position);
+  Arriving none = Arriving(vec3(0.0), vec3(0.0), vec3(0.0));
+  Arriving same = none;
+  Arriving nearby = none;
+  Arriving same_lobe = none;
+  Arriving nearby_lobe = none;
+#ifdef TRANSMISSION
+  bool refracts = here.kind == LOBE_REFRACTION;
+#endif
+  bool light_found = false;
+  bool lobe_found = false;
+  for (int reach = 0; reach <= REACH && !(light_found && lobe_found); reach++) {
+    for (int y = -reach; y <= reach; y++) {
+      for (int x = -reach; x <= reach; x++) {
+        ivec2 other = pixel + ivec2(x, y);
+        if (max(abs(x), abs(y)) < reach) {
+          continue;  // looked at before
+        }
+        if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) {
+          continue;
+        }
+        Seen there = SEEN(known, other);
+        if (!there.hit) {
+          continue;
+        }
+        vec2 off = abs(vec2(float(x), float(y)) - offset);
+        float weight = max(1.5 - off.x, 0.01) * max(1.5 - off.y, 0.01);
+        float facing = dot(here.normal, there.normal);
+        bool equal = facing > 0.8 && abs(dot(here.normal, there.position - here.position)) < tolerance;
+        // Where no pixel is on the surface: at outlines, which turn away within a pixel, rather of what is close.
+        float alike = max(facing, 0.1) * max(facing, 0.1);
+        vec3 apart = (there.position - here.position) / tolerance;
+        float similar = weight * alike * alike / (1.0 + dot(apart, apart));
+        if (!light_found) {
+          vec3 direct = texelFetch(light_diffuse_direct, other, 0).rgb;
+          vec3 indirect = texelFetch(light_diffuse_indirect, other, 0).rgb;
+          if (equal && here.soft == there.soft) {
+            arriving_add(same, direct, indirect, there.color, weight, weight);
+          }
+          arriving_add(nearby, direct, indirect, there.color, similar, similar);
+        }
+        if (!lobe_found && here.kind == there.kind) {
+          vec3 direct = texelFetch(light_glossy_direct, other, 0).rgb;
+          vec3 indirect = texelFetch(light_glossy_indirect, other, 0).rgb;
+#ifdef TRANSMISSION
+          if (refracts) {
+            direct = texelFetch(light_transmission_direct, other, 0).rgb;
+            indirect = texelFetch(light_transmission_indirect, other, 0).rgb;
+          }
+#endif
+          if (equal) {
+            arriving_add(same_lobe, direct, indirect, there.weight, weight, weight);
+          }
+          // Of a highlight that only what faces another way is known to show, hardly anything is taken.
+          arriving_add(nearby_lobe, direct, indirect, there.weight, similar, weight);
+        }
+      }
+    }
+    light_found = arriving_enough(same, here.color) || (reach > 0 && arriving_enough(nearby, here.color));
+    lobe_found = arriving_enough(same_lobe, here.weight) || (reach > 0 && arriving_enough(nearby_lobe, here.weight));
+  }
+  vec3 color = share * here.color;
+  out_diffuse_direct.rgb = color * arriving_mean(same.direct, same.whole, nearby.direct, nearby.whole);
+  out_diffuse_indirect.rgb = color * arriving_mean(same.indirect, same.whole, nearby.indirect, nearby.whole);
+  color = share * here.weight;
+  vec3 direct = color * arriving_mean(same_lobe.direct, same_lobe.whole, nearby_lobe.direct, nearby_lobe.whole);
+  vec3 indirect = color * arriving_mean(same_lobe.indirect, same_lobe.whole, nearby_lobe.indirect, nearby_lobe.whole);
+#ifdef TRANSMISSION
+  if (refracts) {
+    out_transmission_direct.rgb = direct;
+    out_transmission_indirect.rgb = indirect;
+    return;
+  }
+#endif
+  out_glossy_direct.rgb = direct;
+  out_glossy_indirect.rgb = indirect;
+}
