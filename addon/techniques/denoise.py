@@ -1,6 +1,6 @@
-"""Denoise: what is left of noise in diffuse light after the last sample, taken out where it can be told from shade.
+"""Denoise: what is left of noise in light after the last sample, taken out where it can be told from shade.
 
-    light = sum / colour            of diffuse direct and diffuse indirect light, each for itself
+    light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each for itself
     out   = light(p) + sum over pixels q  w(p, q) (light(q) - light(p))
     w     = binomial * same surface * exp(-(light(p) - light(q))^2 / s^2)
     s^2   = k^2 (var(p) + var(q)) / 2 + light(p) light(q) / 100^2
@@ -9,7 +9,8 @@ An edge-avoiding wavelet of three levels (Dammertz, Sewtz, Hanika and Lensch 201
 al. 2017 (SVGF), but by the variance of the picture itself: the sums are copied in the middle of the samples, and half
 the squared difference of the two halves' means estimates it, noise that pixels share included (one set of virtual
 lights or points on a lamp for all pixels). Two numbers are a poor estimate; their mean over 3x3 pixels of the same
-surface does as well as that over 7x7. k is 3 for direct light, 5 for indirect light, whose edges are softer.
+surface does as well as that over 7x7. k is 3 for direct light, 5 for indirect light, whose edges are softer and whose
+glossy part has fireflies: highlights of metal that metal shows, in one sample of many.
 
 w is the same from p to q as from q to p, and what weights lack to one stays where it is: pixels exchange light and none
 is lost, however skewed the noise. Dividing by the weights instead filters a little more and moves means by up to 0.4 %.
@@ -27,8 +28,10 @@ relMSE over the reference's noise, 16 samples at 128x96, as summed up and denois
 | passes | 5 per light path, over the screen |
 | fetches per noisy pixel and path | 9 x 5 + 3 x 25 x 3; 54 where there is no noise |
 
+Glossy indirect light, 16 samples at 256x192: garden .27 .10, product .54 .35, instances 1.09 .46.
+
 Bias: light is spread by at most 14 pixels over a surface, by what the standard error hides; means stay.
-Not filtered: gloss, glass, emission, pixels without a diffuse colour, pictures of fewer than 4 samples, and drafts.
+Not filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of fewer than 4 samples, drafts.
 """
 
 from __future__ import annotations
@@ -42,8 +45,10 @@ from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import no_diffuse_light
+from .traced_glossy import may_be_glossy
 
-TOLERANCE = {"diffuse_direct": 3.0, "diffuse_indirect": 5.0}  # standard errors that pixels may differ by
+# Standard errors that pixels may differ by.
+TOLERANCE = {"diffuse_direct": 3.0, "diffuse_indirect": 5.0, "glossy_indirect": 5.0}
 LEVELS = 3
 FEWEST = 4  # samples: each half needs a mean
 GUIDES = (("FLOAT_2D", "surface_position"), ("FLOAT_2D", "normal_sum"))
@@ -81,10 +86,10 @@ class Denoise(Technique):
     params = (
         Param(
             "strength", "Strength", 1.0,
-            "How much of what may be noise is taken out of diffuse light after the last sample; 0: none", 0.0, 2.0,
+            "How much of what may be noise is taken out of light after the last sample; 0: none", 0.0, 2.0,
         ),
     )  # fmt: skip
-    reads = ("surface.position", "surface.normal_sum", "color.diffuse")
+    reads = ("surface.position", "surface.normal_sum", "color.diffuse", "color.glossy")
     writes = (
         Write("film.combined", "RGBA32F", "The picture with denoised light, premultiplied by alpha"),
         *(
@@ -130,10 +135,11 @@ class Denoise(Technique):
         """Those that a technique of the plan adds light to; Film only clears them."""
         writers = [technique for technique in frame.plan.techniques if technique.name not in ("film", self.name)]
         written = {write.name for technique in writers for write in technique.writes}
+        written -= set() if any(map(may_be_glossy, frame.snapshot.materials[1:])) else {"radiance.glossy_indirect"}
         return [path for path in TOLERANCE if f"radiance.{path}" in written]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
-        sums = {"sum_now": frame.images[f"film.{path}"], "color_sum": frame.images["color.diffuse"]}
+        sums = {"sum_now": frame.images[f"film.{path}"], "color_sum": frame.images[f"color.{path.split('_')[0]}"]}
         guides = {
             "surface_position": frame.images["surface.position"], "normal_sum": frame.images["surface.normal_sum"],
         }  # fmt: skip

@@ -61,8 +61,11 @@ from .virtual_lights import (
     near_radius,
 )
 
+DEEPER = 2  # samples, one of which looks for light that close surfaces reflect to each other again and again
+DEEPER_ORDER = (0, 0, 1, 1, 1, 1, 0, 0)  # which of each two: of 16, all numbers of the sequence in each quarter twice
+MORE_RAYS = 4  # times, in a picture of one sample
 GATHER_TEXTURES = (*PATH_TEXTURES, ("FLOAT_2D", "virtual_lights"))
-GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("FLOAT", "near_radius"))
+GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "deeper"))
 GATHER = passes.fullscreen_program(
     "instant radiosity",
     "indirect/gather.frag.glsl",
@@ -110,7 +113,21 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     bindings = finder.path_bindings(frame)
     bindings["textures"]["virtual_lights"] = lights.image
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near_radius(frame, len(lights))}
+    bindings["constants"]["deeper"] = deeper_weight(frame)
     return bindings
+
+
+def deeper_weight(frame: Frame) -> float:
+    """Weight in this sample of light that was reflected more than once between close surfaces (gather.frag.glsl).
+
+    One of DEEPER samples has it, not always the first of them, whose numbers all lie in one half (sequence.py).
+    Pictures of few samples, and those that are shown while they grow, have it in each.
+    """
+    samples = frame.settings.samples
+    if not frame.settings.whole or samples < 4 * DEEPER or samples % DEEPER:
+        return 1.0
+    chosen = DEEPER_ORDER[frame.sample // DEEPER % len(DEEPER_ORDER)]
+    return float(DEEPER) if frame.sample % DEEPER == chosen else 0.0
 
 
 class InstantRadiosity(Technique):
@@ -122,7 +139,11 @@ class InstantRadiosity(Technique):
             "virtual_lights", "Virtual lights", 384, "Points of surfaces that light the picture in a sample", 1, 1024,
             draft=32,
         ),
-        Param("rays", "Rays", 8, "How many of the virtual lights each pixel traces in a sample", 1, 64, draft=1),
+        Param(
+            "rays", "Rays", 2,
+            "How many of the virtual lights each pixel traces in a sample; pictures of few samples trace up to four "
+            "times as many", 1, 64, draft=1,
+        ),
     )  # fmt: skip
     reads = SURFACES
     writes = INDIRECT_WRITES
@@ -138,7 +159,7 @@ class InstantRadiosity(Technique):
             return
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
-        bindings["constants"]["rays"] = frame.settings.get(self, "rays")
+        bindings["constants"]["rays"] = self._rays(frame)
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
         for rows in frame.bands(self):
@@ -146,6 +167,12 @@ class InstantRadiosity(Technique):
             yield
         smooth(frame, self, "radiance.diffuse_indirect")
         frame.count(self, "passes")
+
+    def _rays(self, frame: Frame) -> int:
+        """Noise of the choice is that of the pixel alone, and averages out over samples while that of the virtual
+        lights, which all pixels share, is still there."""
+        rays, settings = frame.settings.get(self, "rays"), frame.settings
+        return rays if settings.draft else max(rays, min(MORE_RAYS * rays, -(-MORE_RAYS * rays // settings.samples)))
 
     def release(self) -> None:
         self.virtual_lights.release()

@@ -81,7 +81,7 @@ class TracedGlossy(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
             return "the scene has no surface"
-        if not any(_may_be_glossy(material) for material in snapshot.materials[1:]):
+        if not any(may_be_glossy(material) for material in snapshot.materials[1:]):
             return "no material has a glossy closure"
         lit = np.any(snapshot.world.color) and snapshot.world.visibility.glossy
         emits = any(may_emit(material.graph) for material in snapshot.materials)
@@ -139,7 +139,7 @@ class TracedGlossy(Technique):
         self._sources.release()
 
 
-def _may_be_glossy(material) -> bool:
+def may_be_glossy(material) -> bool:
     return any("Bsdf" in node.type and node.type not in _NEVER_GLOSSY for node in material.graph.nodes.values())
 
 

@@ -10,7 +10,9 @@
 #endif
 
 // Radiance that arrives along a ray from surfaces nearer than the bound (from all surfaces, if `whole`), each with the
-// share that virtual lights leave to it, and what reaches those surfaces in the same way.
+// share that virtual lights leave to it, and what reaches those surfaces in the same way: that last light, of which there is
+// little and which takes most of the time where small things stand close, only some samples look for (`deeper`: the
+// weight that it has in them, 0 in the others).
 vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
 {
   vec3 sum = vec3(0.0);
@@ -33,6 +35,12 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
       vec3 from;
       vec3 arriving = virtual_irradiance(vertex.position, vertex.normal, roll.z, from);
       sum += throughput * arriving * reflection_of(vertex.reflection, vertex.normal, from, -direction);
+    }
+    if (bounce == 1) {
+      if (deeper <= 0.0) {
+        break;
+      }
+      throughput *= deeper;
     }
     roll = hash3(roll);
     vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));

@@ -67,3 +67,40 @@ def test_light_paths_that_nothing_writes_are_not_filtered(stage):
     lit_room(stage)
     paths_of(stage, 1.0, 4, 0)
     assert row().counters == {"passes": 5}
+
+
+@pytest.mark.parametrize(("gloss", "passes"), [(False, 10), (True, 15)])
+def test_glossy_indirect_light_is_filtered_where_something_is_glossy(stage, gloss, passes):
+    stage.floor(material=stage.principled(Roughness=0.3) if gloss else stage.diffuse(0.7))
+    stage.rectangle((-2, 0), (2, 2), location=(0, 2, 0), turn=(np.pi / 2, 0, 0), material=stage.diffuse(0.5))
+    stage.light("POINT", (0.5, 0.5, 1.5), energy=50)
+    stage.camera_above(6.0)
+    paths_of(stage, 1.0, 4, 2)
+    assert row().counters == {"passes": passes}
+
+
+@pytest.mark.slow
+def test_fireflies_of_glossy_indirect_light_are_spread_and_none_of_it_is_lost(stage):
+    """A lamp's highlight on a metal ball, as a rough metal floor shows it: some samples have much, most have none."""
+    metal = stage.material("ShaderNodeBsdfGlossy", Roughness=0.35)
+    stage.floor(material=metal)
+    turn = np.linspace(0, 2 * np.pi, 33)[:-1]
+    rings = [
+        [(np.cos(t) * np.sin(h), np.sin(t) * np.sin(h), 1 + np.cos(h)) for t in turn]
+        for h in np.linspace(0.05, 3.09, 17)
+    ]
+    faces = [
+        (32 * k + j, 32 * k + (j + 1) % 32, 32 * (k + 1) + (j + 1) % 32, 32 * (k + 1) + j)
+        for k in range(16)
+        for j in range(32)
+    ]
+    ball = stage.mesh(
+        [p for ring in rings for p in ring], faces, material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.15)
+    )
+    ball.visible_camera = False
+    stage.light("POINT", (2.5, 0.5, 1.5), energy=50, shadow_soft_size=0.05)
+    stage.camera_above(6.0)
+    truth = paths_of(stage, 0.0, 512, 2, seed=2)["glossy_indirect"]
+    plain, filtered = (paths_of(stage, strength, 16, 2)["glossy_indirect"] for strength in (0.0, 1.0))
+    assert filtered.mean() == pytest.approx(plain.mean(), rel=0.01)
+    assert np.mean((filtered - truth) ** 2) < 0.6 * np.mean((plain - truth) ** 2)

@@ -1,12 +1,16 @@
 """Indirect light by virtual lights against closed forms: rooms whose light is known to the last reflection."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.frame.sequence import point
 from addon.gfx import images
+from addon.techniques.instant_radiosity import DEEPER, InstantRadiosity, deeper_weight
 from addon.techniques.reflectance import BANDS, COLUMNS, Reflectance
 
 SAMPLES = 32
@@ -208,3 +212,35 @@ def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_
     assert means.image is used
     assert of_all[1] == pytest.approx(0.5, rel=0.01) and not of_all[0].any() and not of_all[2:].any()
     means.release()
+
+
+@pytest.mark.parametrize(("samples", "whole"), [(1, True), (3, True), (64, False), (4, True), (30, True), (64, True)])
+def test_light_between_close_surfaces_counts_once_in_the_mean(samples, whole):
+    frame = SimpleNamespace(settings=SimpleNamespace(samples=samples, whole=whole), sample=0)
+    weights = []
+    for frame.sample in range(samples):
+        weights.append(deeper_weight(frame))
+    assert np.mean(weights) == 1.0
+    assert set(weights) == ({0.0, float(DEEPER)} if samples >= 8 and whole else {1.0})
+
+
+def test_samples_that_look_for_it_have_numbers_from_all_quarters():
+    """Every other sample alone has numbers from one half of the sequence."""
+    frame = SimpleNamespace(settings=SimpleNamespace(samples=16, whole=True), sample=0)
+    chosen = []
+    for frame.sample in range(16):
+        if deeper_weight(frame):
+            chosen.append(point(frame.sample, "any"))
+    quarters = (4 * np.array(chosen)).astype(int)
+    assert all(sorted(axis) == [0, 0, 1, 1, 2, 2, 3, 3] for axis in quarters.T)
+
+
+def test_pictures_of_few_samples_trace_more_of_the_virtual_lights():
+    technique = InstantRadiosity()
+
+    def rays(samples, draft=False, asked=2):
+        settings = SimpleNamespace(samples=samples, draft=draft, get=lambda *name: asked)
+        return technique._rays(SimpleNamespace(settings=settings))
+
+    assert [rays(samples) for samples in (1, 2, 3, 4, 64)] == [8, 4, 3, 2, 2]
+    assert rays(1, draft=True) == 2 and rays(16, asked=5) == 5
