@@ -126,7 +126,9 @@ class Film(Technique):
         by_lot = any(material.transparent for material in frame.materials.compiled)
         if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
             return 1
-        return film_points.count_of(frame.settings.get(self, "points"), frame.settings.samples)
+        count = film_points.count_of(frame.settings.get(self, "points"), frame.settings.samples)
+        indirect = any(technique.slot == "indirect" for technique in frame.plan.techniques)
+        return count if indirect else -(-count // 2)  # direct light alone costs hardly more than another point
 
     def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
         """The same sample's light at other points of the film."""

@@ -14,10 +14,15 @@ is estimated on the spot: sources by one traced point, the virtual lights by one
 Per pixel and sample, `rays` virtual lights are traced out of all, drawn in proportion to what they would bring: noise
 comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose end is shaded in the same way.
 
+More than two of them do not pay from four samples on: what is left is noise of the virtual lights, which all pixels
+share. Eight have .5 to 5 % less error than two (seven sample scenes, 256x192, 16 samples), in 1.15 to 1.5 times the
+time.
+
 | cost | per sample |
 |---|---|
 | virtual lights | see virtual_lights.py: 1536 candidates, `virtual_lights` kept |
-| rays per pixel | `rays` + 1 short one, + 2 for each surface within r, + 1 to 3 for glossy surfaces |
+| rays per pixel | `rays` + 1 short one, + 2 for a surface within r and, in every other sample, for each after it |
+| of glossy surfaces | + 1 to 3 |
 | arithmetic per pixel | 1 kernel per virtual light, and one 32nd of that again for each ray |
 
 A pixel first chooses all virtual lights that it traces, then traces them: where every pixel traced as soon as its light

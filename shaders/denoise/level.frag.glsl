@@ -4,9 +4,14 @@
 #include "denoise/alike.glsl"
 #include "lib/math.glsl"
 
-const float BINOMIAL[3] = float[3](6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0);
 const float UNSEEN = 0.004;  // a standard error below this share of the light is left as it is
 const float EQUAL = 0.01;    // share of the light by which pixels may differ in any case
+
+// Share of a pixel `place` strides away, along one axis.
+float binomial(int place)
+{
+  return (place == 0) ? 6.0 / 16.0 : ((place == 1) ? 4.0 / 16.0 : 1.0 / 16.0);
+}
 
 // Whether a pixel's noise is worth an exchange.
 bool noisy(vec4 light)
@@ -42,7 +47,7 @@ void main()
       }
       float other = luminance(light.rgb);
       float allowed = 0.5 * tolerance * tolerance * (own.a + light.a) + EQUAL * EQUAL * abs(bright * other);
-      float weight = BINOMIAL[abs(x)] * BINOMIAL[abs(y)] * alike(here, there, max(abs(x), abs(y)) * stride)
+      float weight = binomial(abs(x)) * binomial(abs(y)) * alike(here, there, max(abs(x), abs(y)) * stride)
                      * exp(-(other - bright) * (other - bright) / max(allowed, 1e-37));
       taken += weight * (light.rgb - own.rgb);
       weights += weight;

@@ -47,7 +47,7 @@ def test_edges_are_as_smooth_as_with_as_many_samples_as_points(stage, light_of):
     truth = light_of("diffuse_direct", 1024, 1, bounces=0)
     many = error(light_of("diffuse_direct", 64, 1, bounces=0), truth)
     few = error(light_of("diffuse_direct", 16, 1, bounces=0), truth)
-    shared = error(light_of("diffuse_direct", 16, 64, bounces=0), truth)
+    shared = error(light_of("diffuse_direct", 16, 128, bounces=0), truth)
     assert shared < 1.5 * many < 0.5 * few
 
 
@@ -56,6 +56,8 @@ def test_a_sample_is_lit_once_however_many_points_it_shows(stage, light_of):
     stage.light("SUN", energy=3.0)
     light_of("diffuse_direct", 2, 16, bounces=0)
     assert stage.ledger.row("direct_light").counters["passes"] == 2
+    assert stage.ledger.row("film").counters["points"] == 8
+    light_of("diffuse_direct", 2, 16, bounces=1)
     assert stage.ledger.row("film").counters["points"] == 16
 
 
@@ -81,7 +83,7 @@ def test_no_light_is_lost_beside_a_surface_that_shows_none(stage, light_of, colo
     """What is black, or has no green, tells nothing of the light that arrives there."""
     stripes(stage, 0.11, *(stage.material("ShaderNodeBsdfDiffuse", Color=color) for color in colors))
     stage.light("SUN", energy=3.0)
-    truth, shared = (light_of("diffuse_direct", samples, 256, bounces=0) for samples in (256, 32))
+    truth, shared = (light_of("diffuse_direct", samples, 512, bounces=0) for samples in (256, 32))
     np.testing.assert_allclose(shared.mean(axis=(0, 1)), truth.mean(axis=(0, 1)), rtol=0.01)
     assert error(shared, truth) < 1e-3
 
@@ -127,7 +129,7 @@ def test_layers_are_drawn_by_lot_at_every_point(stage, light_of):
     stage.rectangle((-2, -2), (2, 2), material=stage.see_through(0.5))
     stage.scene.render.film_transparent = True
     coverage = []
-    for points in (1, 8):
+    for points in (1, 16):
         stage.scene.candela.film_points = points
         coverage.append(stage.render(1, SIZE)["combined"][..., 3].std())
     assert coverage[0] > 0.4
