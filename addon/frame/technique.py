@@ -69,7 +69,8 @@ def _refuse(value):
 
 @dataclass(frozen=True)
 class Write:
-    """An image that a technique writes: its format, what it holds, and whether samples add up in it."""
+    """An image that a technique writes: its format, what it holds, and whether what is drawn there adds up: of all
+    samples, or of all techniques in one sample where a technique closes it."""
 
     name: str
     format: str

@@ -135,7 +135,8 @@ class Denoise(Technique):
         """Those that a technique of the plan adds light to; Film only clears them."""
         writers = [technique for technique in frame.plan.techniques if technique.name not in ("film", self.name)]
         written = {write.name for technique in writers for write in technique.writes}
-        written -= set() if any(map(may_be_glossy, frame.snapshot.materials[1:])) else {"radiance.glossy_indirect"}
+        if not any(map(may_be_glossy, frame.snapshot.materials[1:])):
+            written.discard("radiance.glossy_indirect")
         return [path for path in TOLERANCE if f"radiance.{path}" in written]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:

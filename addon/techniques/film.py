@@ -97,7 +97,7 @@ class Film(Technique):
             for path in self._paths:
                 if f"film.{path}" not in frame.images:
                     frame.images[f"film.{path}"] = images.pool.take(*frame.size, "RGBA32F")
-                frame.target(f"film.{path}").clear()
+            frame.target(*(f"film.{path}" for path in self._paths)).clear()
             emitters = frame.emitters
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
@@ -117,8 +117,8 @@ class Film(Technique):
         if count > 1:
             yield
             yield from self._between(frame, count, sums)
+        frame.target(*(f"radiance.{path}" for path in self._paths)).clear()
         for path in self._paths:
-            frame.target(f"radiance.{path}").clear()
             frame.shown[f"radiance.{path}"] = f"film.{path}"
 
     def _points(self, frame: Frame) -> int:
@@ -132,7 +132,6 @@ class Film(Technique):
 
     def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
         """The same sample's light at other points of the film."""
-        refracts = any(one.slot == "transmission" for one in frame.plan.techniques)
         drawn = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
         depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
         target = images.Target(tuple(drawn), depth)
@@ -142,7 +141,7 @@ class Film(Technique):
         try:
             for point in range(first, first + count - 1):
                 frame.look(film=point)
-                draw_sample(frame, self, target, refracts)
+                draw_sample(frame, self, target)
                 self._collect(frame, {f"surface_{name}": image for name, image in surfaces.items()}, 1.0 / count)
                 film_points.add_between(frame, self._paths, sums, surfaces, 1.0 / count, point)
                 frame.count(self, "passes", 2)

@@ -34,10 +34,10 @@ from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.library import Program
+from .surfaces import refracts
 
 MOST = 8  # points of the film that share a sample's light
-PAIRS = ("diffuse", "glossy", "transmission")
-PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in PAIRS)
+PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in ("diffuse", "glossy", "transmission"))
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 
@@ -49,9 +49,7 @@ def count_of(points: int, samples: int) -> int:
 
 def lit_paths(frame: Frame) -> tuple[str, ...]:
     """Light paths that techniques of the plan may add to: diffuse and glossy always, through glass by need."""
-    written = {w.name for one in frame.plan.techniques if not one.closes for w in one.writes}
-    glass = any(f"radiance.transmission_{order}" in written for order in ("direct", "indirect"))
-    return PATHS if glass else REFLECTED
+    return PATHS if refracts(frame) else REFLECTED
 
 
 def _programs(name: str, file: str, guides: bool) -> tuple[Program, Program]:

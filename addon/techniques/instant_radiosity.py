@@ -177,7 +177,7 @@ class InstantRadiosity(Technique):
         """Noise of the choice is that of the pixel alone, and averages out over samples while that of the virtual
         lights, which all pixels share, is still there."""
         rays, settings = frame.settings.get(self, "rays"), frame.settings
-        return rays if settings.draft else max(rays, min(MORE_RAYS * rays, -(-MORE_RAYS * rays // settings.samples)))
+        return rays if settings.draft else max(rays, -(-MORE_RAYS * rays // settings.samples))
 
     def release(self) -> None:
         self.virtual_lights.release()

@@ -81,16 +81,15 @@ class Surfaces(Technique):
     )
 
     def run(self, frame: Frame) -> None:
-        refracts = any(technique.slot == "transmission" for technique in frame.plan.techniques)
         target = frame.target(*SURFACES, depth="surface.depth_buffer")
         if frame.sample == 0:
             modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
-            frame.receivers = self._receivers(frame, target, modes, refracts)
+            frame.receivers = self._receivers(frame, target, modes)
             if modes == (STOCHASTIC,):
                 return  # what was drawn for the receivers is the first sample
-        draw_sample(frame, self, target, refracts)
+        draw_sample(frame, self, target)
 
-    def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...], refracts: bool) -> Receivers:
+    def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...]) -> Receivers:
         width, height = frame.size
         tiles = -(-width // TILE), -(-height // TILE)
         low = np.full((tiles[1], tiles[0], 4), np.inf)
@@ -100,7 +99,7 @@ class Surfaces(Technique):
         for lens in (*(rim(aperture) if aperture else ()), (0.0, 0.0)):  # the middle last: it is the first sample
             frame.look(lens)
             for mode in modes:
-                draw_surfaces(frame, self, surfaces, mode, refracts)
+                draw_surfaces(frame, self, surfaces, mode, refracts(frame))
                 passes.fullscreen(
                     TILE_BOUNDS,
                     target,
@@ -120,21 +119,27 @@ class Surfaces(Technique):
         return Receivers(low[:, :3], high[:, :3], low[:, 3])
 
 
-def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, refracts: bool) -> None:
+def refracts(frame: Frame) -> bool:
+    """Whether light through glass is followed; else glass is a transparent layer."""
+    return any(technique.slot == "transmission" for technique in frame.plan.techniques)
+
+
+def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: bool) -> None:
     """Draw what the camera sees into six surface images with a depth buffer. `mode`: STOCHASTIC, OPAQUE or LEFT_OUT
-    says what becomes of transparent layers; `refracts`: glass is no such layer."""
+    says what becomes of transparent layers; `glass`: it is drawn as a surface, and is no such layer."""
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
-    constants = {"transparent_mode": mode, "refracts": int(refracts)}
+    constants = {"transparent_mode": mode, "refracts": int(glass)}
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants)
     frame.count(technique, "passes")
 
 
-def draw_sample(frame: Frame, technique: Technique, target: images.Target, refracts: bool) -> None:
+def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     """Draw what the camera sees in one sample into six surface images with a depth buffer."""
-    draw_surfaces(frame, technique, target, STOCHASTIC, refracts)
+    glass = refracts(frame)
+    draw_surfaces(frame, technique, target, STOCHASTIC, glass)
     tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
     if not tinted:
         return
@@ -143,7 +148,7 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target, refra
     colors = images.Target(tuple(drawn[name] for name in TINTED))
     position = {"surface_position": drawn["surface.position"]}
     with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
-        _submit(frame, technique, frame.materials.tint_program, tinted, {"refracts": int(refracts)}, position)
+        _submit(frame, technique, frame.materials.tint_program, tinted, {"refracts": int(glass)}, position)
     frame.count(technique, "passes")
 
 

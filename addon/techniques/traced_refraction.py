@@ -155,7 +155,7 @@ class TracedRefraction(Technique):
         surfaces = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
         depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
         behind = images.Target(tuple(images.pool.take(*frame.size, "RGBA32F") for _ in range(2)))
-        draw_surfaces(frame, self, images.Target(tuple(surfaces), depth), LEFT_OUT, refracts=False)
+        draw_surfaces(frame, self, images.Target(tuple(surfaces), depth), LEFT_OUT, glass=False)
         passes.fullscreen(
             ALBEDO,
             behind,

@@ -17,28 +17,29 @@ struct Seen {
   vec3 weight;  // of it; 0: there is none
 };
 
-#define SEEN(images, pixel) \
-  seen_decode(texelFetch(images##_position, pixel, 0), texelFetch(images##_normal, pixel, 0), \
-              texelFetch(images##_diffuse, pixel, 0), texelFetch(images##_tint, pixel, 0), \
-              texelFetch(images##_lobe, pixel, 0))
-
-Seen seen_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe)
+Seen seen_of(Surface s)
 {
-  Seen s;
-  s.hit = position.w != 0.0;
-  s.position = position.xyz;
-  s.normal = octahedral_decode(normal.xy);
-  s.color = max(diffuse.rgb, vec3(0.0));
-  s.weight = tint.rgb;
-  s.kind = int(floor(lobe.z / 2097152.0));
-  float edge = lobe.z - float(s.kind) * 2097152.0;
-  bool lobe_exists = max_component(s.weight) > 0.0;
-  s.soft = lobe_exists && (s.kind == LOBE_SHEEN || s.kind == LOBE_TRANSLUCENT || (s.kind == LOBE_TOON && edge < 1.0));
-  if (s.soft) {
-    s.color += s.weight;
-    s.weight = vec3(0.0);
-  }
-  return s;
+  vec3 weight = s.glossy_weight;
+  bool lobe = max_component(weight) > 0.0;
+  bool soft = lobe && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
+  vec3 color = max(s.diffuse, vec3(0.0)) + (soft ? weight : vec3(0.0));
+  return Seen(s.hit, s.position, s.normal, color, soft, s.kind, soft ? vec3(0.0) : weight);
+}
+
+// At this point of the film.
+Seen seen_here(ivec2 pixel)
+{
+  return seen_of(surface_decode(texelFetch(surface_position, pixel, 0), texelFetch(surface_normal, pixel, 0),
+                                texelFetch(surface_diffuse, pixel, 0), texelFetch(surface_tint, pixel, 0),
+                                texelFetch(surface_lobe, pixel, 0), vec4(0.0)));
+}
+
+// At a pixel's own point, where its light is known.
+Seen seen_there(ivec2 pixel)
+{
+  return seen_of(surface_decode(texelFetch(known_position, pixel, 0), texelFetch(known_normal, pixel, 0),
+                                texelFetch(known_diffuse, pixel, 0), texelFetch(known_tint, pixel, 0),
+                                texelFetch(known_lobe, pixel, 0), vec4(0.0)));
 }
 
 vec3 known_part(vec3 color)
@@ -69,9 +70,13 @@ bool arriving_enough(Arriving sum, vec3 color)
 }
 
 // Of `same` where it is known, else of `nearby`.
-vec3 arriving_mean(vec3 same, vec3 same_whole, vec3 nearby, vec3 nearby_whole)
+void arriving_mean(Arriving same, Arriving nearby, out vec3 direct, out vec3 indirect)
 {
-  return mix(nearby / max(nearby_whole, vec3(1e-20)), same / max(same_whole, vec3(1e-20)), step(vec3(1e-20), same_whole));
+  vec3 known = step(vec3(1e-20), same.whole);
+  vec3 same_whole = max(same.whole, vec3(1e-20));
+  vec3 nearby_whole = max(nearby.whole, vec3(1e-20));
+  direct = mix(nearby.direct / nearby_whole, same.direct / same_whole, known);
+  indirect = mix(nearby.indirect / nearby_whole, same.indirect / same_whole, known);
 }
 
 void main()
@@ -86,7 +91,7 @@ void main()
   out_transmission_direct = vec4(0.0);
   out_transmission_indirect = vec4(0.0);
 #endif
-  Seen here = SEEN(surface, pixel);
+  Seen here = seen_here(pixel);
   if (!here.hit) {
     return;
   }
@@ -111,7 +116,7 @@ void main()
         if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) {
           continue;
         }
-        Seen there = SEEN(known, other);
+        Seen there = seen_there(other);
         if (!there.hit) {
           continue;
         }
@@ -151,12 +156,14 @@ void main()
     light_found = arriving_enough(same, here.color) || (reach > 0 && arriving_enough(nearby, here.color));
     lobe_found = arriving_enough(same_lobe, here.weight) || (reach > 0 && arriving_enough(nearby_lobe, here.weight));
   }
-  vec3 color = share * here.color;
-  out_diffuse_direct.rgb = color * arriving_mean(same.direct, same.whole, nearby.direct, nearby.whole);
-  out_diffuse_indirect.rgb = color * arriving_mean(same.indirect, same.whole, nearby.indirect, nearby.whole);
-  color = share * here.weight;
-  vec3 direct = color * arriving_mean(same_lobe.direct, same_lobe.whole, nearby_lobe.direct, nearby_lobe.whole);
-  vec3 indirect = color * arriving_mean(same_lobe.indirect, same_lobe.whole, nearby_lobe.indirect, nearby_lobe.whole);
+  vec3 direct;
+  vec3 indirect;
+  arriving_mean(same, nearby, direct, indirect);
+  out_diffuse_direct.rgb = share * here.color * direct;
+  out_diffuse_indirect.rgb = share * here.color * indirect;
+  arriving_mean(same_lobe, nearby_lobe, direct, indirect);
+  direct *= share * here.weight;
+  indirect *= share * here.weight;
 #ifdef TRANSMISSION
   if (refracts) {
     out_transmission_direct.rgb = direct;

@@ -74,6 +74,12 @@ vec4 tint_encode(int kind, vec3 weight, vec3 tint, float ior)
   return vec4(weight, pack_three(root, 255.0));
 }
 
+// Whether a lobe without microfacets belongs to the glossy passes.
+bool soft_lobe_is_glossy(Surface s)
+{
+  return s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
+}
+
 Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe, vec4 emission)
 {
   Surface s;

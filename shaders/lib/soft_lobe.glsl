@@ -23,7 +23,7 @@ SoftLobe soft_lobe_begin(Surface s, vec3 view)
   SoftLobe lobe;
   lobe.exists = s.kind > LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;
   lobe.kind = s.kind;
-  lobe.glossy = s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
+  lobe.glossy = soft_lobe_is_glossy(s);
   lobe.weight = s.glossy_weight;
   lobe.shape = vec2(1.0, 0.0);
   lobe.view = view;

@@ -14,7 +14,7 @@ void main()
   vec3 viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   vec3 whole = surface_albedo(s, max(dot(s.geometric_normal, viewer), 0.0));
 #ifdef FROM_LIGHT
-  // Sums over the samples; their difference is what this sample brought. Glossy reflection is added as even.
+  // What this sample found. Glossy reflection is added as even.
   vec3 reflected = texelFetch(direct, pixel, 0).rgb;
   float diffuse = luminance(s.diffuse);
   bool microfacets = s.kind <= FRESNEL_F82;

@@ -53,6 +53,27 @@ def test_several_writers_of_an_image_all_run_before_its_reader():
     assert names(plan) == ["sun", "lamp", "sum"]
 
 
+def closing(name, closed, writes=()):
+    made = technique(name, (), (*closed, *writes))
+    made.closes = tuple(closed)
+    return made
+
+
+def test_who_closes_a_sum_runs_after_all_who_add_to_it():
+    plan = make_plan(
+        [closing("film", ["light"]), technique("sun", (), ["light"]), technique("lamp", (), ["light"])],
+        None,
+        Settings(),
+    )
+    assert names(plan) == ["sun", "lamp", "film"]
+
+
+def test_readers_of_a_closed_sum_run_before_it_is_taken_up():
+    film, bounce = closing("film", ["light"], ["color"]), technique("bounce", ["light"], ["light"])
+    registry = [film, bounce, technique("sun", (), ["light"]), technique("tint", ["color"])]
+    assert names(make_plan(registry, None, Settings())) == ["sun", "bounce", "film", "tint"]
+
+
 def test_reading_what_nothing_writes_is_an_error_that_says_what_was_skipped():
     with pytest.raises(PlanError, match=r"Blur reads depth, which nothing writes \(skipped: Surfaces\)"):
         make_plan([technique("surfaces", (), ["depth"], reason="none"), technique("blur", ["depth"])], None, Settings())
