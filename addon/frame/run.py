@@ -25,7 +25,7 @@ from .lights import Emitter, emitters
 from .materials import MaterialSet, compile_programs
 from .plan import Plan, make_plan
 from .rates import Rate
-from .sequence import point, third
+from .sequence import FILM, LENS, point, third
 from .settings import Settings
 from .technique import Technique
 from .view import VIEW, View, blackman_harris_offset
@@ -93,15 +93,14 @@ class Frame:
         settings, aperture = self.settings, self.snapshot.camera.aperture
         number = self.sample if film is None else film
         if lens is None:
-            lens = point_of(aperture, *self.random("lens")) if self.sample > 0 and aperture else (0.0, 0.0)
+            lens = point_of(aperture, *self.random(LENS)) if aperture else (0.0, 0.0)
         values = self.view.values(number, settings.seed, self.film_offset(number), self.geometry.size, lens)
         self.view_block.update(**values)
         self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
 
     def film_offset(self, number: int) -> tuple[float, float]:
         """Where point `number` of the film lies, in pixels from a pixel's middle."""
-        width = self.snapshot.film.filter_width if number else 0.0
-        x, y = (blackman_harris_offset(u, width) for u in self.random_at(number, "film"))
+        x, y = (blackman_harris_offset(u, self.snapshot.film.filter_width) for u in self.random_at(number, FILM))
         return x, y
 
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:

@@ -9,6 +9,9 @@ random subset there, and the error at edges falls only like 1 / sqrt(n).) With d
 points err 1.8 times as much (mean square) in how far an edge covers a pixel. Shaders get dimensions 1, 2, 5 and 6
 unscrambled and scramble them per pixel.
 
+The first point of the film is its filter's middle, and that of the lens the aperture's: the set is shifted bit by bit so
+that it comes to lie there, which leaves a point in every cell. (Put there alone, it would leave its own cell empty.)
+
 Sources: Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; Joe & Kuo, "Constructing Sobol sequences
 with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (direction numbers).
 """
@@ -21,7 +24,8 @@ from functools import lru_cache
 import numpy as np
 
 _U32 = np.uint64(0xFFFFFFFF)
-FILM = "film"
+FILM, LENS = "film", "lens"
+_FIRST = {FILM: (1 << 31, 1 << 31), LENS: (0, 0)}  # where the first point lies, as 32-bit fractions
 
 
 def _reverse_bits(x: np.ndarray) -> np.ndarray:
@@ -100,9 +104,12 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     salt = zlib.crc32(f"{use}/{seed}".encode())
     index = np.arange(first, first + count, dtype=np.uint64)
     pair = _FILM_DIRECTIONS if use == FILM else _DIRECTIONS[:2]
-    x = _owen(_bits(index, pair[0]), salt * 2654435761 + 1)
-    y = _owen(_bits(index, pair[1]), salt * 2246822519 + 2)
-    return np.stack([x, y], axis=-1).astype(np.float64) / 4294967296.0
+    numbers = [salt * 2654435761 + 1, salt * 2246822519 + 2]
+    scrambled = np.stack([_owen(_bits(index, axis), number) for axis, number in zip(pair, numbers)], axis=-1)
+    if use in _FIRST:
+        now = [_owen(np.zeros(1, np.uint64), number)[0] for number in numbers]
+        scrambled ^= np.bitwise_xor(now, np.array(_FIRST[use], np.uint64))
+    return scrambled.astype(np.float64) / 4294967296.0
 
 
 BLOCK = 64  # numbers that are made at once: an array of so many costs hardly more than one of a single number
