@@ -28,14 +28,14 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   for (int k = 0; k < 4; k++) {
     vec2 cell = clamp(corner + vec2(k & 1, k >> 1), vec2(0.0), vec2(r.rectangle.z - 1.0));
     vec4 caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + cell));
-    vec2 behind = shadow_behind(caster, r.texel - cell - 0.5, r.q, r.gradient);
+    vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
     float above = max(behind.x, behind.y);
     by_lot = by_lot || caster.w > 1.5;
-    if (above > r.slack) {
+    if (above > 0.0) {
       lowest = min(lowest, above);
       highest = max(highest, max(caster.x + 0.5 * dot(abs(caster.yz), vec2(1.0)), r.q + max(behind.x, 0.0)));
     }
-    blocking += int(min(behind.x, behind.y) > r.slack);
+    blocking += int(min(behind.x, behind.y) > 0.0);
   }
   if (lowest >= 1e30) {
     return 1.0;

@@ -19,16 +19,6 @@
 #endif
 
 
-// How far a caster is nearer to the light than the receiver: by the caster's plane at the receiver (x), and at the
-// centre of the caster's cell, `offset` texels away, by the receiver's plane (y). Far negative where nothing was drawn.
-vec2 shadow_behind(vec4 caster, vec2 offset, float q, vec2 receiver_gradient)
-{
-  if (caster.w <= 0.0) {
-    return vec2(-1e30);
-  }
-  return vec2(caster.x + dot(caster.yz, offset) - q, caster.x - q + dot(receiver_gradient, offset));
-}
-
 // A receiver as the first view that contains it sees it.
 struct ShadowReceiver {
   int view;
@@ -38,8 +28,28 @@ struct ShadowReceiver {
   vec2 texel;  // from the view's corner
   float q;
   vec2 gradient;  // of q on the receiver's plane, per texel
-  float slack;  // difference in q that is no difference
+  float slack;  // difference in q from its plane that is no difference
 };
+
+// Difference in q that is none, from a plane with this gradient per texel: rasterisers snap vertices to 1/256 texel, 3 %
+// of the slope covers it; 1e-5 covers float32 in q itself.
+float shadow_slack(float q, vec2 gradient)
+{
+  return 1e-5 * abs(q) + 0.03 * dot(abs(gradient), vec2(1.0));
+}
+
+// How far a caster is nearer to the light than the receiver, apart from what is no difference: by the caster's plane at
+// the receiver (x), and at the centre of the caster's cell, `offset` texels away, by the receiver's plane (y). Each has
+// its own plane's slack: what stands far above a receiver seen edge-on is not excused by the receiver's slope. Far
+// negative where nothing was drawn.
+vec2 shadow_behind(ShadowReceiver r, vec4 caster, vec2 offset)
+{
+  if (caster.w <= 0.0) {
+    return vec2(-1e30);
+  }
+  float height = caster.x - r.q;
+  return height + vec2(dot(caster.yz, offset) - shadow_slack(r.q, caster.yz), dot(r.gradient, offset) - r.slack);
+}
 
 bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out ShadowReceiver r)
 {
@@ -77,8 +87,7 @@ bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out
     if (abs(determinant) > 1e-4 * dot(abs(d1), vec2(1.0)) * dot(abs(d2), vec2(1.0))) {
       r.gradient = vec2(q1 * d2.y - q2 * d1.y, q2 * d1.x - q1 * d2.x) / determinant;
     }
-    // Rasterisers snap vertices to 1/256 texel: 3 % of the slope covers it; 1e-5 covers float32 in q itself.
-    r.slack = 1e-5 * abs(r.q) + 0.03 * dot(abs(r.gradient), vec2(1.0));
+    r.slack = shadow_slack(r.q, r.gradient);
     return true;
   }
   return false;
@@ -108,17 +117,19 @@ vec2 shadow_outward(ShadowReceiver r, vec3 normal)
 bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
 {
   vec4 caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + cell));
-  vec2 behind = shadow_behind(caster, r.texel - cell - 0.5, r.q, r.gradient);
+  vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
   float turn = length(caster.yz - r.gradient);
-  if (behind.x > r.slack && behind.y <= r.slack && turn > 0.6 * (length(caster.yz) + length(r.gradient))) {
+  if (behind.x > 0.0 && behind.y <= 0.0 && turn > 0.6 * (length(caster.yz) + length(r.gradient))) {
     // Only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
-    // convex edge, or it overhangs a steep receiver. One texel out along the receiver's normal the edge is gone, the
-    // overhang is not.
-    vec2 beside = clamp(floor(r.texel + shadow_outward(r, normal)), vec2(0.0), vec2(r.rectangle.z - 1.0));
+    // convex edge, or it overhangs a steep receiver. One texel down the receiver's slope (out along its normal, where
+    // that faces the light) the edge is gone, the overhang is not.
+    vec2 down = shadow_outward(r, normal);
+    down = (dot(r.gradient, down) > 0.0) ? -down : down;
+    vec2 beside = clamp(floor(r.texel + down), vec2(0.0), vec2(r.rectangle.z - 1.0));
     caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + beside));
-    behind = shadow_behind(caster, r.texel - beside - 0.5, r.q, r.gradient);
+    behind = shadow_behind(r, caster, r.texel - beside - 0.5);
   }
-  return behind.x > r.slack && behind.y > r.slack;
+  return min(behind.x, behind.y) > 0.0;
 }
 
 float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal)

@@ -288,6 +288,19 @@ def test_no_light_leaks_under_a_closed_box(stage):
     assert not stage.render(16)["combined"][..., :3].any()
 
 
+def test_a_roof_shades_faces_that_the_sun_sees_edge_on(stage):
+    """Whose shading normals face it: their own slope in the map is without bounds, that of the roof is not."""
+    corners = [(x, y, -abs(x)) for x in (-2, 0, 2) for y in (-2, 2)]
+    ridge = stage.mesh(corners, [(0, 2, 3, 1), (2, 4, 5, 3)])
+    for face in ridge.data.polygons:
+        face.use_smooth = True
+    stage.blocker((-99, -99), (99, 99), 3.0)
+    stage.camera_above(SPAN)
+    for edge_on in (-0.25 * np.pi, 0.25 * np.pi):
+        stage.light("SUN", turn=(0, edge_on, 0), angle=0.03)
+    assert stage.render(16, (48, 16))["diffuse_direct"].max() == 0.0
+
+
 @pytest.mark.parametrize("kind", ["SUN", "POINT", "AREA"])
 def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, kind):
     """Closed, mirrored and open casters: written out in world space or drawn as instances, the picture is the same."""
