@@ -9,8 +9,9 @@ random subset there, and the error at edges falls only like 1 / sqrt(n).) With d
 points err 1.8 times as much (mean square) in how far an edge covers a pixel. Shaders get dimensions 1, 2, 5 and 6
 unscrambled and scramble them per pixel.
 
-The first point of the film is its filter's middle, and that of the lens the aperture's: the set is shifted bit by bit so
-that it comes to lie there, which leaves a point in every cell. (Put there alone, it would leave its own cell empty.)
+The first point of the film is its filter's middle, and that of the lens the aperture's: the set is shifted bit by bit
+to bring it there, which leaves a point in every cell. (Put there alone, it would leave its own cell empty: 16 points
+would err 1.35 times as much at edges, mean square, and 64 points 1.17 times.)
 
 Sources: Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; Joe & Kuo, "Constructing Sobol sequences
 with better two-dimensional projections", SIAM J. Sci. Comput. 30, 2008 (direction numbers).
