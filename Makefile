@@ -9,7 +9,6 @@ PARALLEL := -n 2 --dist worksteal
 
 ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
-ZIP := build/candela.zip
 
 .DEFAULT_GOAL := help
 .PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean

@@ -9,9 +9,9 @@ On a software GPU most of EEVEE's time is a constant that hardly depends on the 
 renders of a scene take longer than the first. Ratios are therefore given for both: of the medians, and of the cold
 renders.
 
-Error is relMSE against Cycles without bounces, the light that Candela renders. EEVEE and full Cycles render bounces
-too, so their pictures are not comparable with that reference and have no figure; a Cycles without bounces stands beside
-them for a comparison of like with like.
+Error is relMSE against Cycles without bounces, the light that Candela is told to render. EEVEE and full Cycles render
+bounces too, so their pictures are not comparable with that reference and have no figure; a Cycles without bounces
+stands beside them for a comparison of like with like.
 """
 
 from __future__ import annotations

@@ -96,9 +96,8 @@ def _parser(program: str) -> argparse.ArgumentParser:
         help="of Cycles, each of two renders (default 256)",
     )
     against.add_argument(
-        "--direct-only", action=argparse.BooleanOptionalAction, default=not _renders_indirect_light(),
-        help="let Cycles stop after the first surface, so that Combined compares like with like "
-        "(the default while Candela renders direct light only)",
+        "--direct-only", action=argparse.BooleanOptionalAction, default=False,
+        help="both engines without bounces",
     )  # fmt: skip
     against.add_argument("--no-cache", action="store_true", help="render the reference anew and do not keep it")
     against.set_defaults(verb=verbs.compare)
@@ -116,10 +115,6 @@ def _parser(program: str) -> argparse.ArgumentParser:
     tune.add_argument("--output", metavar="PATH.blend", type=Path, help="with --apply: leave FILE as it is")
     tune.set_defaults(verb=tuning.tune_scene)
     return parser
-
-
-def _renders_indirect_light() -> bool:
-    return any(technique.slot == "indirect" for technique in REGISTRY)
 
 
 def _example() -> str:

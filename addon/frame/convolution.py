@@ -2,7 +2,7 @@
 
 The comparison of a texel's depth z with a receiver's depth d is a truncated Fourier series whose terms separate into
 functions of d and of z (shaders/lib/convolution.glsl). The functions of z are images that can be averaged beforehand,
-by a pyramid of means (any box within a factor, blurred by bilinear reading, 8 bytes per texel and tile) or by a
+by a pyramid of means (any box within a factor, blurred by bilinear reading, 4 bytes per texel and tile) or by a
 summed-area table (any box exactly, 16 bytes). A depth map of any kind of light can be filtered so: what brings the map
 declares in GLSL how a texel's z follows from it.
 

@@ -11,7 +11,7 @@ points against the ray.
 | cost | |
 |---|---|
 | bake | 0.5 million evaluations of the tree (2 million with a sky, up to 8 million with images), when it changes |
-| background | one evaluation per pixel and sample |
+| background | one evaluation per pixel and point of the film |
 
 Bias: light has the map's resolution, 0.35 degrees (0.18 with a sky) or that of the largest image up to 0.09. All
 surfaces see the same world: Light Path tells the camera from light, not diffuse from glossy rays.

@@ -16,7 +16,7 @@ light below the receiver's horizon does not count; a min-max pyramid settles mos
 
 | cost | per map of N x N texels, order M |
 |---|---|
-| basis, by table | 4 dispatches, 16 (M + 1) bytes per texel kept, as much borrowed |
+| basis, by table | passes as for one table (frame/tables.py), 16 (M + 1) bytes per texel kept, as much borrowed |
 | basis, by pyramid | log2 N dispatches, 4 (M + 1) bytes per texel |
 | lookup | cells^2 boxes, each (M + 1) + M / 2 means: 4 fetches by table, 8 by pyramid |
 

@@ -16,8 +16,8 @@ the surface itself, and the fans' weights are equal. V: what the screen leaves o
 | rays per pixel | `fans` |
 
 For pictures of one sample, where it replaces a few hard shadows of environment_light by smooth shade. relMSE of direct
-diffuse light at 96x72, in one to three times the time of environment_light and a third to a tenth of that of
-environment_area_lights:
+diffuse light at 96x72, before a sample was seen at several points of the film, in one to three times the time of
+environment_light and a third to a tenth of that of environment_area_lights:
 
 | | courtyard | product | garden | foliage | window |
 |---|---|---|---|---|---|

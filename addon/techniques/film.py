@@ -75,7 +75,7 @@ class Film(Technique):
     params = (
         Param(
             "points", "Film points", 64,
-            "Points of the pixel filter that a picture has at least; of fewer samples each shows its light at several",
+            "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
             1, 1024, draft=1,
         ),
     )  # fmt: skip

@@ -16,8 +16,8 @@ K = points / samples, from 1 to MOST: with as many samples as points each point 
 indirect light have half as many, since there a point costs nearly as much as a sample: 16 samples of direct light take
 1.6 times as long with four points, for .6 of the error in `soft_shadow_garden`.
 
-relMSE of direct light at 256x192, 4 and 16 samples, one point and 64 in all: garden .031 .0061 and .016 .0043,
-instances .089 .0185 and .038 .0125, foliage .049 .0106 and .018 .0055, in 1.1 to 1.25 times the time.
+relMSE of direct light at 256x192, 4 and 16 samples, one point a sample, and eight and four: garden .031 .0061 and .016
+.0043, instances .089 .0185 and .038 .0125, foliage .049 .0106 and .018 .0055, in 1.1 to 1.25 times the time.
 
 | cost | per point of the film beside the sample's own |
 |---|---|

@@ -9,7 +9,8 @@ has no bound. So the integral is split by a share s(d) = min(1, d^2 / r^2):
 The first kernel is bounded by cos_x cos_y / r^2. The second needs rays of length r only (Kollig & Keller 2004: bias
 compensation), and both shares add to one at every distance: nothing is doubled, nothing is lost. L at the end of a ray
 is estimated on the spot: sources by one traced point, the virtual lights by one of them, and what is nearer than r to
-*that* point by another short ray, and so on. r is 7 % of the median distance of what is seen.
+*that* point by another short ray, and so on. r is 6 % of the median distance of what is seen with 384 virtual lights,
+and shrinks with their spacing.
 
 Per pixel and sample, `rays` virtual lights are traced out of all, drawn in proportion to what they would bring: noise
 comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose end is shaded in the same way.

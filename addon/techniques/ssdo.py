@@ -15,8 +15,9 @@ there takes the light of its further reflections at once. Glossy surfaces trace 
 What the screen shows is estimated by the screen, and the rest by rays: each direction of x by one of both, so nothing
 is doubled.
 
-L is the direct diffuse light of this very sample (the difference of two sums), with glossy reflection counted as
-diffuse; the next bounce sends what the one before brought, rays included. The mean over the samples has no lag.
+L is the direct diffuse light of this very sample (`radiance.diffuse_direct`, before the Film takes it), with glossy
+reflection counted as diffuse; the next bounce sends what the one before brought, rays included. The mean over the
+samples has no lag.
 
 `visibility` POINTS is the thesis's own way for comparison: as many points as bits have steps, in a half ball of the
 radius; those below what is seen are solid, and each sends as a patch of pi r^2 / N, bounded by the directions that it
@@ -26,7 +27,7 @@ Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque
 
 | cost | per sample |
 |---|---|
-| passes | 3 + 3 per bounce, over the screen |
+| passes | 3 per bounce, over the screen, and 1 with rays |
 | fetches per pixel and bounce | `fans` x `steps` x 3; later bounces have half the fans of the one before |
 | rays per pixel | 1 or 2 per vertex of one path, of 1 / (1 - albedo) vertices in the mean |
 
@@ -173,7 +174,7 @@ class ScreenSpaceBounce(Technique):
                 with_rays = traced and not bounce
                 yield from self._gather(frame, arriving, fans, with_rays)
                 reflect(frame, self, arriving.colors[0], "radiance.diffuse_indirect", noisy=with_rays)
-        frame.count(self, "passes", 1 + traced + 3 * bounces)
+        frame.count(self, "passes", traced + 3 * bounces)
         if traced:
             frame.count(self, "paths", frame.size[0] * frame.size[1])
 
@@ -209,7 +210,7 @@ class ScreenSpaceBounce(Technique):
 
 
 def fan_bindings(frame: Frame, technique: Technique) -> dict:
-    """What shaders/ssdo/fan.glsl needs, by the parameters of a technique that has FAN_PARAMS."""
+    """What shaders/ssdo/fan.glsl needs, by the parameters that `fan_params` declares."""
     distance = float(np.median(frame.receivers.distance))
     return {
         "textures": {**surface_bindings(frame), "energy_table": frame.materials.energy_table},

@@ -20,7 +20,7 @@ depth of field all that the rim of the lens sees, too.
 | draws | one per material (meshes shown once are joined) and one per instanced mesh and material |
 | bytes written per pixel | 6 x 16 + 4 |
 | coloured layers | + 1 pass of their draws, blended into three of the images |
-| first sample | + 1 or 2 surface passes and one reduction, read back at 1/256 of the pixels |
+| first sample | + one reduction, read back at 1/256 of the pixels; with alpha + 2 surface passes and another one |
 | first sample with depth of field | 7 times that |
 
 Fails: more layers than samples look dithered; light through coloured layers casts grey shadows.

@@ -25,11 +25,11 @@ classification by bounds and the plane-relative moments are ours.
 
 | cost | per map of N x N texels |
 |---|---|
-| pyramid, table | log2 N dispatches, 4 log8 N + 3 passes; 20 bytes per texel kept |
+| pyramid, table | log2 N dispatches, 4 log8 N - 1 passes (log8 N rounded up); 20 bytes per texel kept |
 | lookup, lit or all blocked pixels | up to 27 loads |
 | lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 41 loads of 16 bytes, up to 225 of 8; 9 more per mixed cell |
 | contact rays | 4 per pixel that is not settled and map, from 16 samples on 1 |
-| bytes | 36 per texel and 16 borrowed, beside the map's 20 |
+| bytes | 20 per texel and 16 borrowed, beside the map's 20 |
 
 Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the light's
 middle does not see, beyond the reach of contact rays, blocks nothing; visibility multiplies the unblocked light, as if
