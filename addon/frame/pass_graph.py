@@ -173,6 +173,12 @@ def check(graph: PassGraph, registry: Sequence[type[Technique]], root: str = "")
         for node in graph.nodes
         if node.technique in by_name and not sockets(by_name[node.technique], registry)[1]
     }
+    # Who reads the light of one sample needs who takes it up after each.
+    read = {image for node in graph.nodes if node.name in names and node.technique in by_name
+            for image in by_name[node.technique].reads}  # fmt: skip
+    names |= {
+        node.name for node in graph.nodes if node.technique in by_name and read & {*by_name[node.technique].closes}
+    }
     ordered = [graph.node(name) for name in _sorted(graph, good) if name in names]
     running = [node.technique for node in ordered if node.technique in by_name and not node.muted]
     return Checked(tuple(dict.fromkeys(running)), sentences, frozenset(wrong))

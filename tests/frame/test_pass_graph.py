@@ -88,6 +88,20 @@ def test_only_what_feeds_the_output_runs():
     assert check(shown(Surface, Maps, Lamp, Sky, Picture), SMALL, root="Lamp").order == ("surface", "maps", "lamp")
 
 
+def test_who_reads_the_light_of_one_sample_brings_who_takes_it_up():
+    class Bounce(Technique):
+        name, label, reads = "bounce", "Bounce", ("radiance.diffuse",)
+        writes = (Write("radiance.diffuse", "RGBA32F", "", True),)
+
+    class Film(Picture):
+        closes = ("radiance.diffuse",)
+
+    graph = planned(Surface, Lamp, Bounce, Film)
+    registry = (Surface, Lamp, Bounce, Film)
+    assert check(graph, registry, root="Lamp").order == ("surface", "lamp")
+    assert check(graph, registry, root="Bounce").order == ("surface", "lamp", "bounce", "picture")
+
+
 def test_muted_pass_is_left_out_and_lets_sums_through():
     graph = shown(Surface, Lamp, Sky, Picture)
     graph = replace(graph, nodes=tuple(replace(n, muted=n.name == "Sky") for n in graph.nodes))
