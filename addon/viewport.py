@@ -155,15 +155,13 @@ class Viewport:
         self._prepare(source, camera, size, border or (0, 0, *size), settings, clock)
         frame, started = self.frame, clock()
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
-        drawn = False
         while frame.samples_done < settings.samples:
             spent = self._work(frame, clock, budget)
-            drawn |= self._sample is None
+            if self._sample is None:
+                self._resolve(frame)  # now: the next sample, once it has begun, changes the images that are shown
             # Only a picture of this very view and scene may wait for its next sample.
             if (self._waits or frame.samples_done) and clock() - called + spent > budget:
                 break
-        if drawn:
-            self._resolve(frame)
         self.seconds += clock() - started
         self._left_at = None if self.done else clock()
         if self.scale == 1 and frame.samples_done >= settings.samples and not self._finished:

@@ -94,6 +94,22 @@ def test_sample_at_rest_is_done_in_parts_and_the_coarse_picture_stays_until_it_i
     assert region.viewport.picture.size == SIZE
 
 
+def test_picture_between_two_samples_is_the_mean_of_whole_ones(region):
+    """A redraw that ends within a sample shows the samples before it, and nothing of its unfinished images."""
+    whole = region.rest()
+    region.viewport.pace.cost = {1: 1.0, 2: 0.3, 4: 0.06}
+    bpy.context.scene.candela.seed, bpy.context.scene.candela.viewport_samples = 3, 16
+    region.clock.tick = viewport.BUDGET_S / 8  # a few parts a redraw, of more than one sample
+    seen = 0
+    for _ in range(60):
+        picture = region.draw()
+        region.clock.now += viewport.REST_S
+        if picture is not None and region.viewport.frame.samples_done > 0 and picture.size == SIZE:
+            seen += region.viewport._sample is not None
+            np.testing.assert_allclose(images.read(picture)[..., :3].mean(), whole[..., :3].mean(), rtol=0.1)
+    assert seen > 2
+
+
 def test_view_that_is_redrawn_seldom_does_not_rest_between_two_changes(region):
     """Where Blender takes longer than REST_S for its window, a moving view is not taken for one at rest."""
     region.rest()
