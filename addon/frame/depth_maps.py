@@ -78,12 +78,13 @@ def directional_views(
     row_q = np.append(direction, -bottom) / (top - bottom)
     q = (corners @ direction - bottom) / (top - bottom)
     views = []
-    for low, high, members in _merged_rectangles(place, receivers.groups(), 1e-6 * geometry.size):
+    for low, high, _ in _merged_rectangles(place, receivers.groups(), 1e-6 * geometry.size):
         low, high = _padded(*_widened(low, high, reach * (top - bottom)), jitter, resolution)
+        asked = _that_meet(place, low, high)
         row_x = np.append(2 * u, -(low[0] + high[0])) / (high[0] - low[0])
         row_y = np.append(2 * v, -(low[1] + high[1])) / (high[1] - low[1])
         rows = np.stack([row_x, row_y, one, row_q])
-        views.append(MapView(rows, 1.0, (*direction, 0.0), least_q=float(q[members].min())))
+        views.append(MapView(rows, 1.0, (*direction, 0.0), least_q=float(q[asked].min())))
     return views
 
 
@@ -133,6 +134,7 @@ def point_views(
             far = float(depth[members].max())
             wide = reach * (1.0 / max(nearest, 0.1 * far) - 1.0 / far)
             low, high = _padded(*_widened(low, high, wide), jitter, resolution)
+            far = float(depth[_that_meet(tangents, low, high)].max())
             views.append(_perspective(position, u, v, forward, low, high, geometry.size, far))
         return views
     views = []
@@ -182,6 +184,11 @@ def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float
                 continue
         rectangles.append((low, high, group))
     return rectangles
+
+
+def _that_meet(place: np.ndarray, low, high) -> np.ndarray:
+    """Which boxes project into a rectangle: receivers there ask its view, whether it was made for them or not."""
+    return ((place.max(axis=1) >= low) & (place.min(axis=1) <= high)).all(axis=1)
 
 
 def _padded(low, high, jitter, resolution):

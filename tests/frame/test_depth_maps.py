@@ -50,6 +50,29 @@ def test_views_from_a_direction_contain_all_receivers(direction, jitter):
     assert contained(views, boxes.corners.reshape(-1, 3)).all()
 
 
+def reached(views, points):
+    """For each point, whether the view that it asks, the first that contains it, draws casters as far as it lies."""
+    h = np.column_stack([points, np.ones(len(points))])
+    reaches = np.ones(len(points), bool)
+    for view in reversed(views):
+        x, y, w, q = view.rows @ h.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inside = (w > 0) & (np.abs(x / w) < 1) & (np.abs(y / w) < 1)
+            reaches = np.where(inside, q / w >= view.least_q * (1 - 1e-6), reaches)
+    return reaches
+
+
+@pytest.mark.parametrize("direction", [(0.0, -0.98, 0.17), (0.0, 0.98, 0.17), (0, 0, 1)])
+def test_a_near_view_holds_what_shades_the_far_receivers_that_ask_it(direction):
+    """A low sun behind the camera: the ground far away projects into the view of what is near."""
+    boxes = receivers()
+    direction = np.array(direction) / np.linalg.norm(direction)
+    views = directional_views(direction, boxes, around(boxes), JITTERS[0], RESOLUTION)
+    assert reached(views, boxes.corners.reshape(-1, 3)).all()
+    views = point_views(-direction * -200.0, None, np.inf, boxes, around(boxes), JITTERS[0], RESOLUTION)
+    assert reached(views, boxes.corners.reshape(-1, 3)).all()
+
+
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_views_from_a_direction_reach_from_the_lowest_receiver_to_the_top_of_the_scene(direction):
     boxes = receivers()
