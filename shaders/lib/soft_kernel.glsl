@@ -91,8 +91,9 @@ float kernel_height(Light light, ShadowReceiver r, vec2 extent, float most_size)
   float deepest;
   vec2 bounds = kernel_bounds(r, first, last, deepest);
   float height = bounds.y - r.q;
+  float least = shadow_slack(r.q, vec2(0.0));  // its slope excuses nothing that stands above a receiver seen edge-on
   for (int k = 0; k < KERNEL_SEARCHES; k++) {
-    if (height <= r.slack) {
+    if (height <= least) {
       return 0.0;
     }
     vec2 half_size = clamp(extent * height, vec2(0.5), vec2(most_size));
@@ -104,7 +105,7 @@ float kernel_height(Light light, ShadowReceiver r, vec2 extent, float most_size)
     }
     height = min(height, bounds.y - r.q);
   }
-  return (height <= r.slack) ? 0.0 : height;
+  return (height <= least) ? 0.0 : height;
 }
 
 // What was found in a kernel or in the window where blockers are looked for.

@@ -43,6 +43,7 @@ Blockers kernel_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, 
 // From the map's point of view the receiver shows its back, but a part of the light stands above its horizon: rays to
 // that part pass below the receiver's plane as the map sees it. Few pixels are such; a grid of texels is enough.
 #define BACK_TEXELS 6
+#define LEAST_ABOVE 1.5  // rise of the receiver's plane over the kernel beside a blocker's height; 1: the light is just set
 
 Blockers kernel_back(Light light, ShadowReceiver r, vec2 half_size, Blockers found)
 {
@@ -55,13 +56,16 @@ Blockers kernel_back(Light light, ShadowReceiver r, vec2 half_size, Blockers fou
   for (int k = 0; k < BACK_TEXELS * BACK_TEXELS; k++) {
     vec2 offset = low + (vec2(float(k % BACK_TEXELS), float(k / BACK_TEXELS)) + 0.5) * step_size - r.texel;
     vec2 texel = clamp(floor(r.texel + offset), vec2(first), vec2(last));
-    float height = kernel_entry(ivec2(r.rectangle.xy + texel), 0).y - r.q;
+    // At the ray's own place, by the caster's plane: the receiver's falls and rises by far more within a texel.
+    vec4 caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + texel));
+    float height = caster.x - r.q + dot(caster.yz, r.texel + offset - texel - 0.5);
     float weight = kernel_weight(light, offset / half_size, 2.0 / float(BACK_TEXELS));
     if (found.extent.x <= 0.0) {
       weight *= max(dot(found.horizon, offset) - 1.0, 0.0);
     }
     found.whole += weight;
-    if (height > r.slack && height < dot(r.gradient, texel + 0.5 - r.texel) - r.slack) {
+    bool above = caster.w > 0.0 && height > shadow_slack(r.q, vec2(0.0));
+    if (above && height < dot(r.gradient, offset) - r.slack) {
       kernel_add(found, offset, 0.5 * step_size, height, weight);
     }
   }
@@ -144,14 +148,18 @@ float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, f
 #endif
 
 // Share of the light that passes blockers of up to `height` above the receiver; `blocker`: their mean height, 0 without.
-float kernel_visibility(Light light, ShadowReceiver r, vec3 towards, vec3 normal, vec2 extent, float most, float height,
+// `facing`: cosine of the direction to the map's point.
+float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal, vec2 extent, float most, float height,
                         out float blocker)
 {
-  bool back = dot(normal, towards) < 0.0;
-  if (abs(dot(normal, towards)) < EDGE_ON) {
-    // Seen along its plane the receiver has no gradient: it is a wall that bounds the kernel.
-    back = false;
-    r.gradient = shadow_outward(r, normal) * (-1e3 * height);
+  bool back = facing <= -EDGE_ON;
+  if (abs(facing) < EDGE_ON) {
+    r.gradient = shadow_outward(r, normal) * (-1e3 * height);  // a wall that bounds the kernel
+  }
+  blocker = 0.0;
+  if (back && dot(abs(r.gradient), extent) <= LEAST_ABOVE) {
+    // Hardly any of the light stands above the horizon; shading normals may show it all the same.
+    return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
   }
   vec2 within = max(extent, vec2(1e-30));
   vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
@@ -162,7 +170,6 @@ float kernel_visibility(Light light, ShadowReceiver r, vec3 towards, vec3 normal
   else {
     search = kernel_box(light, r, normal, window, within, vec2(0.0));
   }
-  blocker = 0.0;
   float lit = 1.0;
   if (search.blocked > 0.0) {
     blocker = min(search.height / search.blocked, height);
@@ -194,6 +201,13 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   if (r.rectangle.w <= 0.0) {
     return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
   }
+  vec3 towards = safe_normalize(kernel_towards(light, position));
+  float facing = dot(normal, towards);
+  if (abs(facing) < EDGE_ON) {
+    // Seen along its plane the receiver has a slope without bounds, which would excuse all that stands above it.
+    r.gradient = vec2(0.0);
+    r.slack = shadow_slack(r.q, r.gradient);
+  }
   vec2 extent = kernel_extent(light, r, r.rectangle.w);
   float most = min(0.5 * r.rectangle.z, MOST_HALF_SIZE);
   float height = kernel_height(light, r, extent, most);
@@ -201,8 +215,7 @@ float light_visibility(Light light, vec3 position, vec3 normal)
     return 1.0 + height;
   }
   float blocker;
-  vec3 towards = safe_normalize(kernel_towards(light, position));
-  float lit = kernel_visibility(light, r, towards, normal, extent, most, height, blocker);
+  float lit = kernel_visibility(light, r, facing, normal, extent, most, height, blocker);
 #ifdef CONTACT_RAYS
   if (lit > 0.0) {
     float reach = contact_reach(r);

@@ -223,7 +223,9 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
   hit_distance = 1e28;
   density = 0.0;
   if (light.kind == LIGHT_SUN) {
-    if (light.radius <= 0.0 || dot(direction, light.centre) < cos(light.radius)) {
+    // Within a cap its area is pi chord^2; near 1 float32 and drivers' cosines tell nothing.
+    vec3 apart = direction - light.centre;
+    if (light.radius <= 0.0 || PI * dot(apart, apart) > light.area) {
       return vec3(0.0);
     }
     density = 1.0 / light.area;

@@ -44,7 +44,9 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec3 normal, ivec2 first,
 #else
   float deepest;
   vec2 bounds = kernel_bounds(r, first, last, deepest);
-  bool one_sided = bounds.x >= deepest - slack && plane + tilt < range;
+  // Nothing as high as the plane's highest texel: something lies behind the plane there, and the moments do not hold.
+  float highest = plane + tilt - 0.5 * dot(abs(r.gradient), vec2(1.0)) - slack;
+  bool one_sided = bounds.x >= deepest - slack && bounds.y >= highest && plane + tilt < range;
   bool lit = bounds.y <= plane - tilt + slack || (mean <= slack && one_sided);
   bool clear = bounds.x > plane + tilt + slack;  // of the receiver's plane
   bool blocked = clear && bounds.x > r.q + slack;
