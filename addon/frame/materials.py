@@ -208,7 +208,7 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             (_struct(len(compiled.values)), "material_values"),
             (MATERIAL_SCENE, "material_scene"),
         ),
-        constants=(("INT", "first_instance"), ("INT", "transparent_mode"), ("INT", "refracts")),
+        constants=(("INT", "first_instance"), ("INT", "transparent_mode"), ("INT", "glass_bends")),
         defines=CAMERA_DEFINES,
         **_shared(compiled),
     )
@@ -226,7 +226,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
             (_struct(len(compiled.values)), "material_values"),
             (MATERIAL_SCENE, "material_scene"),
         ),
-        constants=(("INT", "first_instance"), ("INT", "refracts")),
+        constants=(("INT", "first_instance"), ("INT", "glass_bends")),
         defines=CAMERA_DEFINES,
         **{**shared, "textures": (*shared["textures"], ("FLOAT_2D", "surface_position"))},
     )

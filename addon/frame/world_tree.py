@@ -82,7 +82,7 @@ class WorldTree:
             blend="ADDITIVE_PREMULT",
             textures={**self._textures, **{name: surfaces[name] for name in SEEN}},
             blocks={"material_values": self._values, "material_scene": self._scene, "film_view": view_block},
-            constants={"share": share},
+            constants={"film_share": share},
         )
 
 
@@ -97,7 +97,12 @@ def bake_program(compiled: CompiledMaterial) -> Program:
 def background_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a world's tree where the camera sees it."""
     return _program(
-        compiled, "world background", "world/background.frag.glsl", SEEN, ((VIEW, "film_view"),), (("FLOAT", "share"),)
+        compiled,
+        "world background",
+        "world/background.frag.glsl",
+        SEEN,
+        ((VIEW, "film_view"),),
+        (("FLOAT", "film_share"),),
     )
 
 

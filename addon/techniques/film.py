@@ -43,7 +43,7 @@ COLLECT = tuple(
             ("FLOAT_2D", "environment_density_map"),
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("FLOAT", "share")),
+        constants=(("INT", "light_count"), ("FLOAT", "film_share")),
         defines=soft_defines,
         outputs=tuple(
             ("VEC4", name)
@@ -164,7 +164,7 @@ class Film(Technique):
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
-            constants={"light_count": self._light_count, "share": share},
+            constants={"light_count": self._light_count, "film_share": share},
         )  # fmt: skip
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
             frame.environment.tree.add_background(

@@ -61,7 +61,7 @@ def _programs(name: str, file: str, guides: bool) -> tuple[Program, Program]:
             file,
             textures=tuple(("FLOAT_2D", texture) for texture in (*seen, *(f"light_{path}" for path in paths))),
             blocks=((VIEW, "film_view"),) if guides else (),
-            constants=(("FLOAT", "share"), *((("VEC2", "offset"),) if guides else ())),
+            constants=(("FLOAT", "film_share"), *((("VEC2", "offset"),) if guides else ())),
             defines=defines,
             outputs=tuple(("VEC4", f"out_{path}") for path in paths),
         )
@@ -78,7 +78,7 @@ def add(frame: Frame, paths: tuple[str, ...], target: images.Target, share: floa
     light = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
     passes.fullscreen(
         ADD[len(paths) == len(PATHS)], target, blend="ADDITIVE_PREMULT", textures=light,
-        constants={"share": share},
+        constants={"film_share": share},
     )  # fmt: skip
 
 
@@ -99,5 +99,5 @@ def add_between(
     passes.fullscreen(
         BETWEEN[len(paths) == len(PATHS)], target,
         blend="ADDITIVE_PREMULT", textures=textures, blocks={"film_view": frame.view_block},
-        constants={"share": share, "offset": between},
+        constants={"film_share": share, "offset": between},
     )  # fmt: skip

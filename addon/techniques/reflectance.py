@@ -36,7 +36,7 @@ REFLECTANCE = passes.fullscreen_program(
     "reflectance",
     "indirect/reflectance.frag.glsl",
     textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table")),
-    constants=(("IVEC2", "cell"), ("INT", "rows"), ("FLOAT", "view_cosine")),
+    constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine")),
     outputs=(("VEC4", "out_reflectance"),),
 )
 
@@ -81,7 +81,7 @@ class Reflectance:
                     **{f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, seen)},
                     "energy_table": frame.materials.energy_table,
                 },
-                constants={"cell": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE},
+                constants={"extent": (SIDE, 2 * SIDE), "rows": rows, "view_cosine": VIEW_COSINE},
             )
         for image in seen:
             images.pool.give(image)
@@ -103,7 +103,7 @@ class Reflectance:
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
         bindings["blocks"]["film_view"] = Block(VIEW, **_view(low, high, backward))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
-            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": STOCHASTIC, "refracts": 0})
+            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": STOCHASTIC, "glass_bends": 0})
             for call in calls(all_draws, own):
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)

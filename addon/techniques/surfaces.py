@@ -130,7 +130,7 @@ def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mod
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
-    constants = {"transparent_mode": mode, "refracts": int(glass)}
+    constants = {"transparent_mode": mode, "glass_bends": int(glass)}
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants)
     frame.count(technique, "passes")
@@ -148,7 +148,7 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
     colors = images.Target(tuple(drawn[name] for name in TINTED))
     position = {"surface_position": drawn["surface.position"]}
     with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
-        _submit(frame, technique, frame.materials.tint_program, tinted, {"refracts": int(glass)}, position)
+        _submit(frame, technique, frame.materials.tint_program, tinted, {"glass_bends": int(glass)}, position)
     frame.count(technique, "passes")
 
 

@@ -9,8 +9,8 @@
 vec3 member_light(int index, Surface s, out vec3 direction)
 {
   VirtualLight light = virtual_light(index);
-  float kernel = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
-  return light.intensity * ((dot(direction, s.geometric_normal) > 0.0) ? kernel : 0.0);
+  float bounded = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+  return light.intensity * ((dot(direction, s.geometric_normal) > 0.0) ? bounded : 0.0);
 }
 
 // Light of one member, drawn in proportion to what it brings, that stands for all: `total` is the sum of luminances.

@@ -21,7 +21,7 @@ struct Cluster {
   vec3 across;
   vec3 along;
   vec2 half_side;
-  vec3 surface_normal;
+  vec3 plane_normal;
   vec3 normal;
   vec2 corner;
   int first;
@@ -35,7 +35,18 @@ Cluster cluster_read(int index)
   vec4 c = texelFetch(virtual_lights, ivec2(index, 5), 0);
   vec4 d = texelFetch(virtual_lights, ivec2(index, 6), 0);
   vec4 e = texelFetch(virtual_lights, ivec2(index, 7), 0);
-  return Cluster(a.xyz, a.w, b.xyz, c.xyz, vec2(b.w, c.w), d.xyz, cross(b.xyz, c.xyz), e.xy, int(d.w), int(e.z));
+  Cluster cluster;
+  cluster.middle = a.xyz;
+  cluster.range = a.w;
+  cluster.across = b.xyz;
+  cluster.along = c.xyz;
+  cluster.half_side = vec2(b.w, c.w);
+  cluster.plane_normal = d.xyz;
+  cluster.normal = cross(b.xyz, c.xyz);
+  cluster.corner = e.xy;
+  cluster.first = int(d.w);
+  cluster.count = int(e.z);
+  return cluster;
 }
 
 // Unit direction in the cluster's frame (z along its normal) from a place in the map, 0..1.

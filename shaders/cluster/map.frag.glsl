@@ -16,12 +16,12 @@ void main()
   vec3 local = map_direction((vec2(texel - tile * map_side) + 0.5) / float(map_side));
   vec3 direction = local.x * c.across + local.y * c.along + local.z * c.normal;
   // Below its own surface the middle sees nothing, other members may: no information counts as lit.
-  if (dot(direction, c.surface_normal) <= 0.01) {
+  if (dot(direction, c.plane_normal) <= 0.01) {
     return;
   }
   ivec2 hit;
   uvec3 roll = hash3(uvec3(uvec2(texel), uint(film_view.sample_index)));
-  float t = trace_nearest(ray_origin(c.middle, c.surface_normal), direction, c.range, roll.x, hit);
+  float t = trace_nearest(ray_origin(c.middle, c.plane_normal), direction, c.range, roll.x, hit);
   if (t >= c.range) {
     return;
   }

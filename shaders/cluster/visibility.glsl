@@ -147,7 +147,7 @@ vec2 kernel_box(ClusterReceiver r, vec2 half_size, bool search)
 // from it, as the standard deviation of what they see.
 float cluster_visibility(Cluster c, vec3 position, vec3 normal, out float doubt)
 {
-  vec3 path = position - ray_origin(c.middle, c.surface_normal);
+  vec3 path = position - ray_origin(c.middle, c.plane_normal);
   ClusterReceiver r;
   r.rectangle = vec4(c.corner, float(map_side), 0.0);
   r.range = c.range;
@@ -158,7 +158,7 @@ float cluster_visibility(Cluster c, vec3 position, vec3 normal, out float doubt)
   vec2 place = map_place(r.towards);
   bool outside = any(lessThanEqual(place, vec2(0.0))) || any(greaterThanEqual(place, vec2(1.0)));
   // Behind its own surface or below the receiver's plane the middle knows little of the members that are not.
-  doubt = (outside || r.height <= 0.0 || dot(path, c.surface_normal) <= 0.0) ? 0.5 : 0.0;
+  doubt = (outside || r.height <= 0.0 || dot(path, c.plane_normal) <= 0.0) ? 0.5 : 0.0;
   if (outside) {
     return 1.0;
   }

@@ -15,14 +15,16 @@ bool shown_at(ivec2 pixel, out Shown shown)
   vec4 position = texelFetch(surface_position, pixel, 0);
   vec3 normal = texelFetch(normal_sum, pixel, 0).xyz;
   float size = length(normal);
-  shown = Shown(position.xyz, normal / max(size, 1e-30), pixel_size_at(position.xyz));
+  shown.position = position.xyz;
+  shown.normal = normal / max(size, 1e-30);
+  shown.pixel_size = pixel_size_at(position.xyz);
   return position.w != 0.0 && size > 0.0;
 }
 
-float alike(Shown one, Shown other, int stride)
+float alike(Shown one, Shown other, int spacing)
 {
   float turned = pow(max(dot(one.normal, other.normal), 0.0), SHARPNESS);
   vec3 path = other.position - one.position;
   float off_plane = max(abs(dot(one.normal, path)), abs(dot(other.normal, path)));
-  return turned * exp(-off_plane / (max(one.pixel_size, other.pixel_size) * 2.0 * float(stride + 1)));
+  return turned * exp(-off_plane / (max(one.pixel_size, other.pixel_size) * 2.0 * float(spacing + 1)));
 }

@@ -19,11 +19,15 @@ struct Seen {
 
 Seen seen_of(Surface s)
 {
-  vec3 weight = s.glossy_weight;
-  bool lobe = max_component(weight) > 0.0;
-  bool soft = lobe && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
-  vec3 color = max(s.diffuse, vec3(0.0)) + (soft ? weight : vec3(0.0));
-  return Seen(s.hit, s.position, s.normal, color, soft, s.kind, soft ? vec3(0.0) : weight);
+  Seen seen;
+  seen.hit = s.hit;
+  seen.position = s.position;
+  seen.normal = s.normal;
+  seen.kind = s.kind;
+  seen.soft = max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
+  seen.color = max(s.diffuse, vec3(0.0)) + (seen.soft ? s.glossy_weight : vec3(0.0));
+  seen.weight = seen.soft ? vec3(0.0) : s.glossy_weight;
+  return seen;
 }
 
 // At this point of the film.
@@ -96,7 +100,10 @@ void main()
     return;
   }
   float tolerance = 2.0 * pixel_size_at(here.position);
-  Arriving none = Arriving(vec3(0.0), vec3(0.0), vec3(0.0));
+  Arriving none;
+  none.direct = vec3(0.0);
+  none.indirect = vec3(0.0);
+  none.whole = vec3(0.0);
   Arriving same = none;
   Arriving nearby = none;
   Arriving same_lobe = none;
@@ -159,11 +166,11 @@ void main()
   vec3 direct;
   vec3 indirect;
   arriving_mean(same, nearby, direct, indirect);
-  out_diffuse_direct.rgb = share * here.color * direct;
-  out_diffuse_indirect.rgb = share * here.color * indirect;
+  out_diffuse_direct.rgb = film_share * here.color * direct;
+  out_diffuse_indirect.rgb = film_share * here.color * indirect;
   arriving_mean(same_lobe, nearby_lobe, direct, indirect);
-  direct *= share * here.weight;
-  indirect *= share * here.weight;
+  direct *= film_share * here.weight;
+  indirect *= film_share * here.weight;
 #ifdef TRANSMISSION
   if (refracts) {
     out_transmission_direct.rgb = direct;

@@ -76,10 +76,10 @@ void main()
       }
     }
   }
-  out_emission *= share;
-  out_environment *= share;
-  out_diffuse_color *= share;
-  out_glossy_color *= share;
-  out_transmission_color *= share;
-  out_normal *= share;
+  out_emission *= film_share;
+  out_environment *= film_share;
+  out_diffuse_color *= film_share;
+  out_glossy_color *= film_share;
+  out_transmission_color *= film_share;
+  out_normal *= film_share;
 }

@@ -22,27 +22,27 @@ void main()
   if (dot(direction, probe.geometric_normal) <= 0.0) {
     return;
   }
-  Vertex vertex;
+  Vertex met;
   float t;
   uvec3 roll = hash3(uvec3(salt, uint(film_view.sample_index), uint(film_view.seed)));
-  if (!trace_vertex(ray_origin(probe.position, probe.geometric_normal), direction, 1e29, roll.z, vertex, t)) {
+  if (!trace_vertex(ray_origin(probe.position, probe.geometric_normal), direction, 1e29, roll.z, met, t)) {
     return;
   }
-  out_point = vec4(vertex.position, 1.0);
-  out_normal = vec4(vertex.normal, t);
+  out_point = vec4(met.position, 1.0);
+  out_normal = vec4(met.normal, t);
   vec3 throughput = vec3(1.0);
-  vec3 radiance = direct_reflected(vertex, -direction, 4, roll.x);
+  vec3 radiance = direct_reflected(met, -direction, 4, roll.x);
   vec3 shorter = (bounces > 1) ? radiance : vec3(0.0);
   for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
     roll = hash3(roll);
-    vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(vertex.reflection, vertex.normal, onward, -direction);
+    vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(met.reflection, met.normal, onward, -direction);
     direction = onward;
-    if (!trace_vertex(ray_origin(vertex.position, vertex.normal), direction, 1e29, roll.z, vertex, t)) {
+    if (!trace_vertex(ray_origin(met.position, met.normal), direction, 1e29, roll.z, met, t)) {
       break;
     }
     roll = hash3(roll);
-    radiance += throughput * direct_reflected(vertex, -direction, 1, roll.x);
+    radiance += throughput * direct_reflected(met, -direction, 1, roll.x);
     shorter = (bounce < bounces) ? radiance : shorter;
   }
   out_radiance = vec4(radiance, 0.0);

@@ -18,10 +18,10 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
   for (int bounce = 1; bounce <= bounces; bounce++) {
-    Vertex vertex;
+    Vertex met;
     float t;
     float limit = (whole && bounce == 1) ? 1e29 : near_radius;
-    if (!trace_vertex(origin, direction, limit, roll.z, vertex, t)) {
+    if (!trace_vertex(origin, direction, limit, roll.z, met, t)) {
       break;
     }
     float share = (whole && bounce == 1) ? 1.0 : 1.0 - t * t / (near_radius * near_radius);
@@ -30,11 +30,11 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
       break;
     }
     roll = hash3(roll);
-    sum += throughput * direct_reflected(vertex, -direction, 1, roll.x);
+    sum += throughput * direct_reflected(met, -direction, 1, roll.x);
     if (bounce < bounces) {
       vec3 from;
-      vec3 arriving = virtual_irradiance(vertex.position, vertex.normal, roll.z, from);
-      sum += throughput * arriving * reflection_of(vertex.reflection, vertex.normal, from, -direction);
+      vec3 arriving = virtual_irradiance(met.position, met.normal, roll.z, from);
+      sum += throughput * arriving * reflection_of(met.reflection, met.normal, from, -direction);
     }
     if (bounce == 1) {
       if (deeper <= 0.0) {
@@ -43,10 +43,10 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
       throughput *= deeper;
     }
     roll = hash3(roll);
-    vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(vertex.reflection, vertex.normal, onward, -direction);
+    vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(met.reflection, met.normal, onward, -direction);
     direction = onward;
-    origin = ray_origin(vertex.position, vertex.normal);
+    origin = ray_origin(met.position, met.normal);
   }
   return sum;
 }

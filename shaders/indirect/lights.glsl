@@ -77,7 +77,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, uint salt, out vec3 directio
   }
   VirtualLight light = virtual_light(chosen);
   float shorter = texelFetch(virtual_lights, ivec2(chosen, 1), 0).w;
-  float kernel = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
+  float bounded = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
   float visible = virtual_light_seen(light, ray_origin(position, normal), salt);
-  return light.intensity * (shorter * kernel * (float(stride) * total / chosen_share) * visible);
+  return light.intensity * (shorter * bounded * (float(stride) * total / chosen_share) * visible);
 }

@@ -54,8 +54,12 @@ Reflection mean_reflection(ivec2 hit)
   ivec2 place = ivec2(material & 15, material >> 4);
   int rows = textureSize(reflectance, 0).y / REFLECTANCE_BANDS;
   vec4 straight = texelFetch(reflectance, place + ivec2(0, 2 * rows), 0);
-  return Reflection(texelFetch(reflectance, place + ivec2(0, rows), 0).rgb, straight.rgb,
-                    texelFetch(reflectance, place + ivec2(0, 3 * rows), 0).rgb, straight.a);
+  Reflection mean;
+  mean.diffuse = texelFetch(reflectance, place + ivec2(0, rows), 0).rgb;
+  mean.straight = straight.rgb;
+  mean.grazing = texelFetch(reflectance, place + ivec2(0, 3 * rows), 0).rgb;
+  mean.alpha = straight.a;
+  return mean;
 }
 
 // What a point reflects: exactly where the camera sees it, else the mean of its material.
@@ -77,19 +81,19 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
 }
 
 // The surface that a ray meets before `limit`; false if none.
-bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Vertex vertex, out float t)
+bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Vertex met, out float t)
 {
   ivec2 hit;
   t = trace_nearest(origin, direction, limit, salt, hit);
   if (t >= limit) {
     return false;
   }
-  vertex.position = origin + t * direction;
-  triangle_emission(hit, vertex.normal);
-  if (dot(vertex.normal, direction) > 0.0) {
-    vertex.normal = -vertex.normal;
+  met.position = origin + t * direction;
+  triangle_emission(hit, met.normal);
+  if (dot(met.normal, direction) > 0.0) {
+    met.normal = -met.normal;
   }
-  vertex.reflection = reflection_at(hit, vertex.position, vertex.normal);
+  met.reflection = reflection_at(hit, met.position, met.normal);
   return true;
 }
 
@@ -133,23 +137,23 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
   return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? 1.0 : 0.0;
 }
 
-// What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `rays`-th of them
+// What a surface reflects towards `viewer` of light straight from the sources of this sample. Of every `light_rays`-th of them
 // one is traced, drawn in proportion to what it brings unblocked: only visibility is sampled. All are weighed before any
 // is traced: pixels that a processor runs together then trace together.
-vec3 direct_reflected(Vertex vertex, vec3 viewer, int rays, uint salt)
+vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
 {
-  vec3 position = vertex.position;
-  vec3 normal = vertex.normal;
+  vec3 position = met.position;
+  vec3 normal = met.normal;
   vec3 origin = ray_origin(position, normal);
   vec3 sum = vec3(0.0);
   uint roll = salt;
-  for (int group = 0; group < min(rays, light_count); group++) {
+  for (int group = 0; group < min(light_rays, light_count); group++) {
     float total = 0.0;
     float chosen_share = 0.0;
     int chosen = 0;
     vec3 chosen_light = vec3(0.0);
     vec3 chosen_direction = normal;
-    for (int i = group; i < light_count; i += rays) {
+    for (int i = group; i < light_count; i += light_rays) {
       vec3 direction;
       vec3 arriving = unblocked_irradiance(light_read(i), position, normal, direction);
       float share = luminance(abs(arriving));
@@ -167,7 +171,7 @@ vec3 direct_reflected(Vertex vertex, vec3 viewer, int rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
-      sum += chosen_light * reflection_of(vertex.reflection, normal, chosen_direction, viewer)
+      sum += chosen_light * reflection_of(met.reflection, normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);
     }
   }

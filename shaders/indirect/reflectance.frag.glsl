@@ -8,11 +8,11 @@
 void main()
 {
   int band = int(gl_FragCoord.y) / rows;
-  ivec2 corner = (ivec2(gl_FragCoord.xy) - ivec2(0, band * rows)) * ivec2(cell);
+  ivec2 corner = (ivec2(gl_FragCoord.xy) - ivec2(0, band * rows)) * ivec2(extent);
   vec4 sum = vec4(0.0);
   float count = 0.0;
-  for (int y = 0; y < cell.y; y++) {
-    for (int x = 0; x < cell.x; x++) {
+  for (int y = 0; y < extent.y; y++) {
+    for (int x = 0; x < extent.x; x++) {
       ivec2 pixel = corner + ivec2(x, y);
       if (texelFetch(surface_position, pixel, 0).w != 0.0) {
         Surface s = SURFACE_READ(pixel);

@@ -16,8 +16,8 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
   if (rays == 0) {
     for (int i = 0; i < virtual_count; i++) {
       VirtualLight light = virtual_light(i);
-      float kernel = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
-      sum += kernel * light.intensity;
+      float bounded = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+      sum += bounded * light.intensity;
     }
     return reflected ? sum * s.diffuse / PI : sum;
   }
@@ -57,7 +57,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       continue;
     }
     VirtualLight light = virtual_light(chosen);
-    float kernel = bounded_kernel(light, s.position, direction);
+    float bounded = bounded_kernel(light, s.position, direction);
     if (dot(direction, s.geometric_normal) <= 0.0) {
       continue;
     }
@@ -65,7 +65,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       visible = virtual_light_seen(light, origin, salt + uint(chosen));
       traced = chosen;
     }
-    vec3 arriving = light.intensity * (kernel * step_size / chosen_share * visible);
+    vec3 arriving = light.intensity * (bounded * step_size / chosen_share * visible);
     sum += arriving * (reflected ? diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction)
                                  : vec3(max(dot(s.normal, direction), 0.0)));
   }

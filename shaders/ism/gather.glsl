@@ -22,11 +22,11 @@ float texel_visibility(ivec2 tile, ivec2 texel, vec3 place, vec3 normal, float s
 }
 
 // The share of a virtual light that a surface sees: bilinear between what four texels say.
-float map_visibility(int index, VirtualLight light, vec3 position, vec3 surface_normal)
+float map_visibility(int index, VirtualLight light, vec3 position, vec3 plane_normal)
 {
   mat3 frame = map_frame(light.normal);
   vec3 place = (position - light.position) * frame;
-  vec3 normal = surface_normal * frame;
+  vec3 normal = plane_normal * frame;
   float away = length(place);
   vec2 spot = (disc_point(place / max(away, 1e-30)) * 0.5 + 0.5) * float(map_side) - 0.5;
   ivec2 texel = ivec2(floor(spot));
@@ -83,22 +83,25 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
   vec3 sum = vec3(0.0);
   int groups = clamp(rays, 1, max(virtual_count, 1));
   for (int group = 0; group < groups; group++) {
-    Pick lit = Pick(vec3(0.0), ivec3(-1), vec3(0.0));
+    Pick lit;
+    lit.total = vec3(0.0);
+    lit.index = ivec3(-1);
+    lit.side = vec3(0.0);
     Pick dark = lit;
     uvec3 roll = hash3(uvec3(salt, uint(group), 77u));
     for (int i = group * virtual_count / groups; i < (group + 1) * virtual_count / groups; i++) {
       VirtualLight light = virtual_light(i);
       vec3 direction;
-      float kernel = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
-      if (!(kernel > 0.0) || dot(direction, s.geometric_normal) <= 0.0) {
+      float bounded = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+      if (!(bounded > 0.0) || dot(direction, s.geometric_normal) <= 0.0) {
         continue;
       }
       float seen = map_visibility(i, light, s.position, s.geometric_normal);
-      sum += light.intensity * (kernel * seen);
+      sum += light.intensity * (bounded * seen);
       if (rays > 0) {
         roll = hash3(roll);
-        pick(lit, i, light.intensity * (kernel * seen), to_unit(roll.x));
-        pick(dark, i, light.intensity * (kernel * (1.0 - seen)), to_unit(roll.y));
+        pick(lit, i, light.intensity * (bounded * seen), to_unit(roll.x));
+        pick(dark, i, light.intensity * (bounded * (1.0 - seen)), to_unit(roll.y));
       }
     }
     sum += traced(dark, origin, false, roll.z) - traced(lit, origin, true, roll.z + 1u);

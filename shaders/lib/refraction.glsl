@@ -59,9 +59,9 @@ vec3 interface_reflectance(Interface surface, float cos_h)
 }
 
 // Chance with which a walk is mirrored at a facet; 0 where another lobe holds what is mirrored.
-float interface_mirror_chance(Interface surface, vec3 reflectance)
+float interface_mirror_chance(Interface surface, vec3 mirrored)
 {
-  return (max_component(surface.reflected) > 0.0) ? clamp(luminance(reflectance), 0.0, 1.0) : 0.0;
+  return (max_component(surface.reflected) > 0.0) ? clamp(luminance(mirrored), 0.0, 1.0) : 0.0;
 }
 
 vec3 interface_value(Interface surface, vec3 light_world, out float density)

@@ -117,6 +117,17 @@ struct Blockers {
   vec2 horizon;  // fall of the cosine per texel, relative to the light's middle; 0 = the same for all of the kernel
 };
 
+Blockers blockers_none(vec2 extent, vec2 horizon)
+{
+  Blockers none;
+  none.whole = 0.0;
+  none.blocked = 0.0;
+  none.height = 0.0;
+  none.extent = extent;
+  none.horizon = horizon;
+  return none;
+}
+
 // Adds a share of a cell at `offset` texels from the receiver, blocked at `height` above the receiver's point. What
 // stands above a steep receiver's plane but not above its point lies beside all rays to the light.
 void kernel_add(inout Blockers found, vec2 offset, vec2 half_cell, float height, float weight)

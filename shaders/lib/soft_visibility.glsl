@@ -17,7 +17,7 @@
 // height; else texels that the box's edge cuts count in part. `horizon`: see Blockers.
 Blockers kernel_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, vec2 extent, vec2 horizon)
 {
-  Blockers found = Blockers(0.0, 0.0, 0.0, extent, horizon);
+  Blockers found = blockers_none(extent, horizon);
   ivec2 first;
   ivec2 last;
   kernel_texels(light, r, half_size, first, last);
@@ -82,9 +82,9 @@ vec3 kernel_towards(Light light, vec3 position)
   return light.point + (offset ? light.centre : vec3(0.0)) - position;
 }
 
-float kernel_lit(Blockers kernel)
+float kernel_lit(Blockers hiding)
 {
-  return (kernel.whole > 0.0) ? clamp(1.0 - kernel.blocked / kernel.whole, 0.0, 1.0) : 1.0;
+  return (hiding.whole > 0.0) ? clamp(1.0 - hiding.blocked / hiding.whole, 0.0, 1.0) : 1.0;
 }
 
 #ifdef CONTACT_RAYS
@@ -99,7 +99,7 @@ float kernel_lit(Blockers kernel)
 // smaller part of the light.
 Blockers kernel_near(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, float most_height, vec2 horizon)
 {
-  Blockers found = Blockers(0.0, 0.0, 0.0, vec2(0.0), horizon);
+  Blockers found = blockers_none(vec2(0.0), horizon);
   ivec2 first;
   ivec2 last;
   kernel_texels(light, r, half_size, first, last);
@@ -165,7 +165,7 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
   vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
   Blockers search;
   if (back) {
-    search = kernel_back(light, r, window, Blockers(0.0, 0.0, 0.0, within, vec2(0.0)));
+    search = kernel_back(light, r, window, blockers_none(within, vec2(0.0)));
   }
   else {
     search = kernel_box(light, r, normal, window, within, vec2(0.0));
@@ -175,14 +175,14 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
     blocker = min(search.height / search.blocked, height);
     vec2 horizon = r.gradient / blocker;
     vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
-    Blockers kernel;
+    Blockers hiding;
     if (back) {
-      kernel = kernel_back(light, r, size, Blockers(0.0, 0.0, 0.0, vec2(0.0), horizon));
+      hiding = kernel_back(light, r, size, blockers_none(vec2(0.0), horizon));
     }
     else {
-      kernel = kernel_box(light, r, normal, size, vec2(0.0), horizon);
+      hiding = kernel_box(light, r, normal, size, vec2(0.0), horizon);
     }
-    lit = kernel_lit(kernel);
+    lit = kernel_lit(hiding);
   }
 #ifndef CONTACT_RAYS
   if (!back) {

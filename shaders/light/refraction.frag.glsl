@@ -161,8 +161,13 @@ void main()
     bool leaves = dot(normal, direction) > 0.0;
     geometric_normal = leaves ? -normal : normal;
     if (to_unit(roll.x) >= shape.y) {
-      vec3 albedo = albedo_behind(hit, position, geometric_normal);
-      Vertex end = Vertex(position, geometric_normal, Reflection(albedo, vec3(0.0), vec3(0.0), 1.0));
+      Vertex end;
+      end.position = position;
+      end.normal = geometric_normal;
+      end.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
+      end.reflection.straight = vec3(0.0);
+      end.reflection.grazing = vec3(0.0);
+      end.reflection.alpha = 1.0;
       out_indirect.rgb += throughput * direct_reflected(end, -direction, 1, roll.z);
       break;
     }

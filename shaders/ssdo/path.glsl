@@ -8,24 +8,24 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
   for (int bounce = 0; bounce < bounces; bounce++) {
-    Vertex vertex;
+    Vertex met;
     float t;
-    if (!trace_vertex(origin, direction, 1e29, roll.z, vertex, t)) {
+    if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
       break;
     }
     roll = hash3(roll);
-    sum += throughput * direct_reflected(vertex, -direction, 1, roll.x);
+    sum += throughput * direct_reflected(met, -direction, 1, roll.x);
     float choice = to_unit(roll.z);
     roll = hash3(roll);
-    vec3 onward = cosine_direction(vertex.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(vertex.reflection, vertex.normal, onward, -direction);
+    vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(met.reflection, met.normal, onward, -direction);
     float stay = min(max_component(throughput), 1.0);
     if (choice >= stay) {
       break;
     }
     throughput /= stay;
     direction = onward;
-    origin = ray_origin(vertex.position, vertex.normal);
+    origin = ray_origin(met.position, met.normal);
   }
   return sum;
 }

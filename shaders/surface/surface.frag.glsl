@@ -17,7 +17,7 @@ void main()
   }
   Instance instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(incoming, instance);
-  point.refracts = refracts != 0;
+  point.refracts = glass_bends != 0;
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));

@@ -23,7 +23,7 @@ void main()
   }
   vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
   SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
-  point.refracts = refracts != 0;
+  point.refracts = glass_bends != 0;
   Closures c = closures_begin(point.normal, 0.5);
   evaluate_material(point, c);
   closures_end(c);

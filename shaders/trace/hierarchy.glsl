@@ -72,10 +72,10 @@ bool trace_next(inout uvec2 pending, inout int level, inout int node)
   return true;
 }
 
-// Boxes of a node's four children against the ray: which it meets before `farthest`, as four bits, and where it enters.
+// Boxes of a node's four children against the ray: which it meets before `reach`, as four bits, and where it enters.
 // Boxes stand on a grid of 256 steps over the node: texel 0 holds the grid's corner and the exponents of its three steps,
 // texels 1 and 2 the lower and upper corners of the children, three bytes (x, y, z) in each float.
-uint node_meets(int node, vec3 origin, vec3 inverse, float farthest, out vec4 enter)
+uint node_meets(int node, vec3 origin, vec3 inverse, float reach, out vec4 enter)
 {
   vec4 frame = node_texel(node);
   uvec4 low = uvec4(node_texel(node + 1));
@@ -94,7 +94,7 @@ uint node_meets(int node, vec3 origin, vec3 inverse, float farthest, out vec4 en
   // By the ray's sign, not by min and max: the inverted box of an empty child is then never met.
   enter = max(max(inverse.x > 0.0 ? x0 : x1, inverse.y > 0.0 ? y0 : y1), max(inverse.z > 0.0 ? z0 : z1, vec4(0.0)));
   vec4 leave = min(min(inverse.x > 0.0 ? x1 : x0, inverse.y > 0.0 ? y1 : y0),
-                   min(inverse.z > 0.0 ? z1 : z0, vec4(farthest)));
+                   min(inverse.z > 0.0 ? z1 : z0, vec4(reach)));
   bvec4 met = lessThanEqual(enter, leave * 1.000001);
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }

@@ -11,6 +11,6 @@ void main()
   out_radiance = vec4(0.0);
   if (texelFetch(surface_position, pixel, 0).w == 0.0) {
     vec3 passed = texelFetch(surface_emission, pixel, 0).rgb;
-    out_radiance.rgb = world_radiance(view_direction(gl_FragCoord.xy), RAY_CAMERA) * passed * share;
+    out_radiance.rgb = world_radiance(view_direction(gl_FragCoord.xy), RAY_CAMERA) * passed * film_share;
   }
 }
