@@ -39,16 +39,17 @@ float shadow_slack(float q, vec2 gradient)
 }
 
 // How far a caster is nearer to the light than the receiver, apart from what is no difference: by the caster's plane at
-// the receiver (x), and at the centre of the caster's cell, `offset` texels away, by the receiver's plane (y). Each has
-// its own plane's slack: what stands far above a receiver seen edge-on is not excused by the receiver's slope. Far
-// negative where nothing was drawn.
+// the receiver (x), and at the centre of the caster's cell, `offset` texels away, by the receiver's plane (y). What stands
+// far above a receiver seen edge-on is not excused by the receiver's slope, nor a steep caster by its own. Far negative
+// where nothing was drawn.
 vec2 shadow_behind(ShadowReceiver r, vec4 caster, vec2 offset)
 {
   if (caster.w <= 0.0) {
     return vec2(-1e30);
   }
   float height = caster.x - r.q;
-  return height + vec2(dot(caster.yz, offset) - shadow_slack(r.q, caster.yz), dot(r.gradient, offset) - r.slack);
+  float slack = min(r.slack, shadow_slack(r.q, caster.yz));
+  return height + vec2(dot(caster.yz, offset) - slack, dot(r.gradient, offset) - r.slack);
 }
 
 bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out ShadowReceiver r)
