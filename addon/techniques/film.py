@@ -128,7 +128,7 @@ class Film(Technique):
             return 1
         count = film_points.count_of(frame.settings.get(self, "points"), frame.settings.samples)
         indirect = any(technique.slot == "indirect" for technique in frame.plan.techniques)
-        return count if indirect else -(-count // 2)  # direct light alone costs hardly more than another point
+        return count if indirect else -(-count // 4)  # a sample of direct light costs hardly more than a point
 
     def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
         """The same sample's light at other points of the film."""
