@@ -23,6 +23,10 @@ class Plan:
     techniques: tuple[Technique, ...]
     skipped: tuple[Row, ...]
 
+    def fills(self, slot: str) -> bool:
+        """Whether a technique that runs stands in the slot."""
+        return any(technique.slot == slot for technique in self.techniques)
+
     def text(self) -> str:
         """As a list for the terminal."""
         lines = [f"  {t.label:<28} runs" + (f" (slot {t.slot})" if t.slot else "") for t in self.techniques]

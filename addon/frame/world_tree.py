@@ -96,14 +96,8 @@ def bake_program(compiled: CompiledMaterial) -> Program:
 
 def background_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a world's tree where the camera sees it."""
-    return _program(
-        compiled,
-        "world background",
-        "world/background.frag.glsl",
-        SEEN,
-        ((VIEW, "film_view"),),
-        (("FLOAT", "film_share"),),
-    )
+    constants = (("FLOAT", "film_share"),)
+    return _program(compiled, "world background", "world/background.frag.glsl", SEEN, ((VIEW, "film_view"),), constants)
 
 
 def _program(

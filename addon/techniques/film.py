@@ -127,8 +127,8 @@ class Film(Technique):
         if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
             return 1
         count = film_points.count_of(frame.settings.get(self, "points"), frame.settings.samples)
-        indirect = any(technique.slot == "indirect" for technique in frame.plan.techniques)
-        return count if indirect else -(-count // 4)  # a sample of direct light costs hardly more than a point
+        # Without indirect light a sample costs hardly more than a point.
+        return count if frame.plan.fills("indirect") else -(-count // 4)
 
     def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
         """The same sample's light at other points of the film."""

@@ -121,7 +121,7 @@ class Surfaces(Technique):
 
 def refracts(frame: Frame) -> bool:
     """Whether light through glass is followed; else glass is a transparent layer."""
-    return any(technique.slot == "transmission" for technique in frame.plan.techniques)
+    return frame.plan.fills("transmission")
 
 
 def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: bool) -> None:

@@ -29,7 +29,7 @@ def sources(program):
     )
 
 
-STRUCTS = {name for file in FILES for name in STRUCT.findall(code_of((SHADER_ROOT / file).read_text()))}
+STRUCTS = {name for file in FILES for name in STRUCT.findall(code_of((SHADER_ROOT / file).read_text(encoding="utf-8")))}
 
 
 @pytest.mark.parametrize("file", FILES)
