@@ -181,7 +181,7 @@ class Viewport:
         before, end = clock(), object()
         whole = next(self._sample, end) is end
         if whole and not frame.profiler.wait:
-            frame.profiler.finish()
+            images.finish()
         spent = clock() - before
         self.bands.learn(spent, budget / 2)
         self._sample_seconds += spent

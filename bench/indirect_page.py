@@ -136,6 +136,7 @@ def growth(techniques=GROWN, dials=DIALS) -> Iterator[tuple[str, ...]]:
 @contextmanager
 def timed_gathers() -> Iterator[list[float]]:
     """Milliseconds of every gather over regions while this lasts: bounds, list, gather, and what fills the others."""
+    from addon.gfx import images
     from addon.gfx.timing import Profiler
     from addon.techniques.multires_radiosity import MultiresRadiosity
 
@@ -144,7 +145,7 @@ def timed_gathers() -> Iterator[list[float]]:
     original = MultiresRadiosity.irradiance
 
     def measured_call(*arguments):
-        fence.finish()
+        images.finish()
         with fence.step("gather"):
             found = yield from original(*arguments)
         spent.append(1000 * fence.seconds.pop("gather"))

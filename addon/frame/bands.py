@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
+from ..gfx import images
 from ..gfx.context import turn
 from ..gfx.timing import Profiler
 
@@ -65,7 +66,7 @@ class Leash:
         if self._drawn < self._samples:
             return
         began = time.perf_counter()
-        self._profiler.finish()
+        images.finish()
         now = time.perf_counter()
         self._profiler.awaited += now - began
         fitting = int(self._samples * self._seconds / max(now - self._since, 1e-9))

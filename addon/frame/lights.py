@@ -23,6 +23,7 @@ WHOLE = 8
 LAMPS = sum(1 << kind for kind in (POINT, SPHERE, SUN, RECTANGLE, ELLIPSE))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST = 1e-12  # metres or radians: smaller sizes count as none, since radiance over their square leaves float32
+BRIGHTEST = 1e30  # W / (m2 sr): a light that would be brighter at its size counts as larger, or as a point
 NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
 NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for it
@@ -138,12 +139,14 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
         DIFFUSE_FLAG * light.visibility.diffuse + GLOSSY_FLAG * light.visibility.glossy
         + SHADOW_FLAG * light.cast_shadow + CAMERA_FLAG * light.visibility.camera
     )  # fmt: skip
+    power = float(np.abs(strength).max())
+    least = np.sqrt(power / BRIGHTEST) if light.normalize else 0.0
     axis = -_unit(matrix[:3, 2])
     centre = matrix[:3, 3] - origin
     zero = np.zeros(3)
     if light.kind == "SUN":
         half = float(np.clip(light.angle, 0.0, np.pi)) / 2
-        half = half if half > SMALLEST else 0.0
+        half = half if half > max(SMALLEST, least) else 0.0
         disc = np.pi * np.sin(half) ** 2 if half > 0 else 1.0
         radiance = strength / disc if light.normalize and half > 0 else strength
         solid_angle = 4 * np.pi * np.sin(half / 2) ** 2 if half > 0 else 1.0
@@ -155,14 +158,14 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
         area = width * height * (np.pi / 4 if light.shape == "ELLIPSE" else 1.0)
         if not area > 0:
             return None
-        area = max(area, SMALLEST**2)
+        area = max(area, SMALLEST**2, power / BRIGHTEST if light.normalize else 0.0)
         radiance = strength / np.pi / (area if light.normalize else 1.0)
         spread = 0.0 if light.spread >= np.pi - 1e-6 else float(np.tan(max(light.spread, 2e-4) / 2))
         kind = ELLIPSE if light.shape == "ELLIPSE" else RECTANGLE
         return Emitter(
             light, kind, flags, centre, 0.0, radiance, area, axis, spread, u * width / 2, v * height / 2, zero
         )
-    radius = light.radius if light.radius > SMALLEST else 0.0
+    radius = light.radius if light.radius > max(SMALLEST, least) else 0.0
     disc = np.pi * radius**2
     if radius > 0:
         radiance = strength / np.pi / (4 * disc if light.normalize else 1.0)

@@ -245,7 +245,7 @@ class Renderer:
         Values that are not finite become 0; the ledger counts them.
         """
         started = time.perf_counter()
-        frame.profiler.finish()
+        images.finish()
         waited = time.perf_counter()
         sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
         out, bad = {}, 0

@@ -90,6 +90,12 @@ def counts_in_images() -> bool:
     return gpu.platform.backend_type_get() != "METAL"
 
 
+def overtakes_draws() -> bool:
+    """Whether a dispatch may run before draws that were asked for earlier: llvmpipe (seen with Mesa 22.3) starts it at
+    once, while its rasteriser still works on them."""
+    return gpu.platform.backend_type_get() == "OPENGL" and "llvmpipe" in gpu.platform.renderer_get()
+
+
 def on_release(function: Callable[[], None]) -> Callable[[], None]:
     """Register (as a decorator) what frees GPU resources. Called in reverse order of registration.
 

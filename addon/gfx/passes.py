@@ -7,9 +7,9 @@ from contextlib import contextmanager
 import gpu
 import numpy as np
 
-from .context import on_release
+from .context import on_release, overtakes_draws
 from .geometry import Batch
-from .images import Image, Target
+from .images import Image, Target, finish
 from .library import Program, Shader, get
 
 FULLSCREEN_VERTEX = "lib/fullscreen.vert.glsl"
@@ -77,6 +77,8 @@ def draw_points(shader: Shader, batch: gpu.types.GPUBatch, instances: int = 1) -
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
     shader = get(program)
+    if overtakes_draws():
+        finish()
     shader.bind(**bindings)
     groups = [-(-extent // group) for extent, group in zip((*size, 1), program.group)]
     gpu.compute.dispatch(shader.handle, *groups)

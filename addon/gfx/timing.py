@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from .images import Image, Target, create
+from .images import finish
 
 
 class Profiler:
@@ -20,7 +20,6 @@ class Profiler:
         self.calls: dict[str, int] = {}
         self.awaited = 0.0  # seconds between steps, for the GPU to catch up
         self.wait = wait
-        self._fence: Target | None = None
 
     @contextmanager
     def step(self, name: str):
@@ -29,7 +28,7 @@ class Profiler:
             yield
         finally:
             if self.wait:
-                self.finish()
+                finish()
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
             self.calls[name] = self.calls.get(name, 0) + 1
 
@@ -42,11 +41,3 @@ class Profiler:
             yield part
             if part is end:
                 return
-
-    def finish(self) -> None:
-        """Wait until the GPU has done everything submitted so far."""
-        if self._fence is None:
-            image: Image = create(1, 1, "R32F")
-            self._fence = Target((image,))
-        self._fence.clear()
-        self._fence.colors[0].texture.read()

@@ -23,6 +23,7 @@ uvec4 table_source(ivec2 texel)
   uint q = uint(share * VSSM_Q + 0.5);
   float exact = float(q) / VSSM_Q;
   // A constant map would round its squares all one way: the dither makes the error's mean zero.
-  uint squared = uint(exact * exact * VSSM_SQUARED + vssm_dither(texel));
+  // By the texel's place in its view: equal maps have equal tables wherever they lie.
+  uint squared = uint(exact * exact * VSSM_SQUARED + vssm_dither(texel & ((1 << top_level) - 1)));
   return uvec4(q, squared, q * uint(texel.x), q * uint(texel.y));
 }

@@ -57,6 +57,7 @@ class SlowGpu:
         self.now, self.seconds, self.asked, self.awaited = 0.0, seconds, 0, 0.0
         self.longest = 0
         monkeypatch.setattr(bands_module.time, "perf_counter", lambda: self.now)
+        monkeypatch.setattr(bands_module.images, "finish", self.finish)
 
     def draw(self):
         self.asked += 1

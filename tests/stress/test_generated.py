@@ -19,11 +19,13 @@ import bpy
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, seed, settings
+from mathutils import Euler
 
 from addon import engine
 from addon.frame import ledger
 from addon.techniques import REGISTRY
-from tests.stress.scenes import Scene, build
+from addon.techniques.shadows_by_light import FEW_LIGHTS
+from tests.stress.scenes import SHAPES, Scene, build
 from tests.stress.strategies import scenes
 
 EXAMPLES = int(os.environ.get("CANDELA_STRESS", "0"))
@@ -185,9 +187,44 @@ def chosen_at_random(scene: Scene) -> bool:
     layers = ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
     return any(
         surface.node in layers
-        or any((name in lobes and value > 0) or (name == "Alpha" and 0 < value < 1) for name, value in surface.inputs)
+        or any(
+            (name in lobes and value > 0) or (name in ("Alpha", "Metallic") and 0 < value < 1)
+            for name, value in surface.inputs
+        )
         for surface in scene.surfaces
     )
+
+
+def edge_on(scene: Scene) -> bool:
+    """Whether a lamp stands in the plane of a surface. Its map draws that surface a thousandth of a texel wide: which
+    texels' centres it covers is decided by the last digits, other ones in every place of the atlas."""
+    normals, points = planes(scene)
+    for lamp in scene.lamps:
+        towards = np.array(Euler(lamp.turn).to_matrix())[:, 2]
+        distance = (
+            normals @ towards if lamp.kind == "SUN" else ((np.array(lamp.location) - points) * normals).sum(axis=1)
+        )
+        if (np.abs(distance) < 1e-4).any():
+            return True
+    return False
+
+
+def planes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) unit normals and (N, 3) points of the planes of all faces."""
+    normals, points = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for shape in scene.shapes:
+        vertices, faces = SHAPES[shape.kind]()
+        turn = np.array(Euler(shape.turn).to_matrix())
+        for k in range(shape.copies):
+            place = np.array(shape.location) + (0.37 * k, 0.11 * k, 0.0)
+            corners = np.array(vertices, float).reshape(-1, 3) * shape.scale @ turn.T + place
+            first = corners[[face[:3] for face in faces]].reshape(-1, 3, 3)
+            across = np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0])
+            length = np.linalg.norm(across, axis=1, keepdims=True)
+            drawn = (length[:, 0] > 1e-12) & np.isfinite(first).all(axis=(1, 2))
+            normals.append(across[drawn] / length[drawn])
+            points.append(first[drawn, 0])
+    return np.concatenate(normals), np.concatenate(points)
 
 
 @long_run
@@ -198,7 +235,9 @@ def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, batch):
 
     def check(scene):
         scene = replace(scene, bounces=0)
-        assume(scene.lamps and not chosen_at_random(scene))
+        assume(scene.lamps and not chosen_at_random(scene) and not edge_on(scene))
+        # In pictures of one sample more lamps have coarser maps each.
+        assume(scene.samples > 1 or 2 * len(scene.lamps) <= FEW_LIGHTS)
         with kept(kept_stage, scene, claim):
             whole = kept_stage.render(scene.samples, SIZE, bounces=scene.bounces)["combined"]
             halves = tuple(replace(lamp, energy=lamp.energy / 2) for lamp in scene.lamps for _ in range(2))
