@@ -13,6 +13,12 @@ from film points that are spread evenly and converges faster than light through 
 larger the part of the error that points on lights could take away. As fast as the samples, it would not pay: with four
 times the points at 64 samples whole pictures of hall, window and garden took 1.18, 1.19 and 1.09 times the processor
 time and had 0.98, 0.92 and 0.93 of the error, the rest being edges and indirect light.
+
+A picture of few samples costs what it costs, whatever its maps: surfaces, hierarchy, virtual lights, film. Directions
+of the world, one cheap map each, are then drawn beyond the budget. relMSE and seconds of 256x192 pixels by the Fast
+preset with one sample, by 1 or 2 directions and by 16: product .44 in 0.51 s, .063 in 0.60; courtyard .52 in 0.47, .075
+in 0.56; foliage .091 in 1.6, .037 in 2.2; instances .23 in 2.6, .11 in 2.9. With four samples, product by 4 and 8: .031
+and .012, both in 2.1 s; courtyard by 2 and 4 rays of each pixel .019 and .012.
 """
 
 from __future__ import annotations
@@ -26,6 +32,8 @@ FEWEST_POINTS = 4  # of a light in a whole picture, whatever its variance: it wa
 MOST_EXPONENT = 3  # sequence.py orders the film for up to 8 points of a light per sample
 USUAL_SAMPLES = 16  # up to here a sample has the budget that was asked for
 LITTLE = 1e-4  # squared error that is left, relative: with it a budget is enough
+FEWEST_DIRECTIONS, MOST_DIRECTIONS = 32, 16  # of the world: in a whole picture, and in one of its samples
+LITTLE_OF_FEW = 1e-2  # squared error by directions of the world that goes unseen in a picture of few samples
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,22 @@ def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequ
     while 2 * budget <= asked * (samples / USUAL_SAMPLES) ** 0.5 and left(variance, samples, budget, film) > LITTLE:
         budget *= 2
     return budget
+
+
+def directions_for(variance: float, samples: int, rate: Rate) -> Rate:
+    """`rate` of the world, doubled where a picture of few samples would see too little of it."""
+    exponent = rate.exponent
+
+    def total(exponent: int) -> float:
+        return 2.0**exponent * samples
+
+    while (
+        total(exponent) < FEWEST_DIRECTIONS
+        and 2 ** (exponent + 1) <= MOST_DIRECTIONS
+        and variance * total(exponent) ** -1.5 > LITTLE_OF_FEW
+    ):
+        exponent += 1
+    return Rate(exponent)
 
 
 def left(variance: Sequence[float], samples: int, budget: float, film: Sequence[float] = ()) -> float:

@@ -32,6 +32,7 @@ from functools import cache
 import numpy as np
 
 from ..frame import acceleration, lights
+from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -164,7 +165,7 @@ class DirectLight(Technique):
         kinds = lights.LAMPS
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
-            rate = rate_of(frame, emitter.light.key)
+            rate = self._rate(frame, emitter, weight, shadow)
             for number in rate.points(frame.sample):
                 points = rate.per_sample * frame.settings.samples / weight
                 part = shadow.part(frame, emitter, number, points) if shadow else None
@@ -191,6 +192,15 @@ class DirectLight(Technique):
                     yield from shade(frame, self, others, kinds, self._sources, maps)
                 if near:
                     yield from shade(frame, self, near, kinds, self._sources, self._with_rays(frame, maps))
+
+    def _rate(self, frame: Frame, emitter: lights.Emitter, weight: float, shadow) -> Rate:
+        """Points per sample: one where each would be the whole light, seen from its middle again and again."""
+        rate = rate_of(frame, emitter.light.key)
+        points = rate.per_sample * frame.settings.samples / weight
+        alike = shadow is not None and emitter.extended and rate.per_sample > 1
+        if alike and shadow.cell(frame, 0, points) >= 1.0 and shadow.part(frame, emitter, 0, points) is None:
+            return Rate()
+        return rate
 
     def _with_rays(self, frame: Frame, maps: Maps) -> Maps:
         """The same maps, asked only where the light is small beside its distance."""

@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..frame import acceleration, environment, lights
-from ..frame.rates import Rate, allocate, budget_for
+from ..frame.rates import Rate, allocate, budget_for, directions_for
 from ..frame.run import Frame
 from ..frame.sequence import point, third
 from ..frame.settings import Settings
@@ -156,6 +156,8 @@ class LightProbes(Technique):
         film = [EDGES * sum(s for s, place in zip(share, places) if place == one) ** 2 for one in distinct]
         budget = budget_for(joint, samples, frame.settings.get(self, "maps"), film)
         rates = dict(zip(distinct, allocate(joint, samples, budget, film)))
+        if lit:
+            rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD])
         if any(material.transparent or material.soft for material in frame.materials.compiled):
             # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, left
+from addon.frame.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, directions_for, left
 
 
 @pytest.mark.parametrize(("exponent", "numbers"), [(0, [[0], [1], [2], [3]]), (1, [[0, 1], [2, 3], [4, 5], [6, 7]])])
@@ -68,3 +68,19 @@ def test_a_light_that_gives_most_of_the_picture_is_in_every_sample_though_its_sh
 
 def test_points_of_the_film_ask_for_no_more_than_one_point_in_a_sample():
     assert [rate.exponent for rate in allocate([0.0], 64, 16.0, film=[1.0])] == [0]
+
+
+@pytest.mark.parametrize(
+    ("variance", "samples", "exponent", "expected"),
+    [
+        (0.5, 1, 1, 4),
+        (0.5, 4, 2, 3),
+        (0.5, 16, 2, 2),
+        (0.5, 64, 2, 2),
+        (0.01, 1, 0, 0),
+        (1e30, 1, 0, 4),
+        (0.0, 1, 3, 3),
+    ],
+)
+def test_pictures_of_few_samples_draw_more_of_the_world(variance, samples, exponent, expected):
+    assert directions_for(variance, samples, Rate(exponent)) == Rate(expected)
