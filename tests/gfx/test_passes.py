@@ -184,3 +184,45 @@ def test_profiled_steps_add_up_by_name_and_count_calls(gpu_context):
                 passes.fullscreen(CONSTANT, targets(4), constants={"value": (1, 1, 1, 1)})
         assert profiler.calls == {"pass": 3}
         assert profiler.seconds["pass"] > 0
+
+
+ONE_VALUE = passes.fullscreen_program(
+    "one value",
+    "generated/main",
+    constants=(("VEC4", "value"),),
+    outputs=(("VEC4", "out_value"),),
+    snippets=(("generated/main", "void main() { out_value = value; }"),),
+)
+SLOW_SOURCE = """void main()
+{
+  float x = screen.x + imageLoad(shown, ivec2(gl_FragCoord.xy)).x;
+  for (int k = 0; k < 1000; k++) { x = fract(x * 1.7 + 0.3); }
+  out_value = vec4(x);
+}
+"""
+SLOW = passes.fullscreen_program(
+    "slow",
+    "generated/main",
+    outputs=(("VEC4", "out_value"),),
+    images=(("shown", "RGBA32F", "FLOAT_2D", "READ"),),
+    snippets=(("generated/main", SLOW_SOURCE),),
+)
+TAKEN = compute_program(
+    "taken",
+    "void main()\n{\n  ivec2 texel = ivec2(gl_GlobalInvocationID.xy);\n"
+    "  imageStore(copied, texel, texelFetch(drawn, texel, 0));\n}",
+    textures=(("FLOAT_2D", "drawn"),),
+    images=(("copied", "RGBA32F", "FLOAT_2D", "WRITE"),),
+)
+
+
+def test_dispatch_finds_what_was_drawn_before_it(gpu_context):
+    """Also while the GPU still works on a pass that reads what was there before (seen with llvmpipe)."""
+    size = (256, 256)
+    busy, drawn = (images.Target((images.create(*size, "RGBA32F"),)) for _ in range(2))
+    copied = images.create(*size, "RGBA32F")
+    for k in range(1, 5):
+        passes.fullscreen(SLOW, busy, images={"shown": drawn.colors[0]})
+        passes.fullscreen(ONE_VALUE, drawn, constants={"value": (k, k, k, k)})
+        passes.compute(TAKEN, size, textures={"drawn": drawn.colors[0]}, images={"copied": copied})
+        assert (images.read(copied) == k).all()
