@@ -25,6 +25,8 @@ relMSE of 256x192 pixels, denoised, by shared directions and by rays:
 | passes | 1 over the screen |
 | rays | 1 per pixel instead of each 2 maps |
 
+Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/frame/rates.py).
+
 Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (see traced_glossy).
 Few samples under an even sky show faint overlapping hard shadows.
 """

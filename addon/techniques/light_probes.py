@@ -75,7 +75,8 @@ class LightProbes(Technique):
         Param(
             "maps", "Maps per sample", 6.0,
             "Depth maps that a sample of a final picture shares out among lights and world, by the error of each, "
-            "and more of them where many samples would leave too much of it; 0: one for every light", 0.0, 64.0,
+            "and more of them where many samples, or few directions of the world, would leave too much of it; "
+            "0: one for every light", 0.0, 64.0,
         ),
     )  # fmt: skip
     reads = SURFACES
