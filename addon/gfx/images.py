@@ -162,20 +162,6 @@ class Target:
                 framebuffer.clear(depth=depth)
 
 
-_fence: list[Target] = []
-
-
-def finish() -> None:
-    """Wait until the GPU has done everything submitted so far, by a texel that is drawn last and read back."""
-    if not _fence:
-        _fence.append(Target((create(1, 1, "R32F"),)))
-    _fence[0].clear()
-    _fence[0].colors[0].texture.read()
-
-
-on_release(_fence.clear)
-
-
 class Pool:
     """Images by size and format, given back after use and handed out again."""
 
@@ -214,3 +200,10 @@ def borrowed(width: int, height: int, image_format: str) -> Iterator[Target]:
         yield Target((image,))
     finally:
         pool.give(image)
+
+
+def finish() -> None:
+    """Wait until the GPU has done everything submitted so far, by a texel that is drawn last and read back."""
+    with borrowed(1, 1, "R32F") as target:
+        target.clear()
+        target.colors[0].texture.read()
