@@ -73,10 +73,10 @@ def test_points_of_the_film_ask_for_no_more_than_one_point_in_a_sample():
 @pytest.mark.parametrize(
     ("variance", "samples", "exponent", "expected"),
     [
-        (0.5, 1, 1, 4),
-        (0.5, 4, 2, 3),
-        (0.5, 16, 2, 2),
-        (0.5, 64, 2, 2),
+        (0.8, 1, 1, 4),
+        (0.8, 4, 2, 3),
+        (0.8, 16, 2, 2),
+        (0.8, 64, 2, 2),
         (0.01, 1, 0, 0),
         (1e30, 1, 0, 4),
         (0.0, 1, 3, 3),
