@@ -22,7 +22,6 @@ from hypothesis import HealthCheck, assume, given, seed, settings
 from mathutils import Euler
 
 from addon import engine
-from addon.frame import ledger
 from addon.techniques import REGISTRY
 from addon.techniques.shadows_by_light import FEW_LIGHTS
 from tests.stress.scenes import SHAPES, Scene, build
@@ -250,26 +249,3 @@ def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, batch):
             )
 
     hold(claim, batch, check)
-
-
-@pytest.mark.parametrize("path", sorted(FOUND.glob("*.blend")), ids=lambda path: path.stem)
-def test_what_was_once_found_stays_mended(registered, path):
-    from addon.compare.reference import render_passes
-
-    def drawn():
-        engine.free_sessions()
-        images = render_passes(bpy.context.scene, "CANDELA", 2, 0, direct_only=False, size=SIZE).images
-        assert ledger.latest().bad_pixels == 0
-        return images
-
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    first = drawn()
-    sound(first)
-    objects = bpy.context.scene.collection.objects
-    things = list(objects)
-    for thing in things:
-        objects.unlink(thing)
-    for k, thing in enumerate(things[::-1]):
-        thing.name = f"{997 * k % 1009:04d}"
-        objects.link(thing)
-    assert same_but_for_edges(first["combined"], drawn()["combined"])
