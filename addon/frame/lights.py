@@ -140,13 +140,13 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
         + SHADOW_FLAG * light.cast_shadow + CAMERA_FLAG * light.visibility.camera
     )  # fmt: skip
     power = float(np.abs(strength).max())
-    least = np.sqrt(power / BRIGHTEST) if light.normalize else 0.0
+    smallest = max(SMALLEST, np.sqrt(power / BRIGHTEST) if light.normalize else 0.0)
     axis = -_unit(matrix[:3, 2])
     centre = matrix[:3, 3] - origin
     zero = np.zeros(3)
     if light.kind == "SUN":
         half = float(np.clip(light.angle, 0.0, np.pi)) / 2
-        half = half if half > max(SMALLEST, least) else 0.0
+        half = half if half > smallest else 0.0
         disc = np.pi * np.sin(half) ** 2 if half > 0 else 1.0
         radiance = strength / disc if light.normalize and half > 0 else strength
         solid_angle = 4 * np.pi * np.sin(half / 2) ** 2 if half > 0 else 1.0
@@ -158,14 +158,14 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
         area = width * height * (np.pi / 4 if light.shape == "ELLIPSE" else 1.0)
         if not area > 0:
             return None
-        area = max(area, SMALLEST**2, power / BRIGHTEST if light.normalize else 0.0)
+        area = max(area, smallest**2)
         radiance = strength / np.pi / (area if light.normalize else 1.0)
         spread = 0.0 if light.spread >= np.pi - 1e-6 else float(np.tan(max(light.spread, 2e-4) / 2))
         kind = ELLIPSE if light.shape == "ELLIPSE" else RECTANGLE
         return Emitter(
             light, kind, flags, centre, 0.0, radiance, area, axis, spread, u * width / 2, v * height / 2, zero
         )
-    radius = light.radius if light.radius > max(SMALLEST, least) else 0.0
+    radius = light.radius if light.radius > smallest else 0.0
     disc = np.pi * radius**2
     if radius > 0:
         radiance = strength / np.pi / (4 * disc if light.normalize else 1.0)

@@ -65,18 +65,10 @@ def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequ
 
 def directions_for(variance: float, samples: int, rate: Rate) -> Rate:
     """`rate` of the world, doubled where a picture of few samples would see too little of it."""
-    exponent = rate.exponent
-
-    def total(exponent: int) -> float:
-        return 2.0**exponent * samples
-
-    while (
-        total(exponent) < FEWEST_DIRECTIONS
-        and 2 ** (exponent + 1) <= MOST_DIRECTIONS
-        and variance * total(exponent) ** -1.5 > LITTLE_OF_FEW
-    ):
-        exponent += 1
-    return Rate(exponent)
+    most = min(MOST_DIRECTIONS, FEWEST_DIRECTIONS / samples)
+    while rate.per_sample < most and variance * (rate.per_sample * samples) ** -1.5 > LITTLE_OF_FEW:
+        rate = Rate(rate.exponent + 1)
+    return rate
 
 
 def left(variance: Sequence[float], samples: int, budget: float, film: Sequence[float] = ()) -> float:

@@ -166,8 +166,8 @@ class DirectLight(Technique):
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
             rate = self._rate(frame, emitter, weight, shadow)
+            points = rate.per_sample * frame.settings.samples / weight
             for number in rate.points(frame.sample):
-                points = rate.per_sample * frame.settings.samples / weight
                 part = shadow.part(frame, emitter, number, points) if shadow else None
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
                 cell = 1.0 if part else (shadow.cell(frame, number, points) if shadow else 0.0)

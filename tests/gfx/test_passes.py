@@ -186,13 +186,6 @@ def test_profiled_steps_add_up_by_name_and_count_calls(gpu_context):
         assert profiler.seconds["pass"] > 0
 
 
-ONE_VALUE = passes.fullscreen_program(
-    "one value",
-    "generated/main",
-    constants=(("VEC4", "value"),),
-    outputs=(("VEC4", "out_value"),),
-    snippets=(("generated/main", "void main() { out_value = value; }"),),
-)
 SLOW_SOURCE = """void main()
 {
   float x = screen.x + imageLoad(shown, ivec2(gl_FragCoord.xy)).x;
@@ -219,10 +212,10 @@ TAKEN = compute_program(
 def test_dispatch_finds_what_was_drawn_before_it(gpu_context):
     """Also while the GPU still works on a pass that reads what was there before (seen with llvmpipe)."""
     size = (256, 256)
-    busy, drawn = (images.Target((images.create(*size, "RGBA32F"),)) for _ in range(2))
+    busy, drawn = targets(1, size), targets(4, size)
     copied = images.create(*size, "RGBA32F")
     for k in range(1, 5):
         passes.fullscreen(SLOW, busy, images={"shown": drawn.colors[0]})
-        passes.fullscreen(ONE_VALUE, drawn, constants={"value": (k, k, k, k)})
+        passes.fullscreen(CONSTANT, drawn, constants={"value": (k, k, k, k)})
         passes.compute(TAKEN, size, textures={"drawn": drawn.colors[0]}, images={"copied": copied})
         assert (images.read(copied) == k).all()

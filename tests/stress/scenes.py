@@ -23,6 +23,10 @@ class Shape:
     casts_shadow: bool = True
     seen: bool = True
 
+    def place(self, copy: int) -> np.ndarray:
+        """(3,) location of a copy."""
+        return np.array(self.location) + (0.37 * copy, 0.11 * copy, 0.0)
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -116,7 +120,7 @@ def build(stage, scene: Scene) -> None:
         if materials:
             data.materials.append(materials[shape.material % len(materials)])
         for k in range(shape.copies):
-            place = (np.array(shape.location) + (0.37 * k, 0.11 * k, 0.0)) * unit
+            place = shape.place(k) * unit
             made = stage.link(shape.kind, data, place, shape.turn, np.array(shape.scale) * unit)
             made.visible_shadow, made.visible_camera = shape.casts_shadow, shape.seen
     for lamp in scene.lamps:

@@ -215,8 +215,7 @@ def planes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         vertices, faces = SHAPES[shape.kind]()
         turn = np.array(Euler(shape.turn).to_matrix())
         for k in range(shape.copies):
-            place = np.array(shape.location) + (0.37 * k, 0.11 * k, 0.0)
-            corners = np.array(vertices, float).reshape(-1, 3) * shape.scale @ turn.T + place
+            corners = np.array(vertices, float).reshape(-1, 3) * shape.scale @ turn.T + shape.place(k)
             first = corners[[face[:3] for face in faces]].reshape(-1, 3, 3)
             across = np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0])
             length = np.linalg.norm(across, axis=1, keepdims=True)
