@@ -1,11 +1,9 @@
 """A bounding volume hierarchy over all triangles, for rays that no depth map can answer (one direction per pixel).
 
-Triangles are sorted along a Morton curve of their centroids, four to a leaf, and the leaves fill a complete tree with
-four children per node. The tree needs no pointers: child c of node i of a level is node 4 i + c of the next, so the
-whole build is a sort and a few reductions in numpy, and the shader walks it with a bit mask instead of a stack.
+Its shape is that of box_tree.py, four children to a node and up to four triangles to a leaf. Boxes of children are
+bytes on a grid of their node. Triangles that moved may keep their places: boxes are made anew from the leaves up.
 
 Instances are expanded here, at 3 x 12 bytes a triangle and copy; above LARGEST triangles there is no hierarchy.
-Sources: Lauterbach et al. 2009 (linear BVH); the implicit four-wide layout is our own.
 """
 
 from __future__ import annotations
@@ -18,13 +16,17 @@ import numpy as np
 from ..gfx import images
 from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
-from .morton import morton_codes
+from . import box_tree
+from .box_tree import LEAF
 
 LARGEST = 4_000_000  # triangles
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
 MOST_REFITTED = 200_000  # triangles of a tree whose parts are kept, some 100 bytes each
-LEAF = 4
-NODE_TEXELS = 3  # the node's grid; lower and upper corners of the four children on it
+# What shaders/trace/hierarchy.glsl reads; first among a program's textures, since rays ask for most of its texels.
+HIERARCHY_TEXTURES = (("RGBA32F", "trace_nodes"), ("RGBA32F", "trace_leaves"))
+# The node's grid; lower and upper corners of the four children on it; number of the first child that is a node, of the
+# first one that is a leaf, and how many are nodes: those come first.
+NODE_TEXELS = 4
 # Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
 # emission r, g, b; material; shading normals of the three corners.
 LEAF_TEXELS = 17
@@ -35,12 +37,16 @@ EMPTY = 1e30
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """The tree in two images; `levels` counts inner levels (the root is level 0), `leaves` on level `levels`."""
+    """The tree in two images."""
 
     nodes: images.Image
     leaves: images.Image
-    levels: int
     triangles: int
+
+    @property
+    def textures(self) -> dict[str, images.Image]:
+        """What HIERARCHY_TEXTURES binds."""
+        return {"trace_nodes": self.nodes, "trace_leaves": self.leaves}
 
 
 def world_triangles(
@@ -116,36 +122,29 @@ def _packed_normals(normals: np.ndarray) -> np.ndarray:
 class Tree:
     """A hierarchy with what it was made of, so that triangles that moved can be put in their old places.
 
-    Of a tree of more than MOST_REFITTED triangles HierarchyCache keeps the hierarchy alone: all arrays are None then.
+    Of a tree of more than MOST_REFITTED triangles HierarchyCache keeps the hierarchy alone: all other fields are None
+    then.
     """
 
     hierarchy: Hierarchy
-    place: np.ndarray | None  # (T,) of each triangle among the sorted ones; -1: left out
+    boxes: box_tree.BoxTree | None
+    place: np.ndarray | None  # (T,) of each triangle among the slots of the leaves; -1: left out
     leaves: np.ndarray | None  # (L, LEAF_TEXELS, LEAF)
-    low: np.ndarray | None  # (slots, 3) of each sorted triangle
+    low: np.ndarray | None  # (slots, 3) of the triangle in each
     high: np.ndarray | None
     refitted: bool = False
 
 
 def build(corners: np.ndarray, look: np.ndarray) -> Tree:
     """The hierarchy of `corners` (T, 3, 3) with opacity, emission, material and normals `look` (T, 8)."""
-    finite = np.isfinite(corners).all(axis=(1, 2))
-    order = np.flatnonzero(finite)
-    low, high = corners[order].min(axis=1), corners[order].max(axis=1)
-    order = order[np.argsort(morton_codes((low + high) * 0.5), kind="stable")]
-    count = len(order)
-    levels = 1
-    while LEAF * 4**levels < count:
-        levels += 1
-    slots = LEAF * 4**levels
-    used = -(-max(count, 1) // LEAF)
+    shown = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
+    boxes = box_tree.build(corners[shown].min(axis=1), corners[shown].max(axis=1))
     place = np.full(len(corners), -1)
-    place[order] = np.arange(count)
-    leaves = np.zeros((used, LEAF_TEXELS, LEAF), np.float32)  # zero edges: never hit
-    box_low = np.full((slots, 3), EMPTY, np.float32)
-    box_high = np.full((slots, 3), -EMPTY, np.float32)
-    hierarchy = Hierarchy(None, None, levels, count)
-    return _written(Tree(hierarchy, place, leaves, box_low, box_high), np.arange(count), corners[order], look[order])
+    place[shown] = boxes.place
+    leaves = np.zeros((max(boxes.leaf_count, 1), LEAF_TEXELS, LEAF), np.float32)  # zero edges: never hit
+    low = np.full((boxes.leaf_count * LEAF, 3), EMPTY, np.float32)
+    hierarchy = Hierarchy(None, None, len(shown))
+    return _written(Tree(hierarchy, boxes, place, leaves, low, -low), boxes.place, corners[shown], look[shown])
 
 
 def refit(tree: Tree, numbers: np.ndarray, corners: np.ndarray, look: np.ndarray) -> Tree | None:
@@ -166,21 +165,20 @@ def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarra
     tree.leaves[leaf, 9:, slot] = look
     tree.low[place], tree.high[place] = corners.min(axis=1), corners.max(axis=1)
 
-    box_low, box_high = tree.low.reshape(-1, LEAF, 3).min(axis=1), tree.high.reshape(-1, LEAF, 3).max(axis=1)
-    nodes, used, old = [], len(tree.leaves), tree.hierarchy
-    reach = max(np.abs(box_low[:used]).max(initial=0.0), np.abs(box_high[:used]).max(initial=0.0))
-    least = max(1e-6 * float(reach), 1e-30)
-    for _ in range(old.levels):
-        children_low, children_high = box_low.reshape(-1, 4, 3), box_high.reshape(-1, 4, 3)
-        nodes.append(_packed_boxes(children_low, children_high, least))
-        box_low, box_high = children_low.min(axis=1), children_high.max(axis=1)
-    rows = np.concatenate(nodes[::-1]).reshape(-1, 4)  # root first
-    leaves = images.upload_list(tree.leaves.reshape(-1, 4))
-    return replace(tree, hierarchy=Hierarchy(images.upload_list(rows), leaves, old.levels, old.triangles))
+    leaf_low, leaf_high = tree.low.reshape(-1, LEAF, 3).min(axis=1), tree.high.reshape(-1, LEAF, 3).max(axis=1)
+    reach = max(np.abs(leaf_low).max(initial=0.0), np.abs(leaf_high).max(initial=0.0))
+    low, high = (
+        tree.boxes.of_children(*ends) for ends in ((leaf_low, np.minimum, EMPTY), (leaf_high, np.maximum, -EMPTY))
+    )
+    rows = np.zeros((len(low), NODE_TEXELS, 4), np.float32)
+    _pack_boxes(rows, low, high, max(1e-6 * float(reach), 1e-30))
+    rows[:, 3, 0], rows[:, 3, 1], rows[:, 3, 2] = tree.boxes.first_node, tree.boxes.first_leaf, tree.boxes.nodes
+    nodes, leaves = (images.upload_list(texels.reshape(-1, 4)) for texels in (rows, tree.leaves))
+    return replace(tree, hierarchy=Hierarchy(nodes, leaves, tree.hierarchy.triangles))
 
 
-def _packed_boxes(low: np.ndarray, high: np.ndarray, least: float) -> np.ndarray:
-    """Boxes of four children per node, (N, 4, 3), as (N, NODE_TEXELS, 4); see node_meets in shaders/trace.
+def _pack_boxes(rows: np.ndarray, low: np.ndarray, high: np.ndarray, least: float) -> None:
+    """Put boxes of four children per node, (N, 4, 3), into `rows` (N, NODE_TEXELS, 4); see node_meets in shaders/trace.
 
     A step of the grid is a power of two, so that the shader's arithmetic is exact but for the last addition; the grid
     starts a little below the node's corner and boxes are rounded outwards. Extents below `least` metres count as that.
@@ -196,11 +194,9 @@ def _packed_boxes(low: np.ndarray, high: np.ndarray, least: float) -> np.ndarray
     last = np.clip(np.ceil((high - start) / step[:, None] + 0.01), 0, 255)
     first[empty], last[empty] = 255, 0
     byte = np.array([1.0, 256.0, 65536.0])
-    packed = np.zeros((len(low), NODE_TEXELS, 4), np.float32)
-    packed[:, 0, :3] = corner
-    packed[:, 0, 3] = (exponent + 127) @ byte
-    packed[:, 1], packed[:, 2] = first @ byte, last @ byte
-    return packed
+    rows[:, 0, :3] = corner
+    rows[:, 0, 3] = (exponent + 127) @ byte
+    rows[:, 1], rows[:, 2] = first @ byte, last @ byte
 
 
 class HierarchyCache:
@@ -235,7 +231,7 @@ class HierarchyCache:
         if tree is None or (tree.refitted and not draft):
             tree = build(*world_triangles(list(shown), snapshot.meshes, materials, origin, path))
             if tree.hierarchy.triangles > MOST_REFITTED:
-                tree.place = tree.leaves = tree.low = tree.high = None
+                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = None
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}

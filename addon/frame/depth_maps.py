@@ -238,7 +238,7 @@ OPAQUE = Program(
     inputs=(("VEC3", "position"), ("INT", "local_instance")),
     varyings=(("smooth", "VEC2", "depth_terms"),),
     outputs=(("VEC4", "out_depth"),),
-    textures=(("FLOAT_2D", "instances"),),
+    textures=(("RGBA32F", "instances"),),
     constants=PROJECTION_CONSTANTS,
     defines=PROJECTION_DEFINES,
 )

@@ -184,8 +184,8 @@ def _shared(compiled: CompiledMaterial) -> dict:
             *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
         ),
         "textures": (
-            ("FLOAT_2D", "instances"), ("FLOAT_2D", "energy_table"),
-            *(("FLOAT_2D", f"material_image{k}") for k in range(len(compiled.images))),
+            ("RGBA32F", "instances"), ("RGBA32F", "energy_table"),
+            *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
         ),
         "snippets": (
             ("generated/attributes", f"void copy_attributes()\n{{\n{copy}}}\n"),
@@ -228,7 +228,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
         ),
         constants=(("INT", "first_instance"), ("INT", "glass_bends")),
         defines=CAMERA_DEFINES,
-        **{**shared, "textures": (*shared["textures"], ("FLOAT_2D", "surface_position"))},
+        **{**shared, "textures": (*shared["textures"], ("RGBA32F", "surface_position"))},
     )
 
 

@@ -59,10 +59,6 @@ def _output(integer: bool) -> tuple[tuple[str, str], ...]:
     return ((_VALUES[integer].upper(), "out_value"),)
 
 
-def _load(name: str, integer: bool) -> tuple[str, str, str, str]:
-    return (name, _FORMATS[integer], "UINT_2D" if integer else "FLOAT_2D", "READ")
-
-
 def _along(axis: int, integer: bool) -> tuple[tuple[str, str], ...]:
     return (("STEP", _STEPS[axis]), ("CHUNK", str(CHUNK)), ("TABLE_VALUE", _VALUES[integer]))
 
@@ -71,7 +67,7 @@ def _sums(axis: int, integer: bool) -> Program:
     return passes.fullscreen_program(
         f"sums of chunks, axis {axis}, {_VALUES[integer]}",
         "table/sums.frag.glsl",
-        images=(_load("summed", integer),),
+        textures=((_FORMATS[integer], "summed"),),
         constants=(("IVEC2", "extent"),),
         defines=_along(axis, integer),
         outputs=_output(integer),
@@ -82,7 +78,7 @@ def _prefix(axis: int, integer: bool, chunks: bool) -> Program:
     return passes.fullscreen_program(
         f"running sums, axis {axis}, {_VALUES[integer]}, {'many chunks' if chunks else 'one chunk'}",
         "table/prefix.frag.glsl",
-        images=(_load("summed", integer), *((_load("chunk_sums", integer),) if chunks else ())),
+        textures=tuple((_FORMATS[integer], name) for name in ("summed", *(("chunk_sums",) if chunks else ()))),
         defines=(*_along(axis, integer), *((("CHUNKS", "1"),) if chunks else ())),
         outputs=_output(integer),
     )
@@ -113,15 +109,15 @@ def _run_along(axis: int, integer: bool, summed: images.Image, target: images.Ta
     kind = _KINDS.index((axis, integer))
     length = summed.size[axis]
     if length <= CHUNK:
-        passes.fullscreen(PREFIX_OF_ONE[kind], target, images={"summed": summed})
+        passes.fullscreen(PREFIX_OF_ONE[kind], target, textures={"summed": summed})
         return
     chunks = list(summed.size)
     chunks[axis] = -(-length // CHUNK)
     with images.borrowed(*chunks, summed.format) as sums, images.borrowed(*chunks, summed.format) as before:
-        passes.fullscreen(SUMS[kind], sums, images={"summed": summed}, constants={"extent": summed.size})
+        passes.fullscreen(SUMS[kind], sums, textures={"summed": summed}, constants={"extent": summed.size})
         _run_along(axis, integer, sums.colors[0], before)
         bound = {"summed": summed, "chunk_sums": before.colors[0]}
-        passes.fullscreen(PREFIX[kind], target, images=bound)
+        passes.fullscreen(PREFIX[kind], target, textures=bound)
 
 
 def sum_up(image: images.Image, table: images.Image) -> None:

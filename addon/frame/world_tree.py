@@ -118,7 +118,7 @@ def _program(
     return passes.fullscreen_program(
         f"{name} {compiled.program_key[:8]}",
         fragment,
-        textures=tuple(("FLOAT_2D", name) for name in (*textures, *own)),
+        textures=tuple(("RGBA32F", name) for name in (*textures, *own)),
         blocks=(*blocks, (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
         constants=constants,
         outputs=(("VEC4", "out_radiance"),),

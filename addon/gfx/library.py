@@ -16,7 +16,7 @@ from pathlib import Path
 
 import gpu
 
-from .context import on_release
+from .context import loads_beat_fetches, on_release
 from .struct import Struct
 
 SHADER_ROOT = Path(__file__).resolve().parents[2] / "shaders"
@@ -26,7 +26,10 @@ _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _ERROR_LINE = re.compile(r"(?:python_shader\.glsl|\|\s*):(\d+)(?::\d+)?:\s*(.*)")
 _QUOTED_LINE = re.compile(r"^\s*\d+ \| (.*\S)")
 
-_SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D"}
+# Types of a texture: the format of its texels, or, where that is not known beforehand, only what they are read as.
+_FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D") | {"RGBA32UI": "UINT_2D"}
+_SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
+_MOST_IMAGES = 8  # that Blender binds at once
 _CONSTANTS = {"FLOAT", "VEC2", "VEC3", "VEC4", "INT", "IVEC2", "IVEC4", "MAT4", "BOOL"}
 _PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 16, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
 
@@ -41,6 +44,9 @@ class Program:
 
     `snippets` are generated texts, included by their name like files. `images` are (name, format, sampler type,
     access) with access in READ, WRITE, READ_WRITE. `varyings` are (interpolation, GLSL type, name).
+
+    Sources read a texture `picture` by `picture_fetch(texel)` and `picture_size()`. Where loads from images are faster
+    than fetches, as many as may be of those with a format are bound as images, the first ones first.
     """
 
     name: str
@@ -73,6 +79,13 @@ class Program:
             raise ShaderError(f"Program {self.name}: {len(self.textures)} textures; Metal allows 16.")
         if bool(self.compute) == bool(self.fragment):
             raise ShaderError(f"Program {self.name}: give either compute, or vertex and fragment.")
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Textures that are bound as images, because this driver loads faster than it fetches."""
+        if not loads_beat_fetches():
+            return ()
+        return tuple(name for kind, name in self.textures if kind in _FORMATS)[: _MOST_IMAGES - len(self.images)]
 
 
 @cache
@@ -118,6 +131,7 @@ class Shader:
         self._constants = {name: kind for kind, name in program.constants}
         self._textures = {name for _, name in program.textures}
         self._images = {name for name, *_ in program.images}
+        self._loaded = set(program.loaded)
         self._blocks = {name for _, name in program.blocks}
 
     def bind(self, textures=None, images=None, blocks=None, constants=None) -> None:
@@ -132,7 +146,7 @@ class Shader:
         for name, block in blocks.items():
             _set(shader.uniform_block, name, block.buffer)
         for name, image in textures.items():
-            _set(shader.uniform_sampler, name, image.texture)
+            _set(shader.image if name in self._loaded else shader.uniform_sampler, name, image.texture)
         for name, image in images.items():
             _set(shader.image, name, image.texture)
         for name, value in constants.items():
@@ -189,9 +203,18 @@ def _compile(program: Program):
         info.typedef_source("".join(structs.values()))
     for slot, (struct, name) in enumerate(program.blocks):
         info.uniform_buf(slot, struct.name, name)
-    for slot, (kind, name) in enumerate(program.textures):
-        info.sampler(slot, kind, name)
-    for slot, (name, image_format, kind, access) in enumerate(program.images):
+    images, samplers = list(program.images), 0
+    for kind, name in program.textures:
+        if name in program.loaded:
+            info.define(f"{name}_fetch(texel)", f"imageLoad({name}, texel)")
+            info.define(f"{name}_size()", f"imageSize({name})")
+            images.append((name, kind, _FORMATS[kind], "READ"))
+        else:
+            info.define(f"{name}_fetch(texel)", f"texelFetch({name}, texel, 0)")
+            info.define(f"{name}_size()", f"textureSize({name}, 0)")
+            info.sampler(samplers, _FORMATS.get(kind, kind), name)
+            samplers += 1
+    for slot, (name, image_format, kind, access) in enumerate(images):
         qualifiers = {"READ", "WRITE"} if access == "READ_WRITE" else {access}
         info.image(slot, image_format, kind, name, qualifiers=qualifiers)
     for kind, name in program.constants:

@@ -79,7 +79,6 @@ class Lookup:
     name: str
     file: str
     textures: tuple[tuple[str, str], ...] = ()
-    images: tuple[tuple[str, str, str, str], ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
     defines: tuple[tuple[str, str], ...] = ()
     blocks: tuple[tuple[Struct, str], ...] = ()
@@ -93,30 +92,26 @@ class Maps:
     views: np.ndarray  # (V, VIEW_TEXELS, 4)
     lookup: Lookup
     textures: dict[str, images.Image] = field(default_factory=dict)
-    images: dict[str, images.Image] = field(default_factory=dict)
     constants: dict[str, object] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
 
 
-# What lookups by rays bind.
-RAY_TEXTURES = (("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
-RAY_CONSTANTS = (("INT", "trace_levels"), ("FLOAT", "offset_size"))
+# What lookups by rays bind besides the hierarchy.
+RAY_CONSTANTS = (("FLOAT", "offset_size"),)
 HARD = Lookup("hard", "lib/hard_visibility.glsl")
 EDGES = Lookup(
     "edge rays",
     "lib/edge_visibility.glsl",
-    textures=RAY_TEXTURES,
-    images=(("depth_image", "RGBA32F", "FLOAT_2D", "READ"),),
+    textures=acceleration.HIERARCHY_TEXTURES,
     constants=RAY_CONSTANTS,
-    defines=(("DEPTH_IMAGE", "1"),),
 )
 
 
 def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, object]]:
-    """Textures and constants of RAY_TEXTURES and RAY_CONSTANTS: what casts shadows, for rays."""
+    """Textures and RAY_CONSTANTS: what casts shadows, for rays."""
     hierarchy = frame.hierarchy("shadow")
-    textures = {"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves}
-    return textures, {"trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size}
+    textures = hierarchy.textures
+    return textures, {"offset_size": 1e-6 * frame.geometry.size}
 
 
 class DepthMapService:
@@ -277,7 +272,7 @@ class AccumulatedMaps(Technique):
         if not (views and frame.settings.get(self, "edge_rays")) or acceleration.too_many(frame.snapshot):
             return maps
         textures, constants = ray_bindings(frame)
-        return replace(maps, lookup=EDGES, textures=textures, images={"depth_image": maps.atlas}, constants=constants)
+        return replace(maps, lookup=EDGES, textures=textures, constants=constants)
 
     def release(self) -> None:
         self.service.release()

@@ -108,7 +108,7 @@ AREA_ROWS = 5  # texels of a cluster, see shaders/cluster/lights.glsl
 MAPS = passes.fullscreen_program(
     "maps of clusters",
     "cluster/map.frag.glsl",
-    textures=(*PATH_TEXTURES, ("FLOAT_2D", "virtual_lights")),
+    textures=(("RGBA32F", "virtual_lights"), *PATH_TEXTURES),
     blocks=PATH_BLOCKS,
     constants=(*PATH_CONSTANTS, ("INT", "cluster_count"), ("INT", "map_side"), ("INT", "map_columns")),
     outputs=(("VEC4", "out_seen"),),
@@ -135,7 +135,7 @@ def _by_means(order: int) -> Gather:
     return replace(
         BY_TEXELS,
         name=f"clusters, order {order}",
-        textures=(*BY_TEXELS.textures, ("FLOAT_2D", "basis_means")),
+        textures=(*BY_TEXELS.textures, ("RGBA16F", "basis_means")),
         constants=(
             *BY_TEXELS.constants, ("IVEC2", "base_extent"), ("INT", "tile_columns"), ("INT", "basis_rows"),
             ("INT", "top_level"),

@@ -48,9 +48,9 @@ from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMa
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
 PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
-BASIS_IMAGES = {
-    PYRAMID: ("basis_means", "RGBA16F", "FLOAT_2D", "READ"),
-    TABLE: ("basis_table", "RGBA32UI", "UINT_2D", "READ"),
+BASIS = {
+    PYRAMID: ("RGBA16F", "basis_means"),
+    TABLE: ("RGBA32UI", "basis_table"),
 }
 SEARCH_OFFSET = 0.42  # of the blocker search's tapered series, over its order: 0.105 with 4 terms
 
@@ -61,7 +61,7 @@ def _basis(order: int, prefilter: str) -> Basis:
         '#include "cssm/basis.glsl"\n',
         order,
         prefilter,
-        textures=(("FLOAT_2D", "depth_maps"), *LIMIT_TEXTURES),
+        textures=(("RGBA32F", "depth_maps"), *LIMIT_TEXTURES),
         constants=LIMIT_CONSTANTS,
     )
 
@@ -72,7 +72,7 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
     return soft_lookup(
         f"convolution soft shadows, order {order}, {prefilter.lower()}, {cells} cells",
         "cssm/visibility.glsl",
-        BASIS_IMAGES[prefilter],
+        BASIS[prefilter],
         constants=(("IVEC2", "base_extent"), ("INT", "tile_columns"), ("INT", "basis_rows")),
         defines=(
             ("ORDER", str(order)), ("CELLS", str(cells)), ("SERIES_SCALE", f"{scale:.6f}"),
@@ -119,7 +119,7 @@ class ConvolutionSoftShadows(SoftMaps):
             basis.build(image, size, maps.constants["top_level"], bound, maps.constants)
         return replace(
             maps,
-            images={**maps.images, BASIS_IMAGES[prefilter][0]: image},
+            textures={**maps.textures, BASIS[prefilter][1]: image},
             constants={**maps.constants, **basis.constants_for(*size)},
         )
 

@@ -51,12 +51,12 @@ from .traced_glossy import may_be_glossy
 TOLERANCE = {"diffuse_direct": 3.0, "diffuse_indirect": 5.0, "glossy_indirect": 5.0}
 LEVELS = 3
 FEWEST = 4  # samples: each half needs a mean
-GUIDES = (("FLOAT_2D", "surface_position"), ("FLOAT_2D", "normal_sum"))
+GUIDES = (("RGBA32F", "surface_position"), ("RGBA32F", "normal_sum"))
 LEAST_COLOR = (("LEAST_COLOR", "1e-4"),)  # albedo below this sends nothing that is seen
 BEGIN = passes.fullscreen_program(
     "denoise: light and variance",
     "denoise/begin.frag.glsl",
-    textures=(*GUIDES, ("FLOAT_2D", "sum_now"), ("FLOAT_2D", "half_sum"), ("FLOAT_2D", "color_sum")),
+    textures=(*GUIDES, ("RGBA32F", "sum_now"), ("RGBA32F", "half_sum"), ("RGBA32F", "color_sum")),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "count"), ("INT", "half_count")),
     defines=LEAST_COLOR,
@@ -65,7 +65,7 @@ BEGIN = passes.fullscreen_program(
 LEVEL = passes.fullscreen_program(
     "denoise: level",
     "denoise/level.frag.glsl",
-    textures=(*GUIDES, ("FLOAT_2D", "light_in")),
+    textures=(*GUIDES, ("RGBA32F", "light_in")),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "stride"), ("FLOAT", "tolerance")),
     outputs=(("VEC4", "out_light"),),
@@ -73,7 +73,7 @@ LEVEL = passes.fullscreen_program(
 END = passes.fullscreen_program(
     "denoise: reflected light",
     "denoise/end.frag.glsl",
-    textures=(("FLOAT_2D", "light_in"), ("FLOAT_2D", "color_sum"), ("FLOAT_2D", "sum_now")),
+    textures=(("RGBA32F", "light_in"), ("RGBA32F", "color_sum"), ("RGBA32F", "sum_now")),
     constants=(("INT", "count"),),
     defines=LEAST_COLOR,
     outputs=(("VEC4", "out_sum"),),

@@ -45,7 +45,6 @@ from .accumulated_maps import (
     EDGES,
     HARD,
     RAY_CONSTANTS,
-    RAY_TEXTURES,
     AccumulatedMaps,
     DepthMapService,
     Lookup,
@@ -66,7 +65,7 @@ NEAR = 0.25  # radius / distance from which rays are traced instead
 RAYS_WHERE_NEAR = Lookup(
     "rays where near",
     "light/near_visibility.glsl",
-    textures=RAY_TEXTURES,
+    textures=acceleration.HIERARCHY_TEXTURES,
     constants=(*RAY_CONSTANTS, ("FLOAT", "near_share")),
 )
 
@@ -78,8 +77,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
     return passes.fullscreen_program(
         f"direct light, {lookup.name}",
         "light/direct.frag.glsl",
-        textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "depth_maps"), ("FLOAT_2D", "energy_table"), *lookup.textures),
-        images=lookup.images,
+        textures=(*lookup.textures, ("RGBA32F", "depth_maps"), ("RGBA32F", "energy_table"), *SURFACE_TEXTURES),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
         constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
         defines=(
@@ -112,7 +110,6 @@ def shade(
             **surface_bindings(frame), "depth_maps": maps.atlas, "energy_table": frame.materials.energy_table,
             **maps.textures,
         },
-        "images": maps.images,
         "blocks": {"film_view": frame.view_block, "sources": sources.set(rows, maps.views), **maps.blocks},
         "constants": {
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
@@ -206,7 +203,7 @@ class DirectLight(Technique):
         """The same maps, asked only where the light is small beside its distance."""
         textures, constants = ray_bindings(frame)
         constants["near_share"] = NEAR
-        return replace(maps, lookup=RAYS_WHERE_NEAR, textures=textures, images={}, constants=constants)
+        return replace(maps, lookup=RAYS_WHERE_NEAR, textures=textures, constants=constants)
 
     def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
         """Lights of this sample with the inverse of their chance."""

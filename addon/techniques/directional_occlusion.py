@@ -44,6 +44,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..frame import acceleration
 from ..frame.environment import WORLD, Environment
 from ..frame.run import Frame
 from ..frame.settings import Settings
@@ -58,7 +59,7 @@ from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, fan_bindings, fan_params
 from .surfaces import SURFACES
 
 CELLS = (32, 64)
-ENVIRONMENT_TEXTURES = (("FLOAT_2D", "environment_map"), ("FLOAT_2D", "environment_density_map"))
+ENVIRONMENT_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))
 OCCLUSION_BITS, OCCLUSION_POINTS, OCCLUSION_RAYS = (
     passes.fullscreen_program(
         f"directional occlusion, {kind}",
@@ -75,8 +76,8 @@ OCCLUSION_BITS, OCCLUSION_POINTS, OCCLUSION_RAYS = (
         (
             "bits and rays",
             "occlusion",
-            (("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves")),
-            (("FLOAT", "offset_size"), ("INT", "trace_levels")),
+            acceleration.HIERARCHY_TEXTURES,
+            (("FLOAT", "offset_size"),),
             (("RAYS", ""),),
         ),
     )
@@ -118,9 +119,9 @@ class DirectionalOcclusion(Technique):
             traced = hierarchy is not None
             program = OCCLUSION_RAYS if traced else OCCLUSION_BITS
         if traced:
-            bindings["textures"] |= {"trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves}
+            bindings["textures"] |= hierarchy.textures
             bindings["constants"] |= {
-                "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
+                "offset_size": 1e-6 * frame.geometry.size,
             }  # fmt: skip
             frame.count(self, "rays", frame.size[0] * frame.size[1] * frame.settings.get(self, "fans"))
         with images.borrowed(*frame.size, "RGBA32F") as arriving:

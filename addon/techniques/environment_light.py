@@ -37,7 +37,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frame import depth_maps, environment, lights, world_tiles
+from ..frame import acceleration, depth_maps, environment, lights, world_tiles
 from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
@@ -53,11 +53,11 @@ WORLD_RAYS = Lookup(
     "world rays",
     "light/world_rays.glsl",
     textures=(
-        ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"), ("FLOAT_2D", "environment_map"),
-        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "world_edges"),
+        *acceleration.HIERARCHY_TEXTURES, ("RGBA32F", "environment_map"),
+        ("R32F", "environment_density_map"), ("R32F", "world_edges"),
     ),
     constants=(
-        ("INT", "trace_levels"), ("FLOAT", "offset_size"), ("IVEC2", "world_tiles"), ("IVEC2", "world_grid"),
+        ("FLOAT", "offset_size"), ("IVEC2", "world_tiles"), ("IVEC2", "world_grid"),
     ),
     defines=(("OWN_POINTS", "1"),),
     blocks=((environment.WORLD, "world_light"),),
@@ -179,11 +179,11 @@ class EnvironmentLight(Technique):
         return Maps(
             nothing.atlas, nothing.views, WORLD_RAYS,
             textures={
-                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves, "environment_map": world.map,
+                **hierarchy.textures, "environment_map": world.map,
                 "environment_density_map": world.density_map, "world_edges": self._edges,
             },
             constants={
-                "trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size,
+                "offset_size": 1e-6 * frame.geometry.size,
                 "world_tiles": self._tiles, "world_grid": (environment.GUIDE_COLUMNS, environment.GUIDE_ROWS),
             },
             blocks={"world_light": world.block},

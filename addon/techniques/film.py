@@ -39,8 +39,8 @@ COLLECT = tuple(
         "film collect",
         "film/collect.frag.glsl",
         textures=(
-            *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
-            ("FLOAT_2D", "environment_density_map"),
+            *SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "environment_map"),
+            ("R32F", "environment_density_map"),
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
         constants=(("INT", "light_count"), ("FLOAT", "film_share")),
@@ -56,14 +56,14 @@ COLLECT = tuple(
 DEPTH = passes.fullscreen_program(
     "film depth",
     "film/depth.frag.glsl",
-    textures=(("FLOAT_2D", "surface_position"),),
+    textures=(("RGBA32F", "surface_position"),),
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_depth"),),
 )
 RESOLVE = passes.fullscreen_program(
     "film resolve",
     "film/resolve.frag.glsl",
-    textures=tuple(("FLOAT_2D", name) for name in (*PATHS, "emission", "environment")),
+    textures=tuple(("RGBA32F", name) for name in (*PATHS, "emission", "environment")),
     constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
     outputs=(("VEC4", "out_combined"),),
 )  # fmt: skip

@@ -59,7 +59,7 @@ def _programs(name: str, file: str, guides: bool) -> tuple[Program, Program]:
         passes.fullscreen_program(
             name,
             file,
-            textures=tuple(("FLOAT_2D", texture) for texture in (*seen, *(f"light_{path}" for path in paths))),
+            textures=tuple(("RGBA32F", texture) for texture in (*seen, *(f"light_{path}" for path in paths))),
             blocks=((VIEW, "film_view"),) if guides else (),
             constants=(("FLOAT", "film_share"), *((("VEC2", "offset"),) if guides else ())),
             defines=defines,

@@ -101,7 +101,7 @@ SPLAT = Program(
         )
     ),
     outputs=PLANE_OUTPUT,
-    textures=(("FLOAT_2D", "surface_points"), ("FLOAT_2D", "virtual_lights")),
+    textures=(("RGBA32F", "surface_points"), ("RGBA32F", "virtual_lights")),
     constants=(
         *MAP_CONSTANTS, ("INT", "map_rows"), ("INT", "triangle_count"), ("INT", "first_run"), ("INT", "run_count"),
         ("INT", "run_points"), ("FLOAT", "depth_unit"), ("INT", "lot"),

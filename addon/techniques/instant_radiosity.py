@@ -70,7 +70,7 @@ from .virtual_lights import (
 DEEPER = 2  # samples, one of which looks for light that close surfaces reflect to each other again and again
 DEEPER_ORDER = (0, 0, 1, 1, 1, 1, 0, 0)  # which of each two: of 16, all numbers of the sequence in each quarter twice
 MORE_RAYS = 4  # times, in a picture of one sample
-GATHER_TEXTURES = (*PATH_TEXTURES, ("FLOAT_2D", "virtual_lights"))
+GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
 GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "deeper"))
 GATHER = passes.fullscreen_program(
     "instant radiosity",

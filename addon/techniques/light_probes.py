@@ -43,14 +43,14 @@ EDGES = 0.04
 ROUNDING = 1e-5  # of sums of POINTS equal numbers and their squares
 MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
 WORLD = "world"  # its name among the rates
-RAYS = (*SURFACE_TEXTURES, ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"))
+RAYS = (*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES)
 GUIDE = passes.fullscreen_program(
     "environment guide",
     "light/guide.frag.glsl",
     textures=RAYS,
     blocks=((VIEW, "film_view"),),
     constants=(
-        ("INT", "trace_levels"), ("INT", "columns"), ("INT", "rows"), ("IVEC2", "probes"), ("FLOAT", "offset_size"),
+        ("INT", "columns"), ("INT", "rows"), ("IVEC2", "probes"), ("FLOAT", "offset_size"),
     ),
     outputs=(("FLOAT", "out_useful"),),
 )  # fmt: skip
@@ -59,7 +59,7 @@ SPREAD = passes.fullscreen_program(
     "light/spread.frag.glsl",
     textures=RAYS,
     blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-    constants=(("INT", "trace_levels"), ("IVEC2", "probes"), ("FLOAT", "offset_size"), ("INT", "points")),
+    constants=(("IVEC2", "probes"), ("FLOAT", "offset_size"), ("INT", "points")),
     outputs=(("VEC4", "out_moments"),),
 )
 
@@ -108,9 +108,9 @@ class LightProbes(Technique):
         hierarchy = frame.hierarchy()
         return {
             "textures": {
-                **surface_bindings(frame), "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
+                **surface_bindings(frame), **hierarchy.textures,
             },
-            "constants": {"trace_levels": hierarchy.levels, "offset_size": 1e-6 * frame.geometry.size},
+            "constants": {"offset_size": 1e-6 * frame.geometry.size},
         }  # fmt: skip
 
     def _guide(self, frame: Frame) -> None:

@@ -79,7 +79,7 @@ BOUNDS_FORMATS = ("RGBA32F", "RGBA32F", "RG32F")
 FIRST_BOUNDS = passes.fullscreen_program(
     "region bounds of pixels",
     "indirect/region_bounds.frag.glsl",
-    textures=(("FLOAT_2D", "surface_position"), ("FLOAT_2D", "surface_normal")),
+    textures=(("RGBA32F", "surface_position"), ("RGBA32F", "surface_normal")),
     blocks=((VIEW, "film_view"),),
     constants=BOUNDS_CONSTANTS,
     outputs=BOUNDS_OUTPUTS,
@@ -102,7 +102,7 @@ GRID = (("IVEC2", "grid_offset"), ("IVEC2", "atlas_size"))  # of what includes s
 LIST = Program(
     name="list of regions",
     compute="indirect/region_list.comp.glsl",
-    textures=(("FLOAT_2D", "surface_position"), ("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags")),
+    textures=(("RGBA32F", "surface_position"), ("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags")),
     images=(("entries", "R32UI", "UINT_2D", "WRITE"), ("entry_count", "R32UI", "UINT_2D_ATOMIC", "READ_WRITE")),
     constants=(*GRID, ("INT", "level"), ("INT", "levels")),
     defines=RUNS,
@@ -154,7 +154,7 @@ TRACED_REGIONS = regions(TRACED)
 GATHER_SHARED = passes.fullscreen_program(
     "instant radiosity of regions",
     "indirect/gather.frag.glsl",
-    textures=(*GATHER_TEXTURES, ("FLOAT_2D", "shared_irradiance")),
+    textures=(*GATHER_TEXTURES, ("RGBA32F", "shared_irradiance")),
     blocks=PATH_BLOCKS,
     constants=(*GATHER_CONSTANTS, ("IVEC2", "grid_offset")),
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),

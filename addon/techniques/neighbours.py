@@ -45,8 +45,8 @@ MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
         f"mean of neighbours{of}",
         "neighbours/mean.frag.glsl",
         textures=(
-            ("FLOAT_2D", "surface_position"), ("FLOAT_2D", "surface_normal"), ("FLOAT_2D", "surface_diffuse"),
-            ("FLOAT_2D", "light_in"),
+            ("RGBA32F", "surface_position"), ("RGBA32F", "surface_normal"), ("RGBA32F", "surface_diffuse"),
+            ("RGBA32F", "light_in"),
         ),
         blocks=((VIEW, "film_view"),),
         constants=(("INT", "stride"),),
@@ -62,7 +62,7 @@ MEAN, MEAN_OF_REFLECTED, MEAN_AGAIN = (
 REFLECT = passes.fullscreen_program(
     "reflected light",
     "neighbours/reflect.frag.glsl",
-    textures=(("FLOAT_2D", "surface_diffuse"), ("FLOAT_2D", "arriving")),
+    textures=(("RGBA32F", "surface_diffuse"), ("RGBA32F", "arriving")),
     outputs=(("VEC4", "out_diffuse"),),
 )
 

@@ -35,7 +35,7 @@ VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
 REFLECTANCE = passes.fullscreen_program(
     "reflectance",
     "indirect/reflectance.frag.glsl",
-    textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table")),
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine")),
     outputs=(("VEC4", "out_reflectance"),),
 )

@@ -28,7 +28,6 @@ from ..frame.technique import Param
 from ..gfx import images
 from .accumulated_maps import (
     RAY_CONSTANTS,
-    RAY_TEXTURES,
     AccumulatedMaps,
     Lookup,
     Maps,
@@ -48,29 +47,25 @@ CONTACTS = Param(
 FEWEST_POINTS = (
     16  # fewer parts that do not tile the light, at points of a low-discrepancy set, are worse than all of it
 )
-LIMIT_TEXTURES = (("FLOAT_2D", "depth_bounds"), ("FLOAT_2D", "depth_limits"))
+LIMIT_TEXTURES = (("RG32F", "depth_bounds"), ("RG32F", "depth_limits"))
 LIMIT_CONSTANTS = (("INT", "bounds_rows"), ("INT", "top_level"))
-# What lookups load (lib/shadow.glsl: DEPTH_IMAGE).
-LOADED_IMAGES = (("depth_image", "RGBA32F", "FLOAT_2D", "READ"), ("bounds_image", "RG32F", "FLOAT_2D", "READ"))
-LOADED_DEFINES = (("DEPTH_IMAGE", "1"),)
 BOUNDS = tables.PyramidSource(
     "depth bounds",
-    "vec2 bounds_source(ivec2 texel)\n{\n  vec4 caster = texelFetch(depth_maps, texel, 0);\n"
+    "vec2 bounds_source(ivec2 texel)\n{\n  vec4 caster = depth_maps_fetch(texel);\n"
     "  return (caster.w > 0.0) ? caster.xx : vec2(0.0);\n}\n",
-    textures=(("FLOAT_2D", "depth_maps"),),
+    textures=(("RGBA32F", "depth_maps"),),
 )
 DEPTH_BOUNDS = tables.level_program(BOUNDS)
 
 
-def soft_lookup(name: str, file: str, image: tuple, constants: tuple = (), defines: tuple = ()) -> Lookup:
-    """A lookup that asks the map, its pyramid and limits, and the filtered map in `image`."""
+def soft_lookup(name: str, file: str, filtered: tuple[str, str], constants: tuple = (), defines: tuple = ()) -> Lookup:
+    """A lookup that asks the map, its pyramid and limits, and the `filtered` map."""
     return Lookup(
         name,
         file,
-        textures=LIMIT_TEXTURES,
-        images=(*LOADED_IMAGES, image),
+        textures=(filtered, *LIMIT_TEXTURES),
         constants=(*LIMIT_CONSTANTS, *constants),
-        defines=(*LOADED_DEFINES, *defines),
+        defines=defines,
     )
 
 
@@ -79,7 +74,7 @@ def with_contacts(lookup: Lookup) -> Lookup:
     return replace(
         lookup,
         name=f"{lookup.name}, contact rays",
-        textures=lookup.textures + RAY_TEXTURES,
+        textures=lookup.textures + acceleration.HIERARCHY_TEXTURES,
         constants=(*lookup.constants, *RAY_CONSTANTS, ("INT", "contact_side")),
         defines=(*lookup.defines, ("CONTACT_RAYS", "1")),
     )
@@ -168,8 +163,7 @@ class SoftMaps(AccumulatedMaps):
             tables.build_pyramid(BOUNDS, bounds, levels, textures={"depth_maps": maps.atlas})
         limits = images.upload(_limits(views, rectangles, (height // side, width // side), side), "RG32F")
         shared = {"depth_bounds": bounds, "depth_limits": limits}
-        loaded = {"depth_image": maps.atlas, "bounds_image": bounds}
-        maps = replace(maps, textures=shared, images=loaded, constants=constants)
+        maps = replace(maps, textures=shared, constants=constants)
         return self.filtered(frame, maps, (width, height), bool(views))
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:

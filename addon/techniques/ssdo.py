@@ -73,7 +73,7 @@ from .neighbours import reflect
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
 
-FAN_TEXTURES = (*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"))
+FAN_TEXTURES = (*SURFACE_TEXTURES, ("RGBA32F", "energy_table"))
 FAN_CONSTANTS = (("INT", "fan_count"), ("INT", "step_count"), ("FLOAT", "farthest"), ("FLOAT", "thickness"))
 BITS, POINTS = "BITS", "POINTS"
 BOUNCE_BITS, BOUNCE_POINTS, BOUNCE_RAYS = (

@@ -51,7 +51,7 @@ DESCRIPTIONS = {  # the layout in full: shaders/lib/gbuffer.glsl
     "emission": "Emitted radiance towards the viewer; glossy roughness",
 }
 SURFACES = tuple(f"surface.{name}" for name in SURFACE_IMAGES)
-SURFACE_TEXTURES = tuple(("FLOAT_2D", f"surface_{name}") for name in SURFACE_IMAGES)
+SURFACE_TEXTURES = tuple(("RGBA32F", f"surface_{name}") for name in SURFACE_IMAGES)
 
 # Defines of the programs that light surfaces: without and with soft lobes, which few scenes have.
 SOFT_DEFINES = ((), (("SOFT_LOBES", ""),))
@@ -65,7 +65,7 @@ def surface_bindings(frame: Frame) -> dict[str, images.Image]:
 TILE_BOUNDS = passes.fullscreen_program(
     "tile bounds",
     "surface/tile_bounds.frag.glsl",
-    textures=(("FLOAT_2D", "surface_position"),),
+    textures=(("RGBA32F", "surface_position"),),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "tile"),),
     outputs=(("VEC4", "out_low"), ("VEC4", "out_high")),

@@ -47,12 +47,12 @@ TRACED = passes.fullscreen_program(
     "traced glossy",
     "light/traced.frag.glsl",
     textures=(
-        *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
-        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
+        *acceleration.HIERARCHY_TEXTURES, ("RGBA32F", "environment_map"), ("R32F", "environment_density_map"),
+        *SURFACE_TEXTURES, ("RGBA32F", "energy_table"),
     ),
     blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
-        ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"), ("INT", "trace_levels"),
+        ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
     ),
     defines=TRACED_DEFINES,
@@ -115,14 +115,14 @@ class TracedGlossy(Technique):
             "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
-                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
+                **hierarchy.textures,
             },
             "blocks": {
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
             "constants": {
                 "light_count": self._light_count, "traced_roughness": roughness,
-                "offset_size": 1e-6 * frame.geometry.size, "trace_levels": hierarchy.levels,
+                "offset_size": 1e-6 * frame.geometry.size,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive_power, "emissive_points": emissive_points,

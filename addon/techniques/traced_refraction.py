@@ -52,14 +52,14 @@ REFRACTION = passes.fullscreen_program(
     "traced refraction",
     "light/refraction.frag.glsl",
     textures=(
-        *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "environment_map"),
-        ("FLOAT_2D", "environment_density_map"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
-        ("FLOAT_2D", "reflectance"), ("FLOAT_2D", "interface_table"), ("FLOAT_2D", "behind_position"),
-        ("FLOAT_2D", "behind_albedo"),
+        *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES,
+        *(("RGBA32F", name) for name in (
+            "energy_table", "environment_map", "reflectance", "interface_table", "behind_position", "behind_albedo")),
+        ("R32F", "environment_density_map"),
     ),
     blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
-        ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "trace_levels"), ("INT", "interfaces"),
+        ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "interfaces"),
         ("INT", "world_transmission"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"),
         ("FLOAT", "emissive_points"),
     ),
@@ -68,7 +68,7 @@ REFRACTION = passes.fullscreen_program(
 ALBEDO = passes.fullscreen_program(
     "surface albedo",
     "surface/albedo.frag.glsl",
-    textures=(*SURFACE_TEXTURES, ("FLOAT_2D", "energy_table")),
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_position"), ("VEC4", "out_albedo")),
 )
@@ -129,7 +129,7 @@ class TracedRefraction(Technique):
             textures={
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
-                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves,
+                **hierarchy.textures,
                 "reflectance": self._reflectance.image, "interface_table": self._interfaces,
                 "behind_position": behind.colors[0], "behind_albedo": behind.colors[1],
             },
@@ -139,7 +139,7 @@ class TracedRefraction(Technique):
             },
             constants={
                 "light_count": len(rows), "offset_size": 1e-6 * frame.geometry.size,
-                "trace_levels": hierarchy.levels, "interfaces": frame.settings.get(self, "interfaces"),
+                "interfaces": frame.settings.get(self, "interfaces"),
                 "world_transmission": int(self._world), "world_samples": float(WORLD_DIRECTIONS),
                 "emissive_power": self._triangles.power if self._triangles else 0.0,
                 "emissive_points": float(EMISSIVE_POINTS),

@@ -50,7 +50,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..frame import lights
+from ..frame import acceleration, lights
 from ..frame.morton import morton_codes
 from ..frame.run import Frame
 from ..frame.view import VIEW
@@ -70,12 +70,11 @@ FLOOR = 1.0  # share of the mean importance that every candidate keeps
 MOST_VIRTUAL = 2048
 
 PATH_TEXTURES = (
-    *SURFACE_TEXTURES, ("FLOAT_2D", "energy_table"), ("FLOAT_2D", "trace_nodes"), ("FLOAT_2D", "trace_leaves"),
-    ("FLOAT_2D", "reflectance"),
+    *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "reflectance"),
 )  # fmt: skip
 PATH_BLOCKS = ((VIEW, "film_view"), (lights.SOURCES, "sources"))
 PATH_CONSTANTS = (
-    ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "trace_levels"), ("INT", "bounces"),
+    ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "bounces"),
 )  # fmt: skip
 PROBE_CONSTANTS = (("IVEC2", "probes"), ("INT", "rays"))
 CANDIDATES = passes.fullscreen_program(
@@ -89,7 +88,7 @@ CANDIDATES = passes.fullscreen_program(
 DENSITY = passes.fullscreen_program(
     "virtual light density",
     "indirect/density.frag.glsl",
-    textures=(*PATH_TEXTURES, ("FLOAT_2D", "candidate_point"), ("FLOAT_2D", "candidate_normal"), ("FLOAT_2D", "kept")),
+    textures=(*PATH_TEXTURES, ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"), ("R32F", "kept")),
     blocks=PATH_BLOCKS,
     constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
     outputs=(("FLOAT", "out_density"),),
@@ -186,12 +185,12 @@ class VirtualLights:
         return {
             "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
-                "trace_nodes": hierarchy.nodes, "trace_leaves": hierarchy.leaves, "reflectance": self.reflectance.image,
+                **hierarchy.textures, "reflectance": self.reflectance.image,
             },
             "blocks": {"film_view": frame.view_block, "sources": self._source_block},
             "constants": {
                 "light_count": self._source_count, "offset_size": 1e-6 * frame.geometry.size,
-                "trace_levels": hierarchy.levels, "bounces": frame.settings.bounces,
+                "bounces": frame.settings.bounces,
             },
         }  # fmt: skip
 

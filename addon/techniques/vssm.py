@@ -61,7 +61,7 @@ RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
 MOMENTS = tables.TableSource(
     "depth moments",
     '#include "vssm/moments.glsl"\n',
-    textures=(("FLOAT_2D", "depth_maps"), *LIMIT_TEXTURES),
+    textures=(("RGBA32F", "depth_maps"), *LIMIT_TEXTURES),
     constants=LIMIT_CONSTANTS,
     integer=True,
 )
@@ -71,7 +71,7 @@ def _lookup(rule: str, cells: int) -> Lookup:
     return soft_lookup(
         f"variance soft shadows, {rule.lower()}, {cells} cells",
         "vssm/visibility.glsl",
-        ("depth_table", "RGBA32UI", "UINT_2D", "READ"),
+        ("RGBA32UI", "depth_table"),
         defines=(("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
     )
 
@@ -101,7 +101,7 @@ class VarianceSoftShadows(SoftMaps):
         if drawn:
             bound = {"depth_maps": maps.atlas, **maps.textures}
             tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
-        return replace(maps, images={**maps.images, "depth_table": table})
+        return replace(maps, textures={**maps.textures, "depth_table": table})
 
     def lookup(self, frame: Frame) -> Lookup:
         return _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"))

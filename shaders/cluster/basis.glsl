@@ -9,5 +9,5 @@ vec4 basis_source(ivec2 place)
   if (index >= BASIS_TILES) {
     return vec4(0.0);
   }
-  return basis_values(index, cluster_depth(texelFetch(cluster_maps, place - tile * base_extent, 0).x));
+  return basis_values(index, cluster_depth(cluster_maps_fetch(place - tile * base_extent).x));
 }

@@ -30,11 +30,11 @@ struct Cluster {
 
 Cluster cluster_read(int index)
 {
-  vec4 a = texelFetch(virtual_lights, ivec2(index, 3), 0);
-  vec4 b = texelFetch(virtual_lights, ivec2(index, 4), 0);
-  vec4 c = texelFetch(virtual_lights, ivec2(index, 5), 0);
-  vec4 d = texelFetch(virtual_lights, ivec2(index, 6), 0);
-  vec4 e = texelFetch(virtual_lights, ivec2(index, 7), 0);
+  vec4 a = virtual_lights_fetch(ivec2(index, 3));
+  vec4 b = virtual_lights_fetch(ivec2(index, 4));
+  vec4 c = virtual_lights_fetch(ivec2(index, 5));
+  vec4 d = virtual_lights_fetch(ivec2(index, 6));
+  vec4 e = virtual_lights_fetch(ivec2(index, 7));
   Cluster cluster;
   cluster.middle = a.xyz;
   cluster.range = a.w;

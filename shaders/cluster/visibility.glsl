@@ -61,7 +61,7 @@ vec2 box_of_texels(ClusterReceiver r, vec2 low, vec2 high)
     for (int x = first.x; x <= last.x; x++) {
       vec2 covered = max(min(vec2(x, y) + 1.0, high) - max(vec2(x, y), low), vec2(0.0));
       float weight = covered.x * covered.y;
-      vec4 seen = texelFetch(cluster_maps, ivec2(r.rectangle.xy) + ivec2(x, y), 0);
+      vec4 seen = cluster_maps_fetch(ivec2(r.rectangle.xy) + ivec2(x, y));
       whole += weight;
       if (texel_blocks(r, seen, vec2(x, y) + 0.5)) {
         blocked += weight;
@@ -81,7 +81,7 @@ vec2 box_of_taps(ClusterReceiver r, vec2 low, vec2 high)
   for (int k = 0; k < TAPS * TAPS; k++) {
     vec2 part = (vec2(float(k % TAPS), float(k / TAPS)) + 0.5) / float(TAPS);
     vec2 texel = floor(mix(low, high, part));
-    vec4 seen = texelFetch(cluster_maps, ivec2(r.rectangle.xy + texel), 0);
+    vec4 seen = cluster_maps_fetch(ivec2(r.rectangle.xy + texel));
     if (texel_blocks(r, seen, texel + 0.5)) {
       blocked += 1.0;
       distances += seen.x * r.range;

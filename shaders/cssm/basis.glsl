@@ -10,7 +10,7 @@ vec4 basis_source(ivec2 place)
   if (index >= BASIS_TILES) {
     return vec4(0.0);
   }
-  vec4 caster = texelFetch(depth_maps, texel, 0);
+  vec4 caster = depth_maps_fetch(texel);
   bool perspective;
   vec2 range = cssm_range(texel, perspective);
   // Where nothing was drawn nothing blocks: as far as can be.

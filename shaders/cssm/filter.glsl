@@ -9,16 +9,9 @@
 #ifdef PREFILTER_TABLE
 ivec4 basis_sum(ivec2 place)
 {
-  return (min(place.x, place.y) <= 0) ? ivec4(0) : ivec4(imageLoad(basis_table, place - 1));
+  return (min(place.x, place.y) <= 0) ? ivec4(0) : ivec4(basis_table_fetch(place - 1));
 }
 #else
-// Loaded from an image where the depth map is too (lib/shadow.glsl).
-#ifdef DEPTH_IMAGE
-#  define BASIS_MEANS(texel) imageLoad(basis_means, texel)
-#else
-#  define BASIS_MEANS(texel) texelFetch(basis_means, texel, 0)
-#endif
-
 vec4 basis_level(ivec2 origin, vec2 low, vec2 high, vec2 place, int level)
 {
   float size = float(1 << level);
@@ -28,10 +21,10 @@ vec4 basis_level(ivec2 origin, vec2 low, vec2 high, vec2 place, int level)
   ivec2 most = max(ivec2(high / size) - 1, ivec2(low / size));
   ivec2 offset = (origin >> level) + ivec2(0, basis_rows - (basis_rows >> (level - 1)));
   ivec2 next = min(corner + 1, most);
-  vec4 a = BASIS_MEANS(offset + corner);
-  vec4 b = BASIS_MEANS(offset + ivec2(next.x, corner.y));
-  vec4 c = BASIS_MEANS(offset + ivec2(corner.x, next.y));
-  vec4 d = BASIS_MEANS(offset + next);
+  vec4 a = basis_means_fetch(offset + corner);
+  vec4 b = basis_means_fetch(offset + ivec2(next.x, corner.y));
+  vec4 c = basis_means_fetch(offset + ivec2(corner.x, next.y));
+  vec4 d = basis_means_fetch(offset + next);
   return mix(mix(a, b, t.x), mix(c, d, t.x), t.y);
 }
 #endif

@@ -12,8 +12,8 @@ struct Shown {
 
 bool shown_at(ivec2 pixel, out Shown shown)
 {
-  vec4 position = texelFetch(surface_position, pixel, 0);
-  vec3 normal = texelFetch(normal_sum, pixel, 0).xyz;
+  vec4 position = surface_position_fetch(pixel);
+  vec3 normal = normal_sum_fetch(pixel).xyz;
   float size = length(normal);
   shown.position = position.xyz;
   shown.normal = normal / max(size, 1e-30);

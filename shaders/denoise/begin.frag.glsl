@@ -5,12 +5,12 @@
 
 vec3 without_color(vec3 light, ivec2 pixel)
 {
-  return light / max(texelFetch(color_sum, pixel, 0).rgb / float(count), vec3(LEAST_COLOR));
+  return light / max(color_sum_fetch(pixel).rgb / float(count), vec3(LEAST_COLOR));
 }
 
 float half_difference(ivec2 pixel, vec3 whole)
 {
-  vec3 first = texelFetch(half_sum, pixel, 0).rgb;
+  vec3 first = half_sum_fetch(pixel).rgb;
   float n = float(count);
   float m = float(half_count);
   float difference = luminance(without_color(first / m - (whole - first) / (n - m), pixel));
@@ -20,11 +20,11 @@ float half_difference(ivec2 pixel, vec3 whole)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  ivec2 size = textureSize(sum_now, 0);
-  vec3 whole = texelFetch(sum_now, pixel, 0).rgb;
+  ivec2 size = sum_now_size();
+  vec3 whole = sum_now_fetch(pixel).rgb;
   out_light = vec4(without_color(whole / float(count), pixel), -1.0);
   Shown here;
-  bool colored = max_component(texelFetch(color_sum, pixel, 0).rgb) > LEAST_COLOR * float(count);
+  bool colored = max_component(color_sum_fetch(pixel).rgb) > LEAST_COLOR * float(count);
   if (!shown_at(pixel, here) || !colored) {
     return;
   }
@@ -36,7 +36,7 @@ void main()
       Shown there;
       if (shown_at(place, there)) {
         float weight = alike(here, there, 1);
-        sum += weight * half_difference(place, texelFetch(sum_now, place, 0).rgb);
+        sum += weight * half_difference(place, sum_now_fetch(place).rgb);
         weights += weight;
       }
     }

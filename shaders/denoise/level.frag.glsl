@@ -23,8 +23,8 @@ bool noisy(vec4 light)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  ivec2 size = textureSize(light_in, 0);
-  vec4 own = texelFetch(light_in, pixel, 0);
+  ivec2 size = light_in_size();
+  vec4 own = light_in_fetch(pixel);
   out_light = own;
   Shown here;
   if (!noisy(own) || !shown_at(pixel, here)) {
@@ -40,7 +40,7 @@ void main()
       if ((x == 0 && y == 0) || any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, size))) {
         continue;
       }
-      vec4 light = texelFetch(light_in, place, 0);
+      vec4 light = light_in_fetch(place);
       Shown there;
       if (!noisy(light) || !shown_at(place, there)) {
         continue;

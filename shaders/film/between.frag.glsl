@@ -33,17 +33,17 @@ Seen seen_of(Surface s)
 // At this point of the film.
 Seen seen_here(ivec2 pixel)
 {
-  return seen_of(surface_decode(texelFetch(surface_position, pixel, 0), texelFetch(surface_normal, pixel, 0),
-                                texelFetch(surface_diffuse, pixel, 0), texelFetch(surface_tint, pixel, 0),
-                                texelFetch(surface_lobe, pixel, 0), vec4(0.0)));
+  return seen_of(surface_decode(surface_position_fetch(pixel), surface_normal_fetch(pixel),
+                                surface_diffuse_fetch(pixel), surface_tint_fetch(pixel),
+                                surface_lobe_fetch(pixel), vec4(0.0)));
 }
 
 // At a pixel's own point, where its light is known.
 Seen seen_there(ivec2 pixel)
 {
-  return seen_of(surface_decode(texelFetch(known_position, pixel, 0), texelFetch(known_normal, pixel, 0),
-                                texelFetch(known_diffuse, pixel, 0), texelFetch(known_tint, pixel, 0),
-                                texelFetch(known_lobe, pixel, 0), vec4(0.0)));
+  return seen_of(surface_decode(known_position_fetch(pixel), known_normal_fetch(pixel),
+                                known_diffuse_fetch(pixel), known_tint_fetch(pixel),
+                                known_lobe_fetch(pixel), vec4(0.0)));
 }
 
 vec3 known_part(vec3 color)
@@ -86,7 +86,7 @@ void arriving_mean(Arriving same, Arriving nearby, out vec3 direct, out vec3 ind
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  ivec2 size = textureSize(known_position, 0);
+  ivec2 size = known_position_size();
   out_diffuse_direct = vec4(0.0);
   out_diffuse_indirect = vec4(0.0);
   out_glossy_direct = vec4(0.0);
@@ -136,20 +136,20 @@ void main()
         vec3 apart = (there.position - here.position) / tolerance;
         float similar = weight * alike * alike / (1.0 + dot(apart, apart));
         if (!light_found) {
-          vec3 direct = texelFetch(light_diffuse_direct, other, 0).rgb;
-          vec3 indirect = texelFetch(light_diffuse_indirect, other, 0).rgb;
+          vec3 direct = light_diffuse_direct_fetch(other).rgb;
+          vec3 indirect = light_diffuse_indirect_fetch(other).rgb;
           if (equal && here.soft == there.soft) {
             arriving_add(same, direct, indirect, there.color, weight, weight);
           }
           arriving_add(nearby, direct, indirect, there.color, similar, similar);
         }
         if (!lobe_found && here.kind == there.kind) {
-          vec3 direct = texelFetch(light_glossy_direct, other, 0).rgb;
-          vec3 indirect = texelFetch(light_glossy_indirect, other, 0).rgb;
+          vec3 direct = light_glossy_direct_fetch(other).rgb;
+          vec3 indirect = light_glossy_indirect_fetch(other).rgb;
 #ifdef TRANSMISSION
           if (refracts) {
-            direct = texelFetch(light_transmission_direct, other, 0).rgb;
-            indirect = texelFetch(light_transmission_indirect, other, 0).rgb;
+            direct = light_transmission_direct_fetch(other).rgb;
+            indirect = light_transmission_indirect_fetch(other).rgb;
           }
 #endif
           if (equal) {

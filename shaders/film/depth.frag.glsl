@@ -2,6 +2,6 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec4 position = texelFetch(surface_position, pixel, 0);
+  vec4 position = surface_position_fetch(pixel);
   out_depth = vec4(position.w != 0.0 ? dot(film_view.eye.xyz - position.xyz, film_view.backward.xyz) : 1e10);
 }

@@ -2,12 +2,12 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec4 world = texelFetch(environment, pixel, 0);
-  vec3 direct = texelFetch(diffuse_direct, pixel, 0).rgb + texelFetch(glossy_direct, pixel, 0).rgb
-                + texelFetch(transmission_direct, pixel, 0).rgb;
-  vec3 indirect = texelFetch(diffuse_indirect, pixel, 0).rgb + texelFetch(glossy_indirect, pixel, 0).rgb
-                  + texelFetch(transmission_indirect, pixel, 0).rgb;
-  vec3 sum = direct + indirect + texelFetch(emission, pixel, 0).rgb;
+  vec4 world = environment_fetch(pixel);
+  vec3 direct = diffuse_direct_fetch(pixel).rgb + glossy_direct_fetch(pixel).rgb
+                + transmission_direct_fetch(pixel).rgb;
+  vec3 indirect = diffuse_indirect_fetch(pixel).rgb + glossy_indirect_fetch(pixel).rgb
+                  + transmission_indirect_fetch(pixel).rgb;
+  vec3 sum = direct + indirect + emission_fetch(pixel).rgb;
   if (transparent == 0) {
     sum += world.rgb;
   }

@@ -6,10 +6,10 @@ void main()
 {
   out_density = 0.0;
   ivec2 place = ivec2(gl_FragCoord.xy);
-  int number = int(texelFetch(kept, ivec2(place.x, 0), 0).x);
+  int number = int(kept_fetch(ivec2(place.x, 0)).x);
   ivec2 candidate = ivec2(number % rays, number / rays);
-  vec3 normal = texelFetch(candidate_normal, candidate, 0).xyz;
-  vec3 point = ray_origin(texelFetch(candidate_point, candidate, 0).xyz, normal);
+  vec3 normal = candidate_normal_fetch(candidate).xyz;
+  vec3 point = ray_origin(candidate_point_fetch(candidate).xyz, normal);
   Probe probe = probe_read(place.y);
   if (!probe.receives) {
     return;

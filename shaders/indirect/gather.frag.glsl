@@ -56,7 +56,7 @@ void main()
   out_diffuse = vec4(0.0);
   out_glossy = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
+  if (surface_position_fetch(pixel).w == 0.0) {
     return;
   }
   Surface s = SURFACE_READ(pixel);
@@ -66,7 +66,7 @@ void main()
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   if (max_component(s.diffuse) > 0.0) {
 #ifdef SHARED
-    out_diffuse.rgb = s.diffuse / PI * texelFetch(shared_irradiance, pixel + grid_offset, 0).rgb;
+    out_diffuse.rgb = s.diffuse / PI * shared_irradiance_fetch(pixel + grid_offset).rgb;
 #else
     float choice = scrambled(film_view.bits_w, salt.z);
     out_diffuse.rgb = virtual_gather(s, to_viewer, true, origin, choice, salt.x + roll.x);

@@ -13,9 +13,9 @@ struct VirtualLight {
 VirtualLight virtual_light(int index)
 {
   VirtualLight light;
-  light.position = texelFetch(virtual_lights, ivec2(index, 0), 0).xyz;
-  light.normal = texelFetch(virtual_lights, ivec2(index, 1), 0).xyz;
-  vec4 sent = texelFetch(virtual_lights, ivec2(index, 2), 0);
+  light.position = virtual_lights_fetch(ivec2(index, 0)).xyz;
+  light.normal = virtual_lights_fetch(ivec2(index, 1)).xyz;
+  vec4 sent = virtual_lights_fetch(ivec2(index, 2));
   light.intensity = sent.xyz;
   light.footprint = sent.w;
   return light;
@@ -35,8 +35,8 @@ float bounded_kernel(VirtualLight light, vec3 position, out vec3 direction)
 // reflected once more.
 float unblocked_share(int index, vec3 position, vec3 normal, bool shorter)
 {
-  vec4 a = texelFetch(virtual_lights, ivec2(index, 0), 0);
-  vec4 b = texelFetch(virtual_lights, ivec2(index, 1), 0);
+  vec4 a = virtual_lights_fetch(ivec2(index, 0));
+  vec4 b = virtual_lights_fetch(ivec2(index, 1));
   vec3 path = a.xyz - position;
   float squared = max(dot(path, path), 1e-30);
   float cosines = max(-dot(b.xyz, path), 0.0) * max(dot(normal, path), 0.0) / squared;
@@ -76,7 +76,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, uint salt, out vec3 directio
     return vec3(0.0);
   }
   VirtualLight light = virtual_light(chosen);
-  float shorter = texelFetch(virtual_lights, ivec2(chosen, 1), 0).w;
+  float shorter = virtual_lights_fetch(ivec2(chosen, 1)).w;
   float bounded = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
   float visible = virtual_light_seen(light, ray_origin(position, normal), salt);
   return light.intensity * (shorter * bounded * (float(stride) * total / chosen_share) * visible);

@@ -1,7 +1,7 @@
 // Light that surfaces send on: where rays meet them, what they reflect, and what light reaches them straight from sources.
 //
 // A program that includes this binds the surface images, `film_view`, `sources`, the hierarchy and `reflectance`, and has
-// the constants `light_count`, `offset_size` and `trace_levels`.
+// the constants `light_count` and `offset_size`.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "light/sources.glsl"
@@ -27,7 +27,7 @@ bool pixel_of(vec3 position, vec3 normal, out ivec2 pixel, out float slant, out 
   if (w <= 0.0) {
     return false;
   }
-  vec2 size = vec2(textureSize(surface_position, 0));
+  vec2 size = vec2(surface_position_size());
   vec2 place = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * size;
   if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
     return false;
@@ -44,7 +44,7 @@ bool pixel_of(vec3 position, vec3 normal, out ivec2 pixel, out float slant, out 
 vec3 mean_albedo(ivec2 hit)
 {
   int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
-  return texelFetch(reflectance, ivec2(material & 15, material >> 4), 0).rgb;
+  return reflectance_fetch(ivec2(material & 15, material >> 4)).rgb;
 }
 
 // The same as a diffuse part and a lobe.
@@ -52,12 +52,12 @@ Reflection mean_reflection(ivec2 hit)
 {
   int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
   ivec2 place = ivec2(material & 15, material >> 4);
-  int rows = textureSize(reflectance, 0).y / REFLECTANCE_BANDS;
-  vec4 straight = texelFetch(reflectance, place + ivec2(0, 2 * rows), 0);
+  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  vec4 straight = reflectance_fetch(place + ivec2(0, 2 * rows));
   Reflection mean;
-  mean.diffuse = texelFetch(reflectance, place + ivec2(0, rows), 0).rgb;
+  mean.diffuse = reflectance_fetch(place + ivec2(0, rows)).rgb;
   mean.straight = straight.rgb;
-  mean.grazing = texelFetch(reflectance, place + ivec2(0, 3 * rows), 0).rgb;
+  mean.grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
   mean.alpha = straight.a;
   return mean;
 }
@@ -69,7 +69,7 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
   float slant;
   float footprint;
   if (pixel_of(position, normal, pixel, slant, footprint)) {
-    vec4 seen = texelFetch(surface_position, pixel, 0);
+    vec4 seen = surface_position_fetch(pixel);
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
       Surface s = SURFACE_READ(pixel);
       if (dot(s.geometric_normal, normal) > 0.9) {

@@ -12,7 +12,7 @@ Probe probe_read(int index)
   uvec3 bits = hash3(uvec3(uint(index), 91u, uint(film_view.seed)));
   vec2 within = vec2(scrambled(film_view.bits_z, bits.x), scrambled(film_view.bits_w, bits.y));
   vec2 cell = vec2(float(index % probes.x), float(index / probes.x));
-  ivec2 pixel = ivec2((cell + within) / vec2(probes) * vec2(textureSize(surface_position, 0)));
+  ivec2 pixel = ivec2((cell + within) / vec2(probes) * vec2(surface_position_size()));
   Surface s = SURFACE_READ(pixel);
   Probe probe;
   probe.receives = s.hit && (max_component(s.diffuse) > 0.0 || max_component(s.glossy_weight) > 0.0);

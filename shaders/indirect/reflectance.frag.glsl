@@ -14,7 +14,7 @@ void main()
   for (int y = 0; y < extent.y; y++) {
     for (int x = 0; x < extent.x; x++) {
       ivec2 pixel = corner + ivec2(x, y);
-      if (texelFetch(surface_position, pixel, 0).w != 0.0) {
+      if (surface_position_fetch(pixel).w != 0.0) {
         Surface s = SURFACE_READ(pixel);
         Reflection r = surface_reflection(s, view_cosine);
         sum += (band == 0) ? vec4(surface_albedo(s, view_cosine), 0.0)

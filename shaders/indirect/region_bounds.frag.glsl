@@ -18,14 +18,14 @@ void main()
   for (int y = -1; y <= 1; y++) {  // one pixel before: an edge may run between two regions, and splits one of them
     for (int x = -1; x <= 1; x++) {
       ivec2 pixel = 2 * region + ivec2(x, y) - grid_offset;
-      bool outside = any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, textureSize(surface_position, 0)));
-      vec4 position = outside ? vec4(0.0) : texelFetch(surface_position, pixel, 0);
+      bool outside = any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, surface_position_size()));
+      vec4 position = outside ? vec4(0.0) : surface_position_fetch(pixel);
       if (position.w == 0.0) {
         kinds |= 2;
         continue;
       }
       float depth = dot(film_view.backward.xyz, film_view.eye.xyz - position.xyz);
-      vec4 value = vec4(depth, octahedral_decode(texelFetch(surface_normal, pixel, 0).xy));
+      vec4 value = vec4(depth, octahedral_decode(surface_normal_fetch(pixel).xy));
       out_low = min(out_low, value);
       out_high = max(out_high, value);
       kinds |= 1;
@@ -34,9 +34,9 @@ void main()
 #else
   for (int child = 0; child < 4; child++) {
     ivec2 finer = 2 * region + ivec2(child & 1, child >> 1);
-    out_low = min(out_low, texelFetch(finer_low, finer, 0));
-    out_high = max(out_high, texelFetch(finer_high, finer, 0));
-    kinds |= int(texelFetch(finer_flags, finer, 0).y);
+    out_low = min(out_low, finer_low_fetch(finer));
+    out_high = max(out_high, finer_high_fetch(finer));
+    kinds |= int(finer_flags_fetch(finer).y);
   }
 #endif
   bool split = kinds == 3;
@@ -48,8 +48,8 @@ void main()
 #ifndef PIXELS
   for (int y = -1; y <= 2; y++) {
     for (int x = -1; x <= 2; x++) {
-      ivec2 finer = clamp(2 * region + ivec2(x, y), ivec2(0), textureSize(finer_flags, 0) - 1);
-      split = split || texelFetch(finer_flags, finer, 0).x > 0.5;
+      ivec2 finer = clamp(2 * region + ivec2(x, y), ivec2(0), finer_flags_size() - 1);
+      split = split || finer_flags_fetch(finer).x > 0.5;
     }
   }
 #endif

@@ -24,11 +24,11 @@ void main()
 {
   ivec2 region = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
   ivec2 first = (region << level) - grid_offset;
-  if (any(lessThan(first + (1 << level), ivec2(1))) || any(greaterThanEqual(first, textureSize(surface_position, 0)))) {
+  if (any(lessThan(first + (1 << level), ivec2(1))) || any(greaterThanEqual(first, surface_position_size()))) {
     return;
   }
-  bool split = level > 0 && texelFetch(region_flags, region, 0).x > 0.5;
-  if (!split && (level == levels || texelFetch(coarser_flags, region >> 1, 0).x > 0.5)) {
+  bool split = level > 0 && region_flags_fetch(region).x > 0.5;
+  if (!split && (level == levels || coarser_flags_fetch(region >> 1).x > 0.5)) {
     gather(region, level);
   }
 }
@@ -36,7 +36,7 @@ void main()
 void main()
 {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
-  if (place.y >= textureSize(surface_position, 0).y) {
+  if (place.y >= surface_position_size().y) {
     return;
   }
   // Fewer threads than there is room for: the list is mostly short, and a thread without an entry is not free.

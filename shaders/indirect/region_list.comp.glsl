@@ -10,12 +10,12 @@ void add(int index, ivec2 region, int level_of_region)
 void main()
 {
   ivec2 region = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(region, textureSize(region_flags, 0)))) {
+  if (any(greaterThanEqual(region, region_flags_size()))) {
     return;
   }
-  vec2 flags = texelFetch(region_flags, region, 0).xy;
+  vec2 flags = region_flags_fetch(region).xy;
   if (flags.x < 0.5) {
-    bool largest = level == levels || texelFetch(coarser_flags, region >> 1, 0).x > 0.5;
+    bool largest = level == levels || coarser_flags_fetch(region >> 1).x > 0.5;
     if (largest && flags.y == 1.0) {
       add(int(imageAtomicAdd(entry_count, ivec2(0), 1u)), region, level);
     }
@@ -29,8 +29,8 @@ void main()
   for (int child = 0; child < 4; child++) {
     ivec2 place = 2 * region + ivec2(child & 1, child >> 1);
     ivec2 pixel = place - grid_offset;
-    bool outside = any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, textureSize(surface_position, 0)));
-    if (!outside && texelFetch(surface_position, pixel, 0).w != 0.0) {
+    bool outside = any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, surface_position_size()));
+    if (!outside && surface_position_fetch(pixel).w != 0.0) {
       pixels[found++] = place;
     }
   }

@@ -5,21 +5,21 @@
 // Where an entry of the list lies: runs one above the other, so that some rows of the list hold their share of it.
 ivec2 entry_place(int index)
 {
-  int rows = textureSize(surface_position, 0).y;
+  int rows = surface_position_size().y;
   int run = index / RUN;
   return ivec2((run / rows) * RUN + index % RUN, run % rows);
 }
 
 int entry_index(ivec2 place)
 {
-  return ((place.x / RUN) * textureSize(surface_position, 0).y + place.y) * RUN + place.x % RUN;
+  return ((place.x / RUN) * surface_position_size().y + place.y) * RUN + place.x % RUN;
 }
 
 // The pixel that stands for a region.
 ivec2 region_pixel(ivec2 region, int level_of_region)
 {
   ivec2 pixel = (region << level_of_region) + ((1 << level_of_region) >> 1) - grid_offset;
-  return clamp(pixel, ivec2(0), textureSize(surface_position, 0) - 1);
+  return clamp(pixel, ivec2(0), surface_position_size() - 1);
 }
 
 // Where a region lies in the atlas: pixels, and right of them, one above the other, the regions of levels 1, 2, …

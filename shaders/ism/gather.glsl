@@ -10,7 +10,7 @@
 // is that by which the chord leaves the tangent, twice.
 float texel_visibility(ivec2 tile, ivec2 texel, vec3 place, vec3 normal, float slack)
 {
-  Plane blocker = plane_unpack(texelFetch(virtual_maps, tile + texel, 0).xy);
+  Plane blocker = plane_unpack(virtual_maps_fetch(tile + texel).xy);
   float behind = dot(place, blocker.normal) - blocker.distance;
   if (blocker.distance <= 0.0 || behind <= slack) {
     return 1.0;

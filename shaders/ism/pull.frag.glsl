@@ -10,7 +10,7 @@ void main()
   vec4 depths = vec4(1e30);
   out_plane = vec2(0.0);
   for (int child = 0; child < 4; child++) {
-    vec2 texel = texelFetch(finer_maps, 2 * place + ivec2(child & 1, child >> 1), 0).xy;
+    vec2 texel = finer_maps_fetch(2 * place + ivec2(child & 1, child >> 1)).xy;
     Plane plane = plane_unpack(texel);
     depths[child] = plane.whole ? 1e30 : plane_along(plane, direction);
     if (depths[child] < nearest) {

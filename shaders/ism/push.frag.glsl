@@ -7,8 +7,8 @@ void main()
   ivec2 place = ivec2(gl_FragCoord.xy);
   ivec2 tile = place / map_side;
   vec3 direction = texel_direction(place - tile * map_side, map_side);
-  out_plane = texelFetch(finer_maps, place, 0).xy;
-  vec2 coarse = texelFetch(coarser_maps, place >> 1, 0).xy;
+  out_plane = finer_maps_fetch(place).xy;
+  vec2 coarse = coarser_maps_fetch(place >> 1).xy;
   float own = plane_along(plane_unpack(out_plane), direction);
   float filled = plane_along(plane_unpack(coarse), direction);
   if (filled < 1e30 && own > filled * (1.0 + threshold)) {

@@ -29,7 +29,7 @@ void main()
     inside = dot(off, off) <= disc.w;
     if (inside && tile.z == CUT_DISC) {
       ivec2 map = ivec2(tile.xy) / map_side;
-      vec3 axis = texelFetch(virtual_lights, ivec2(map.y * map_columns + map.x, 1), 0).xyz;
+      vec3 axis = virtual_lights_fetch(ivec2(map.y * map_columns + map.x, 1)).xyz;
       vec3 place = map_frame(axis) * met.xyz;
       inside = all(greaterThan(place, first_bound.xyz - margin)) && all(lessThan(place, second_bound.xyz + margin));
     }

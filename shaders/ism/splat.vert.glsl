@@ -6,7 +6,7 @@
 
 vec4 entry_texel(int index)
 {
-  return texelFetch(surface_points, ivec2(index & 2047, index >> 11), 0);
+  return surface_points_fetch(ivec2(index & 2047, index >> 11));
 }
 
 // Plane through an edge, upright on its triangle: distance of a place to one side of it is dot(xyz, place) + w.
@@ -41,8 +41,8 @@ void main()
   if (to_unit(hash3(hash3(block) + uvec3(uint(map), uint(lot), 0u)).x) >= look.z) {
     return;
   }
-  vec3 origin = texelFetch(virtual_lights, ivec2(map, 0), 0).xyz;
-  mat3 frame = map_frame(texelFetch(virtual_lights, ivec2(map, 1), 0).xyz);
+  vec3 origin = virtual_lights_fetch(ivec2(map, 0)).xyz;
+  mat3 frame = map_frame(virtual_lights_fetch(ivec2(map, 1)).xyz);
   vec3 centre = (place.xyz - origin) * frame;
   vec3 normal = octahedral_decode(look.xy) * frame;
   float away = dot(centre, normal);

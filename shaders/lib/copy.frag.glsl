@@ -1,5 +1,5 @@
 // An image as it stands.
 void main()
 {
-  out_copy = texelFetch(original, ivec2(gl_FragCoord.xy), 0);
+  out_copy = original_fetch(ivec2(gl_FragCoord.xy));
 }

@@ -26,9 +26,9 @@ vec4 energy_cell(float roughness, float mu, float nodes)
 vec4 energy_bilinear(ivec2 origin, vec4 cell)
 {
   ivec2 texel = origin + ivec2(cell.xy);
-  vec4 low = mix(texelFetch(energy_table, texel, 0), texelFetch(energy_table, texel + ivec2(1, 0), 0), cell.z);
+  vec4 low = mix(energy_table_fetch(texel), energy_table_fetch(texel + ivec2(1, 0)), cell.z);
   vec4 high = mix(
-      texelFetch(energy_table, texel + ivec2(0, 1), 0), texelFetch(energy_table, texel + ivec2(1, 1), 0), cell.z);
+      energy_table_fetch(texel + ivec2(0, 1)), energy_table_fetch(texel + ivec2(1, 1)), cell.z);
   return mix(low, high, cell.w);
 }
 
@@ -43,7 +43,7 @@ float ggx_energy_average(float roughness)
 {
   vec4 cell = energy_cell(roughness, 0.0, ENERGY_NODES);
   ivec2 texel = ivec2(int(cell.x), 32);
-  return mix(texelFetch(energy_table, texel, 0).z, texelFetch(energy_table, texel + ivec2(1, 0), 0).z, cell.z);
+  return mix(energy_table_fetch(texel).z, energy_table_fetch(texel + ivec2(1, 0)).z, cell.z);
 }
 
 // Place of an index of refraction between the tables' slices: lower slice and weight of the next one.
@@ -79,9 +79,9 @@ float glass_energy_average(float roughness, float ior)
   vec2 slice = ior_slice(ior);
   vec4 cell = energy_cell(roughness, 0.0, LAYER_NODES);
   ivec2 texel = ivec2(((ior < 1.0) ? 48 : 32) + int(cell.x), 32 + int(slice.x));
-  vec2 low = vec2(texelFetch(energy_table, texel, 0).z, texelFetch(energy_table, texel + ivec2(1, 0), 0).z);
-  vec2 high = vec2(texelFetch(energy_table, texel + ivec2(0, 1), 0).z,
-                   texelFetch(energy_table, texel + ivec2(1, 1), 0).z);
+  vec2 low = vec2(energy_table_fetch(texel).z, energy_table_fetch(texel + ivec2(1, 0)).z);
+  vec2 high = vec2(energy_table_fetch(texel + ivec2(0, 1)).z,
+                   energy_table_fetch(texel + ivec2(1, 1)).z);
   vec2 ends = mix(low, high, slice.y);
   return mix(ends.x, ends.y, cell.z);
 }

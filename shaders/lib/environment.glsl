@@ -17,7 +17,7 @@ vec3 environment_lookup_direction(vec3 direction)
 
 vec3 environment_radiance(vec3 direction)
 {
-  ivec2 size = textureSize(environment_map, 0);
+  ivec2 size = environment_map_size();
   vec2 uv = equirectangular_uv(environment_lookup_direction(direction));
   vec2 texel = uv * vec2(size) - 0.5;
   vec2 corner = floor(texel);
@@ -26,16 +26,16 @@ vec3 environment_radiance(vec3 direction)
   int x1 = int(mod(corner.x + 1.0, float(size.x)));
   int y0 = clamp(int(corner.y), 0, size.y - 1);
   int y1 = clamp(int(corner.y) + 1, 0, size.y - 1);
-  vec3 low = mix(texelFetch(environment_map, ivec2(x0, y0), 0).rgb, texelFetch(environment_map, ivec2(x1, y0), 0).rgb, t.x);
-  vec3 high = mix(texelFetch(environment_map, ivec2(x0, y1), 0).rgb, texelFetch(environment_map, ivec2(x1, y1), 0).rgb, t.x);
+  vec3 low = mix(environment_map_fetch(ivec2(x0, y0)).rgb, environment_map_fetch(ivec2(x1, y0)).rgb, t.x);
+  vec3 high = mix(environment_map_fetch(ivec2(x0, y1)).rgb, environment_map_fetch(ivec2(x1, y1)).rgb, t.x);
   return mix(low, high, t.y) * world_light.color.rgb;
 }
 
 // Density per steradian of the drawn directions; 0 where the world is not sampled.
 float environment_density(vec3 direction)
 {
-  ivec2 size = textureSize(environment_density_map, 0);
+  ivec2 size = environment_density_map_size();
   vec2 uv = equirectangular_uv(environment_lookup_direction(direction));
   ivec2 cell = clamp(ivec2(uv * vec2(size)), ivec2(0), size - 1);
-  return texelFetch(environment_density_map, cell, 0).r;
+  return environment_density_map_fetch(cell).r;
 }

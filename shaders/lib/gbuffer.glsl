@@ -35,9 +35,9 @@ struct Surface {
 };
 
 #define SURFACE_READ(pixel) \
-  surface_decode(texelFetch(surface_position, pixel, 0), texelFetch(surface_normal, pixel, 0), \
-                 texelFetch(surface_diffuse, pixel, 0), texelFetch(surface_tint, pixel, 0), \
-                 texelFetch(surface_lobe, pixel, 0), texelFetch(surface_emission, pixel, 0))
+  surface_decode(surface_position_fetch(pixel), surface_normal_fetch(pixel), \
+                 surface_diffuse_fetch(pixel), surface_tint_fetch(pixel), \
+                 surface_lobe_fetch(pixel), surface_emission_fetch(pixel))
 
 // Three numbers in 0..1 in one float, `steps` + 1 levels each; and back.
 float pack_three(vec3 v, float steps)

@@ -25,10 +25,10 @@ Instance instance_read(int id)
 {
   ivec2 place = instance_place(id);
   Instance instance;
-  instance.row0 = texelFetch(instances, place, 0);
-  instance.row1 = texelFetch(instances, place + ivec2(1, 0), 0);
-  instance.row2 = texelFetch(instances, place + ivec2(2, 0), 0);
-  vec4 rest = texelFetch(instances, place + ivec2(3, 0), 0);
+  instance.row0 = instances_fetch(place);
+  instance.row1 = instances_fetch(place + ivec2(1, 0));
+  instance.row2 = instances_fetch(place + ivec2(2, 0));
+  vec4 rest = instances_fetch(place + ivec2(3, 0));
   instance.random = rest.x;
   instance.pass_index = rest.y;
   instance.flags = int(rest.z);
@@ -56,10 +56,10 @@ vec3 instance_normal(Instance instance, vec3 local)
 void instance_extras(int id, out vec4 color, out vec3 generated, out vec2 uv)
 {
   ivec2 place = instance_place(id);
-  color = texelFetch(instances, place + ivec2(4, 0), 0);
-  vec4 first = texelFetch(instances, place + ivec2(5, 0), 0);
+  color = instances_fetch(place + ivec2(4, 0));
+  vec4 first = instances_fetch(place + ivec2(5, 0));
   generated = first.xyz;
-  uv = vec2(first.w, texelFetch(instances, place + ivec2(6, 0), 0).x);
+  uv = vec2(first.w, instances_fetch(place + ivec2(6, 0)).x);
 }
 
 bool instance_seen(Instance instance)

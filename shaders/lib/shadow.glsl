@@ -10,14 +10,6 @@
 
 #define VIEW_TEXELS 5
 
-// Lookups that ask for many texels bind the atlas as an image: on a software rasteriser a load takes a quarter of the
-// time of a fetch.
-#ifdef DEPTH_IMAGE
-#  define DEPTH_TEXEL(texel) imageLoad(depth_image, texel)
-#else
-#  define DEPTH_TEXEL(texel) texelFetch(depth_maps, texel, 0)
-#endif
-
 
 // A receiver as the first view that contains it sees it.
 struct ShadowReceiver {
@@ -117,7 +109,7 @@ vec2 shadow_outward(ShadowReceiver r, vec3 normal)
 // Whether the caster in a texel of the view (from its corner) stands between light and receiver.
 bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
 {
-  vec4 caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + cell));
+  vec4 caster = depth_maps_fetch(ivec2(r.rectangle.xy + cell));
   vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
   float turn = length(caster.yz - r.gradient);
   if (behind.x > 0.0 && behind.y <= 0.0 && turn > 0.6 * (length(caster.yz) + length(r.gradient))) {
@@ -127,7 +119,7 @@ bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
     vec2 down = shadow_outward(r, normal);
     down = (dot(r.gradient, down) > 0.0) ? -down : down;
     vec2 beside = clamp(floor(r.texel + down), vec2(0.0), vec2(r.rectangle.z - 1.0));
-    caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + beside));
+    caster = depth_maps_fetch(ivec2(r.rectangle.xy + beside));
     behind = shadow_behind(r, caster, r.texel - beside - 0.5);
   }
   return min(behind.x, behind.y) > 0.0;

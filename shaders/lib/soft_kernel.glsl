@@ -11,10 +11,10 @@ float kernel_weight(Light light, vec2 place, float cell)
 vec2 kernel_entry(ivec2 texel, int level)
 {
   if (level == 0) {
-    vec4 caster = DEPTH_TEXEL(texel);
+    vec4 caster = depth_maps_fetch(texel);
     return (caster.w > 0.0) ? caster.xx : vec2(0.0);
   }
-  return imageLoad(bounds_image, texel + ivec2(0, bounds_rows - (bounds_rows >> (level - 1)))).xy;
+  return depth_bounds_fetch(texel + ivec2(0, bounds_rows - (bounds_rows >> (level - 1)))).xy;
 }
 
 // Bounds of q over the texels first..last (from the view's corner, inclusive): those of a block that contains them.
@@ -147,7 +147,7 @@ void kernel_texel(inout Blockers found, ShadowReceiver r, vec3 normal, ivec2 tex
 {
   found.whole += weight;
   if (shadow_blocked(r, vec2(texel), normal)) {
-    float q = DEPTH_TEXEL(ivec2(r.rectangle.xy) + texel).x;
+    float q = depth_maps_fetch(ivec2(r.rectangle.xy) + texel).x;
     kernel_add(found, vec2(texel) + 0.5 - r.texel, vec2(0.5), max(q - r.q, least), weight);
   }
 }

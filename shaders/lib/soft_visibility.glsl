@@ -57,7 +57,7 @@ Blockers kernel_back(Light light, ShadowReceiver r, vec2 half_size, Blockers fou
     vec2 offset = low + (vec2(float(k % BACK_TEXELS), float(k / BACK_TEXELS)) + 0.5) * step_size - r.texel;
     vec2 texel = clamp(floor(r.texel + offset), vec2(first), vec2(last));
     // At the ray's own place, by the caster's plane: the receiver's falls and rises by far more within a texel.
-    vec4 caster = DEPTH_TEXEL(ivec2(r.rectangle.xy + texel));
+    vec4 caster = depth_maps_fetch(ivec2(r.rectangle.xy + texel));
     float height = caster.x - r.q + dot(caster.yz, r.texel + offset - texel - 0.5);
     float weight = kernel_weight(light, offset / half_size, 2.0 / float(BACK_TEXELS));
     if (found.extent.x <= 0.0) {

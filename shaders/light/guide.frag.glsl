@@ -10,7 +10,7 @@ void main()
   ivec2 probe = ivec2(place.y % probes.x, place.y / probes.x);
   uvec3 bits = hash3(uvec3(uint(place.x), uint(place.y), 41u));
   vec2 shift = vec2(to_unit(bits.x), to_unit(bits.y));
-  vec2 size = vec2(textureSize(surface_position, 0));
+  vec2 size = vec2(surface_position_size());
   uvec3 pixel_bits = hash3(uvec3(uint(place.y), 7u, 5u));
   vec2 within = vec2(to_unit(pixel_bits.x), to_unit(pixel_bits.y));
   ivec2 pixel = ivec2((vec2(probe) + within) / vec2(probes) * size);

@@ -84,9 +84,9 @@ vec3 albedo_behind(ivec2 hit, vec3 position, vec3 normal)
   float slant;
   float footprint;
   if (pixel_of(position, normal, pixel, slant, footprint)) {
-    vec4 seen = texelFetch(behind_position, pixel, 0);
+    vec4 seen = behind_position_fetch(pixel);
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
-      return texelFetch(behind_albedo, pixel, 0).rgb;
+      return behind_albedo_fetch(pixel).rgb;
     }
   }
   return mean_albedo(hit);
@@ -97,7 +97,7 @@ void main()
   out_direct = vec4(0.0);
   out_indirect = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (texelFetch(surface_position, pixel, 0).w == 0.0 || max_component(texelFetch(surface_tint, pixel, 0).rgb) <= 0.0) {
+  if (surface_position_fetch(pixel).w == 0.0 || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
     return;
   }
   Surface s = SURFACE_READ(pixel);
@@ -154,8 +154,8 @@ void main()
     position = origin + t * direction;
     roll = hash3(roll + uvec3(uint(step), 0u, 0u));
     int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
-    vec4 glass = texelFetch(interface_table, ivec2(0, material), 0);
-    vec4 shape = texelFetch(interface_table, ivec2(1, material), 0);
+    vec4 glass = interface_table_fetch(ivec2(0, material));
+    vec4 shape = interface_table_fetch(ivec2(1, material));
     vec3 smooth_normal = triangle_shading_normal(hit, position);
     normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
     bool leaves = dot(normal, direction) > 0.0;

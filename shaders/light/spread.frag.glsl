@@ -10,7 +10,7 @@ void main()
   ivec2 place = ivec2(gl_FragCoord.xy);
   vec2 probe = vec2(float(place.x % probes.x), float(place.x / probes.x));
   uvec3 bits = hash3(uvec3(uint(place.x), 7u, 5u));
-  vec2 size = vec2(textureSize(surface_position, 0));
+  vec2 size = vec2(surface_position_size());
   ivec2 pixel = ivec2((probe + vec2(to_unit(bits.x), to_unit(bits.y))) / vec2(probes) * size);
   Surface s = SURFACE_READ(pixel);
   if (!s.hit) {

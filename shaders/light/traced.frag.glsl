@@ -49,7 +49,7 @@ void main()
   out_diffuse = vec4(0.0);
   out_glossy = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  if (texelFetch(surface_position, pixel, 0).w == 0.0 || max_component(texelFetch(surface_tint, pixel, 0).rgb) <= 0.0) {
+  if (surface_position_fetch(pixel).w == 0.0 || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
     return;
   }
   Surface s = SURFACE_READ(pixel);

@@ -11,7 +11,7 @@ int world_cell(int tile, int cells, float x)
   int high = cells;
   while (high - low > 1) {
     int middle = (low + high) / 2;
-    if (texelFetch(world_edges, ivec2(middle, tile), 0).r <= x) {
+    if (world_edges_fetch(ivec2(middle, tile)).r <= x) {
       low = middle;
     }
     else {
@@ -27,12 +27,12 @@ Light own_point(Light light, int number)
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.seed) + 23u));
   vec2 u = vec2((scrambled(film_view.bits_x, salt.x) + float(number)) / float(light_count),
                 scrambled(film_view.bits_y, salt.y));
-  ivec2 tile = ivec2(gl_FragCoord.xy / vec2(textureSize(surface_position, 0)) * vec2(world_tiles));
+  ivec2 tile = ivec2(gl_FragCoord.xy / vec2(surface_position_size()) * vec2(world_tiles));
   int row = tile.y * world_tiles.x + tile.x;
   int cells = world_grid.x * world_grid.y;
   int place = world_cell(row, cells, u.x);
-  float from = texelFetch(world_edges, ivec2(place, row), 0).r;
-  float to = (place + 1 < cells) ? texelFetch(world_edges, ivec2(place + 1, row), 0).r : 1.0;
+  float from = world_edges_fetch(ivec2(place, row)).r;
+  float to = (place + 1 < cells) ? world_edges_fetch(ivec2(place + 1, row)).r : 1.0;
   float chance = max(to - from, 1e-9);
   vec2 cell = vec2(float(place % world_grid.x) + clamp((u.x - from) / chance, 0.0, 1.0),
                    float(place / world_grid.x) + u.y);

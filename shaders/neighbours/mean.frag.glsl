@@ -7,9 +7,9 @@
 // luminance; where the input has it, only pixels join whose difference it explains, so that shade stays where it is.
 vec3 arriving_at(ivec2 pixel)
 {
-  vec3 light = texelFetch(light_in, pixel, 0).rgb;
+  vec3 light = light_in_fetch(pixel).rgb;
 #ifdef REFLECTED
-  light /= max(texelFetch(surface_diffuse, pixel, 0).rgb, vec3(1e-6));
+  light /= max(surface_diffuse_fetch(pixel).rgb, vec3(1e-6));
 #endif
   return light;
 }
@@ -17,18 +17,18 @@ vec3 arriving_at(ivec2 pixel)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  ivec2 size = textureSize(light_in, 0);
-  vec4 centre = texelFetch(surface_position, pixel, 0);
+  ivec2 size = light_in_size();
+  vec4 centre = surface_position_fetch(pixel);
   out_arriving = vec4(arriving_at(pixel), 0.0);
   if (centre.w == 0.0) {
     return;  // sums hold samples that met a surface here where the last one met none
   }
-  vec3 normal = octahedral_decode(texelFetch(surface_normal, pixel, 0).xy);
+  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).xy);
   float pixel_size = pixel_size_at(centre.xyz);
   vec4 on_surface = vec4(0.0);
   float squares = 0.0;
 #ifdef WITH_VARIANCE
-  vec4 own = texelFetch(light_in, pixel, 0);
+  vec4 own = light_in_fetch(pixel);
 #endif
   vec4 nearby = vec4(0.0);
   for (int y = -2; y < 2; y++) {
@@ -37,15 +37,15 @@ void main()
       if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) {
         continue;
       }
-      vec4 position = texelFetch(surface_position, other, 0);
-      bool lit = position.w != 0.0 && max_component(texelFetch(surface_diffuse, other, 0).rgb) > 0.0;
+      vec4 position = surface_position_fetch(other);
+      bool lit = position.w != 0.0 && max_component(surface_diffuse_fetch(other).rgb) > 0.0;
       vec3 path = position.xyz - centre.xyz;
       if (lit) {
         vec4 light = vec4(arriving_at(other), 1.0);
-        vec3 facing = octahedral_decode(texelFetch(surface_normal, other, 0).xy);
+        vec3 facing = octahedral_decode(surface_normal_fetch(other).xy);
         bool same = dot(normal, facing) > 0.8 && abs(dot(normal, path)) < 2.0 * pixel_size * float(stride);
 #ifdef WITH_VARIANCE
-        float noise = own.w + texelFetch(light_in, other, 0).w;
+        float noise = own.w + light_in_fetch(other).w;
         float difference = luminance(light.rgb - own.rgb);
         float equal = 0.01 * luminance(own.rgb);
         same = same && difference * difference <= 16.0 * noise + equal * equal;

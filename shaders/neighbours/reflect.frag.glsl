@@ -2,5 +2,5 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  out_diffuse = vec4(max(texelFetch(surface_diffuse, pixel, 0).rgb, vec3(0.0)) * texelFetch(arriving, pixel, 0).rgb, 0.0);
+  out_diffuse = vec4(max(surface_diffuse_fetch(pixel).rgb, vec3(0.0)) * arriving_fetch(pixel).rgb, 0.0);
 }

@@ -23,7 +23,7 @@ vec3 fan_light(Fan fan, Surface s, vec2 u, out uint open)
     taken |= found.sectors;
     if (seen != 0u && found.faces) {
       vec3 direction = safe_normalize(found.position - fan.origin);
-      vec3 radiance = texelFetch(senders, found.texel, 0).rgb;
+      vec3 radiance = senders_fetch(found.texel).rgb;
       sum += radiance * diffuse_weight(s, fan.toward, direction) * float(bitCount(seen));
       open &= ~seen;
     }

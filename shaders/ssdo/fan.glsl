@@ -185,14 +185,14 @@ bool fan_step(Fan fan, int index, vec2 u, inout vec2 last, out Patch found)
   if (all(equal(found.texel, ivec2(fan.place)))) {
     return false;
   }
-  vec4 position = texelFetch(surface_position, found.texel, 0);
+  vec4 position = surface_position_fetch(found.texel);
   vec2 before = last;
   last = vec2(at, (position.w == 0.0) ? 1e30 : film_depth(position.xyz));
   if (position.w == 0.0) {
     return false;
   }
   found.position = position.xyz;
-  found.normal = octahedral_decode(texelFetch(surface_normal, found.texel, 0).zw);
+  found.normal = octahedral_decode(surface_normal_fetch(found.texel).zw);
   vec3 path = found.position - fan.origin;
   float range = length(path);
   if (u.y < smoothstep(0.7 * farthest, farthest, range)) {

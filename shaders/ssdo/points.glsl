@@ -39,13 +39,13 @@ Blocker point_blocker(vec3 origin, vec3 direction, float share)
   if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
     return found;
   }
-  vec4 position = texelFetch(surface_position, ivec2(place), 0);
+  vec4 position = surface_position_fetch(ivec2(place));
   if (position.w == 0.0) {
     return found;
   }
   found.texel = ivec2(place);
   found.position = position.xyz;
-  found.normal = octahedral_decode(texelFetch(surface_normal, found.texel, 0).zw);
+  found.normal = octahedral_decode(surface_normal_fetch(found.texel).zw);
   // Depth of the surface's tangent plane on the point's ray, which is not that of the pixel's centre.
   vec3 ray_origin;
   vec3 ray = film_ray(place, ray_origin);

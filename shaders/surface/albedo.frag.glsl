@@ -6,7 +6,7 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  out_position = texelFetch(surface_position, pixel, 0);
+  out_position = surface_position_fetch(pixel);
   out_albedo = vec4(0.0);
   if (out_position.w != 0.0) {
     Surface s = SURFACE_READ(pixel);

@@ -1,7 +1,7 @@
 // Bounds of the positions in a tile of pixels; w: least and greatest depth. Empty tiles give low > high.
 void main()
 {
-  ivec2 size = textureSize(surface_position, 0);
+  ivec2 size = surface_position_size();
   ivec2 corner = ivec2(gl_FragCoord.xy) * tile;
   vec4 low = vec4(1e30);
   vec4 high = vec4(-1e30);
@@ -9,7 +9,7 @@ void main()
     for (int x = 0; x < tile; x++) {
       ivec2 pixel = corner + ivec2(x, y);
       if (pixel.x < size.x && pixel.y < size.y) {
-        vec4 position = texelFetch(surface_position, pixel, 0);
+        vec4 position = surface_position_fetch(pixel);
         if (position.w != 0.0) {
           vec4 place = vec4(position.xyz, dot(film_view.eye.xyz - position.xyz, film_view.backward.xyz));
           low = min(low, place);

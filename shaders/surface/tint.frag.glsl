@@ -14,7 +14,7 @@ void main()
   out_emission = vec4(1.0);
   vec3 eye = film_view.eye.xyz;
   float depth = dot(eye - world_position, film_view.backward.xyz);
-  vec4 hit = texelFetch(surface_position, ivec2(gl_FragCoord.xy), 0);
+  vec4 hit = surface_position_fetch(ivec2(gl_FragCoord.xy));
   float hit_depth = dot(eye - hit.xyz, film_view.backward.xyz);
   // Interpolated positions of one point differ by some units of the last place between two programs.
   bool behind = hit.w != 0.0 && depth >= hit_depth - 1e-6 * (abs(hit_depth) + length(hit.xyz - eye));

@@ -8,11 +8,11 @@ void main()
   int chunk = place / CHUNK;
   TABLE_VALUE sum = TABLE_VALUE(0);
   for (int k = chunk * CHUNK - place; k <= 0; k++) {
-    sum += imageLoad(summed, texel + k * along);
+    sum += summed_fetch(texel + k * along);
   }
 #ifdef CHUNKS
   if (chunk > 0) {
-    sum += imageLoad(chunk_sums, texel + (chunk - 1 - place) * along);
+    sum += chunk_sums_fetch(texel + (chunk - 1 - place) * along);
   }
 #endif
   out_value = sum;

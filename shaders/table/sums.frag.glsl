@@ -7,7 +7,7 @@ void main()
   for (int k = 0; k < CHUNK; k++) {
     ivec2 texel = first + k * STEP;
     if (all(lessThan(texel, extent))) {
-      sum += imageLoad(summed, texel);
+      sum += summed_fetch(texel);
     }
   }
   out_value = sum;

@@ -1,11 +1,11 @@
 // Nearest hit of a ray in the bounding volume hierarchy of addon/frame/acceleration.py.
 //
-// The tree is complete and four-wide, so a node's address follows from its level and number, and the children that are
-// still to visit are four bits per level in one pair of integers: no stack in memory.
+// The tree is four-wide. A stack holds nodes of which some children are still to visit, and those children as four bits.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 
-#define NODE_TEXELS 3
+#define NODE_TEXELS 4
+#define DEEPEST 32  // nodes above each other, as in addon/frame/box_tree.py
 #define LEAF_TEXELS 17
 // Negative: the triangle may also bend what meets it. By 2 more: rays that look for a light pass; by 4: only they do not.
 #define OPACITY_TEXEL 9
@@ -14,12 +14,12 @@
 
 vec4 node_texel(int index)
 {
-  return texelFetch(trace_nodes, ivec2(index & 2047, index >> 11), 0);
+  return trace_nodes_fetch(ivec2(index & 2047, index >> 11));
 }
 
 vec4 leaf_texel(int index)
 {
-  return texelFetch(trace_leaves, ivec2(index & 2047, index >> 11), 0);
+  return trace_leaves_fetch(ivec2(index & 2047, index >> 11));
 }
 
 // Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed.
@@ -51,25 +51,30 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction)
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
 }
 
-// On to the deepest child that is still to visit; false if there is none.
-bool trace_next(inout uvec2 pending, inout int level, inout int node)
+// A place in the tree: a node, or a leaf.
+struct Place {
+  int index;
+  bool leaf;
+};
+
+// Child of a node. Those that are nodes come first, and those of either kind follow each other.
+Place node_child(int node, int child)
 {
-  bool deep = pending.y != 0u;
-  uint word = deep ? pending.y : pending.x;
-  if (word == 0u) {
-    return false;
-  }
-  int bit = findMSB(word);
-  if (deep) {
-    pending.y ^= 1u << uint(bit);
-  }
-  else {
-    pending.x ^= 1u << uint(bit);
-  }
-  int parent_level = (bit >> 2) + (deep ? 8 : 0);
-  node = (node >> (2 * (level - parent_level))) * 4 + (bit & 3);
-  level = parent_level + 1;
-  return true;
+  vec4 links = node_texel(node * NODE_TEXELS + 3);
+  int nodes = int(links.z);
+  Place place;
+  place.leaf = child >= nodes;
+  place.index = place.leaf ? int(links.y) + child - nodes : int(links.x) + child;
+  return place;
+}
+
+// Takes one child off an entry of the stack; `node` is whose.
+int next_pending(inout uint entry, out int node)
+{
+  node = int(entry >> 4u);
+  int child = findLSB(entry & 15u);
+  entry ^= 1u << uint(child);
+  return child;
 }
 
 // Boxes of a node's four children against the ray: which it meets before `reach`, as four bits, and where it enters.
@@ -110,42 +115,48 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
   hit = ivec2(-1);
   vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
   float nearest = limit;
-  int level = 0;
-  int node = 0;
-  uvec2 pending = uvec2(0u);  // four bits per level: children still to visit
+  Place place;
+  place.index = 0;
+  place.leaf = false;
+  uint pending[DEEPEST];  // node, and as its last four bits the children still to visit
+  int height = 0;
   for (int round = 0; round < 4096; round++) {
     // Down to a leaf, nearest child first; then all rays of a group test triangles together.
     bool more = true;
-    while (more && level < trace_levels) {
-      int level_start = (level == 0) ? 0 : int(0x55555555u >> uint(32 - 2 * level));
+    while (more && !place.leaf) {
       vec4 enter;
-      uint met = node_meets((level_start + node) * NODE_TEXELS, origin, inverse, nearest, enter);
+      uint met = node_meets(place.index * NODE_TEXELS, origin, inverse, nearest, enter);
+      int node = place.index;
+      int child = 0;
       if (met != 0u) {
         enter = mix(vec4(1e38), enter, notEqual(uvec4(met) & uvec4(1u, 2u, 4u, 8u), uvec4(0u)));
         vec2 pair = min(enter.xy, enter.zw);
         float first = min(pair.x, pair.y);
-        int child = (enter.x == first) ? 0 : (enter.y == first) ? 1 : (enter.z == first) ? 2 : 3;
+        child = (enter.x == first) ? 0 : (enter.y == first) ? 1 : (enter.z == first) ? 2 : 3;
         met &= ~(1u << uint(child));
-        if (level < 8) {
-          pending.x |= met << uint(4 * level);
+        if (met != 0u) {
+          pending[height] = (uint(node) << 4u) | met;
+          height++;
         }
-        else {
-          pending.y |= met << uint(4 * (level - 8));
-        }
-        node = node * 4 + child;
-        level++;
+      }
+      else if (height > 0) {
+        child = next_pending(pending[height - 1], node);
+        height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
       }
       else {
-        more = trace_next(pending, level, node);
+        more = false;
+      }
+      if (more) {
+        place = node_child(node, child);
       }
     }
     if (!more) {
       break;
     }
-    vec4 t = intersect_four(node, origin, direction);
+    vec4 t = intersect_four(place.index, origin, direction);
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
-      vec4 opacity = leaf_texel(node * LEAF_TEXELS + OPACITY_TEXEL);
+      vec4 opacity = leaf_texel(place.index * LEAF_TEXELS + OPACITY_TEXEL);
       vec4 blocks = floor(abs(opacity) * 0.5);  // 0: all rays, 1: not those that look for a light, 2: only those
       bvec4 passed = equal(blocks, vec4(shadow ? 1.0 : 2.0));
       opacity = (bent ? mix(abs(opacity) - 2.0 * blocks, vec4(1.0), lessThan(opacity, vec4(0.0)))
@@ -154,19 +165,23 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
 #ifdef OPAQUE_ONLY
       opacity = floor(opacity);
 #endif
-      uint roll = hash3(uvec3(uint(node), salt, 77u)).x;
+      uint roll = hash3(uvec3(uint(place.index), salt, 77u)).x;
       vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
                          to_unit(roll * 277803737u + 7u));
       t = mix(vec4(1e30), t, lessThan(chance, opacity));
       best = min(min(t.x, t.y), min(t.z, t.w));
       if (best < nearest) {
         nearest = best;
-        hit = ivec2(node, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
+        hit = ivec2(place.index, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
       }
     }
-    if (nearest < enough || !trace_next(pending, level, node)) {
+    if (nearest < enough || height == 0) {
       break;
     }
+    int above;
+    int child = next_pending(pending[height - 1], above);
+    height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+    place = node_child(above, child);
   }
   return nearest;
 }

@@ -1,6 +1,6 @@
 // Rays that leave a surface and ask whether something stands in their way.
 //
-// A program that includes this binds the hierarchy and `film_view`, and has the constants `trace_levels` and `offset_size`.
+// A program that includes this binds the hierarchy and `film_view`, and has the constant `offset_size`.
 #include "trace/hierarchy.glsl"
 
 // How far beside a surface rays begin: what float32 positions of this size cannot tell apart.

@@ -15,7 +15,7 @@ float vssm_dither(ivec2 texel)
 
 uvec4 table_source(ivec2 texel)
 {
-  vec4 caster = texelFetch(depth_maps, texel, 0);
+  vec4 caster = depth_maps_fetch(texel);
   if (caster.w <= 0.0) {
     return uvec4(0u);
   }

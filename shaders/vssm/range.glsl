@@ -8,7 +8,7 @@
 float vssm_range(ivec2 texel)
 {
   ivec2 cell = texel >> top_level;
-  float nearest = texelFetch(depth_bounds, cell + ivec2(0, bounds_rows - (bounds_rows >> (top_level - 1))), 0).y;
-  vec2 limits = texelFetch(depth_limits, cell, 0).xy;
+  float nearest = depth_bounds_fetch(cell + ivec2(0, bounds_rows - (bounds_rows >> (top_level - 1)))).y;
+  vec2 limits = depth_limits_fetch(cell).xy;
   return clamp(nearest, 1e-30, (limits.y > 0.5) ? max(MOST_RANGE * limits.x, 1e-30) : 1.0);
 }

@@ -15,7 +15,7 @@
 uvec4 vssm_sum(ivec2 texel)
 {
   // A prefix: sums up to, not including, the texel. The table begins at the atlas' corner.
-  return (min(texel.x, texel.y) <= 0) ? uvec4(0u) : imageLoad(depth_table, texel - 1);
+  return (min(texel.x, texel.y) <= 0) ? uvec4(0u) : depth_table_fetch(texel - 1);
 }
 
 // Texels first..last of the view, whose sum in the table is `sum`.

@@ -9,8 +9,8 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   out_radiance = vec4(0.0);
-  if (texelFetch(surface_position, pixel, 0).w == 0.0) {
-    vec3 passed = texelFetch(surface_emission, pixel, 0).rgb;
+  if (surface_position_fetch(pixel).w == 0.0) {
+    vec3 passed = surface_emission_fetch(pixel).rgb;
     out_radiance.rgb = world_radiance(view_direction(gl_FragCoord.xy), RAY_CAMERA) * passed * film_share;
   }
 }

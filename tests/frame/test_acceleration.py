@@ -35,6 +35,6 @@ def test_triangle_that_is_not_finite_is_left_out_and_not_refitted(triangles):
     corners[3, 1, 2] = np.nan
     tree = acceleration.build(corners, look)
     assert tree.hierarchy.triangles == 299
-    assert tree.place[3] == -1 and sorted(np.delete(tree.place, 3)) == list(range(299))
+    assert tree.place[3] == -1 and len(set(np.delete(tree.place, 3))) == 299
     assert acceleration.refit(tree, np.array([3]), np.zeros((1, 3, 3), np.float32), look[:1]) is None
     assert acceleration.refit(tree, np.array([4]), corners[3:4], look[:1]) is None

@@ -17,12 +17,12 @@ vec4 material_image{k}_texel(ivec2 size, ivec2 texel, int extension, int flags)
   if (at.x < 0 || at.y < 0) {{
     return vec4(0.0);
   }}
-  return image_associate(texelFetch(material_image{k}, at, 0), flags);
+  return image_associate(material_image{k}_fetch(at), flags);
 }}
 
 vec4 material_image{k}_filtered(vec2 coordinate, int interpolation, int extension, int flags)
 {{
-  ivec2 size = textureSize(material_image{k}, 0);
+  ivec2 size = material_image{k}_size();
   vec2 position = image_position(coordinate, size, extension);
   if (interpolation == INTERPOLATION_CLOSEST) {{
     return material_image{k}_texel(size, ivec2(floor(position)), extension, flags);
@@ -113,21 +113,21 @@ void material_image{k}_mirror_ball(vec3 direction, int interpolation, float stor
 SKY_FUNCTIONS = """\
 void material_image{k}_sky(vec3 direction, SurfacePoint point, float sun_is_lamp, out vec3 color)
 {{
-  ivec2 size = textureSize(material_image{k}, 0) - ivec2(0, 1);
+  ivec2 size = material_image{k}_size() - ivec2(0, 1);
   vec3 d = safe_normalize(direction);
-  vec3 turn = texelFetch(material_image{k}, ivec2(3, size.y), 0).rgb;
+  vec3 turn = material_image{k}_fetch(ivec2(3, size.y)).rgb;
   vec2 position = sky_place(d, turn.x) * vec2(size) - vec2(0.5);
   vec2 lower = floor(position);
   vec2 share = position - lower;
   ivec4 at = sky_texels(ivec2(lower), size);
-  vec3 low = mix(texelFetch(material_image{k}, at.xy, 0).rgb, texelFetch(material_image{k}, at.zy, 0).rgb, share.x);
-  vec3 high = mix(texelFetch(material_image{k}, at.xw, 0).rgb, texelFetch(material_image{k}, at.zw, 0).rgb, share.x);
+  vec3 low = mix(material_image{k}_fetch(at.xy).rgb, material_image{k}_fetch(at.zy).rgb, share.x);
+  vec3 high = mix(material_image{k}_fetch(at.xw).rgb, material_image{k}_fetch(at.zw).rgb, share.x);
   color = mix(low, high, share.y);
   if (sun_is_lamp < 0.5 || point.ray == RAY_CAMERA) {{
-    color += sky_sun(d, turn, texelFetch(material_image{k}, ivec2(0, size.y), 0).rgb,
-                     texelFetch(material_image{k}, ivec2(1, size.y), 0).rgb,
-                     texelFetch(material_image{k}, ivec2(2, size.y), 0).rgb,
-                     texelFetch(material_image{k}, ivec2(4, size.y), 0).r);
+    color += sky_sun(d, turn, material_image{k}_fetch(ivec2(0, size.y)).rgb,
+                     material_image{k}_fetch(ivec2(1, size.y)).rgb,
+                     material_image{k}_fetch(ivec2(2, size.y)).rgb,
+                     material_image{k}_fetch(ivec2(4, size.y)).r);
   }}
 }}
 """
