@@ -5,6 +5,8 @@
 #include "lib/color.glsl"
 #include "lib/energy.glsl"
 
+#define MOST_IOR 1e5  // of an index of refraction: it mirrors all but a hundred-thousandth, and more would leave float32
+
 #define DISTRIBUTION_SINGLE 0  // GGX as it is, which loses energy when rough
 #define DISTRIBUTION_MULTIPLE 1
 
@@ -252,7 +254,7 @@ void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3
                   vec3 normal, int distribution)
 {
   vec3 positive = max(color, vec3(0.0));
-  add_glass(closures, point, weight, positive, positive, vec3(1.0), max(ior, 1e-5), roughness, normal, distribution);
+  add_glass(closures, point, weight, positive, positive, vec3(1.0), clamp(ior, 1e-5, MOST_IOR), roughness, normal, distribution);
 }
 
 // What passes an interface without the losses of reflection.
@@ -261,7 +263,7 @@ void shader_refraction(inout Closures closures, SurfacePoint point, vec3 weight,
 {
   vec3 passing = weight * max(color, vec3(0.0));
   if (point.refracts) {
-    float inside = max(ior, 1e-5);
+    float inside = clamp(ior, 1e-5, MOST_IOR);
     vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
     closure_glossy(closures, passing, 1.0, LOBE_REFRACTION, vec3(0.0), vec3(0.0),
                    point.backfacing ? 1.0 / inside : inside, clamp(roughness, 0.0, 1.0), 0.0, default_tangent(n), n);
@@ -292,7 +294,7 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
                      float coat_ior, vec3 coat_tint, vec3 coat_normal)
 {
   vec3 n = reflecting_normal(point, coat_normal);
-  float ior = max(coat_ior, 1.0);
+  float ior = clamp(coat_ior, 1.0, MOST_IOR);
   vec3 albedo = add_glossy(closures, point, weight * coat_weight, DISTRIBUTION_MULTIPLE, FRESNEL_DIELECTRIC,
                            vec3(dielectric_f0(ior)), vec3(1.0), ior, clamp(coat_roughness, 0.0, 1.0), 0.0,
                            default_tangent(n), n);
@@ -344,11 +346,11 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   float through = clamp(transmission, 0.0, 1.0);
   if (through > SMALLEST_WEIGHT) {
     if (thin_wall > 0.5) {
-      shader_thin_wall(closures, point, w * through, base, max(specular_tint, vec3(0.0)), max(ior, 1.0), r,
+      shader_thin_wall(closures, point, w * through, base, max(specular_tint, vec3(0.0)), clamp(ior, 1.0, MOST_IOR), r,
                        mirror_normal);
     }
     else {
-      add_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)), max(ior, 1e-5), r,
+      add_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)), clamp(ior, 1e-5, MOST_IOR), r,
                 mirror_normal, distribution);
     }
     w *= 1.0 - through;
@@ -358,7 +360,7 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   }
   vec3 f0;
   float specular_ior;
-  principled_specular(max(ior, 1e-5), specular_level, max(specular_tint, vec3(0.0)), f0, specular_ior);
+  principled_specular(clamp(ior, 1e-5, MOST_IOR), specular_level, max(specular_tint, vec3(0.0)), f0, specular_ior);
   if (specular_ior != 1.0) {
     vec3 albedo = add_glossy(closures, point, w, distribution, FRESNEL_DIELECTRIC, f0, vec3(1.0), specular_ior, r,
                              stretch, t, mirror_normal);

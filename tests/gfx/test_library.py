@@ -73,7 +73,7 @@ def bound(gpu_context):
     from addon.gfx.struct import Block
 
     struct = Struct("Options", ("vec4", "factor"))
-    source = "void main() { imageStore(seen, ivec2(0), texelFetch(picture, ivec2(0), 0) * options.factor * scale); }"
+    source = "void main() { imageStore(seen, ivec2(0), picture_fetch(ivec2(0)) * options.factor * scale); }"
     program = compute_program(
         source, textures=(("FLOAT_2D", "picture"),), constants=(("FLOAT", "scale"),), blocks=((struct, "options"),)
     )
@@ -139,11 +139,39 @@ def test_a_program_that_failed_is_tried_again(gpu_context):
             library.get(compute_program("void main() { nonsense(); }", name="fails"))
 
 
+@pytest.fixture(params=[False, True], ids=["fetched", "loaded"])
+def loads(request, monkeypatch):
+    """Programs as they are where texels are fetched from textures, and where they are loaded from images."""
+    monkeypatch.setattr(library, "loads_beat_fetches", lambda: request.param)
+    monkeypatch.setattr(library, "_shaders", {})
+    return request.param
+
+
+def test_a_texture_is_read_alike_from_a_texture_and_from_an_image(gpu_context, loads):
+    import numpy as np
+
+    from addon.gfx import images, passes
+
+    pixels = np.random.default_rng(3).uniform(-1e9, 1e9, (3, 5, 4)).astype(np.float32)
+    names = [f"part{k}" for k in range(10)]
+    total = " + ".join(f"{name}_fetch(texel)" for name in names)
+    source = f"void main() {{ ivec2 texel = part9_size() - 1 - ivec2(gl_FragCoord.xy); out_color = {total}; }}"
+    program = passes.fullscreen_program(
+        "many", "generated/main", outputs=(("VEC4", "out_color"),), snippets=(("generated/main", source),),
+        textures=tuple(("RGBA32F", name) for name in names),
+    )  # fmt: skip
+    assert program.loaded == (tuple(names[:8]) if loads else ())
+    parts = {name: images.upload(pixels if k == 4 else 0 * pixels) for k, name in enumerate(names)}
+    with images.borrowed(5, 3, "RGBA32F") as target:
+        passes.fullscreen(program, target, textures=parts)
+        assert np.array_equal(images.read(target.colors[0]), pixels[::-1, ::-1])
+
+
 # The project's shaders -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("program", programs(), ids=lambda p: p.name)
-def test_every_declared_program_compiles(program, gpu_context):
+def test_every_declared_program_compiles(program, gpu_context, loads):
     library.get(program)
 
 

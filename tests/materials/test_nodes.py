@@ -290,6 +290,9 @@ def shader_alone(kind, **values):
 @hypothesis.settings(max_examples=30, deadline=None, suppress_health_check=list(hypothesis.HealthCheck))
 @hypothesis.given(trees())
 @hypothesis.example(shader_alone("ShaderNodeBsdfAnisotropic", Rotation=float("inf")))
+@hypothesis.example(shader_alone("ShaderNodeBsdfPrincipled", **{"Coat Weight": 1.0, "Coat IOR": float("inf")}))
+@hypothesis.example(shader_alone("ShaderNodeBsdfPrincipled", **{"Transmission Weight": 1.0, "IOR": float("inf")}))
+@hypothesis.example(shader_alone("ShaderNodeBsdfGlass", IOR=float("inf")))
 @hypothesis.example(shader_alone("ShaderNodeBsdfPrincipled", **{"Anisotropic": 1.0, "Anisotropic Rotation": -1e30}))
 def test_random_trees_compile_and_stay_finite(evaluate, tree):
     material = compile_material("Test", tree, {"picture": PICTURE})

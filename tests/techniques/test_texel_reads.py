@@ -1,0 +1,19 @@
+"""GPUs fetch texels from textures, software rasterisers load them from images: the picture is the same."""
+
+import numpy as np
+
+from addon.gfx import library
+
+
+def test_the_picture_does_not_depend_on_how_texels_are_read(stage, monkeypatch):
+    stage.floor(material=stage.principled(roughness=0.3))
+    stage.rectangle((-0.5, -0.3), (0.5, 0.3), 0.5, material=stage.diffuse(0.5))
+    stage.light("AREA", (0.5, 0.7, 2), size=1.0)
+    stage.world()
+    stage.camera_above(4.0)
+    pictures = []
+    for loads in (False, True):
+        monkeypatch.setattr(library, "loads_beat_fetches", lambda loads=loads: loads)
+        monkeypatch.setattr(library, "_shaders", {})
+        pictures.append(stage.render(2)["combined"])
+    assert pictures[0].any() and np.array_equal(*pictures)
