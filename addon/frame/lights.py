@@ -5,6 +5,7 @@ Radiance follows Cycles' conventions for every kind. All points inside a light c
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -225,6 +226,11 @@ class Sources:
 
     def release(self) -> None:
         self._block = None
+
+
+def kinds_of(emitters: Iterable[Emitter]) -> int:
+    """The kinds of these lights as bits, for LIGHT_KINDS of a program."""
+    return sum(1 << kind for kind in {emitter.kind for emitter in emitters})
 
 
 def direction_row(

@@ -103,6 +103,11 @@ class MaterialSet:
         """Some material has a lobe of shaders/lib/soft_lobe.glsl, so that programs which light surfaces need it."""
         return any(compiled.soft for compiled in self.compiled)
 
+    @property
+    def glossy(self) -> bool:
+        """Some material has a lobe of microfacets, of mirrors or glass."""
+        return any(compiled.glossy or compiled.glass for compiled in self.compiled)
+
     def fingerprint(self) -> tuple:
         """Equal in two frames if all materials shade alike."""
         return tuple((c.program_key, c.values.tobytes(), c.images) for c in self.compiled) + tuple(self._images)

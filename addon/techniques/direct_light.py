@@ -159,7 +159,7 @@ class DirectLight(Technique):
             return
         service = frame.services.get("shadow")
         items: dict[AccumulatedMaps | None, list] = {}
-        kinds = lights.LAMPS
+        kinds = lights.kinds_of(self._emitters)
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
             rate = self._rate(frame, emitter, weight, shadow)

@@ -11,6 +11,8 @@ have done so it goes into the sums, at several such points where the picture has
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import cache
 
 from ..frame import lights
 from ..frame.environment import WORLD
@@ -19,6 +21,7 @@ from ..frame.run import Frame
 from ..frame.technique import Param, Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..gfx.library import Program
 from . import film_points
 from .film_points import PATHS
 from .neighbours import shown_sum
@@ -34,8 +37,23 @@ SUMS = (
 )
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
 LIGHT = tuple(f"radiance.{path}" for path in PATHS)
-COLLECT = tuple(
-    passes.fullscreen_program(
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the camera may see besides diffuse surfaces. Drivers that mask instead of branching compute all that a
+    program holds, so it holds no more."""
+
+    soft: bool  # lobes of shaders/lib/soft_lobe.glsl
+    glossy: bool  # lobes of microfacets
+    world: bool
+    kinds: int  # of lights, bits as in lights.LAMPS
+
+
+@cache
+def collect_program(seen: Seen) -> Program:
+    shown = (("GLOSSY", seen.glossy), ("WORLD", seen.world))
+    return passes.fullscreen_program(
         "film collect",
         "film/collect.frag.glsl",
         textures=(
@@ -44,15 +62,19 @@ COLLECT = tuple(
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
         constants=(("INT", "light_count"), ("FLOAT", "film_share")),
-        defines=soft_defines,
+        defines=(
+            *SOFT_DEFINES[seen.soft], *((name, "1") for name, is_seen in shown if is_seen),
+            ("LIGHT_KINDS", str(seen.kinds)),
+        ),
         outputs=tuple(
             ("VEC4", name)
             for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color",
                          "out_transmission_color", "out_normal")
         ),
-    )
-    for soft_defines in SOFT_DEFINES
-)  # fmt: skip
+    )  # fmt: skip
+
+
+COLLECT = (collect_program(Seen(True, True, True, -1)), collect_program(Seen(False, False, False, 0)))
 DEPTH = passes.fullscreen_program(
     "film depth",
     "film/depth.frag.glsl",
@@ -102,6 +124,11 @@ class Film(Technique):
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
             self._light_count = len(seen)
+            shown = frame.snapshot.world.visibility.camera and frame.environment.power > 0
+            world = frame.environment.tree is None and shown
+            self._collecting = collect_program(
+                Seen(frame.materials.soft, frame.materials.glossy, world, lights.kinds_of(seen))
+            )
             passes.fullscreen(
                 DEPTH,
                 frame.target("film.depth"),
@@ -154,7 +181,7 @@ class Film(Technique):
     def _collect(self, frame: Frame, surfaces: dict[str, images.Image], share: float) -> None:
         """Add what needs no light, at the point of the film that the frame looks at."""
         passes.fullscreen(
-            COLLECT[frame.materials.soft],
+            self._collecting,
             frame.target(*(write.name for write in SUMS)),
             blend="ADDITIVE_PREMULT",
             textures={

@@ -44,6 +44,7 @@ corner several times, the last bounces before the limit may be counted once more
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
@@ -52,6 +53,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import passes
+from ..gfx.library import Program
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..snapshot.scene import Snapshot
@@ -72,14 +74,28 @@ DEEPER_ORDER = (0, 0, 1, 1, 1, 1, 0, 0)  # which of each two: of 16, all numbers
 MORE_RAYS = 4  # times, in a picture of one sample
 GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
 GATHER_CONSTANTS = (*PATH_CONSTANTS, ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "deeper"))
-GATHER = passes.fullscreen_program(
-    "instant radiosity",
-    "indirect/gather.frag.glsl",
-    textures=GATHER_TEXTURES,
-    blocks=PATH_BLOCKS,
-    constants=(*GATHER_CONSTANTS, *TRACED.constants),
-    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
-)
+
+
+@cache
+def gather_program(kinds: int, glossy: bool) -> Program:
+    """For light sources of these kinds (bits as in lights.LAMPS), and surfaces that may be glossy."""
+    return passes.fullscreen_program(
+        "instant radiosity",
+        "indirect/gather.frag.glsl",
+        textures=GATHER_TEXTURES,
+        blocks=PATH_BLOCKS,
+        constants=(*GATHER_CONSTANTS, *TRACED.constants),
+        defines=gather_defines(kinds, glossy),
+        outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+    )
+
+
+def gather_defines(kinds: int, glossy: bool) -> tuple[tuple[str, str], ...]:
+    """What a program leaves out that a scene does not need: drivers that mask instead of branching would compute it."""
+    return (("LIGHT_KINDS", str(kinds)), *((("GLOSSY", "1"),) if glossy else ()))
+
+
+GATHERS = (gather_program(-1, True), gather_program(0, False))
 INDIRECT_WRITES = (
     Write("radiance.diffuse_indirect", "RGBA32F", "Light that diffuse surfaces receive from other surfaces", True),
     Write("radiance.glossy_indirect", "RGBA32F", "Light that glossy surfaces receive from other surfaces", True),
@@ -168,8 +184,9 @@ class InstantRadiosity(Technique):
         bindings["constants"]["rays"] = self._rays(frame)
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
+        program = gather_program(self.virtual_lights.kinds, frame.materials.glossy)
         for rows in frame.bands(self):
-            passes.fullscreen(GATHER, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
             yield
         smooth(frame, self, "radiance.diffuse_indirect")
         frame.count(self, "passes")

@@ -62,7 +62,7 @@ from ..frame.view import VIEW
 from ..gfx import context, images, passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings
+from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings, gather_defines
 from .neighbours import smooth
 from .surfaces import surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
@@ -151,15 +151,23 @@ def regions(gather: Gather, listed: bool = True) -> Program:
 
 
 TRACED_REGIONS = regions(TRACED)
-GATHER_SHARED = passes.fullscreen_program(
-    "instant radiosity of regions",
-    "indirect/gather.frag.glsl",
-    textures=(*GATHER_TEXTURES, ("RGBA32F", "shared_irradiance")),
-    blocks=PATH_BLOCKS,
-    constants=(*GATHER_CONSTANTS, ("IVEC2", "grid_offset")),
-    outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
-    defines=(("SHARED", ""),),
-)
+
+
+@cache
+def shared_gather_program(kinds: int, glossy: bool) -> Program:
+    """As gather_program, for pixels whose regions have gathered the virtual lights."""
+    return passes.fullscreen_program(
+        "instant radiosity of regions",
+        "indirect/gather.frag.glsl",
+        textures=(*GATHER_TEXTURES, ("RGBA32F", "shared_irradiance")),
+        blocks=PATH_BLOCKS,
+        constants=(*GATHER_CONSTANTS, ("IVEC2", "grid_offset")),
+        outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
+        defines=(("SHARED", ""), *gather_defines(kinds, glossy)),
+    )
+
+
+GATHERS_SHARED = (shared_gather_program(-1, True), shared_gather_program(0, False))
 
 
 def pixels_shown_alone(snapshot: Snapshot, settings: Settings) -> int:
@@ -201,8 +209,9 @@ class MultiresRadiosity(InstantRadiosity):
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
+        program = shared_gather_program(self.virtual_lights.kinds, frame.materials.glossy)
         for rows in frame.bands(self):
-            passes.fullscreen(GATHER_SHARED, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
             yield
         smooth(frame, self, "radiance.diffuse_indirect")
         images.pool.give(irradiance)

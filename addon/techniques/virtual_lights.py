@@ -47,6 +47,7 @@ Bias, in diffuse and glossy indirect light:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -55,6 +56,7 @@ from ..frame.morton import morton_codes
 from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..materials.compiler import may_emit
 from .emissive_light import EmissiveTriangles
@@ -77,14 +79,23 @@ PATH_CONSTANTS = (
     ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "bounces"),
 )  # fmt: skip
 PROBE_CONSTANTS = (("IVEC2", "probes"), ("INT", "rays"))
-CANDIDATES = passes.fullscreen_program(
-    "virtual light candidates",
-    "indirect/candidates.frag.glsl",
-    textures=PATH_TEXTURES,
-    blocks=PATH_BLOCKS,
-    constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
-    outputs=tuple(("VEC4", f"out_{name}") for name in ("point", "normal", "radiance", "shorter")),
-)
+
+
+@cache
+def candidates_program(kinds: int) -> Program:
+    """For sources of these kinds (bits as in lights.LAMPS)."""
+    return passes.fullscreen_program(
+        "virtual light candidates",
+        "indirect/candidates.frag.glsl",
+        textures=PATH_TEXTURES,
+        blocks=PATH_BLOCKS,
+        constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
+        defines=(("LIGHT_KINDS", str(kinds)),),
+        outputs=tuple(("VEC4", f"out_{name}") for name in ("point", "normal", "radiance", "shorter")),
+    )
+
+
+CANDIDATES = tuple(candidates_program(kinds) for kinds in (-1, 0))
 DENSITY = passes.fullscreen_program(
     "virtual light density",
     "indirect/density.frag.glsl",
@@ -142,6 +153,7 @@ class VirtualLights:
         self._source_block: Block | None = None
         self._source_count = 0
         self._emissive: EmissiveTriangles | None = None
+        self.kinds = 0  # of the sources, as bits
 
     def make(self, frame: Frame, technique, count: int) -> VirtualLightSet:
         """At most `count` virtual lights for this sample. Counts rays in the technique's ledger row."""
@@ -203,6 +215,8 @@ class VirtualLights:
             triangles = EmissiveTriangles(frame)
             self._emissive = triangles if triangles.power > 0 else None
         self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.diffuse
+        self.kinds = lights.kinds_of(self._emitters)
+        self.kinds |= (self._emissive is not None) << lights.SURFACE | bool(self._world) << lights.DIRECTION
 
     def _source_rows(self, frame: Frame) -> list[np.ndarray]:
         """Points of this sample on lights, emissive surfaces and the world."""
@@ -259,7 +273,7 @@ class VirtualLights:
         """Points, normals, radiances, and radiances of paths one bounce shorter: a row per probe."""
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(4)))
-        passes.fullscreen(CANDIDATES, found, **self._probing(frame, grid))
+        passes.fullscreen(candidates_program(self.kinds), found, **self._probing(frame, grid))
         return found
 
     def _densities(self, frame: Frame, grid: Grid, found: images.Target, keep: np.ndarray) -> np.ndarray:

@@ -41,6 +41,7 @@ void main()
       microfacets = false;
     }
 #endif
+#ifdef GLOSSY
     if (microfacets && s.kind == LOBE_REFRACTION) {
       float mu = max(dot(s.glossy_normal, -direction), 0.0);
       vec3 share = vec3(1.0);
@@ -56,15 +57,19 @@ void main()
       out_glossy_color.rgb = s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior,
                                                              sqrt(sqrt(alpha.x * alpha.y)), mu);
     }
+#endif
     if (max_component(s.diffuse) <= 0.0 && max_component(s.glossy_weight) > 0.0) {
       out_normal.xyz = s.glossy_normal;
     }
   }
   else {
-    out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) * s.emission : vec3(0.0);
+#ifdef WORLD
+    out_environment.rgb = environment_radiance(direction) * s.emission;
+#endif
     coverage = 1.0 - world_light.map_options.x;
   }
   out_environment.a = coverage;
+#if LIGHT_KINDS != 0
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
     if ((light.flags & LIGHT_CAMERA) != 0) {
@@ -76,6 +81,7 @@ void main()
       }
     }
   }
+#endif
   out_emission *= film_share;
   out_environment *= film_share;
   out_diffuse_color *= film_share;

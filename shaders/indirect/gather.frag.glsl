@@ -79,6 +79,7 @@ void main()
       out_diffuse.rgb += weight * near_radiance(origin, direction, false, roll);
     }
   }
+#ifdef GLOSSY
   if (s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0) {
     Lobe lobe = lobe_begin(s, to_viewer);
     vec3 weight;
@@ -89,4 +90,5 @@ void main()
       out_glossy.rgb = weight * near_radiance(origin, direction, true, roll);
     }
   }
+#endif
 }

@@ -197,18 +197,21 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
 // Distance from `origin` to the point of a light that light_sample found in `direction`; 1e29 for lights at infinity.
 float light_distance(Light light, vec3 origin, vec3 direction)
 {
-  if (light.kind == LIGHT_SUN || light.kind == LIGHT_DIRECTION) {
+  if (LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION)) {
     return 1e29;
   }
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE || light.kind == LIGHT_SURFACE) {
+  if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
     return length(light.point - origin);
+  }
+  if (!LIGHTS_HAVE(LIGHT_POINT) && !LIGHTS_HAVE(LIGHT_SPHERE)) {
+    return 1e29;
   }
   vec3 to_centre = light.centre - origin;
   float along = dot(to_centre, direction);
   if (light.radius <= 0.0) {
     return length(to_centre);
   }
-  if (light.kind == LIGHT_SPHERE) {
+  if (LIGHT_IS(light, LIGHT_SPHERE)) {
     vec3 missed = to_centre - along * direction;
     float half_chord = sqrt(max(light.radius * light.radius - dot(missed, missed), 0.0));
     return (length(to_centre) < light.radius) ? along + half_chord : along - half_chord;
@@ -222,7 +225,7 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
 {
   hit_distance = 1e28;
   density = 0.0;
-  if (light.kind == LIGHT_SUN) {
+  if (LIGHT_IS(light, LIGHT_SUN)) {
     // Within a cap its area is pi chord^2; near 1 float32 and drivers' cosines tell nothing.
     vec3 apart = direction - light.centre;
     if (light.radius <= 0.0 || PI * dot(apart, apart) > light.area) {
@@ -231,7 +234,7 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     density = 1.0 / light.area;
     return light.radiance;
   }
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+  if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     float cos_light = -dot(direction, light.axis);
     if (cos_light <= 0.0) {
       return vec3(0.0);
@@ -241,7 +244,7 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     vec3 v = sources.light[light.base + 6].xyz;
     vec3 offset = origin + t * direction - light.centre;
     vec2 place = vec2(dot(offset, u) / max(dot(u, u), 1e-30), dot(offset, v) / max(dot(v, v), 1e-30));
-    bool inside = (light.kind == LIGHT_RECTANGLE) ? max(abs(place.x), abs(place.y)) <= 1.0 : dot(place, place) <= 1.0;
+    bool inside = LIGHT_IS(light, LIGHT_RECTANGLE) ? max(abs(place.x), abs(place.y)) <= 1.0 : dot(place, place) <= 1.0;
     if (t <= 0.0 || !inside) {
       return vec3(0.0);
     }
@@ -249,13 +252,14 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     density = t * t / max(light.area * cos_light, 1e-30);
     return light.radiance * spread_attenuation(light.spread, cos_light);
   }
-  if (light.kind == LIGHT_DIRECTION || light.kind == LIGHT_SURFACE || light.radius <= 0.0) {
+  if ((!LIGHTS_HAVE(LIGHT_POINT) && !LIGHTS_HAVE(LIGHT_SPHERE)) || LIGHT_IS(light, LIGHT_DIRECTION)
+      || LIGHT_IS(light, LIGHT_SURFACE) || light.radius <= 0.0) {
     return vec3(0.0);
   }
   vec3 to_centre = light.centre - origin;
   float distance_squared = max(dot(to_centre, to_centre), 1e-30);
   float along = dot(to_centre, direction);
-  if (light.kind == LIGHT_SPHERE) {
+  if (LIGHT_IS(light, LIGHT_SPHERE)) {
     float miss_squared = max(distance_squared - along * along, 0.0);
     float r_squared = light.radius * light.radius;
     bool within = distance_squared < r_squared;
