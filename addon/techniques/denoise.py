@@ -37,6 +37,7 @@ Not filtered: direct gloss, glass, emission, pixels without the path's colour, p
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from ..frame.run import Frame
 from ..frame.settings import Settings
@@ -47,9 +48,20 @@ from ..snapshot.scene import Snapshot
 from .instant_radiosity import no_diffuse_light
 from .traced_glossy import may_be_glossy
 
-# Standard errors that pixels may differ by.
-TOLERANCE = {"diffuse_direct": 3.0, "diffuse_indirect": 5.0, "glossy_indirect": 5.0}
-LEVELS = 3
+
+@dataclass(frozen=True)
+class Filter:
+    """How far the light of a path may be exchanged between pixels."""
+
+    tolerance: float  # standard errors that they may differ by
+    sharpness: float  # power of the cosine between their normals
+    strides: tuple[int, ...]  # of the levels
+
+
+SOFT = Filter(8.0, 8.0, (1, 2, 4, 8, 1))
+FILTERS = {
+    "diffuse_direct": Filter(3.0, 32.0, (1, 2, 4)), "diffuse_indirect": SOFT, "glossy_indirect": SOFT,
+}  # fmt: skip
 FEWEST = 4  # samples: each half needs a mean
 GUIDES = (("RGBA32F", "surface_position"), ("RGBA32F", "normal_sum"))
 LEAST_COLOR = (("LEAST_COLOR", "1e-4"),)  # albedo below this sends nothing that is seen
@@ -58,7 +70,7 @@ BEGIN = passes.fullscreen_program(
     "denoise/begin.frag.glsl",
     textures=(*GUIDES, ("RGBA32F", "sum_now"), ("RGBA32F", "half_sum"), ("RGBA32F", "color_sum")),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "count"), ("INT", "half_count")),
+    constants=(("INT", "count"), ("INT", "half_count"), ("FLOAT", "sharpness")),
     defines=LEAST_COLOR,
     outputs=(("VEC4", "out_light"),),
 )
@@ -67,7 +79,7 @@ LEVEL = passes.fullscreen_program(
     "denoise/level.frag.glsl",
     textures=(*GUIDES, ("RGBA32F", "light_in")),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "stride"), ("FLOAT", "tolerance")),
+    constants=(("INT", "stride"), ("FLOAT", "tolerance"), ("FLOAT", "sharpness")),
     outputs=(("VEC4", "out_light"),),
 )
 END = passes.fullscreen_program(
@@ -94,7 +106,7 @@ class Denoise(Technique):
         Write("film.combined", "RGBA32F", "The picture with denoised light, premultiplied by alpha"),
         *(
             write
-            for path in TOLERANCE
+            for path in FILTERS
             for write in (
                 Write(f"denoise.{path}_half", "RGBA32F", "What the first half of the samples summed up"),
                 Write(f"denoise.{path}", "RGBA32F", "The sum of all samples, denoised"),
@@ -137,26 +149,25 @@ class Denoise(Technique):
         written = {write.name for technique in writers for write in technique.writes}
         if not any(map(may_be_glossy, frame.snapshot.materials[1:])):
             written.discard("radiance.glossy_indirect")
-        return [path for path in TOLERANCE if f"radiance.{path}" in written]
+        return [path for path in FILTERS if f"radiance.{path}" in written]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
         sums = {"sum_now": frame.images[f"film.{path}"], "color_sum": frame.images[f"color.{path.split('_')[0]}"]}
         guides = {
             "surface_position": frame.images["surface.position"], "normal_sum": frame.images["surface.normal_sum"],
         }  # fmt: skip
-        blocks = {"film_view": frame.view_block}
+        blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
                 passes.fullscreen(
                     BEGIN, light, rows=rows, blocks=blocks,
                     textures={**guides, **sums, "half_sum": frame.images[f"denoise.{path}_half"]},
-                    constants={"count": count, "half_count": self._half_count},
+                    constants={"count": count, "half_count": self._half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
-            for level in range(LEVELS):
-                constants = {
-                    "stride": 1 << level, "tolerance": TOLERANCE[path] * frame.settings.get(self, "strength"),
-                }  # fmt: skip
+            tolerance = how.tolerance * frame.settings.get(self, "strength")
+            for stride in how.strides:
+                constants = {"stride": stride, "tolerance": tolerance, "sharpness": how.sharpness}
                 for rows in frame.bands(self):
                     passes.fullscreen(
                         LEVEL, other, rows=rows, blocks=blocks, textures={**guides, "light_in": light.colors[0]},
@@ -166,4 +177,4 @@ class Denoise(Technique):
                 light, other = other, light
             textures = {"light_in": light.colors[0], **sums}
             passes.fullscreen(END, frame.target(f"denoise.{path}"), textures=textures, constants={"count": count})
-        frame.count(self, "passes", LEVELS + 2)
+        frame.count(self, "passes", len(how.strides) + 2)

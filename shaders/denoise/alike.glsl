@@ -1,8 +1,7 @@
 // How much two pixels show the same surface, 0 to 1, the same seen from either: by the mean normals of all samples, and
-// by the distance from each other's tangent plane, which may be some pixels for neighbours `stride` pixels apart.
+// by the distance from each other's tangent plane, which may be some pixels for neighbours `stride` pixels apart. Programs
+// have the constant `sharpness`, of the cosine between normals: 32 is half at 12 degrees, 8 at 24.
 #include "neighbours/pixel_size.glsl"
-
-const float SHARPNESS = 32.0;  // of the cosine between normals: half at 12 degrees
 
 struct Shown {
   vec3 position;
@@ -23,7 +22,7 @@ bool shown_at(ivec2 pixel, out Shown shown)
 
 float alike(Shown one, Shown other, int spacing)
 {
-  float turned = pow(max(dot(one.normal, other.normal), 0.0), SHARPNESS);
+  float turned = pow(max(dot(one.normal, other.normal), 0.0), sharpness);
   vec3 path = other.position - one.position;
   float off_plane = max(abs(dot(one.normal, path)), abs(dot(other.normal, path)));
   return turned * exp(-off_plane / (max(one.pixel_size, other.pixel_size) * 2.0 * float(spacing + 1)));
