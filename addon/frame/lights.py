@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..gfx.context import to_hold
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Light, Snapshot
 
@@ -229,8 +230,8 @@ class Sources:
 
 
 def kinds_of(emitters: Iterable[Emitter]) -> int:
-    """The kinds of these lights as bits, for LIGHT_KINDS of a program."""
-    return sum(1 << kind for kind in {emitter.kind for emitter in emitters})
+    """The kinds of these lights as bits, for LIGHT_KINDS of a program; all lamps where that is as fast."""
+    return to_hold(sum(1 << kind for kind in {emitter.kind for emitter in emitters}), LAMPS)
 
 
 def direction_row(

@@ -102,6 +102,17 @@ def loads_beat_fetches() -> bool:
     return "llvmpipe" in gpu.platform.renderer_get()
 
 
+def masks_branches() -> bool:
+    """Whether shaders compute what they branch around, and mask it: so does Mesa's software rasteriser."""
+    return "llvmpipe" in gpu.platform.renderer_get()
+
+
+def to_hold(needed, everything):
+    """What a program should hold: what the scene needs, where branches are masked; else everything, so that no change
+    of the scene compiles it anew."""
+    return needed if masks_branches() else everything
+
+
 def on_release(function: Callable[[], None]) -> Callable[[], None]:
     """Register (as a decorator) what frees GPU resources. Called in reverse order of registration.
 

@@ -21,6 +21,7 @@ from ..frame.run import Frame
 from ..frame.technique import Param, Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from . import film_points
 from .film_points import PATHS
@@ -126,9 +127,8 @@ class Film(Technique):
             self._light_count = len(seen)
             shown = frame.snapshot.world.visibility.camera and frame.environment.power > 0
             world = frame.environment.tree is None and shown
-            self._collecting = collect_program(
-                Seen(frame.materials.soft, frame.materials.glossy, world, lights.kinds_of(seen))
-            )
+            glossy, world = to_hold((frame.materials.glossy, world), (True, True))
+            self._collecting = collect_program(Seen(frame.materials.soft, glossy, world, lights.kinds_of(seen)))
             passes.fullscreen(
                 DEPTH,
                 frame.target("film.depth"),

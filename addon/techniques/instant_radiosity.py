@@ -53,6 +53,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import passes
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
@@ -184,7 +185,7 @@ class InstantRadiosity(Technique):
         bindings["constants"]["rays"] = self._rays(frame)
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
-        program = gather_program(self.virtual_lights.kinds, frame.materials.glossy)
+        program = gather_program(self.virtual_lights.kinds, to_hold(frame.materials.glossy, True))
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
             yield

@@ -60,6 +60,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..frame.view import VIEW
 from ..gfx import context, images, passes
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings, gather_defines
@@ -209,7 +210,7 @@ class MultiresRadiosity(InstantRadiosity):
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
-        program = shared_gather_program(self.virtual_lights.kinds, frame.materials.glossy)
+        program = shared_gather_program(self.virtual_lights.kinds, to_hold(frame.materials.glossy, True))
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
             yield

@@ -56,6 +56,7 @@ from ..frame.morton import morton_codes
 from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..materials.compiler import may_emit
@@ -215,8 +216,8 @@ class VirtualLights:
             triangles = EmissiveTriangles(frame)
             self._emissive = triangles if triangles.power > 0 else None
         self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.diffuse
-        self.kinds = lights.kinds_of(self._emitters)
-        self.kinds |= (self._emissive is not None) << lights.SURFACE | bool(self._world) << lights.DIRECTION
+        others = (self._emissive is not None) << lights.SURFACE | bool(self._world) << lights.DIRECTION
+        self.kinds = to_hold(lights.kinds_of(self._emitters) | others, -1)
 
     def _source_rows(self, frame: Frame) -> list[np.ndarray]:
         """Points of this sample on lights, emissive surfaces and the world."""

@@ -64,7 +64,7 @@ void main()
   }
   else {
 #ifdef WORLD
-    out_environment.rgb = environment_radiance(direction) * s.emission;
+    out_environment.rgb = (world_light.color.w > 0.5) ? environment_radiance(direction) * s.emission : vec3(0.0);
 #endif
     coverage = 1.0 - world_light.map_options.x;
   }

@@ -69,7 +69,7 @@ def test_light_paths_that_nothing_writes_are_not_filtered(stage):
     assert row().counters == {"passes": 5}
 
 
-@pytest.mark.parametrize(("gloss", "passes"), [(False, 10), (True, 15)])
+@pytest.mark.parametrize(("gloss", "passes"), [(False, 12), (True, 19)])
 def test_glossy_indirect_light_is_filtered_where_something_is_glossy(stage, gloss, passes):
     stage.floor(material=stage.principled(Roughness=0.3) if gloss else stage.diffuse(0.7))
     stage.rectangle((-2, 0), (2, 2), location=(0, 2, 0), turn=(np.pi / 2, 0, 0), material=stage.diffuse(0.5))
