@@ -97,8 +97,8 @@ def overtakes_draws() -> bool:
 
 
 def loads_beat_fetches() -> bool:
-    """Whether shaders read a texel faster from an image than from a texture: in a quarter of the time, with Mesa's
-    software rasteriser, which compiles fetches as it does filtered lookups."""
+    """Whether shaders read texels faster from images than from textures: with Mesa's software rasteriser in down to a
+    quarter of the time, where neighbours ask for texels far apart."""
     return "llvmpipe" in gpu.platform.renderer_get()
 
 

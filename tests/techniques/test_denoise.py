@@ -38,6 +38,22 @@ def test_indirect_light_has_half_the_error_and_the_same_mean(stage):
     assert errors[1] < 0.5 * errors[0]
 
 
+def test_columns_a_few_pixels_wide_lose_their_noise_too(stage):
+    """Normals turn by some 20 degrees from pixel to pixel, light hardly."""
+    lit_room(stage)
+    turn = np.linspace(0, 2 * np.pi, 25)[:-1]
+    sides = [(k, (k + 1) % 24, 24 + (k + 1) % 24, 24 + k) for k in range(24)]
+    for x in (-1.5, -0.8, 0.8, 1.5):  # they lie on the floor, so that the camera above sees their sides
+        ends = [(x + 0.25 * np.cos(t), y, 0.4 + 0.25 * np.sin(t)) for y in (-2, 2) for t in turn]
+        stage.mesh(ends, sides, material=stage.diffuse(0.5))
+    plain, denoised = ([paths_of(stage, strength, 8, 2, seed)["diffuse_indirect"] for seed in range(3)] for strength in (0.0, 1.0))
+    middle = plain[0].shape[1] / 2
+    columns = [int(middle + x * plain[0].shape[1] / 6.0) for x in (-1.5, -0.8, 0.8, 1.5)]
+    shown = np.s_[12:36, [c + k for c in columns for k in (-1, 0, 1)]]
+    noise = [np.var([image[shown] for image in images], axis=0).mean() for images in (plain, denoised)]
+    assert noise[1] < 0.4 * noise[0]
+
+
 def test_what_both_halves_agree_on_is_left_as_it_is(stage):
     """A point without size: every sample has the same light, apart from edges."""
     lit_room(stage)
