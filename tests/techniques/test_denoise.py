@@ -46,7 +46,9 @@ def test_columns_a_few_pixels_wide_lose_their_noise_too(stage):
     for x in (-1.5, -0.8, 0.8, 1.5):  # they lie on the floor, so that the camera above sees their sides
         ends = [(x + 0.25 * np.cos(t), y, 0.4 + 0.25 * np.sin(t)) for y in (-2, 2) for t in turn]
         stage.mesh(ends, sides, material=stage.diffuse(0.5))
-    plain, denoised = ([paths_of(stage, strength, 8, 2, seed)["diffuse_indirect"] for seed in range(3)] for strength in (0.0, 1.0))
+    plain, denoised = (
+        [paths_of(stage, strength, 8, 2, seed)["diffuse_indirect"] for seed in range(3)] for strength in (0.0, 1.0)
+    )
     middle = plain[0].shape[1] / 2
     columns = [int(middle + x * plain[0].shape[1] / 6.0) for x in (-1.5, -0.8, 0.8, 1.5)]
     shown = np.s_[12:36, [c + k for c in columns for k in (-1, 0, 1)]]
