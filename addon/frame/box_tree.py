@@ -5,11 +5,11 @@ at REACH of them to either side for the one with which it has the smallest commo
 become one, until one is left. Then every node takes over grandchildren, the largest first, until it has four children
 (Wald, Benthin & Boulos 2008), and what has at most LEAF boxes is a leaf.
 
-A tree of equal halves of the Morton order, which needs no addresses, lets rays visit far more: expected visits of a ray
-through the scene, nodes and leaves (sums of their boxes' areas over the root's): `window_interior` 34 and 10 against 9
-and 4 of a tree by the surface area heuristic, `soft_shadow_garden` 15 and 4 against 3 and 2.
+Nodes and leaves that a ray through the scene may expect to visit (sums of their boxes' areas over the root's), here, in
+a tree that is split by the surface area heuristic, and in one of equal halves of the Morton order, which needs no
+addresses: `window_interior` 9 and 4, 9 and 4, 34 and 10; `soft_shadow_garden` 2 and 2, 3 and 2, 15 and 4.
 
-Cost: about 0.5 us per box. Coincident boxes are paired at random but always the same.
+Cost: 1.5 to 2 us per box. Coincident boxes are paired at random but always the same.
 """
 
 from __future__ import annotations
