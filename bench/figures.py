@@ -3,8 +3,9 @@
 Two curves are compared where both have something to say. At equal error: the least error that both reach; how many
 times longer the peer takes for it (a bound, where even the fastest point of one has less error than that). At equal
 time: the time of Candela's 16 samples, at most that of the peer's slowest picture (what it would do with more is not
-known), at least that of the peer's fastest; how many times larger the peer's error is. Between measured points both are
-interpolated on logarithmic axes, along the staircase of points that no other point beats in time and error at once.
+known), at least that of the peer's fastest; how many times larger the peer's error is; and the same at the time of the
+longest picture that both have. Between measured points both are interpolated on logarithmic axes, along the staircase
+of points that no other point beats in time and error at once.
 
 An error below the reference's noise is quoted as that noise.
 """
@@ -133,19 +134,22 @@ class Against:
     bound: str  # of the speed-up: ">" where Candela's worst point has less error already, "<" where the peer's has
     gain: float | None  # the peer's error over Candela's at equal time
     seconds: float | None  # that time
+    late_gain: float | None  # and at the time of the longest picture that both have
 
 
 def against(own: list[Point], peer: list[Point], name: str) -> Against:
     """Both figures, or None where a curve has no point."""
     if not own or not peer:
-        return Against(name, None, None, "", None, None)
+        return Against(name, None, None, "", None, None, None)
     error = max(min(point.error for point in own), min(point.error for point in peer))
     speed_up = seconds_for(peer, error) / seconds_for(own, error)
     bound = ">" if staircase(own)[0].error < error else "<" if staircase(peer)[0].error < error else ""
     middle = next((point.seconds for point in own if point.samples == MIDDLE), own[-1].seconds)
     middle = min(middle, max(point.seconds for point in peer))
     seconds = max(middle, *(min(point.seconds for point in curve) for curve in (own, peer)))
-    return Against(name, speed_up, error, bound, error_after(peer, seconds) / error_after(own, seconds), seconds)
+    late = min(max(point.seconds for point in curve) for curve in (own, peer))
+    gain, late_gain = (error_after(peer, time) / error_after(own, time) for time in (seconds, late))
+    return Against(name, speed_up, error, bound, gain, seconds, late_gain)
 
 
 def geometric_mean(values: list[float]) -> float | None:

@@ -139,11 +139,12 @@ def claims(results: Results) -> list[str]:
             + listed("; not on", [f"{s} ({times(r)})" for s, r in tenth if s not in reached])
             + "."
         )
-    gains = []
+    gains, late = [], []
     for scene in scenes:
         found = against(results.own_curve(scene), results.curve(scene, "Cycles, denoised"), "")
         if found.gain is not None:
             gains.append((scene, found.gain))
+            late.append((scene, found.late_gain))
     if gains:
         lost = [(scene, gain) for scene, gain in gains if gain <= 1]
         sentences.append(
@@ -152,6 +153,11 @@ def claims(results: Results) -> list[str]:
             f"{len(gains) - len(lost)} of {len(gains)} scenes"
             + listed("; not on", [f"{scene} ({times(gain)})" for scene, gain in lost])
             + "."
+        )
+        behind = [f"{scene} ({times(gain)})" for scene, gain in late if gain <= 1]
+        sentences.append(
+            "In the time of the longest picture that both have, mostly that of Candela's largest number of samples, it "
+            f"has less error on {len(late) - len(behind)} of {len(late)}{listed('; not on', behind)}."
         )
         sentences += remedies(results, [scene for scene, _ in lost])
     return sentences
