@@ -203,9 +203,9 @@ def _compile(program: Program):
         info.typedef_source("".join(structs.values()))
     for slot, (struct, name) in enumerate(program.blocks):
         info.uniform_buf(slot, struct.name, name)
-    images, samplers = list(program.images), 0
+    images, loaded, samplers = list(program.images), program.loaded, 0
     for kind, name in program.textures:
-        if name in program.loaded:
+        if name in loaded:
             info.define(f"{name}_fetch(texel)", f"imageLoad({name}, texel)")
             info.define(f"{name}_size()", f"imageSize({name})")
             images.append((name, kind, _FORMATS[kind], "READ"))

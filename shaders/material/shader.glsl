@@ -254,7 +254,8 @@ void shader_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3
                   vec3 normal, int distribution)
 {
   vec3 positive = max(color, vec3(0.0));
-  add_glass(closures, point, weight, positive, positive, vec3(1.0), clamp(ior, 1e-5, MOST_IOR), roughness, normal, distribution);
+  add_glass(closures, point, weight, positive, positive, vec3(1.0), clamp(ior, 1e-5, MOST_IOR), roughness, normal,
+            distribution);
 }
 
 // What passes an interface without the losses of reflection.
@@ -350,8 +351,8 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
                        mirror_normal);
     }
     else {
-      add_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)), clamp(ior, 1e-5, MOST_IOR), r,
-                mirror_normal, distribution);
+      add_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)),
+                clamp(ior, 1e-5, MOST_IOR), r, mirror_normal, distribution);
     }
     w *= 1.0 - through;
   }
