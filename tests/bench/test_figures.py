@@ -5,7 +5,7 @@ import json
 import pytest
 
 from bench import again, figures, markdown, page, plots
-from bench.figures import Point, Results, against, bias_floor, error_after, seconds_for, staircase
+from bench.figures import Point, Results, against, bias_floor, error_after, seconds_for, staircase, without_noise
 
 
 def curve(error, seconds=lambda n: 0.1 * n, samples=(1, 2, 4, 8, 16, 32, 64)):
@@ -85,6 +85,15 @@ def test_error_below_the_noise_is_quoted_as_the_noise():
     found = results()
     found.references["room"]["floors"]["combined"]["relmse"] = 0.05
     assert min(point.error for point in found.curve("room", "Candela")) == 0.05
+
+
+def test_noise_of_the_reference_that_both_errors_hold_is_taken_off():
+    noise = 0.05
+    noisy = [[Point(p.samples, p.seconds, p.error + noise) for p in points] for points in (OWN, SLOWER)]
+    found = against(*(without_noise(points, noise) for points in noisy), "")
+    assert against(*noisy, "").gain < 2.5  # of 10, which is what the errors without the noise say
+    assert found.gain == pytest.approx(10)
+    assert without_noise([Point(1, 1.0, noise)], noise)[0].error == pytest.approx(figures.RESOLVED * noise)
 
 
 def test_peers_are_held_against_the_defaults_and_the_fast_preset_together():
