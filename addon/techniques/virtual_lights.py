@@ -8,7 +8,10 @@ points shared by the sample) and what a path on from y finds in up to `bounces` 
 
     L(y) = rho / pi * (E(y) + sum over further bounces of their albedos x E there)
 
-No path is ended by lot; one ends where its albedos have multiplied to below 1e-4. Any probe could have found y, so the
+From its second reflection on a path ends by lot, in proportion to its albedos. The next surfaces z_i that the paths of
+GROUP candidates y_j meet, which lie beside each other and face alike, are shared by them (path reuse, Bekaert et al.
+2002): j takes the part p_j(z_i) / sum over k of p_k(z_i) of what z_i sends, p_k = cos cos V / (pi d^2), the density of
+its own directions there. No candidate's path is lost, and single ones weigh less. Any probe could have found y, so the
 density of candidates there is the sum over all probes x (the balance heuristic)
 
     n(y) = sum over x of  R cos_x cos_y V(x, y) / (pi |x - y|^2)      per m2
@@ -26,8 +29,8 @@ lobe together: the energy that is seen is right, and only among those who see it
 | cost | per sample, with P = 192 probes and N virtual lights |
 |---|---|
 | candidates | 1152, or 4 N if that is more |
-| rays | 2 per bounce + 4 for each candidate, then 192 for the density of each virtual light |
-| readback | 64 bytes per candidate, 768 per virtual light |
+| rays | 2 per bounce + 19 for each candidate, then 192 for the density of each virtual light |
+| readback | 160 bytes per candidate, 768 per virtual light |
 
 Bias, in diffuse and glossy indirect light:
 
@@ -68,7 +71,9 @@ PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe
 CHOICE = 4  # candidates at least, for each virtual light that is kept
 NEAR = 0.1  # the bound of 128 virtual lights, in median distances of what is seen
-MOST_SOURCES = 64  # points of light sources that the paths of a sample look for
+LAMP_POINTS = 16  # on all lamps, which the paths of a sample look for
+OTHER_POINTS = (32, 24)  # of emissive surfaces and of the world: of one of them, or of each of both
+GROUP = 16  # candidates that share the next surfaces of their paths
 FLOOR = 1.0  # share of the mean importance that every candidate keeps
 MOST_VIRTUAL = 2048
 
@@ -82,6 +87,13 @@ PATH_CONSTANTS = (
 PROBE_CONSTANTS = (("IVEC2", "probes"), ("INT", "rays"))
 
 
+# Of each candidate: its place; its normal; radiance of what its own path alone says, w: luminance of the part that was
+# reflected at least once less than allowed; diffuse albedo, w: that luminance of what comes from the next surface; the
+# place of that; what comes from there. Two numbers of the next surface's normal stand in w of normal and next_radiance,
+# the third one's sign in w of next_point: a framebuffer has six images at most.
+FOUND = ("point", "normal", "radiance", "albedo", "next_point", "next_radiance")
+
+
 @cache
 def candidates_program(kinds: int) -> Program:
     """For sources of these kinds (bits as in lights.LAMPS)."""
@@ -92,7 +104,7 @@ def candidates_program(kinds: int) -> Program:
         blocks=PATH_BLOCKS,
         constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
         defines=(("LIGHT_KINDS", str(kinds)),),
-        outputs=tuple(("VEC4", f"out_{name}") for name in ("point", "normal", "radiance", "shorter")),
+        outputs=tuple(("VEC4", f"out_{name}") for name in FOUND),
     )
 
 
@@ -105,6 +117,18 @@ DENSITY = passes.fullscreen_program(
     constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
     outputs=(("FLOAT", "out_density"),),
 )
+PAIRS = passes.fullscreen_program(
+    "virtual light pairs",
+    "indirect/pairs.frag.glsl",
+    textures=(
+        *PATH_TEXTURES, ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"), ("RGBA32F", "next_point"),
+        ("RGBA32F", "next_radiance"), ("R32F", "grouped"),
+    ),
+    blocks=PATH_BLOCKS,
+    constants=(*PATH_CONSTANTS, ("INT", "rays")),
+    defines=(("GROUP", str(GROUP)),),
+    outputs=(("FLOAT", "out_density"),),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -161,9 +185,7 @@ class VirtualLights:
         self.draw_sources(frame)
         grid = Grid.of(frame, count)
         found = self._candidates(frame, grid)
-        point, normal, radiance, shorter = (
-            images.read(image).reshape(-1, 4)[:, :3].astype(np.float64) for image in found.colors
-        )
+        point, normal, radiance, shorter = self._radiances(frame, grid, found)
         keep, weight = _resample(point, radiance, count, frame.random("virtual lights/keep")[0])
         density = self._densities(frame, grid, found, keep)
         for image in found.colors:
@@ -180,7 +202,7 @@ class VirtualLights:
             whole = np.abs(radiance[keep]) @ lights.LUMINANCE
             packed[0, :, 3] = np.abs(intensity) @ lights.LUMINANCE
             packed[2, :, 3] = footprints
-            packed[1, :, 3] = np.abs(shorter[keep]) @ lights.LUMINANCE / np.maximum(whole, 1e-300)
+            packed[1, :, 3] = shorter[keep] / np.maximum(whole, 1e-300)
         frame.count(technique, "virtual lights", len(keep))
         return VirtualLightSet(point[keep], normal[keep], intensity, footprints, images.upload(packed))
 
@@ -221,14 +243,9 @@ class VirtualLights:
 
     def _source_rows(self, frame: Frame) -> list[np.ndarray]:
         """Points of this sample on lights, emissive surfaces and the world."""
-        kinds = bool(self._emitters) + (self._emissive is not None) + self._world
-        if not kinds:
-            return []
-        share = MOST_SOURCES // kinds
-        rows = []
-        if self._emitters:
-            rows += self._light_rows(frame, share)
+        rows = self._light_rows(frame, LAMP_POINTS) if self._emitters else []
         seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
+        share = OTHER_POINTS[self._emissive is not None and bool(self._world)]
         total = share * frame.settings.samples
         numbers = range(frame.sample * share, (frame.sample + 1) * share)
         if self._emissive is not None:
@@ -271,11 +288,49 @@ class VirtualLights:
         return bindings
 
     def _candidates(self, frame: Frame, grid: Grid) -> images.Target:
-        """Points, normals, radiances, and radiances of paths one bounce shorter: a row per probe."""
+        """FOUND, a row per probe."""
         size = (grid.rays, grid.count)
-        found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(4)))
+        found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
         passes.fullscreen(candidates_program(self.kinds), found, **self._probing(frame, grid))
         return found
+
+    def _radiances(self, frame: Frame, grid: Grid, found: images.Target) -> tuple[np.ndarray, ...]:
+        """Points, normals and radiances (N, 3) of all candidates, and luminances (N,) of what was reflected at least
+        once less than allowed. Candidates share what their paths met next: `_shared`."""
+        point, normal, radiance, albedo, _, later = (
+            images.read(image).reshape(-1, 4).astype(np.float64) for image in found.colors
+        )
+        later[:, 3] = albedo[:, 3]
+        later[~np.isfinite(later).all(axis=1)] = 0.0
+        if frame.settings.bounces > 1 and not frame.settings.draft:
+            later = self._shared(frame, grid, found, point, normal[:, :3], later)
+        shorter = radiance[:, 3] + later[:, 3] * (albedo[:, :3] @ lights.LUMINANCE)
+        return point[:, :3], normal[:, :3], radiance[:, :3] + albedo[:, :3] * later[:, :3], shorter
+
+    def _shared(self, frame: Frame, grid: Grid, found: images.Target, point, normal, later: np.ndarray) -> np.ndarray:
+        """`later` (N, C), what each candidate's path brings per albedo, from the paths of all GROUP candidates that
+        stand beside each other and face alike, by the balance heuristic."""
+        there = np.flatnonzero(point[:, 3])
+        if not len(there):
+            return later
+        axis = np.abs(normal[there]).argmax(axis=1)
+        side = 2 * axis + (normal[there, axis] < 0)
+        groups = np.full((-(-len(there) // GROUP), GROUP), -1)
+        groups.reshape(-1)[: len(there)] = there[np.lexsort((morton_codes(point[there, :3]), side))]
+        bindings = self._probing(frame, grid)
+        del bindings["constants"]["probes"]
+        bindings["textures"] |= {
+            "candidate_point": found.colors[0], "candidate_normal": found.colors[1], "next_point": found.colors[4],
+            "next_radiance": found.colors[5], "grouped": images.upload(groups.astype(np.float32), "R32F"),
+        }  # fmt: skip
+        with images.borrowed(GROUP, groups.size, "R32F") as target:
+            passes.fullscreen(PAIRS, target, **bindings)
+            density = images.read(target.colors[0]).astype(np.float64).reshape(-1, GROUP, GROUP)
+        share = density / np.maximum(density.sum(axis=1, keepdims=True), 1e-300)
+        shared = later.copy()
+        members = groups >= 0
+        shared[groups[members]] = (share @ np.where(members[..., None], later[groups], 0.0))[members]
+        return shared
 
     def _densities(self, frame: Frame, grid: Grid, found: images.Target, keep: np.ndarray) -> np.ndarray:
         """(N,) how many rays of all probes fall on a square metre around each candidate that is kept."""
@@ -324,7 +379,7 @@ def near_radius(frame: Frame, count: int) -> float:
 
 
 def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the candidates that are kept, and how many candidates each stands for.
+    """Numbers of the candidates that are kept, in an order in space, and how many candidates each stands for.
 
     Marks at equal steps of the importance run along a curve through space, so that what is kept is spread over the
     surfaces as evenly as the candidates allow.
@@ -336,5 +391,6 @@ def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> 
     expected = importance / importance.sum() * count
     order = np.argsort(morton_codes(point), kind="stable")
     picked = np.searchsorted(np.cumsum(expected[order]), np.arange(count) + u, side="right")
-    keep, times = np.unique(order[np.minimum(picked, len(order) - 1)], return_counts=True)
+    place, times = np.unique(np.minimum(picked, len(order) - 1), return_counts=True)
+    keep = order[place]
     return keep, times / expected[keep]

@@ -9,7 +9,7 @@
 vec3 member_light(int index, Surface s, out vec3 direction)
 {
   VirtualLight light = virtual_light(index);
-  float bounded = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+  float bounded = bounded_kernel(light, s.position, near_radius, direction) * max(dot(s.normal, direction), 0.0);
   return light.intensity * ((dot(direction, s.geometric_normal) > 0.0) ? bounded : 0.0);
 }
 

@@ -1,5 +1,6 @@
 // Candidates for virtual lights: points that light the picture, found from the picture. A pixel's cosine-distributed ray
-// meets a surface; what that reflects, after up to `bounces` reflections, is estimated by a path on from there.
+// meets a surface. What that reflects of light straight from sources, and what comes to it from the next surface on a path
+// of up to `bounces` reflections, are estimated apart: candidates share their next surfaces (indirect/pairs.frag.glsl).
 #include "indirect/path.glsl"
 #include "indirect/probe.glsl"
 
@@ -8,7 +9,9 @@ void main()
   out_point = vec4(0.0);
   out_normal = vec4(0.0);
   out_radiance = vec4(0.0);
-  out_shorter = vec4(0.0);
+  out_albedo = vec4(0.0);
+  out_next_point = vec4(0.0);
+  out_next_radiance = vec4(0.0);
   ivec2 place = ivec2(gl_FragCoord.xy);
   Probe probe = probe_read(place.y);
   if (!probe.receives) {
@@ -29,22 +32,44 @@ void main()
     return;
   }
   out_point = vec4(met.position, 1.0);
-  out_normal = vec4(met.normal, t);
-  vec3 throughput = vec3(1.0);
+  out_normal = vec4(met.normal, 0.0);
+  out_albedo = vec4(met.reflection.diffuse, 0.0);
   vec3 radiance = direct_reflected(met, -direction, 4, roll.x);
   vec3 shorter = (bounces > 1) ? radiance : vec3(0.0);
+  vec3 lobe = vec3(0.0);
+  vec3 later = vec3(0.0);
+  vec3 later_shorter = vec3(0.0);
+  vec3 throughput = vec3(1.0);
   for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
     roll = hash3(roll);
     vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(met.reflection, met.normal, onward, -direction);
+    vec3 reflected = PI * reflection_of(met.reflection, met.normal, onward, -direction);
+    if (bounce == 2) {
+      lobe = max(reflected - met.reflection.diffuse, vec3(0.0));
+    }
+    else {
+      // From here on paths end by lot: what they bring is a mean over many, shared by many.
+      throughput *= reflected;
+      float chance = min(max_component(throughput), 1.0);
+      if (to_unit(roll.z) >= chance) {
+        break;
+      }
+      throughput /= chance;
+    }
     direction = onward;
     if (!trace_vertex(ray_origin(met.position, met.normal), direction, 1e29, roll.z, met, t)) {
       break;
     }
+    if (bounce == 2) {
+      out_next_point = vec4(met.position, (met.normal.z < 0.0) ? -1.0 : 1.0);
+      out_normal.w = met.normal.x;
+      out_next_radiance.w = met.normal.y;
+    }
     roll = hash3(roll);
-    radiance += throughput * direct_reflected(met, -direction, 1, roll.x);
-    shorter = (bounce < bounces) ? radiance : shorter;
+    later += throughput * direct_reflected(met, -direction, 1, roll.x);
+    later_shorter = (bounce < bounces) ? later : later_shorter;
   }
-  out_radiance = vec4(radiance, 0.0);
-  out_shorter = vec4(shorter, 0.0);
+  out_radiance = vec4(radiance + lobe * later, luminance(abs(shorter + lobe * later_shorter)));
+  out_albedo.w = luminance(abs(later_shorter));
+  out_next_radiance.rgb = later;
 }

@@ -21,26 +21,26 @@ VirtualLight virtual_light(int index)
   return light;
 }
 
-// Geometry term without the receiver's cosine, bounded: cos / max(d2, r2). Nor is a virtual light brighter than its area
+// Geometry term without the receiver's cosine, bounded: cos / max(d2, reach2). Nor is a virtual light brighter than its area
 // would be: one that its finder saw at a grazing angle stands for a large area, and beside it may lie what faces it.
-float bounded_kernel(VirtualLight light, vec3 position, out vec3 direction)
+float bounded_kernel(VirtualLight light, vec3 position, float reach, out vec3 direction)
 {
   vec3 path = light.position - position;
   float squared = max(dot(path, path), 1e-30);
   direction = path * inversesqrt(squared);
-  return max(-dot(light.normal, direction), 0.0) / max(squared, max(near_radius * near_radius, light.footprint));
+  return max(-dot(light.normal, direction), 0.0) / max(squared, max(reach * reach, light.footprint));
 }
 
 // Luminance of the irradiance by a virtual light if nothing is between; `shorter`: by the light in it that may be
 // reflected once more.
-float unblocked_share(int index, vec3 position, vec3 normal, bool shorter)
+float unblocked_share(int index, vec3 position, vec3 normal, float reach, bool shorter)
 {
   vec4 a = virtual_lights_fetch(ivec2(index, 0));
   vec4 b = virtual_lights_fetch(ivec2(index, 1));
   vec3 path = a.xyz - position;
   float squared = max(dot(path, path), 1e-30);
   float cosines = max(-dot(b.xyz, path), 0.0) * max(dot(normal, path), 0.0) / squared;
-  return cosines / max(squared, near_radius * near_radius) * a.w * (shorter ? b.w : 1.0);
+  return cosines / max(squared, reach * reach) * a.w * (shorter ? b.w : 1.0);
 }
 
 // Whether nothing is between a place beside a surface and a virtual light: 1 or 0.
@@ -55,7 +55,7 @@ float virtual_light_seen(VirtualLight light, vec3 origin, uint salt)
 // no more than PART are looked at; one of those is traced, along `direction`.
 #define PART 64
 
-vec3 virtual_irradiance(vec3 position, vec3 normal, uint salt, out vec3 direction)
+vec3 virtual_irradiance(vec3 position, vec3 normal, float reach, uint salt, out vec3 direction)
 {
   direction = normal;
   int stride = (virtual_count + PART - 1) / PART;
@@ -65,7 +65,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, uint salt, out vec3 directio
   int chosen = 0;
   uint roll = salt;
   for (int i = first; i < virtual_count; i += stride) {
-    float share = unblocked_share(i, position, normal, true);
+    float share = unblocked_share(i, position, normal, reach, true);
     total += share;
     if (draw_passing(share, total, roll)) {
       chosen_share = share;
@@ -77,7 +77,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, uint salt, out vec3 directio
   }
   VirtualLight light = virtual_light(chosen);
   float shorter = virtual_lights_fetch(ivec2(chosen, 1)).w;
-  float bounded = bounded_kernel(light, position, direction) * max(dot(normal, direction), 0.0);
+  float bounded = bounded_kernel(light, position, reach, direction) * max(dot(normal, direction), 0.0);
   float visible = virtual_light_seen(light, ray_origin(position, normal), salt);
   return light.intensity * (shorter * bounded * (float(stride) * total / chosen_share) * visible);
 }

@@ -1,7 +1,18 @@
 // Virtual lights that are seen along rays.
 #include "indirect/lights.glsl"
 
-#define PARTS 32  // of all virtual lights: a choice looks for its part, then within
+#define PARTS 32  // of the virtual lights: a choice looks for its part, then within
+
+// Pixels side by side look at every other one of the virtual lights, which stand in an order along a curve through space: a
+// mean over neighbours, of pixels or of samples, is one over all of them.
+#ifdef SUBSETS
+int subset_of(ivec2 pixel)
+{
+  return (pixel.x + ((SUBSETS > 2) ? 2 : 1) * pixel.y + film_view.sample_index) % SUBSETS;
+}
+#else
+#define SUBSETS 1
+#endif
 
 // Irradiance at a surface by all virtual lights, and, given the surface's diffuse closure, what it reflects of it. Of all
 // of them `rays` are traced, drawn in proportion to what they bring unblocked (systematic resampling); 0: none is, and
@@ -13,27 +24,32 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
 {
   vec3 direction;
   vec3 sum = vec3(0.0);
+#if SUBSETS > 1
+  int first = subset_of(ivec2(gl_FragCoord.xy));
+#else
+  int first = 0;
+#endif
   if (rays == 0) {
-    for (int i = 0; i < virtual_count; i++) {
+    for (int i = first; i < virtual_count; i += SUBSETS) {
       VirtualLight light = virtual_light(i);
-      float bounded = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+      float bounded = bounded_kernel(light, s.position, near_radius, direction) * max(dot(s.normal, direction), 0.0);
       sum += bounded * light.intensity;
     }
-    return reflected ? sum * s.diffuse / PI : sum;
+    return (reflected ? sum * s.diffuse / PI : sum) * float(SUBSETS);
   }
   float passed[PARTS];  // what the parts up to each one bring
-  int part_size = (virtual_count + PARTS - 1) / PARTS;
+  int part_size = (virtual_count + PARTS * SUBSETS - 1) / (PARTS * SUBSETS) * SUBSETS;
   float total = 0.0;
   for (int part = 0; part < PARTS; part++) {
-    for (int i = part * part_size; i < min((part + 1) * part_size, virtual_count); i++) {
-      total += unblocked_share(i, s.position, s.normal, false);
+    for (int i = part * part_size + first; i < min((part + 1) * part_size, virtual_count); i += SUBSETS) {
+      total += unblocked_share(i, s.position, s.normal, near_radius, false);
     }
     passed[part] = total;
   }
   if (!(total > DARK)) {
     return sum;
   }
-  float step_size = total / float(rays);
+  float step_size = total / float(rays);  // of these
   int part = 0;
   int traced = -1;
   float visible = 0.0;
@@ -45,8 +61,8 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
     float before = (part > 0) ? passed[part - 1] : 0.0;
     float chosen_share = 0.0;
     int chosen = -1;
-    for (int i = part * part_size; i < min((part + 1) * part_size, virtual_count); i++) {
-      float share = unblocked_share(i, s.position, s.normal, false);
+    for (int i = part * part_size + first; i < min((part + 1) * part_size, virtual_count); i += SUBSETS) {
+      float share = unblocked_share(i, s.position, s.normal, near_radius, false);
       if (share > 0.0 && (chosen < 0 || before <= mark)) {
         chosen = i;
         chosen_share = share;
@@ -57,7 +73,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       continue;
     }
     VirtualLight light = virtual_light(chosen);
-    float bounded = bounded_kernel(light, s.position, direction);
+    float bounded = bounded_kernel(light, s.position, near_radius, direction);
     if (dot(direction, s.geometric_normal) <= 0.0) {
       continue;
     }
@@ -69,5 +85,5 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
     sum += arriving * (reflected ? diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction)
                                  : vec3(max(dot(s.normal, direction), 0.0)));
   }
-  return sum;
+  return sum * float(SUBSETS);
 }

@@ -92,7 +92,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
     for (int i = group * virtual_count / groups; i < (group + 1) * virtual_count / groups; i++) {
       VirtualLight light = virtual_light(i);
       vec3 direction;
-      float bounded = bounded_kernel(light, s.position, direction) * max(dot(s.normal, direction), 0.0);
+      float bounded = bounded_kernel(light, s.position, near_radius, direction) * max(dot(s.normal, direction), 0.0);
       if (!(bounded > 0.0) || dot(direction, s.geometric_normal) <= 0.0) {
         continue;
       }
