@@ -304,8 +304,11 @@ class VirtualLights:
         later[~np.isfinite(later).all(axis=1)] = 0.0
         if frame.settings.bounces > 1 and not frame.settings.draft:
             later = self._shared(frame, grid, found, point, normal[:, :3], later)
-        shorter = radiance[:, 3] + later[:, 3] * (albedo[:, :3] @ lights.LUMINANCE)
-        return point[:, :3], normal[:, :3], radiance[:, :3] + albedo[:, :3] * later[:, :3], shorter
+        reflected = albedo[:, :3] * later[:, :3]
+        # Of light of any colour on a surface of any: luminances of factors do not multiply.
+        part = later[:, 3] / np.maximum(np.abs(later[:, :3]) @ lights.LUMINANCE, 1e-300)
+        shorter = radiance[:, 3] + part * (np.abs(reflected) @ lights.LUMINANCE)
+        return point[:, :3], normal[:, :3], radiance[:, :3] + reflected, shorter
 
     def _shared(self, frame: Frame, grid: Grid, found: images.Target, point, normal, later: np.ndarray) -> np.ndarray:
         """`later` (N, C), what each candidate's path brings per albedo, from the paths of all GROUP candidates that
