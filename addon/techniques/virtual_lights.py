@@ -320,8 +320,8 @@ class VirtualLights:
         side = 2 * axis + (normal[there, axis] < 0)
         groups = np.full((-(-len(there) // GROUP), GROUP), -1)
         groups.reshape(-1)[: len(there)] = there[np.lexsort((morton_codes(point[there, :3]), side))]
-        bindings = self._probing(frame, grid)
-        del bindings["constants"]["probes"]
+        bindings = self.path_bindings(frame)
+        bindings["constants"]["rays"] = grid.rays
         bindings["textures"] |= {
             "candidate_point": found.colors[0], "candidate_normal": found.colors[1], "next_point": found.colors[4],
             "next_radiance": found.colors[5], "grouped": images.upload(groups.astype(np.float32), "R32F"),

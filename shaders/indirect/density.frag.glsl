@@ -8,24 +8,14 @@ void main()
   ivec2 place = ivec2(gl_FragCoord.xy);
   int number = int(kept_fetch(ivec2(place.x, 0)).x);
   ivec2 candidate = ivec2(number % rays, number / rays);
-  vec3 normal = candidate_normal_fetch(candidate).xyz;
-  vec3 point = ray_origin(candidate_point_fetch(candidate).xyz, normal);
   Probe probe = probe_read(place.y);
   if (!probe.receives) {
     return;
   }
+  bool known = candidate.y == place.y;  // a probe sees what its own rays have met
   vec3 origin = ray_origin(probe.position, probe.geometric_normal);
-  vec3 path = point - origin;
-  float squared = max(dot(path, path), 1e-30);
-  vec3 direction = path * inversesqrt(squared);
-  float cosines = max(dot(probe.normal, direction), 0.0) * max(-dot(normal, direction), 0.0);
-  if (cosines <= 0.0 || dot(direction, probe.geometric_normal) <= 0.0) {
-    return;
-  }
-  float visible = 1.0;
-  if (candidate.y != place.y) {  // a probe sees what its own rays have met
-    uvec3 roll = hash3(uvec3(uint(place.x), uint(place.y), uint(film_view.sample_index)));
-    visible = clear_path(origin, direction, sqrt(squared), roll.x);
-  }
-  out_density = visible * float(rays) * cosines / (PI * squared);
+  uvec3 salt = uvec3(uint(place.x), uint(place.y), uint(film_view.sample_index));
+  out_density = float(rays) * direction_density(origin, probe.normal, probe.geometric_normal,
+                                                candidate_point_fetch(candidate).xyz,
+                                                candidate_normal_fetch(candidate).xyz, known, salt);
 }

@@ -21,17 +21,6 @@ void main()
   vec2 flat_part = vec2(candidate_normal_fetch(to).w, next_radiance_fetch(to).w);
   vec3 next_normal = vec3(flat_part, next.w * sqrt(max(1.0 - dot(flat_part, flat_part), 0.0)));
   vec3 origin = ray_origin(candidate_point_fetch(from).xyz, normal);
-  vec3 path = ray_origin(next.xyz, next_normal) - origin;
-  float squared = max(dot(path, path), 1e-30);
-  vec3 direction = path * inversesqrt(squared);
-  float cosines = max(dot(normal, direction), 0.0) * max(-dot(next_normal, direction), 0.0);
-  if (cosines <= 0.0) {
-    return;
-  }
-  float visible = 1.0;
-  if (own != other) {  // a path has met its own
-    uvec3 roll = hash3(uvec3(uint(own), uint(other), uint(film_view.sample_index)));
-    visible = clear_path(origin, direction, sqrt(squared), roll.x);
-  }
-  out_density = visible * cosines / (PI * squared);
+  uvec3 salt = uvec3(uint(own), uint(other), uint(film_view.sample_index));
+  out_density = direction_density(origin, normal, normal, next.xyz, next_normal, own == other, salt);
 }

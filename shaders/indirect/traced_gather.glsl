@@ -3,15 +3,13 @@
 
 #define PARTS 32  // of the virtual lights: a choice looks for its part, then within
 
-// Pixels side by side look at every other one of the virtual lights, which stand in an order along a curve through space: a
-// mean over neighbours, of pixels or of samples, is one over all of them.
+// Where pixels take turns, those side by side look at other SUBSETS of the virtual lights, which stand in an order along a curve
+// through space: a mean over neighbours, of pixels or of samples, is one over all of them.
 #ifdef SUBSETS
-int subset_of(ivec2 pixel)
-{
-  return (pixel.x + ((SUBSETS > 2) ? 2 : 1) * pixel.y + film_view.sample_index) % SUBSETS;
-}
+#define FIRST ((int(gl_FragCoord.x) + int(gl_FragCoord.y) + film_view.sample_index) % SUBSETS)
 #else
 #define SUBSETS 1
+#define FIRST 0
 #endif
 
 // Irradiance at a surface by all virtual lights, and, given the surface's diffuse closure, what it reflects of it. Of all
@@ -24,11 +22,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
 {
   vec3 direction;
   vec3 sum = vec3(0.0);
-#if SUBSETS > 1
-  int first = subset_of(ivec2(gl_FragCoord.xy));
-#else
-  int first = 0;
-#endif
+  int first = FIRST;
   if (rays == 0) {
     for (int i = first; i < virtual_count; i += SUBSETS) {
       VirtualLight light = virtual_light(i);
@@ -49,7 +43,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
   if (!(total > DARK)) {
     return sum;
   }
-  float step_size = total / float(rays);  // of these
+  float step_size = total / float(rays);
   int part = 0;
   int traced = -1;
   float visible = 0.0;
