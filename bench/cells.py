@@ -8,6 +8,7 @@ after a change, measures only the cells whose keys it does not find.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import re
@@ -57,7 +58,7 @@ def preset(name: str) -> tuple[tuple[str, float], ...]:
     """What a quality preset of Candela sets by property; samples are swept and left out."""
     text = (ROOT / "addon" / "ui" / "presets" / "candela" / "quality" / f"{name}.py").read_text(encoding="utf-8")
     found = re.findall(r"^candela\.(\w+) = (\S+)$", text, re.MULTILINE)
-    return tuple((key, json.loads(value)) for key, value in found if not key.endswith("samples"))
+    return tuple((key, ast.literal_eval(value)) for key, value in found if not key.endswith("samples"))
 
 
 OWN = Series("Candela", "CANDELA", SWEEP, main=True)

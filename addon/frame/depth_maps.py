@@ -259,13 +259,14 @@ class Atlas:
 
     def __init__(self):
         self.target: images.Target | None = None
+        self._targets: dict[tuple[int, int], images.Target] = {}
         self._resolution = 0
 
     def prepare(self, views: list[MapView], resolution: int) -> tuple[list[tuple[int, int, int]], np.ndarray]:
         """Cells (x, y, size) for the views, and what shaders must know of them, (V, VIEW_TEXELS, 4).
 
-        The image holds the views and, at one resolution, only grows: the number of views varies from sample to sample,
-        and a new size costs an allocation. A single view does not clear a row of four.
+        The number of views varies from sample to sample, and a new size costs an allocation, so rows are counted in
+        powers of two, and an image of each size is kept: a few views do not clear the rows of many.
         """
         if resolution != self._resolution:
             self.release()
@@ -283,14 +284,15 @@ class Atlas:
             place = (0, 0) if views[k].scale == 1 else (quarter % 2 * side, quarter // 2 % 2 * side)
             quarter += views[k].scale > 1
             cells[k] = (corner[0] + place[0], corner[1] + place[1], side)
-        size = (columns * resolution, -(-taken // columns) * resolution)
-        if self.target is None or self.target.size[0] < size[0] or self.target.size[1] < size[1]:
-            if self.target is not None:
-                size = tuple(max(wanted, had) for wanted, had in zip(size, self.target.size))
-                self.release()
-            self.target = images.Target(
+        rows = 1
+        while rows * columns < taken:
+            rows *= 2
+        size = (columns * resolution, rows * resolution)
+        if size not in self._targets:
+            self._targets[size] = images.Target(
                 (images.pool.take(*size, "RGBA32F"),), images.pool.take(*size, "DEPTH_COMPONENT32F")
             )
+        self.target = self._targets[size]
         texels = np.zeros((len(views), VIEW_TEXELS, 4))
         for k, view in enumerate(views):
             texels[k, :4] = view.rows
@@ -298,10 +300,10 @@ class Atlas:
         return cells, texels
 
     def release(self) -> None:
-        if self.target is not None:
-            images.pool.give(self.target.colors[0])
-            images.pool.give(self.target.depth)
-        self.target = None
+        for target in self._targets.values():
+            images.pool.give(target.colors[0])
+            images.pool.give(target.depth)
+        self._targets, self.target = {}, None
 
 
 @dataclass(frozen=True)

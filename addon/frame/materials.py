@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..gfx import images, library
+from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
 from ..materials.compiled import CompiledMaterial
@@ -56,7 +57,7 @@ class MaterialSet:
             if cached is None or cached[0] != (material.graph, versions):
                 cached = (
                     (material.graph, versions),
-                    compile_material(material.name, material.graph, snapshot.images),
+                    compile_material(material.name, material.graph, snapshot.images, lean=to_hold(True, False)),
                 )
             cache[material.key] = cached
             compiled = cached[1]

@@ -56,9 +56,12 @@ class Rate:
 
 
 def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequence[float] = ()) -> float:
-    """Points per sample that leave LITTLE error: what was asked for, doubled at most half as often as the samples."""
+    """Points per sample that leave little error: what was asked for, doubled at most half as often as the samples are
+    doubled beyond the usual number, or halved below it."""
+    few = samples < USUAL_SAMPLES
+    most = asked * (USUAL_SAMPLES / samples if few else samples / USUAL_SAMPLES) ** 0.5
     budget = asked
-    while 2 * budget <= asked * (samples / USUAL_SAMPLES) ** 0.5 and left(variance, samples, budget, film) > LITTLE:
+    while 2 * budget <= most and left(variance, samples, budget, film) > (LITTLE_OF_FEW if few else LITTLE):
         budget *= 2
     return budget
 

@@ -37,13 +37,19 @@ def copy(image: Image, target: Target) -> None:
     fullscreen(COPY, target, textures={"original": image})
 
 
-def fullscreen(program: Program, target: Target, *, blend="NONE", rows=None, viewport=None, **bindings) -> None:
+def fullscreen(
+    program: Program, target: Target, *, blend="NONE", where="NONE", rows=None, viewport=None, **bindings
+) -> None:
     """Run a full-screen program over the target, or over some `rows` (from, to) of it. `bindings` as in Shader.bind.
 
-    With a `viewport` (x, y, width, height) that rectangle is the screen.
+    With a `viewport` (x, y, width, height) that rectangle is the screen. `where` is a depth test against the target's
+    depth image, in which the program stands at 0.5: a driver leaves out whole blocks of pixels that fail it, which
+    branches in the program cannot save where they are masked. A program that writes depth marks such pixels.
     """
     shader = get(program)
-    with _state(target, viewport, blend=blend, depth_test="NONE", depth_write=False, rows=rows):
+    if program.writes_depth:
+        where = "ALWAYS"
+    with _state(target, viewport, blend=blend, depth_test=where, depth_write=program.writes_depth, rows=rows):
         shader.bind(**bindings)
         _fullscreen_batch().draw(shader.handle)
     gpu.shader.unbind()

@@ -39,19 +39,22 @@ def default_graph() -> Graph:
 
 
 def compile_material(
-    name: str, graph: Graph, images: dict | None = None, notes: Sequence[tuple[str, str]] = ()
+    name: str, graph: Graph, images: dict | None = None, notes: Sequence[tuple[str, str]] = (), lean: bool = False
 ) -> CompiledMaterial:
     """Compile `graph`. `images` (Image.key -> snapshot Image) tells how pixels are stored and what they are on average;
-    without it every image counts as present, linear and opaque. `notes` are the reader's sentences, handed on."""
-    return _Compilation(name, graph, images, notes).result()
+    without it every image counts as present, linear and opaque. `notes` are the reader's sentences, handed on. `lean`:
+    layers of weight 0 are left out of the program, which is then another one when a slider leaves 0."""
+    return _Compilation(name, graph, images, notes, lean).result()
 
 
 class _Compilation:
     """One pass over a graph; nothing of it lives longer than the call."""
 
-    def __init__(self, name: str, graph: Graph, images: dict | None, notes: Sequence[tuple[str, str]]) -> None:
+    def __init__(
+        self, name: str, graph: Graph, images: dict | None, notes: Sequence[tuple[str, str]], lean: bool
+    ) -> None:
         self.graph = graph
-        self.code = Expressions(name, graph, images)
+        self.code = Expressions(name, graph, images, lean)
         self.code.fallbacks.update(dict.fromkeys(tuple(note) for note in notes))
         self.bounds = Bounds(self.code)
 

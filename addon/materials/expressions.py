@@ -50,8 +50,8 @@ class _Scope:
 class Expressions:
     """The program text of one material while it grows."""
 
-    def __init__(self, name: str, graph: Graph, images: dict | None) -> None:
-        self.name, self.graph, self.images = name, graph, images
+    def __init__(self, name: str, graph: Graph, images: dict | None, lean: bool = False) -> None:
+        self.name, self.graph, self.images, self.lean = name, graph, images, lean
         self.fallbacks: dict[tuple[str, str], None] = {}
         self.values = ValueBlock()
         self.attributes: list[Attribute] = []
@@ -285,6 +285,8 @@ class Expressions:
             return socket.implicit
         value, kind = (socket.default, socket.kind) if given is None else (given.value, given.kind)
         constant = to_kind(socket.default if value is None else value, kind, socket.kind)
+        if self.lean and socket.layer and constant == 0.0:
+            return glsl_number(0.0, socket.kind)
         return self._constant(node, socket, constant, socket.kind)
 
     def _attribute(self, node: Node, kind: str, name: str) -> str:

@@ -53,7 +53,7 @@ from .accumulated_maps import (
     rounds,
 )
 from .light_probes import rate_of
-from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, surface_bindings
+from .surfaces import ANY_SURFACE, LIT_SURFACES, MARKS, SOFT_DEFINES, SURFACE_TEXTURES, surface_bindings
 
 CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
@@ -117,9 +117,9 @@ def shade(
         },
     }  # fmt: skip
     program = lighting(maps.lookup, frame.materials.soft, kinds)
-    target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct")
+    target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct", depth=MARKS)
     for band in frame.bands(technique):
-        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
+        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=band, **bindings)
         yield
     frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
@@ -134,7 +134,7 @@ class DirectLight(Technique):
             "With more lights than this, each sample draws so many of them by lot", 1, 256,
         ),
     )  # fmt: skip
-    reads = SURFACES
+    reads = LIT_SURFACES
     writes = DIRECT_WRITES
     uses = ("shadow", "rates")
 

@@ -1,6 +1,7 @@
 """Emissive light: meshes whose material emits, as light sources of other surfaces.
 
-Points on emissive triangles are drawn in proportion to area times luminance, a few per sample, each with depth maps:
+Points on emissive triangles are drawn in proportion to area times luminance, a few per sample (in pictures of few
+samples so many that the picture has FEWEST_POINTS), each with depth maps. All are of one low-discrepancy set:
 
     L(x, v) = mean over samples of  f(x, v, w) cos(w) Le |cos_y| V(x, y) / (|x - y|^2 p(y)),   p(y) = lum(Le) / power
 
@@ -18,6 +19,7 @@ Fails: emission from a texture is taken at its mean over the material; very many
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +31,9 @@ from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .accumulated_maps import RESOLUTION, DepthMapService, map_resolution, rounds
 from .direct_light import DIRECT_WRITES, shade
-from .surfaces import SURFACES
+from .surfaces import LIT_SURFACES
+
+FEWEST_POINTS, MOST_POINTS = 32, 16  # in a whole picture, and in one of its samples
 
 
 class EmissiveTriangles:
@@ -76,10 +80,10 @@ class EmissiveLight(Technique):
     name = "emissive_light"
     label = "Emissive surfaces"
     params = (
-        Param("points", "Points", 2, "Points on emissive surfaces that are drawn per sample", 1, 64),
-        RESOLUTION,
+        Param("points", "Points", 4, "Points on emissive surfaces that are drawn per sample", 1, 64),
+        replace(RESOLUTION, default=1.0),
     )
-    reads = SURFACES
+    reads = LIT_SURFACES
     writes = DIRECT_WRITES
     offers = ("emissive",)
 
@@ -99,7 +103,7 @@ class EmissiveLight(Technique):
             return
         if frame.sample == 0:
             self._triangles = EmissiveTriangles(frame)
-        count = frame.settings.get(self, "points")
+        count = self._count(frame.settings)
         frame.services["emissive"] = (self._triangles.power, float(count))
         if not self._triangles.power > 0:
             return
@@ -107,8 +111,9 @@ class EmissiveLight(Technique):
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.GLOSSY_FLAG + lights.TRACED_FLAG
         items = []
         for k in range(count):
-            point, normal, radiance, density = self._triangles.draw(*frame.random_volume(f"emissive{k}"))
-            jitter = (*frame.random(f"map/emissive{k}"), *frame.random(f"map/emissive{k}/turn"))
+            number = frame.sample * count + k
+            point, normal, radiance, density = self._triangles.draw(*frame.random_volume_at(number, "emissive"))
+            jitter = (*frame.random_at(number, "map/emissive"), *frame.random_at(number, "map/emissive/turn"))
             views = depth_maps.point_views(
                 point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution
             )  # fmt: skip
@@ -120,6 +125,11 @@ class EmissiveLight(Technique):
             maps = self.service.draw(frame, self, views, resolution)
             yield
             yield from shade(frame, self, rows, 1 << lights.SURFACE, self._sources, maps)
+
+    def _count(self, settings: Settings) -> int:
+        """Points per sample: more where a picture of few samples would have few in all."""
+        points = settings.get(self, "points")
+        return max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS)) if settings.whole else points
 
     def release(self) -> None:
         self.service.release()

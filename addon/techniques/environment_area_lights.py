@@ -51,7 +51,7 @@ from .cssm import ConvolutionSoftShadows
 from .direct_light import DIRECT_WRITES, shade
 from .environment_light import EnvironmentLight
 from .soft_maps import SoftMaps
-from .surfaces import SURFACES
+from .surfaces import LIT_SURFACES
 from .vssm import VarianceSoftShadows
 
 SHADOWS = (("VARIANCE", "Variance", 0), ("CONVOLUTION", "Convolution", 1))
@@ -70,7 +70,7 @@ class EnvironmentAreaLights(Technique):
         ),
         Param("shadows", "Shadows", "VARIANCE", "Kind of soft shadow maps", items=SHADOWS),
     )  # fmt: skip
-    reads = SURFACES
+    reads = LIT_SURFACES
     writes = DIRECT_WRITES
 
     def __init__(self):

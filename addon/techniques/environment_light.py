@@ -34,6 +34,7 @@ Few samples under an even sky show faint overlapping hard shadows.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,7 +48,7 @@ from ..snapshot.scene import Snapshot
 from .accumulated_maps import RESOLUTION, DepthMapService, Lookup, Maps, map_resolution, rounds
 from .direct_light import DIRECT_WRITES, lighting, shade
 from .light_probes import WORLD
-from .surfaces import SURFACES
+from .surfaces import LIT_SURFACES
 
 WORLD_RAYS = Lookup(
     "world rays",
@@ -102,9 +103,10 @@ class EnvironmentLight(Technique):
             0,
             64,
         ),
-        RESOLUTION,
+        # One of many directions, of light that comes from all sides: what a coarser map gets wrong nobody sees.
+        replace(RESOLUTION, default=1.0),
     )
-    reads = SURFACES
+    reads = LIT_SURFACES
     writes = DIRECT_WRITES
     uses = ("rates",)
 

@@ -66,7 +66,7 @@ from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..snapshot.scene import Snapshot
 from .neighbours import smooth
-from .surfaces import SURFACES
+from .surfaces import ANY_SURFACE, LIT_SURFACES, MARKS
 from .virtual_lights import (
     PATH_BLOCKS,
     PATH_CONSTANTS,
@@ -185,7 +185,7 @@ class InstantRadiosity(Technique):
             "times as many", 1, 64, draft=1,
         ),
     )  # fmt: skip
-    reads = SURFACES
+    reads = LIT_SURFACES
     writes = INDIRECT_WRITES
 
     def __init__(self):
@@ -202,10 +202,10 @@ class InstantRadiosity(Technique):
         bindings["constants"]["rays"] = self._rays(frame)
         bindings["constants"] |= self._reach(frame, -(-len(lights) // SUBSETS))
         yield
-        target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
+        target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         program = gather_program(self.virtual_lights.kinds, to_hold(frame.materials.glossy, True))
         for rows in frame.bands(self):
-            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield
         smooth(frame, self, "radiance.diffuse_indirect")
         frame.count(self, "passes")

@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..frame import acceleration, environment, lights
-from ..frame.rates import Rate, allocate, budget_for, directions_for
+from ..frame.rates import USUAL_SAMPLES, Rate, allocate, budget_for, directions_for
 from ..frame.run import Frame
 from ..frame.sequence import point, third
 from ..frame.settings import Settings
@@ -32,6 +32,7 @@ from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot, World
+from .accumulated_maps import AccumulatedMaps
 from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
@@ -73,7 +74,7 @@ class LightProbes(Technique):
             draft=False,
         ),
         Param(
-            "maps", "Maps per sample", 6.0,
+            "maps", "Maps per sample", 8.0,
             "Depth maps that a sample of a final picture shares out among lights and world, by the error of each, "
             "and more of them where many samples, or few directions of the world, would leave too much of it; "
             "0: one for every light", 0.0, 64.0,
@@ -155,7 +156,10 @@ class LightProbes(Technique):
         samples = frame.settings.samples
         share = relative_share(moments[..., 0])
         film = [EDGES * sum(s for s, place in zip(share, places) if place == one) ** 2 for one in distinct]
-        budget = budget_for(joint, samples, frame.settings.get(self, "maps"), film)
+        # Soft maps show a light as a whole: few samples need no more of them.
+        points = AccumulatedMaps.name in (technique.name for technique in frame.plan.techniques)
+        planned = samples if points else max(samples, USUAL_SAMPLES)
+        budget = budget_for(joint, planned, frame.settings.get(self, "maps"), film)
         rates = dict(zip(distinct, allocate(joint, samples, budget, film)))
         if lit:
             rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD])

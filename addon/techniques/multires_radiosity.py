@@ -65,7 +65,7 @@ from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings, gather_defines
 from .neighbours import smooth
-from .surfaces import surface_bindings
+from .surfaces import ANY_SURFACE, MARKS, surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 
 # From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
@@ -207,12 +207,12 @@ class MultiresRadiosity(InstantRadiosity):
         bound = self.visibility(frame, lights)
         yield
         irradiance = yield from self.irradiance(frame, levels, offset, scale, bindings, bound)
-        target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect")
+        target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
         program = shared_gather_program(self.virtual_lights.kinds, to_hold(frame.materials.glossy, True))
         for rows in frame.bands(self):
-            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield
         smooth(frame, self, "radiance.diffuse_indirect")
         images.pool.give(irradiance)

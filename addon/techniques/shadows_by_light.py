@@ -65,6 +65,10 @@ class ShadowsByLight(AccumulatedMaps):
             "important", "Important lights", 8,
             "So many lights with wide penumbrae have variance soft shadow maps, the others convolution maps", 0, 64,
         ),
+        Param(
+            "soft_maps", "Soft maps", True,
+            "Filter the maps of soft lights in pictures of one sample; else each such light has several points",
+        ),
     )  # fmt: skip
 
     def __init__(self):
@@ -72,7 +76,9 @@ class ShadowsByLight(AccumulatedMaps):
         self._kinds: dict[str, str] = {}
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
-        return settings.samples == 1 and not settings.draft and any(_is_soft(light) for light in snapshot.lights)
+        if settings.samples > 1 or settings.draft or not settings.get(self, "soft_maps"):
+            return False
+        return any(_is_soft(light) for light in snapshot.lights)
 
     def run(self, frame: Frame) -> None:
         if frame.sample == 0:

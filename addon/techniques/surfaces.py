@@ -20,6 +20,7 @@ depth of field all that the rim of the lens sees, too.
 | draws | one per material (meshes shown once are joined) and one per instanced mesh and material |
 | bytes written per pixel | 6 x 16 + 4 |
 | coloured layers | + 1 pass of their draws, blended into three of the images |
+| marks | 1 pass: which pixels show a surface, which one with a narrow lobe; others are left out by the depth test |
 | first sample | + one reduction, read back at 1/256 of the pixels; with alpha + 2 surface passes and another one |
 | first sample with depth of field | 7 times that |
 
@@ -62,6 +63,17 @@ def surface_bindings(frame: Frame) -> dict[str, images.Image]:
     return {f"surface_{name}": frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}
 
 
+# Which pixels a pass that adds light is about: `where` of passes.fullscreen, with MARKS as depth of the target.
+MARKS = "surface.marks"
+ANY_SURFACE, NARROW_LOBE = "LESS_EQUAL", "LESS"
+LIT_SURFACES = (*SURFACES, MARKS)
+MARK = passes.fullscreen_program(
+    "surface marks",
+    "surface/marks.frag.glsl",
+    textures=tuple(("RGBA32F", f"surface_{name}") for name in ("position", "tint", "emission")),
+    constants=(("FLOAT", "roughness"),),
+    writes_depth=True,
+)
 TILE_BOUNDS = passes.fullscreen_program(
     "tile bounds",
     "surface/tile_bounds.frag.glsl",
@@ -78,6 +90,7 @@ class Surfaces(Technique):
     writes = (
         *(Write(f"surface.{name}", "RGBA32F", text) for name, text in DESCRIPTIONS.items()),
         Write("surface.depth_buffer", "DEPTH_COMPONENT32F", "Depth buffer of the surface pass"),
+        Write(MARKS, "DEPTH_COMPONENT32F", "0 nothing, 0.5 a surface, 1 one with a lobe that rays are traced for"),
     )
 
     def run(self, frame: Frame) -> None:
@@ -85,9 +98,15 @@ class Surfaces(Technique):
         if frame.sample == 0:
             modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
             frame.receivers = self._receivers(frame, target, modes)
-            if modes == (STOCHASTIC,):
-                return  # what was drawn for the receivers is the first sample
-        draw_sample(frame, self, target)
+        if frame.sample > 0 or modes != (STOCHASTIC,):  # else what was drawn for the receivers is the first sample
+            draw_sample(frame, self, target)
+        passes.fullscreen(
+            MARK,
+            frame.target(depth=MARKS),
+            textures={f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "tint", "emission")},
+            constants={"roughness": frame.services.get("traced_roughness", -1.0)},
+        )
+        frame.count(self, "passes")
 
     def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...]) -> Receivers:
         width, height = frame.size

@@ -41,7 +41,7 @@ from ..snapshot.scene import Snapshot
 from .direct_light import DIRECT_WRITES, TRACED_DEFINES
 from .environment_light import directions_rate
 from .light_probes import rate_of
-from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
+from .surfaces import LIT_SURFACES, MARKS, NARROW_LOBE, SURFACE_TEXTURES, surface_bindings
 
 TRACED = passes.fullscreen_program(
     "traced glossy",
@@ -66,11 +66,11 @@ class TracedGlossy(Technique):
     slot = "reflection"
     params = (
         Param(
-            "roughness", "Roughness", 1.0,
+            "roughness", "Roughness", 0.6,
             "Lobes up to this roughness trace a ray per sample; rougher ones are lit by light samples alone", 0.0, 1.0,
         ),
     )  # fmt: skip
-    reads = SURFACES
+    reads = LIT_SURFACES
     writes = DIRECT_WRITES
     uses = ("emissive",)
 
@@ -128,9 +128,9 @@ class TracedGlossy(Technique):
                 "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
         }  # fmt: skip
-        target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct")
+        target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct", depth=MARKS)
         for rows in frame.bands(self):
-            passes.fullscreen(TRACED, target, blend="ADDITIVE_PREMULT", rows=rows, **bindings)
+            passes.fullscreen(TRACED, target, blend="ADDITIVE_PREMULT", where=NARROW_LOBE, rows=rows, **bindings)
             yield
         frame.count(self, "passes")
 

@@ -198,7 +198,9 @@ class TracedRefraction(Technique):
         seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG
         if self._triangles is not None:
             for k in range(EMISSIVE_POINTS):
-                point, normal, radiance, density = self._triangles.draw(*frame.random_volume(f"refraction/emissive{k}"))
+                index = frame.sample * EMISSIVE_POINTS + k
+                drawn = frame.random_volume_at(index, "refraction/emissive")
+                point, normal, radiance, density = self._triangles.draw(*drawn)
                 rows.append(lights.surface_row(point, normal, radiance, density * EMISSIVE_POINTS, seen, 0, 1))
         if self._world:
             for k in range(WORLD_DIRECTIONS):

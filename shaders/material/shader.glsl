@@ -336,8 +336,8 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   }
   closure_emission(closures, w * emission_color * emission_strength);
 
-  vec3 t = rotated_tangent(tangent, mirror_normal, rotation);
   float stretch = clamp(anisotropy, 0.0, 1.0);
+  vec3 t = (stretch > 0.0) ? rotated_tangent(tangent, mirror_normal, rotation) : default_tangent(mirror_normal);
   float metal = clamp(metallic, 0.0, 1.0);
   if (metal > SMALLEST_WEIGHT) {
     add_glossy(closures, point, w * metal, distribution, FRESNEL_F82, min(base, vec3(1.0)),

@@ -48,8 +48,10 @@ def test_variances_that_are_no_numbers_do_no_harm():
     assert allocate([], 16, 6.0) == []
 
 
-@pytest.mark.parametrize(("samples", "most"), [(1, 6.0), (16, 6.0), (63, 6.0), (64, 12.0), (256, 24.0)])
-def test_the_budget_grows_half_as_fast_as_the_samples_and_only_where_error_is_left(samples, most):
+@pytest.mark.parametrize(
+    ("samples", "most"), [(1, 24.0), (4, 12.0), (5, 6.0), (16, 6.0), (63, 6.0), (64, 12.0), (256, 24.0)]
+)
+def test_the_budget_grows_half_as_fast_as_samples_leave_their_usual_number_and_only_where_error_is_left(samples, most):
     assert budget_for([100.0], samples, 6.0) == most
     assert budget_for([1e-6], samples, 6.0) == 6.0
     assert budget_for([], samples, 6.0) == 6.0

@@ -30,6 +30,7 @@ class Socket:
     implicit: str = ""  # GLSL expression; "@UV", "@GENERATED": that attribute; "@RADIAL": around Generated's z
     only_with: str = ""  # another socket: while it is unlinked and 0, nobody asks for the implicit value, which is 0
     clamp: str = ""  # name of a boolean property of the node: when true the argument is clamped to 0..1
+    layer: bool = False  # the weight of a layer: at 0 the shader skips what it computes of it
 
 
 @dataclass(frozen=True)
