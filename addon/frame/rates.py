@@ -33,6 +33,7 @@ MOST_EXPONENT = 3  # sequence.py orders the film for up to 8 points of a light p
 USUAL_SAMPLES = 16  # up to here a sample has the budget that was asked for
 LITTLE = 1e-4  # squared error that is left, relative: with it a budget is enough
 FEWEST_DIRECTIONS, MOST_DIRECTIONS = 32, 16  # of the world: in a whole picture, and in one of its samples
+LITTLE_OF_WORLD = 2e-4  # squared error by directions of the world for which any picture draws twice as many
 LITTLE_OF_FEW = 1e-2  # squared error by directions of the world that goes unseen in a picture of few samples
 
 
@@ -67,9 +68,11 @@ def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequ
 
 
 def directions_for(variance: float, samples: int, rate: Rate) -> Rate:
-    """`rate` of the world, doubled where a picture of few samples would see too little of it."""
-    most = min(MOST_DIRECTIONS, FEWEST_DIRECTIONS / samples)
-    while rate.per_sample < most and variance * (rate.per_sample * samples) ** -1.5 > LITTLE_OF_FEW:
+    """`rate` of the world, doubled where a picture of few samples would see too little of it, and once where any picture
+    would."""
+    few = min(MOST_DIRECTIONS, FEWEST_DIRECTIONS / samples)
+    most, little = (few, LITTLE_OF_FEW) if few > rate.per_sample else (2 * rate.per_sample, LITTLE_OF_WORLD)
+    while rate.per_sample < min(most, MOST_DIRECTIONS) and variance * (rate.per_sample * samples) ** -1.5 > little:
         rate = Rate(rate.exponent + 1)
     return rate
 
