@@ -68,8 +68,8 @@ def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequ
 
 
 def directions_for(variance: float, samples: int, rate: Rate) -> Rate:
-    """`rate` of the world, doubled where a picture of few samples would see too little of it, and once where any picture
-    would."""
+    """`rate` of the world, doubled where a picture of few samples would see too little of it, and once where any
+    picture would."""
     few = min(MOST_DIRECTIONS, FEWEST_DIRECTIONS / samples)
     most, little = (few, LITTLE_OF_FEW) if few > rate.per_sample else (2 * rate.per_sample, LITTLE_OF_WORLD)
     while rate.per_sample < min(most, MOST_DIRECTIONS) and variance * (rate.per_sample * samples) ** -1.5 > little:

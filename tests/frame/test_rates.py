@@ -77,12 +77,12 @@ def test_points_of_the_film_ask_for_no_more_than_one_point_in_a_sample():
     [
         (0.8, 1, 1, 4),
         (0.8, 4, 2, 3),
-        (0.8, 16, 2, 2),
+        (0.8, 16, 2, 3),
         (0.8, 64, 2, 2),
         (0.01, 1, 0, 0),
         (1e30, 1, 0, 4),
         (0.0, 1, 3, 3),
     ],
 )
-def test_pictures_of_few_samples_draw_more_of_the_world(variance, samples, exponent, expected):
+def test_pictures_that_would_see_too_little_of_the_world_draw_more_of_it(variance, samples, exponent, expected):
     assert directions_for(variance, samples, Rate(exponent)) == Rate(expected)
