@@ -205,6 +205,11 @@ class Store:
                     continue  # the line that was being written when the machine went down
                 self.found[row["key"]] = row
 
+    def remember(self, rows: Iterable[dict]) -> None:
+        """Take rows of a results file for those that are not in the store, as on a machine that lost its own."""
+        for row in rows:
+            self.found.setdefault(row["key"], row)
+
     def add(self, key: str, figures: dict) -> dict:
         """Keep the figures of a cell; returns the row as it was written."""
         row = {"key": key, **figures}

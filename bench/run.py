@@ -1,7 +1,8 @@
 """Time against error over scenes, techniques and samples, beside EEVEE and Cycles: `python -m bench run`.
 
 Every cell (bench/cells.py) is measured by a worker, a fresh process per scene, and kept at once in out/bench: a run
-that is interrupted goes on where it was. What was measured becomes one file, bench/results/bench.json.
+that is interrupted goes on where it was. What was measured becomes one file, bench/results/bench.json, and what that
+file has of the same sources, Blender, device and processor is not measured again, unless `--anew` says so.
 
 `--budget` gives the minutes that the whole may take. What a page needs (bench/cells.py: NEEDED) is measured of all
 scenes before anything else. How long each cell will take is predicted from what has been measured, and of what does not
@@ -320,6 +321,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reference-samples", default=512, type=int, metavar="N", help="of each of two (default 512)")
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="leave out the dearest cells beyond this time")
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
+    parser.add_argument("--anew", action="store_true", help="measure what the results have from elsewhere, too")
     parser.add_argument("--list", action="store_true", help="print the cells and end")
     parser.add_argument(
         "--references", action="store_true", help="render the references alone, which may be done while others work"
@@ -396,6 +398,9 @@ def command(options: argparse.Namespace) -> int:
     if options.references:
         return render_references(cells)
     store = Store(OUT / "cells.jsonl")
+    before = json.loads(options.results.read_text(encoding="utf-8")) if options.results.exists() else {}
+    if not options.anew:
+        store.remember(before.get("cells", ()))
     budget = None if options.budget is None else 60.0 * options.budget
     form = "{desc}{percentage:3.0f}% |{bar}| {elapsed}, {remaining} left, {postfix}"
     with tqdm(total=1, bar_format=form, disable=not sys.stderr.isatty()) as bar:
@@ -407,9 +412,8 @@ def command(options: argparse.Namespace) -> int:
         "reference_samples": options.reference_samples,
         "load": load(),
     }
-    rows, references = gathered(cells, done.machine, store), done.references
-    if options.results.exists():  # references that this run found no need to open
-        references = {**json.loads(options.results.read_text(encoding="utf-8"))["references"], **references}
+    rows = gathered(cells, done.machine, store)
+    references = {**before.get("references", {}), **done.references}  # those first that this run had no need to open
     left_out = [f"{cell.scene.name}, {cell.series.label}, {cell.samples}" for cell in done.missing]
     write_results(options.results, about, references, rows, left_out)
     for failure in done.failures:

@@ -54,6 +54,14 @@ def test_store_keeps_each_cell_at_once_and_survives_half_a_line(tmp_path):
     assert Store(path).found == {"a": {"key": "a", "wall": 1.0}}
 
 
+def test_rows_of_a_results_file_fill_what_the_store_lacks(tmp_path):
+    store = Store(tmp_path / "cells.jsonl")
+    store.add("a", {"wall": 1.0})
+    store.remember([{"key": "a", "wall": 9.0}, {"key": "b", "wall": 2.0}])
+    assert store.found == {"a": {"key": "a", "wall": 1.0}, "b": {"key": "b", "wall": 2.0}}
+    assert Store(store.path).found.keys() == {"a"}
+
+
 def test_dearest_cells_of_the_lowest_rank_are_left_out():
     own, ray_traced, main, extra = cell(OWN, 1), cell(EEVEE, 16), cell(CYCLES, 256), cell(CYCLES, 128)
     assert [one.rank for one in (own, ray_traced, main, extra)] == [cells.NEEDED, cells.NEEDED, cells.MAIN, cells.EXTRA]
