@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 
+NEEDED = {bool: "on or off", int: "a whole number", float: "a number", str: "a word"}  # for messages, by type
+
+
 @dataclass(frozen=True)
 class Param:
     """One parameter, declared once. Blender property, command-line override, benchmark axis and manual derive from it.
@@ -36,7 +39,7 @@ class Param:
         try:
             value = _as_bool(value) if kind is bool else kind(value)
         except (TypeError, ValueError):
-            raise ValueError(f"'{self.name}' needs a {kind.__name__}, not '{value}'.") from None
+            raise ValueError(f"'{self.name}' needs {NEEDED[kind]}, not '{value}'.") from None
         if self.items and value not in [item[0] for item in self.items]:
             raise ValueError(f"'{self.name}' must be one of {', '.join(i[0] for i in self.items)}, not '{value}'.")
         if kind in (int, float):

@@ -50,7 +50,7 @@ What does not help:
 
 Bias: light is spread by at most 14 pixels over a surface, indirect light by 32, by what the standard error hides; means
 stay.
-Not filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of fewer than 4 samples, drafts.
+Not filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of one sample, drafts.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ FILTERS = {
     "diffuse_indirect": Filter(5.5, 8.0, (1, 2, 4, 8, 1)),
     "glossy_indirect": Filter(5.0, 8.0, (1, 2, 4, 8, 1)),
 }
-FEWEST = 4  # samples: each half needs a mean
+FEWEST = 2  # samples: one for each half
 GUIDES = (("RGBA32F", "surface_position"), ("RGBA32F", "normal_sum"))
 LEAST_COLOR = (("LEAST_COLOR", "1e-4"),)  # albedo below this sends nothing that is seen
 BEGIN = passes.fullscreen_program(

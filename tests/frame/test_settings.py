@@ -60,14 +60,14 @@ def test_a_text_fills_a_slot():
     [
         ("rays.count", "'rays.count' is not of the form name=value"),
         ("rays.counts=2", "There is no setting 'rays.counts'. Known settings: samples, seed, bounces, .*rays.count"),
-        ("rays.count=many", "'count' needs a int, not 'many'"),
+        ("rays.count=many", "'count' needs a whole number, not 'many'"),
         ("rays.count=0", "'count' must be at least 1, not 0"),
         ("rays.count=65", "'count' must be at most 64, not 65"),
         ("rays.reach=nan", "'reach' must be at least 0.0, not nan"),
-        ("rays.jitter=perhaps", "'jitter' needs a bool, not 'perhaps'"),
+        ("rays.jitter=perhaps", "'jitter' needs on or off, not 'perhaps'"),
         ("rays.kind=ODD", "'kind' must be one of COSINE, EVEN, not 'ODD'"),
         ("samples=0", "'samples' must be at least 1, not 0"),
-        ("samples=1e3", "'samples' needs a int, not '1e3'"),
+        ("samples=1e3", "'samples' needs a whole number, not '1e3'"),
     ],
 )
 def test_a_mistake_is_answered_with_a_sentence_that_names_it(text, sentence):

@@ -74,7 +74,7 @@ def test_the_picture_is_the_sum_of_its_passes(stage):
     np.testing.assert_allclose(images["combined"][..., :3], total, rtol=1e-3, atol=1e-5)
 
 
-@pytest.mark.parametrize(("strength", "samples", "reason"), [(0.0, 8, "strength"), (1.0, 3, "fewer than 4")])
+@pytest.mark.parametrize(("strength", "samples", "reason"), [(0.0, 8, "strength"), (1.0, 1, "fewer than 2")])
 def test_it_is_left_out_with_a_reason(stage, strength, samples, reason):
     lit_room(stage)
     paths_of(stage, strength, samples, 0)
