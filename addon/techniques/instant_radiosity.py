@@ -80,7 +80,7 @@ from .virtual_lights import (
 DEEPER = 2  # samples, one of which looks for light that close surfaces reflect to each other again and again
 DEEPER_ORDER = (0, 0, 1, 1, 1, 1, 0, 0)  # which of each two: of 16, all numbers of the sequence in each quarter twice
 SUBSETS = 2  # of the virtual lights, of which each pixel looks at one
-SEVERAL = 4  # samples, from which on Denoise runs, and rays of pixels look farther
+SEVERAL = 2  # samples, from which on Denoise runs, and rays of pixels look farther
 FARTHER = 0.2  # median distances of what is seen: their reach then
 MORE_RAYS = 4  # times, in a picture of one sample
 GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
