@@ -48,6 +48,9 @@ What does not help:
   pixels of the same surface in each sample (3 to 10 % more error, since light changes there); weights by light that was
   filtered before.
 
+- To filter direct gloss as diffuse light: pictures of product, garden, window and instances have .97 to 1.01 times the
+  error at 16 samples, the path itself .94 to twice as much.
+
 Bias: light is spread by at most 14 pixels over a surface, indirect light by 32, by what the standard error hides; means
 stay.
 Not filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of one sample, drafts.
