@@ -157,7 +157,7 @@ def against(own: list[Point], peer: list[Point], name: str) -> Against:
     middle = next((point.seconds for point in own if point.samples == MIDDLE), own[-1].seconds)
     middle = min(middle, max(point.seconds for point in peer))
     seconds = max(middle, *(min(point.seconds for point in curve) for curve in (own, peer)))
-    late = min(max(point.seconds for point in curve) for curve in (own, peer))
+    late = max(seconds, min(max(point.seconds for point in curve) for curve in (own, peer)))
     gain, late_gain = (error_after(peer, time) / error_after(own, time) for time in (seconds, late))
     return Against(name, speed_up, error, bound, gain, seconds, late_gain)
 
