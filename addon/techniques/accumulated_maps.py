@@ -46,6 +46,7 @@ from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Snapshot
+from . import repeated_light
 
 RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
@@ -152,7 +153,8 @@ _NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
 def rounds(
     frame: Frame, items: list[tuple[np.ndarray, list]], resolution: int, most_texels: int = ATLAS_TEXELS
 ) -> Iterator[tuple[list[np.ndarray], list]]:
-    """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers."""
+    """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers. Maps of a
+    second round lie where those of the first were, whose light then cannot be repeated."""
     if frame.shared_out is not None:
         most_texels = min(most_texels, PART_TEXELS)
     rows, views, texels = [], [], 0
@@ -161,6 +163,7 @@ def rounds(
         full = texels + size > most_texels or len(views) + len(own) > lights.MOST_VIEWS
         if rows and (full or len(rows) == lights.MOST_LIGHTS):
             yield rows, views
+            repeated_light.forbid(frame)
             rows, views, texels = [], [], 0
         texels += size
         row[0, 2:4] = len(views), len(own)

@@ -40,6 +40,7 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
+from . import repeated_light
 from .accumulated_maps import (
     ATLAS_TEXELS,
     EDGES,
@@ -53,7 +54,8 @@ from .accumulated_maps import (
     rounds,
 )
 from .light_probes import rate_of
-from .surfaces import ANY_SURFACE, LIT_SURFACES, MARKS, SOFT_DEFINES, SURFACE_TEXTURES, surface_bindings
+from .repeated_light import Lit
+from .surfaces import ANY_SURFACE, LIT_SURFACES, SOFT_DEFINES, SURFACE_TEXTURES
 
 CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
@@ -79,7 +81,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
         "light/direct.frag.glsl",
         textures=(*lookup.textures, ("RGBA32F", "depth_maps"), ("RGBA32F", "energy_table"), *SURFACE_TEXTURES),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
-        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
+        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "light_share"), *lookup.constants),
         defines=(
             *TRACED_DEFINES,
             *SOFT_DEFINES[soft_lobes],
@@ -106,21 +108,15 @@ def shade(
     """Add the light of `rows` (each (TEXELS, 4)), of these `kinds`, to the radiance images, in
     parts."""
     bindings = {
-        "textures": {
-            **surface_bindings(frame), "depth_maps": maps.atlas, "energy_table": frame.materials.energy_table,
-            **maps.textures,
-        },
-        "blocks": {"film_view": frame.view_block, "sources": sources.set(rows, maps.views), **maps.blocks},
+        "textures": {"depth_maps": maps.atlas, "energy_table": frame.materials.energy_table, **maps.textures},
+        "blocks": maps.blocks,
         "constants": {
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
             **maps.constants,
         },
     }  # fmt: skip
     program = lighting(maps.lookup, frame.materials.soft, kinds)
-    target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct", depth=MARKS)
-    for band in frame.bands(technique):
-        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=band, **bindings)
-        yield
+    yield from repeated_light.add(frame, technique, sources, Lit(program, ANY_SURFACE, bindings, rows, maps.views))
     frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
 

@@ -52,6 +52,7 @@ from ..frame.technique import Param, Technique
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
+from . import repeated_light
 from .direct_light import DIRECT_WRITES
 from .environment_light import no_environment_light
 from .neighbours import reflect
@@ -129,6 +130,7 @@ class DirectionalOcclusion(Technique):
                 passes.fullscreen(program, arriving, rows=rows, **bindings)
                 yield
             reflect(frame, self, arriving.colors[0], "radiance.diffuse_direct", noisy=traced)
+            repeated_light.forbid(frame)
         frame.count(self, "passes", 2)
 
     def release(self) -> None:

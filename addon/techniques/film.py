@@ -23,7 +23,7 @@ from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from . import film_points
+from . import film_points, repeated_light
 from .film_points import PATHS
 from .neighbours import shown_sum
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_sample, surface_bindings
@@ -113,6 +113,7 @@ class Film(Technique):
 
     def __init__(self):
         self._sources = lights.Sources()
+        self._repeated = lights.Sources()
 
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.sample == 0:
@@ -145,6 +146,7 @@ class Film(Technique):
             yield
             yield from self._between(frame, count, sums)
         frame.target(*(f"radiance.{path}" for path in self._paths)).clear()
+        repeated_light.forget(frame)
         for path in self._paths:
             frame.shown[f"radiance.{path}"] = f"film.{path}"
 
@@ -165,13 +167,22 @@ class Film(Technique):
         surfaces = dict(zip(SURFACE_IMAGES, drawn))
         # The first numbers are those of the samples' own points, so that all together are a prefix of the sequence.
         first = frame.settings.samples + frame.sample * (count - 1)
+        repeated = repeated_light.possible(frame)
+        marked = images.Target(sums.colors, depth)
+        direct = images.Target(tuple(frame.images[f"film.{path}"] for path in repeated_light.PATHS), depth)
+        share = 1.0 / count
         try:
             for point in range(first, first + count - 1):
                 frame.look(film=point)
                 draw_sample(frame, self, target)
-                self._collect(frame, {f"surface_{name}": image for name, image in surfaces.items()}, 1.0 / count)
-                film_points.add_between(frame, self._paths, sums, surfaces, 1.0 / count, point)
+                bindings = {f"surface_{name}": image for name, image in surfaces.items()}
+                self._collect(frame, bindings, share)
+                into = marked if repeated else sums
+                film_points.add_between(frame, self._paths, into, surfaces, share, point, repeated)
                 frame.count(self, "passes", 2)
+                if repeated:
+                    repeated_light.repeat(frame, self._repeated, bindings, direct, share)
+                    frame.count(self, "passes", len(frame.services["lit"]))
                 yield
         finally:
             frame.look()
@@ -201,6 +212,7 @@ class Film(Technique):
 
     def release(self) -> None:
         self._sources.release()
+        self._repeated.release()
 
 
 def check_tree(names: Collection[str] | None) -> None:

@@ -52,7 +52,7 @@ def lit_paths(frame: Frame) -> tuple[str, ...]:
     return PATHS if refracts(frame) else REFLECTED
 
 
-def _programs(name: str, file: str, guides: bool) -> tuple[Program, Program]:
+def _programs(name: str, file: str, guides: bool, repeated: bool = False) -> tuple[Program, Program]:
     """Without light through glass, and with it."""
     seen = tuple(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES) if guides else ()
     return tuple(
@@ -62,7 +62,8 @@ def _programs(name: str, file: str, guides: bool) -> tuple[Program, Program]:
             textures=tuple(("RGBA32F", texture) for texture in (*seen, *(f"light_{path}" for path in paths))),
             blocks=((VIEW, "film_view"),) if guides else (),
             constants=(("FLOAT", "film_share"), *((("VEC2", "offset"),) if guides else ())),
-            defines=defines,
+            defines=(*defines, *((("REPEATED", "1"),) if repeated else ())),
+            writes_depth=repeated,
             outputs=tuple(("VEC4", f"out_{path}") for path in paths),
         )
         for paths, defines in ((REFLECTED, ()), (PATHS, (("TRANSMISSION", ""),)))
@@ -71,6 +72,7 @@ def _programs(name: str, file: str, guides: bool) -> tuple[Program, Program]:
 
 ADD = _programs("film light", "film/add.frag.glsl", False)
 BETWEEN = _programs("film light between points", "film/between.frag.glsl", True)
+MARKING = _programs("film light between points, edges marked", "film/between.frag.glsl", True, True)
 
 
 def add(frame: Frame, paths: tuple[str, ...], target: images.Target, share: float) -> None:
@@ -89,15 +91,16 @@ def add_between(
     surfaces: dict[str, images.Image],
     share: float,
     point: int,
+    repeated: bool,
 ) -> None:
     """Add what `surfaces` (by names of SURFACE_IMAGES), seen at this point of the film, reflect of this sample's
-    light."""
+    light. `repeated`: without direct light where the pixel's own point lies elsewhere; there the target's depth is 1."""
     between = tuple(there - own for there, own in zip(frame.film_offset(point), frame.film_offset(frame.sample)))
     textures = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
     textures |= {f"surface_{guide}": surfaces[guide] for guide in GUIDES}
     textures |= {f"known_{guide}": frame.images[f"surface.{guide}"] for guide in GUIDES}
     passes.fullscreen(
-        BETWEEN[len(paths) == len(PATHS)], target,
+        (MARKING if repeated else BETWEEN)[len(paths) == len(PATHS)], target,
         blend="ADDITIVE_PREMULT", textures=textures, blocks={"film_view": frame.view_block},
         constants={"film_share": share, "offset": between},
     )  # fmt: skip

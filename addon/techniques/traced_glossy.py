@@ -38,10 +38,12 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
+from . import repeated_light
 from .direct_light import DIRECT_WRITES, TRACED_DEFINES
 from .environment_light import directions_rate
 from .light_probes import rate_of
-from .surfaces import LIT_SURFACES, MARKS, NARROW_LOBE, SURFACE_TEXTURES, surface_bindings
+from .repeated_light import Lit
+from .surfaces import LIT_SURFACES, NARROW_LOBE, SURFACE_TEXTURES
 
 TRACED = passes.fullscreen_program(
     "traced glossy",
@@ -52,7 +54,7 @@ TRACED = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
-        ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
+        ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"), ("FLOAT", "light_share"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
     ),
     defines=TRACED_DEFINES,
@@ -113,13 +115,11 @@ class TracedGlossy(Technique):
         frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
         bindings = {
             "textures": {
-                **surface_bindings(frame), "energy_table": frame.materials.energy_table,
+                "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
             },
-            "blocks": {
-                "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
-            },
+            "blocks": {"world_light": frame.environment.block, "sources": self._lights},
             "constants": {
                 "light_count": self._light_count, "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size,
@@ -128,10 +128,7 @@ class TracedGlossy(Technique):
                 "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
         }  # fmt: skip
-        target = frame.target("radiance.diffuse_direct", "radiance.glossy_direct", depth=MARKS)
-        for rows in frame.bands(self):
-            passes.fullscreen(TRACED, target, blend="ADDITIVE_PREMULT", where=NARROW_LOBE, rows=rows, **bindings)
-            yield
+        yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings))
         frame.count(self, "passes")
 
     def release(self) -> None:

@@ -1,6 +1,8 @@
 // What a surface seen at another point of the film sends to the eye, of the light that was found at the pixels' own
 // points (`known`): light arrives there as at the pixel's own point where that lies on the same surface, else as at the
 // pixels around it that do, else as nearby; and leaves by the colours of the surface that is seen.
+// REPEATED: where the pixel's own point lies elsewhere direct light is left out, but for that through glass, and the
+// pixel marked by its depth (techniques/repeated_light.py).
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
@@ -87,6 +89,9 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = known_position_size();
+#ifdef REPEATED
+  gl_FragDepth = 0.0;
+#endif
   out_diffuse_direct = vec4(0.0);
   out_diffuse_indirect = vec4(0.0);
   out_glossy_direct = vec4(0.0);
@@ -111,6 +116,9 @@ void main()
 #ifdef TRANSMISSION
   bool refracts = here.kind == LOBE_REFRACTION;
 #endif
+#ifdef REPEATED
+  bool own = false;
+#endif
   bool light_found = false;
   bool lobe_found = false;
   for (int reach = 0; reach <= REACH && !(light_found && lobe_found); reach++) {
@@ -131,6 +139,9 @@ void main()
         float weight = max(1.5 - off.x, 0.01) * max(1.5 - off.y, 0.01);
         float facing = dot(here.normal, there.normal);
         bool equal = facing > 0.8 && abs(dot(here.normal, there.position - here.position)) < tolerance;
+#ifdef REPEATED
+        own = own || (reach == 0 && equal);
+#endif
         // Where no pixel is on the surface: at outlines, which turn away within a pixel, rather of what is close.
         float alike = max(facing, 0.1) * max(facing, 0.1);
         vec3 apart = (there.position - here.position) / tolerance;
@@ -166,6 +177,12 @@ void main()
   vec3 direct;
   vec3 indirect;
   arriving_mean(same, nearby, direct, indirect);
+#ifdef REPEATED
+  if (!own) {
+    gl_FragDepth = 1.0;
+    direct = vec3(0.0);
+  }
+#endif
   out_diffuse_direct.rgb = film_share * here.color * direct;
   out_diffuse_indirect.rgb = film_share * here.color * indirect;
   arriving_mean(same_lobe, nearby_lobe, direct, indirect);
@@ -177,6 +194,9 @@ void main()
     out_transmission_indirect.rgb = indirect;
     return;
   }
+#endif
+#ifdef REPEATED
+  direct *= own ? 1.0 : 0.0;
 #endif
   out_glossy_direct.rgb = direct;
   out_glossy_indirect.rgb = indirect;

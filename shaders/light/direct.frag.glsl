@@ -106,6 +106,6 @@ void main()
       glossy += from_glossy * visibility;
     }
   }
-  out_diffuse = vec4(diffuse, 0.0);
-  out_glossy = vec4(glossy, 0.0);
+  out_diffuse = vec4(light_share * diffuse, 0.0);
+  out_glossy = vec4(light_share * glossy, 0.0);
 }
