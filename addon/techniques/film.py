@@ -101,6 +101,7 @@ class Film(Technique):
             "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
             1, 1024, draft=1,
         ),
+        repeated_light.EDGES,
     )  # fmt: skip
     reads = SURFACES
     closes = LIGHT
@@ -167,7 +168,7 @@ class Film(Technique):
         surfaces = dict(zip(SURFACE_IMAGES, drawn))
         # The first numbers are those of the samples' own points, so that all together are a prefix of the sequence.
         first = frame.settings.samples + frame.sample * (count - 1)
-        repeated = repeated_light.possible(frame)
+        repeated = frame.settings.get(self, "edges") and repeated_light.possible(frame)
         marked = images.Target(sums.colors, depth)
         direct = images.Target(tuple(frame.images[f"film.{path}"] for path in repeated_light.PATHS), depth)
         share = 1.0 / count

@@ -24,8 +24,8 @@ relMSE of direct light at 256x192, 4 and 16 samples, one point a sample, and eig
 | draws | those of the surface pass, one pass of the film and one of this |
 | fetches per pixel | 10 + 4, at edges 9 x 9 |
 
-Bias: at edges, of light that is that of the next pixel on the surface; in pixels where light and texture change
-together. It ends where K = 1.
+Bias: at edges, of indirect light, and of direct light where it is not repeated (repeated_light.py), which is that of
+the next pixel on the surface; in pixels where light and texture change together. It ends where K = 1.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def add_between(
     repeated: bool,
 ) -> None:
     """Add what `surfaces` (by names of SURFACE_IMAGES), seen at this point of the film, reflect of this sample's
-    light. `repeated`: without direct light where the pixel's own point lies elsewhere; there the target's depth is 1."""
+    light. `repeated`: direct light at edges is left to repeated_light.py; the target's depth marks them by 1."""
     between = tuple(there - own for there, own in zip(frame.film_offset(point), frame.film_offset(frame.sample)))
     textures = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
     textures |= {f"surface_{guide}": surfaces[guide] for guide in GUIDES}

@@ -1,13 +1,24 @@
 """Repeated light: direct light of a sample once more, where a point of the film shows another surface.
 
 Points of the film that share a sample's light (film_points.py) take it from pixels whose own point lies on the same
-surface. At edges that is a guess: on what is thinner than a pixel, or on a leaf whose next pixel lies in shadow, it
-erred more than all else in pictures of edges. So pixels whose own point lies elsewhere are marked, and the passes of
-light run again in them alone: the same points on lights, the same depth maps, which hold until the next sample.
+surface. At edges that is a guess: on what is thinner than a pixel, on a leaf half in shadow, on an outline that alone
+shows a highlight. So pixels are marked whose own point lies elsewhere, unless the direct light of two or more
+neighbours on the surface differs by less than 30 %, and the passes of light run again in them alone: the same points
+on lights, the same depth maps, which hold until the next sample.
+
+relMSE of direct light, 256x192, 16 samples (4 points each), by the guess and repeated, with seconds of the render:
+
+| | guess | repeated | every edge repeated |
+|---|---|---|---|
+| `instances` | .0114, 6.4 s | .0059, 7.7 s | .0056, 8.3 s |
+| `soft_shadow_garden` | .0043, 3.1 s | .0031, 3.6 s | .0030, 4.0 s |
+| `window_interior` | .0252, 3.5 s | .0214, 4.0 s | .0208, 4.4 s |
+
+The glossy light of outlines has its mean again: garden .963 to .996, product 1.019 to 1.005.
 
 | cost | per point of the film beside the sample's own |
 |---|---|
-| passes | those of direct light, over the marked pixels: a tenth of the picture, two fifths where it is full of edges |
+| passes | those of direct light, over the marked pixels |
 
 Direct light is added by `add`, which keeps what it needs to be repeated. Who adds such light in another way, or draws
 maps over maps of the same sample, says `forbid`: then the guess stays. Indirect light is smooth, and always guessed.
@@ -22,11 +33,16 @@ import numpy as np
 
 from ..frame import lights
 from ..frame.run import Frame
-from ..frame.technique import Technique
+from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
 from .surfaces import MARKS, surface_bindings
 
+EDGES = Param(
+    "edges", "Light edges", True,
+    "From four samples on, points of the filter that show another surface than the pixel's own are lit by themselves",
+)  # fmt: skip
+FEWEST = 4  # samples: fewer err by light, not by edges
 PATHS = ("diffuse_direct", "glossy_direct")
 MARKED = "LESS"  # `where` of passes.fullscreen: the marks are 1 of 0
 
@@ -72,8 +88,9 @@ def forbid(frame: Frame) -> None:
 
 
 def possible(frame: Frame) -> bool:
-    """Whether this sample's direct light can be repeated, after all techniques have added theirs."""
-    return bool(frame.services.get("lit")) and "lit forbidden" not in frame.services
+    """Whether this sample's direct light can be repeated, and is worth it, after all techniques have added theirs."""
+    allowed = frame.settings.samples >= FEWEST and "lit forbidden" not in frame.services
+    return allowed and bool(frame.services.get("lit"))
 
 
 def repeat(

@@ -113,6 +113,7 @@ class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
         column.prop(context.scene.render, "filter_size", text="Filter Size")
         column.prop(context.scene.render, "film_transparent", text="Transparent")
         column.prop(context.scene.candela, "film_points")
+        column.prop(context.scene.candela, "film_edges")
 
 
 class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):

@@ -1,8 +1,8 @@
 // What a surface seen at another point of the film sends to the eye, of the light that was found at the pixels' own
 // points (`known`): light arrives there as at the pixel's own point where that lies on the same surface, else as at the
 // pixels around it that do, else as nearby; and leaves by the colours of the surface that is seen.
-// REPEATED: where the pixel's own point lies elsewhere direct light is left out, but for that through glass, and the
-// pixel marked by its depth (techniques/repeated_light.py).
+// REPEATED: where the pixel's own point lies elsewhere, and the light of pixels around that lie there is not even, direct
+// light is left out, but for that through glass, and the pixel marked by its depth (techniques/repeated_light.py).
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
@@ -75,6 +75,35 @@ bool arriving_enough(Arriving sum, vec3 color)
   return max_component(missing) <= 0.0;
 }
 
+#ifdef REPEATED
+#define EVEN 0.3  // share of the light by which it may differ
+#define LIKE 0.99  // cosine of an angle by which a highlight may turn
+// How much the direct light differs that arrives at pixels on one surface, and how many of them face alike.
+struct Spread {
+  float least;
+  float most;
+  int count;
+};
+
+void spread_add(inout Spread spread, vec3 direct, vec3 color, bool like)
+{
+  float shown = luminance(color);
+  spread.count -= like ? 0 : 100;
+  if (shown > LEAST_COLOR) {
+    float arriving = luminance(direct) / shown;
+    spread.least = min(spread.least, arriving);
+    spread.most = max(spread.most, arriving);
+    spread.count++;
+  }
+}
+
+bool spread_is_even(Spread spread, Arriving same, vec3 color)
+{
+  bool even = spread.count >= 2 && spread.most - spread.least <= EVEN * spread.most;
+  return luminance(color) <= LEAST_COLOR || (even && arriving_enough(same, color));
+}
+#endif
+
 // Of `same` where it is known, else of `nearby`.
 void arriving_mean(Arriving same, Arriving nearby, out vec3 direct, out vec3 indirect)
 {
@@ -118,6 +147,11 @@ void main()
 #endif
 #ifdef REPEATED
   bool own = false;
+  Spread spread;
+  spread.least = 1e30;
+  spread.most = 0.0;
+  spread.count = 0;
+  Spread lobe_spread = spread;
 #endif
   bool light_found = false;
   bool lobe_found = false;
@@ -140,7 +174,7 @@ void main()
         float facing = dot(here.normal, there.normal);
         bool equal = facing > 0.8 && abs(dot(here.normal, there.position - here.position)) < tolerance;
 #ifdef REPEATED
-        own = own || (reach == 0 && equal);
+        own = own || (reach == 0 && equal && (facing > LIKE || max_component(here.weight) <= 0.0));
 #endif
         // Where no pixel is on the surface: at outlines, which turn away within a pixel, rather of what is close.
         float alike = max(facing, 0.1) * max(facing, 0.1);
@@ -151,6 +185,9 @@ void main()
           vec3 indirect = light_diffuse_indirect_fetch(other).rgb;
           if (equal && here.soft == there.soft) {
             arriving_add(same, direct, indirect, there.color, weight, weight);
+#ifdef REPEATED
+            spread_add(spread, direct, there.color, true);
+#endif
           }
           arriving_add(nearby, direct, indirect, there.color, similar, similar);
         }
@@ -165,6 +202,9 @@ void main()
 #endif
           if (equal) {
             arriving_add(same_lobe, direct, indirect, there.weight, weight, weight);
+#ifdef REPEATED
+            spread_add(lobe_spread, direct, there.weight, facing > LIKE);
+#endif
           }
           // Of a highlight that only what faces another way is known to show, hardly anything is taken.
           arriving_add(nearby_lobe, direct, indirect, there.weight, similar, weight);
@@ -178,6 +218,7 @@ void main()
   vec3 indirect;
   arriving_mean(same, nearby, direct, indirect);
 #ifdef REPEATED
+  own = own || (spread_is_even(spread, same, here.color) && spread_is_even(lobe_spread, same_lobe, here.weight));
   if (!own) {
     gl_FragDepth = 1.0;
     direct = vec3(0.0);
