@@ -8,6 +8,7 @@ Every view is shifted and turned at random each sample, so that texel edges aver
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -322,8 +323,8 @@ def draw_views(
     alpha: AlphaCasters,
     sample: int,
     lasting: bool = True,
-) -> int:
-    """Draw all casters into every view of sample number `sample`. Returns how many triangles were sent.
+) -> Iterator[int]:
+    """Draw all casters into every view of sample number `sample`. Yields after each how many triangles were sent.
 
     `lasting`: the picture has more samples to come, so that what helps them may cost this one something.
     """
@@ -332,8 +333,8 @@ def draw_views(
     resting = geometry.resting_casters(make=sample > 0 and lasting)
     boxes, alpha_boxes = Boxes.of(geometry.opaque_casters), Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
-    sent = 0
     for view, (x, y, side) in zip(views, cells):
+        sent = 0
         viewport = (x, y, side, side)
         rows = {"row_x": view.rows[0], "row_y": view.rows[1], "row_w": view.rows[2], "row_q": view.rows[3]}
         constants = {**rows, "near": view.near}
@@ -353,7 +354,7 @@ def draw_views(
                 shader.bind(**bindings, constants={**constants, **own})
                 passes.draw(shader, call.draw.batch, call.count)
                 sent += call.triangles
-    return sent
+        yield sent
 
 
 def _draw_resting(atlas: Atlas, viewport, constants: dict, clusters: Clusters, view: MapView, light_point) -> int:

@@ -64,7 +64,7 @@ EDGE_RAYS = Param(
     draft=False,
 )  # fmt: skip
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
-PART_TEXELS = 2**21  # the same for samples that are drawn in parts: a window answers between rounds
+PART_TEXELS = 2**21  # after as many of a sample that is drawn in parts, a window answers
 
 
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
@@ -95,6 +95,7 @@ class Maps:
     textures: dict[str, images.Image] = field(default_factory=dict)
     constants: dict[str, object] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
+    drawing: Iterator[None] = field(default_factory=lambda: iter(()))  # to be exhausted before they are asked
 
 
 # What lookups by rays bind besides the hierarchy.
@@ -132,16 +133,25 @@ class DepthMapService:
         return depth_maps.AlphaCasters(draws, programs)
 
     def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> Maps:
-        """Draw the views, to be asked point by point."""
+        """Draw the views, to be asked point by point, once `drawing` is exhausted."""
         cells, texels = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
-        if views:
-            sent = depth_maps.draw_views(
-                self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample,
-                lasting=not frame.settings.draft,
-            )  # fmt: skip
-            frame.count(technique, "maps", len(views))
+        drawing = self._in_parts(frame, technique, views, cells) if views else iter(())
+        return Maps(self._atlas.target.colors[0], texels, HARD, drawing=drawing)
+
+    def _in_parts(self, frame: Frame, technique: Technique, views: list, cells) -> Iterator[None]:
+        """Draws the views; yields now and then where a window waits."""
+        drawn = depth_maps.draw_views(
+            self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample,
+            lasting=not frame.settings.draft,
+        )  # fmt: skip
+        frame.count(technique, "maps", len(views))
+        texels = 0
+        for (_, _, side), sent in zip(cells, drawn):
             frame.count(technique, "caster triangles", sent)
-        return Maps(self._atlas.target.colors[0], texels, HARD)
+            texels += side * side
+            if texels >= PART_TEXELS and frame.shared_out is not None:
+                texels = 0
+                yield
 
     def release(self) -> None:
         self._atlas.release()
@@ -155,8 +165,6 @@ def rounds(
 ) -> Iterator[tuple[list[np.ndarray], list]]:
     """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers. Maps of a
     second round lie where those of the first were, whose light then cannot be repeated."""
-    if frame.shared_out is not None:
-        most_texels = min(most_texels, PART_TEXELS)
     rows, views, texels = [], [], 0
     for row, own in items:
         size = sum((resolution // view.scale) ** 2 for view in own)
@@ -270,7 +278,12 @@ class AccumulatedMaps(Technique):
         """Shift and turn of the maps of point `number`."""
         return (*frame.random_at(number, "map"), *frame.random_at(number, "map/turn"))
 
+    def most_texels(self, frame: Frame) -> int:
+        """Of the views of a round."""
+        return self.atlas_texels
+
     def draw(self, frame: Frame, views: list) -> Maps:
+        """Draw the views of a round. The maps may be asked once `drawing` is exhausted."""
         maps = self.service.draw(frame, self, views, self.resolution(frame))
         if not (views and frame.settings.get(self, "edge_rays")) or acceleration.too_many(frame.snapshot):
             return maps

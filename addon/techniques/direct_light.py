@@ -176,8 +176,9 @@ class DirectLight(Technique):
                 items.setdefault(shadow, []).append((row, views))
         for shadow, own in items.items():
             resolution = shadow.resolution(frame) if shadow else 16
-            for rows, views in rounds(frame, own, resolution, shadow.atlas_texels if shadow else ATLAS_TEXELS):
+            for rows, views in rounds(frame, own, resolution, shadow.most_texels(frame) if shadow else ATLAS_TEXELS):
                 maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
+                yield from maps.drawing
                 yield
                 near = [row for row in rows if int(row[0, 1]) & lights.NEAR_FLAG]
                 others = [row for row in rows if not int(row[0, 1]) & lights.NEAR_FLAG]

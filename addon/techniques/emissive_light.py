@@ -123,6 +123,7 @@ class EmissiveLight(Technique):
             items.append((row, views))
         for rows, views in rounds(frame, items, resolution):
             maps = self.service.draw(frame, self, views, resolution)
+            yield from maps.drawing
             yield
             yield from shade(frame, self, rows, 1 << lights.SURFACE, self._sources, maps)
 

@@ -112,7 +112,7 @@ class EnvironmentAreaLights(Technique):
             row[0, 1] += lights.WHOLE_FLAG * (cell >= 1.0)
             row[2, 3] = NO_SHARE
             items.append((row, views))
-        for rows, views in rounds(frame, items, resolution, maps_of.atlas_texels):
+        for rows, views in rounds(frame, items, resolution, maps_of.most_texels(frame)):
             maps = maps_of.draw(frame, views)
             frame.count(self, "maps", len(views))
             yield

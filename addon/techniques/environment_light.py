@@ -153,6 +153,7 @@ class EnvironmentLight(Technique):
             items.append((row, views))
         for rows, views in rounds(frame, items, resolution):
             maps = self.service.draw(frame, self, views, resolution)
+            yield from maps.drawing
             yield
             yield from shade(frame, self, rows, 1 << lights.DIRECTION, self._sources, maps)
 

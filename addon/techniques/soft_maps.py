@@ -27,6 +27,7 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images
 from .accumulated_maps import (
+    PART_TEXELS,
     RAY_CONSTANTS,
     AccumulatedMaps,
     Lookup,
@@ -126,6 +127,10 @@ class SoftMaps(AccumulatedMaps):
         frame.count(self, "lights with penumbra" if cell else "hard lights")
         return [replace(view, cell=cell) for view in super().views(frame, emitter, sample, number, cell)]
 
+    def most_texels(self, frame: Frame) -> int:
+        """Of the views of a round: filtered at once, a window answers between rounds only."""
+        return self.atlas_texels if frame.shared_out is None else min(self.atlas_texels, PART_TEXELS)
+
     def draw(self, frame: Frame, views: list) -> Maps:
         seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self))
         key = (*seen, *((view.rows.tobytes(), view.cell) for view in views))
@@ -134,7 +139,10 @@ class SoftMaps(AccumulatedMaps):
         if not varies and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
             return self._to_ask(frame, self._drawn[1])
-        maps = self._with_bounds(frame, views, self.service.draw(frame, self, views, self.resolution(frame)))
+        maps = self.service.draw(frame, self, views, self.resolution(frame))
+        for _ in maps.drawing:
+            pass
+        maps = self._with_bounds(frame, views, maps)
         self._drawn = (key, maps)
         return self._to_ask(frame, maps)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
+from addon.frame.bands import samples_in_parts
 
 SIZE = (24, 24)
 POINTS = 64
@@ -106,6 +107,18 @@ def test_light_that_cannot_be_repeated_is_guessed_whole(stage, light_of, monkeyp
         stage.scene.candela.slot_environment = "directional_occlusion"
     guess, repeated = (light_of("diffuse_direct", 4, edges) for edges in (False, True))
     np.testing.assert_array_equal(guess, repeated)
+
+
+def test_samples_that_are_drawn_in_parts_are_the_same(stage, light_of, monkeypatch):
+    """As in a window, which answers between parts: after each map here."""
+    half_in_shadow(stage)
+    stage.light("SUN", energy=1.0, turn=(0.3, 0, 0))
+    stage.world((1, 1, 1), 0.5)
+    whole = light_of("diffuse_direct", 4, True)
+    light_of("diffuse_direct", 4, False)  # else the picture is only shown again
+    monkeypatch.setattr("addon.techniques.accumulated_maps.PART_TEXELS", 1)
+    monkeypatch.setattr("addon.engine._whole_samples", samples_in_parts)
+    np.testing.assert_array_equal(whole, light_of("diffuse_direct", 4, True))
 
 
 def test_the_same_picture_twice(stage, light_of):
