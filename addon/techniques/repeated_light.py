@@ -49,35 +49,33 @@ MARKED = "LESS"  # `where` of passes.fullscreen: the marks are 1 of 0
 
 @dataclass(frozen=True)
 class Lit:
-    """A pass of light over the surfaces of a sample. `bindings` lack the surfaces, the view and the share; the block
-    `sources` is filled from `rows` and `views`, if there are rows."""
+    """A pass of light over the surfaces of a sample. `bindings` lack the surfaces, the view, the share and the block
+    `sources`, which is filled from `rows` and `views`."""
 
     program: Program
     where: str
     bindings: dict[str, dict]
-    rows: list[np.ndarray] | None = None
+    rows: list[np.ndarray]
     views: np.ndarray | None = None
 
-    def draw(
-        self, frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image], target: images.Target,
-        where: str, share: float, band: tuple[int, int] | None = None,
-    ) -> None:  # fmt: skip
-        """Add `share` of the light on `surfaces` (by their bindings) to `target`."""
-        blocks = {"film_view": frame.view_block, **self.bindings["blocks"]}
-        if self.rows is not None:
-            blocks["sources"] = sources.set(self.rows, self.views)
-        passes.fullscreen(
-            self.program, target, blend="ADDITIVE_PREMULT", where=where, rows=band,
-            textures={**surfaces, **self.bindings["textures"]}, blocks=blocks,
-            constants={**self.bindings["constants"], "light_share": share},
-        )  # fmt: skip
+    def bound(
+        self, frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image], share: float
+    ) -> dict[str, dict]:
+        """All bindings of the pass that adds `share` of the light on `surfaces` (by their bindings)."""
+        block = sources.set(self.rows, self.views)
+        return {
+            "textures": {**surfaces, **self.bindings["textures"]},
+            "blocks": {"film_view": frame.view_block, "sources": block, **self.bindings["blocks"]},
+            "constants": {**self.bindings["constants"], "light_share": share},
+        }
 
 
 def add(frame: Frame, technique: Technique, sources: lights.Sources, lit: Lit) -> Iterator[None]:
     """Add this light to the sample's radiance, in parts, and keep it for other points of the film."""
     target = frame.target(*(f"radiance.{path}" for path in PATHS), depth=MARKS)
+    bindings = lit.bound(frame, sources, surface_bindings(frame), 1.0)
     for band in frame.bands(technique):
-        lit.draw(frame, sources, surface_bindings(frame), target, lit.where, 1.0, band)
+        passes.fullscreen(lit.program, target, blend="ADDITIVE_PREMULT", where=lit.where, rows=band, **bindings)
         yield
     frame.services.setdefault("lit", []).append(lit)
 
@@ -98,7 +96,8 @@ def repeat(
 ) -> None:
     """Add `share` of the sample's direct light on `surfaces` where the depth of `target` marks it."""
     for lit in frame.services["lit"]:
-        lit.draw(frame, sources, surfaces, target, MARKED, share)
+        bindings = lit.bound(frame, sources, surfaces, share)
+        passes.fullscreen(lit.program, target, blend="ADDITIVE_PREMULT", where=MARKED, **bindings)
 
 
 def forget(frame: Frame) -> None:

@@ -78,7 +78,7 @@ class TracedGlossy(Technique):
 
     def __init__(self):
         self._sources = lights.Sources()
-        self._lights = None
+        self._rows: list[np.ndarray] = []
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
@@ -105,10 +105,9 @@ class TracedGlossy(Technique):
             shown = lights.traceable([emitter for emitter in found if emitter is not None])
             rates = [rate_of(frame, emitter.light.key).per_sample for emitter in shown]
             rows = [emitter.row(emitter.centre, 0, 0, rate, rate) for emitter, rate in zip(shown, rates)]
-            self._lights = self._sources.set(rows)
+            self._rows = rows
             sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
             self._world_samples = directions_rate(frame).per_sample if sampled else 0.0
-            self._light_count = len(shown)
         world = frame.snapshot.world
         hierarchy = frame.hierarchy()
         emissive_power, emissive_points = frame.services.get("emissive", (0.0, 1.0))
@@ -119,20 +118,19 @@ class TracedGlossy(Technique):
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
             },
-            "blocks": {"world_light": frame.environment.block, "sources": self._lights},
+            "blocks": {"world_light": frame.environment.block},
             "constants": {
-                "light_count": self._light_count, "traced_roughness": roughness,
+                "light_count": len(self._rows), "traced_roughness": roughness,
                 "offset_size": 1e-6 * frame.geometry.size,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive_power, "emissive_points": emissive_points,
             },
         }  # fmt: skip
-        yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings))
+        yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings, self._rows))
         frame.count(self, "passes")
 
     def release(self) -> None:
-        self._lights = None
         self._sources.release()
 
 

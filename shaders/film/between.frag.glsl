@@ -78,17 +78,18 @@ bool arriving_enough(Arriving sum, vec3 color)
 #ifdef REPEATED
 #define EVEN 0.3  // share of the light by which it may differ
 #define LIKE 0.99  // cosine of an angle by which a highlight may turn
-// How much the direct light differs that arrives at pixels on one surface, and how many of them face alike.
+// How much the direct light differs that arrives at pixels on one surface, and whether all face alike.
 struct Spread {
   float least;
   float most;
   int count;
+  bool alike;
 };
 
 void spread_add(inout Spread spread, vec3 direct, vec3 color, bool like)
 {
   float shown = luminance(color);
-  spread.count -= like ? 0 : 100;
+  spread.alike = spread.alike && like;
   if (shown > LEAST_COLOR) {
     float arriving = luminance(direct) / shown;
     spread.least = min(spread.least, arriving);
@@ -99,7 +100,7 @@ void spread_add(inout Spread spread, vec3 direct, vec3 color, bool like)
 
 bool spread_is_even(Spread spread, Arriving same, vec3 color)
 {
-  bool even = spread.count >= 2 && spread.most - spread.least <= EVEN * spread.most;
+  bool even = spread.alike && spread.count >= 2 && spread.most - spread.least <= EVEN * spread.most;
   return luminance(color) <= LEAST_COLOR || (even && arriving_enough(same, color));
 }
 #endif
@@ -151,6 +152,7 @@ void main()
   spread.least = 1e30;
   spread.most = 0.0;
   spread.count = 0;
+  spread.alike = true;
   Spread lobe_spread = spread;
 #endif
   bool light_found = false;

@@ -36,10 +36,6 @@ def wires(stage, height, material, width=0.03):
         stage.mesh(corners, [(0, 1, 2, 3)], material=material)
 
 
-def passes_of(stage, name="film"):
-    return stage.ledger.row(name).counters["passes"]
-
-
 def half_in_shadow(stage):
     """Wires above a floor; something overhead shades one half of both, along a slanting edge."""
     stage.floor(material=stage.diffuse(0.2))
@@ -92,7 +88,7 @@ def test_pictures_of_few_samples_do_without(stage, light_of):
 def test_a_point_for_each_sample_needs_none(stage, light_of):
     half_in_shadow(stage)
     light_of("diffuse_direct", 16, True, points=16)
-    assert passes_of(stage) == 2 * 16
+    assert stage.ledger.row("film").counters["passes"] == 2 * 16
 
 
 @pytest.mark.parametrize("why", ["rounds", "occlusion"])
