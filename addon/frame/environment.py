@@ -7,11 +7,15 @@ may guide the density further, to directions from which light reaches what the c
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ..gfx import images
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Note, World
+from . import irradiance
+from .irradiance import WorldCells
 from .lights import LUMINANCE
 from .world_tree import WorldTree
 
@@ -49,20 +53,51 @@ class Environment:
             map_x=rows[0], map_y=rows[1], map_z=rows[2],
             map_options=(float(transparent_film), 0, 0, 0),
         )  # fmt: skip
+        self._openness: np.ndarray | None = None  # of the cells of light
+        self._known: tuple[images.Image, int] | None = None
         self._set_density(density)
+
+    @cached_property
+    def _light_cells(self) -> WorldCells:
+        pixels = self.pixels
+        height, width = max(pixels.shape[0], 2 * irradiance.ROWS), max(pixels.shape[1], 2 * irradiance.COLUMNS)
+        if (height, width) != pixels.shape[:2]:  # smaller ones are seen interpolated
+            v, u = np.mgrid[0:height, 0:width]
+            latitude, azimuth = ((v + 0.5) / height - 0.5) * np.pi, (0.5 - (u + 0.5) / width) * 2 * np.pi
+            ring = np.cos(latitude)
+            pixels = self.lookup(np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), np.sin(latitude)], axis=-1))
+        return WorldCells(pixels * self.color)
+
+    def known_irradiance(self) -> tuple[images.Image, int]:
+        """What normals get of the world where it is as open as `guide` was told, as shaders/lib/known_irradiance.glsl
+        reads it, and how many bright cells stand in it."""
+        if self._known is None:
+            known = self._light_cells.irradiance(self._to_world, 1.0 if self._openness is None else self._openness)
+            self._known = images.upload(known.texels()), len(known.bright)
+        return self._known
+
+    def openness(self, directions: np.ndarray) -> np.ndarray:
+        """(...) how open the scene is towards directions (..., 3) of the world, as `guide` was told; else 1."""
+        if self._openness is None:
+            return np.ones(directions.shape[:-1])
+        return self._openness[self._light_cells.of(directions @ self.rotation.T)]
 
     @property
     def notes(self) -> tuple[Note, ...]:
         """What of the world is drawn otherwise than Cycles would."""
         return () if self.tree is None else self.tree.notes
 
-    def guide(self, usefulness: np.ndarray | None) -> None:
+    def guide(self, usefulness: np.ndarray | None, openness: np.ndarray | None = None) -> None:
         """Prefer directions from which light reaches what the camera sees.
 
         `usefulness`, (GUIDE_ROWS, GUIDE_COLUMNS), is the mean of visibility x cosine over probes, for cells of equal
         solid angle in the world's own frame. A tenth of the directions ignores it, so that what the probes missed is
-        still drawn. None: back to radiance alone.
+        still drawn. None: back to radiance alone. `openness`, of the same cells: the mean of visibility over probes that
+        face them.
         """
+        self._known, self._openness = None, None
+        if openness is not None:
+            self._openness = _between_cells(openness, self._light_cells.centres() @ self._to_world.T)
         if usefulness is None:
             if self.density is not self._by_radiance:
                 self._set_density(self._by_radiance)
@@ -155,6 +190,18 @@ def _largest_nearby(cells: np.ndarray) -> np.ndarray:
     """Maximum over a cell and its eight neighbours: what probes saw there is likely to be seen here by others."""
     round_about = np.pad(np.pad(cells, ((0, 0), (1, 1)), mode="wrap"), ((1, 1), (0, 0)), mode="edge")
     return np.lib.stride_tricks.sliding_window_view(round_about, (3, 3)).max(axis=(2, 3))
+
+
+def _between_cells(cells: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Values (GUIDE_ROWS, GUIDE_COLUMNS) of cells as of `guide`, bilinear in directions (N, 3) of the world."""
+    row = np.clip((directions[:, 2] + 1) / 2 * GUIDE_ROWS - 0.5, 0, GUIDE_ROWS - 1)
+    column = (np.arctan2(directions[:, 1], directions[:, 0]) / (2 * np.pi) + 0.5) * GUIDE_COLUMNS - 0.5
+    y, x = np.minimum(row.astype(int), GUIDE_ROWS - 2), np.floor(column).astype(int)
+    ty, tx = row - y, column - x
+    left, right = x % GUIDE_COLUMNS, (x + 1) % GUIDE_COLUMNS
+    return (cells[y, left] * (1 - tx) + cells[y, right] * tx) * (1 - ty) + (
+        cells[y + 1, left] * (1 - tx) + cells[y + 1, right] * tx
+    ) * ty
 
 
 def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:

@@ -235,12 +235,20 @@ def kinds_of(emitters: Iterable[Emitter]) -> int:
 
 
 def direction_row(
-    direction, radiance_over_density, density, flags, first_view: int, view_count: int, rate: float = 1.0
+    direction,
+    radiance_over_density,
+    density,
+    flags,
+    first_view: int,
+    view_count: int,
+    rate: float = 1.0,
+    openness: float = 1.0,
 ) -> np.ndarray:
-    """A row for light from one direction at infinity, as the environment draws them, `rate` in a sample."""
+    """A row for light from one direction at infinity, as the environment draws them, `rate` in a sample; `openness`:
+    of what is drawn from there, how much is expected to arrive."""
     rows = np.zeros((TEXELS, 4))
     rows[0] = DIRECTION, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
-    rows[1, :3] = direction
+    rows[1] = *direction, openness
     rows[2, 3] = rate
     rows[3] = *(np.asarray(radiance_over_density) / rate), density
     return rows

@@ -8,6 +8,14 @@ and no scene spends them on the ground below it.
 Directions w come from a low-discrepancy set warped by the world's luminance (addon/frame/environment.py); V is an
 orthographic depth map along w over what the camera sees, so it converges to the truth with any occluder.
 
+What shared directions bring where nothing is in the way has a known mean, the irradiance of a normal
+(addon/frame/irradiance.py), and differs from it by noise that all pixels share. Diffuse surfaces have that noise taken
+off, as much of it as light arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl): an open
+floor has its exact light in every sample. Directions count there by how open the probes found the scene towards them;
+with what is hardly seen, and hardly drawn, counted in full, there would be more noise than before. relMSE of the
+picture, 256x192, 1, 4 and 16 samples, without and with: product .0558 .0134 .00199 and .0455 .0106 .00181, and its mean
+1.029 1.016 .997 and .993 1.000 .999 of Cycles'; instances .113 .0367 and .112 .0357; garden, foliage 0 to 3 % less.
+
 Where many pixels see little of the world (a gallery behind columns), most of the shared directions bring them nothing.
 There each pixel of a final picture traces a ray instead of each two directions, drawn from a table of its tile
 (addon/frame/world_tiles.py). The probes tell beforehand which of the two leaves less: an open sky and a sun in a
@@ -22,10 +30,14 @@ relMSE of 256x192 pixels, denoised, by shared directions and by rays:
 | cost | per sample |
 |---|---|
 | maps | `directions` orthographic views (more where the picture reaches from near to far) |
-| passes | 1 over the screen |
+| passes | 2 over the screen |
 | rays | 1 per pixel instead of each 2 maps |
 
 Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/frame/rates.py).
+
+Bias: the first sample takes its own share of the known light, an error that falls with its directions and with the
+samples; the irradiance is known to within 0.3 % (irradiance.py). Rough diffuse surfaces have it as Lambert's do, which
+costs noise, not truth.
 
 Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (see traced_glossy).
 Few samples under an even sky show faint overlapping hard shadows.
@@ -43,9 +55,9 @@ from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..gfx import images
+from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import RESOLUTION, DepthMapService, Lookup, Maps, map_resolution, rounds
+from .accumulated_maps import HARD, RESOLUTION, DepthMapService, Lookup, Maps, map_resolution, rounds
 from .direct_light import DIRECT_WRITES, lighting, shade
 from .light_probes import WORLD
 from .surfaces import LIT_SURFACES
@@ -63,6 +75,20 @@ WORLD_RAYS = Lookup(
     defines=(("OWN_POINTS", "1"),),
     blocks=((environment.WORLD, "world_light"),),
 )  # fmt: skip
+KNOWN = Lookup(
+    "hard, irradiance known",
+    HARD.file,
+    textures=(("RGBA32F", "irradiance_table"), ("RG32F", "openness")),
+    constants=(("FLOAT", "known_share"), ("INT", "bright_count")),
+    defines=(("KNOWN_IRRADIANCE", "1"),),
+)
+KNOWN_LIGHTING = tuple(lighting(KNOWN, soft_lobes, 1 << lights.DIRECTION) for soft_lobes in (False, True))
+OPENNESS = passes.fullscreen_program(
+    "openness to the world",
+    "light/openness.frag.glsl",
+    textures=(("RG32F", "openness"), ("RGBA32F", "diffuse"), ("RGBA32F", "glossy")),
+    outputs=(("VEC4", "out_openness"),),
+)
 RAY_LIGHTING = tuple(lighting(WORLD_RAYS, soft_lobes, 1 << lights.DIRECTION) for soft_lobes in (False, True))
 UNSHARED = 1.5  # times less of the noise of rays than of shared directions remains after denoising
 USUAL = 4.0  # shared directions of a sample that rays are compared with: with more of both the same one wins
@@ -114,6 +140,7 @@ class EnvironmentLight(Technique):
         self.service = DepthMapService()
         self._sources = lights.Sources()
         self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
+        self._openness: list[images.Target] = []  # sums before this sample, and a place for those after it
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_environment_light(snapshot)
@@ -149,13 +176,42 @@ class EnvironmentLight(Technique):
                     *frame.random_at(number, "map/environment"), *frame.random_at(number, "map/environment/turn")
                 )  # fmt: skip
                 views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, jitter, resolution)
-            row = lights.direction_row(direction, radiance / density, density, flags, 0, len(views), rate.per_sample)
+            row = lights.direction_row(
+                direction, radiance / density, density, flags, 0, len(views), rate.per_sample,
+                float(frame.environment.openness(direction)),
+            )  # fmt: skip
             items.append((row, views))
         for rows, views in rounds(frame, items, resolution):
             maps = self.service.draw(frame, self, views, resolution)
             yield from maps.drawing
             yield
+            maps = self._known(frame, maps, len(rows) / (len(items) * min(rate.per_sample, 1.0)))
             yield from shade(frame, self, rows, 1 << lights.DIRECTION, self._sources, maps)
+        if items and frame.sample + 1 < frame.settings.samples:
+            self._sum_openness(frame)
+
+    def _known(self, frame: Frame, maps: Maps, share: float) -> Maps:
+        """The same maps, asked for what is missing of `share` of the world's irradiance, too."""
+        if frame.sample == 0 or not self._openness:
+            self._give_openness()
+            self._openness = [images.Target((images.pool.take(*frame.size, "RG32F"),)) for _ in range(2)]
+            self._openness[0].clear()
+        table, bright = frame.environment.known_irradiance()
+        return replace(
+            maps, lookup=KNOWN, textures={"irradiance_table": table, "openness": self._openness[0].colors[0]},
+            constants={"known_share": share, "bright_count": bright},
+        )  # fmt: skip
+
+    def _sum_openness(self, frame: Frame) -> None:
+        before, after = self._openness
+        light = {path: frame.images[f"radiance.{path}_direct"] for path in ("diffuse", "glossy")}
+        passes.fullscreen(OPENNESS, after, textures={"openness": before.colors[0], **light})
+        self._openness = [after, before]
+
+    def _give_openness(self) -> None:
+        for target in self._openness:
+            images.pool.give(target.colors[0])
+        self._openness = []
 
     def _tables(self, frame: Frame, rate: Rate) -> images.Image | None:
         """Tables of directions by tile, where rays by them leave less noise than `rate` shared directions."""
@@ -194,5 +250,6 @@ class EnvironmentLight(Technique):
 
     def release(self) -> None:
         self._edges = None
+        self._give_openness()
         self.service.release()
         self._sources.release()

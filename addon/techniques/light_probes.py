@@ -53,7 +53,7 @@ GUIDE = passes.fullscreen_program(
     constants=(
         ("INT", "columns"), ("INT", "rows"), ("IVEC2", "probes"), ("FLOAT", "offset_size"),
     ),
-    outputs=(("FLOAT", "out_useful"),),
+    outputs=(("VEC2", "out_useful"),),
 )  # fmt: skip
 SPREAD = passes.fullscreen_program(
     "light spread",
@@ -124,7 +124,7 @@ class LightProbes(Technique):
         fine = frame.settings.whole and affordable >= FINE_PROBES[0] * FINE_PROBES[1]
         grid = FINE_PROBES if fine else GUIDE_PROBES
         probes = grid[0] * grid[1]
-        with images.borrowed(rows * columns, probes, "R32F") as target:
+        with images.borrowed(rows * columns, probes, "RG32F") as target:
             passes.fullscreen(
                 GUIDE,
                 target,
@@ -132,8 +132,9 @@ class LightProbes(Technique):
                 blocks={"film_view": frame.view_block},
                 constants={**rays["constants"], "columns": columns, "rows": rows, "probes": grid},
             )
-            useful = images.read(target.colors[0]).reshape(grid[1], grid[0], rows, columns)
-        frame.environment.guide(useful.mean(axis=(0, 1)))
+            found = images.read(target.colors[0]).reshape(grid[1], grid[0], rows, columns, 2)
+        useful, facing = found[..., 0], found[..., 1].sum(axis=(0, 1))
+        frame.environment.guide(useful.mean(axis=(0, 1)), useful.sum(axis=(0, 1)) / np.maximum(facing, 1e-30))
         frame.services["world_seen"] = useful
         frame.count(self, "guiding rays", rows * columns * probes)
 

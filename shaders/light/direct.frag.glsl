@@ -5,6 +5,9 @@
 // The point is the same for all pixels, so a narrow glossy lobe would see a few bright dots. Where rays are traced
 // (light/traced.frag.glsl) such lobes take part of their light from there; both are weighted by the balance of squared
 // densities (Veach's power heuristic), so the sum has the same mean.
+//
+// KNOWN_IRRADIANCE: the lights are directions of the world, whose irradiance is known where nothing is in the way
+// (lib/known_irradiance.glsl); what arrived of the light that was drawn, and that, are left in w, for light/openness.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #ifdef SOFT_LOBES
@@ -12,6 +15,9 @@
 #endif
 #include "light/whole.glsl"
 #include "generated/visibility"
+#ifdef KNOWN_IRRADIANCE
+#include "lib/known_irradiance.glsl"
+#endif
 
 // Irradiance in closed form times the closure towards the light's middle: exact for Lambert's.
 vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
@@ -48,6 +54,11 @@ void main()
   bool traced = s.glossy_roughness <= traced_roughness;
   vec3 diffuse = vec3(0.0);
   vec3 glossy = vec3(0.0);
+#ifdef KNOWN_IRRADIANCE
+  vec3 drawn = vec3(0.0);
+  float arrived = 0.0;
+  bool known = false;
+#endif
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
 #ifdef OWN_POINTS
@@ -60,6 +71,9 @@ void main()
     vec3 from_diffuse = vec3(0.0);
     vec3 from_glossy = vec3(0.0);
     vec3 facing = s.geometric_normal;
+#ifdef KNOWN_IRRADIANCE
+    vec3 falling = vec3(0.0);
+#endif
     if (whole && on_diffuse) {
       vec3 to_middle = (light.kind == LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
       from_diffuse = whole_diffuse(light, s, to_viewer, to_middle);
@@ -72,6 +86,11 @@ void main()
       vec3 direction;
       float density;
       vec3 arriving = light_sample(source, s.position, direction, density);
+#ifdef KNOWN_IRRADIANCE
+      falling = arriving * max(dot(s.normal, direction), 0.0);
+      known = known || on_diffuse;
+      drawn += light.radius * falling;  // openness of its direction
+#endif
       if (on_diffuse && !whole) {
         from_diffuse += arriving *
                         diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction);
@@ -104,8 +123,20 @@ void main()
       }
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;
+#ifdef KNOWN_IRRADIANCE
+      arrived += luminance(abs(falling)) * visibility;
+#endif
     }
   }
   out_diffuse = vec4(light_share * diffuse, 0.0);
   out_glossy = vec4(light_share * glossy, 0.0);
+#ifdef KNOWN_IRRADIANCE
+  if (known) {
+    float all = luminance(abs(drawn));
+    vec3 missing = known_share * known_irradiance(s.normal) - drawn;
+    out_diffuse.rgb += light_share * openness_of(pixel, arrived, all) * missing * s.diffuse / PI;
+    out_diffuse.w = arrived;
+    out_glossy.w = all;
+  }
+#endif
 }

@@ -1,11 +1,12 @@
-// Guiding: does light from a cell of directions (column) arrive at a probe (row), a pixel of a coarse grid?
+// Guiding: does light from a cell of directions (column) arrive at a probe (row), a pixel of a coarse grid? By its cosine;
+// y: if nothing were in the way.
 // Each probe shifts its directions within the cells, so that the mean over the probes covers them.
 #include "lib/gbuffer.glsl"
 #include "trace/rays.glsl"
 
 void main()
 {
-  out_useful = 0.0;
+  out_useful = vec2(0.0);
   ivec2 place = ivec2(gl_FragCoord.xy);
   ivec2 probe = ivec2(place.y % probes.x, place.y / probes.x);
   uvec3 bits = hash3(uvec3(uint(place.x), uint(place.y), 41u));
@@ -29,5 +30,6 @@ void main()
     return;
   }
   float side = (dot(direction, s.geometric_normal) < 0.0 && translucent) ? -1.0 : 1.0;
-  out_useful = cosine * clear_path(ray_origin(s.position, side * s.geometric_normal), direction, 1e29, bits.z);
+  out_useful.y = cosine;
+  out_useful.x = cosine * clear_path(ray_origin(s.position, side * s.geometric_normal), direction, 1e29, bits.z);
 }

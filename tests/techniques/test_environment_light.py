@@ -152,6 +152,42 @@ def gallery(stage):
             stage.rectangle((x, y + 0.6), (x + 0.6, y + 1), z=0.4).visible_camera = False
 
 
+def test_what_is_known_of_an_uneven_sky_needs_no_directions(floor):
+    """Each sample of an open floor has the irradiance of its normal, whatever directions it drew."""
+    height, width = 32, 64
+    direction, solid_angle = directions(height, width)
+    pixels = np.repeat((0.1 + np.maximum(direction[..., 2], 0) + 5.0 * (direction[..., 0] > 0.8))[..., None], 3, 2)
+    sky(floor, pixels)
+    known = (pixels[..., 0] * solid_angle * np.maximum(direction[..., 2], 0)).sum() / np.pi
+    for seed in (1, 2):
+        found = floor.render(1, seed=seed)["diffuse_direct"]
+        np.testing.assert_allclose(found, known, rtol=0.02)  # the map is seen interpolated
+
+
+@pytest.mark.slow
+def test_known_light_leaves_the_mean_where_things_stand_in_the_way(floor, monkeypatch):
+    """A wall beside the floor under an uneven sky: the same mean with what is known taken off and without."""
+    height, width = 32, 64
+    direction, _ = directions(height, width)
+    pixels = np.repeat((0.1 + 2.0 * (direction[..., 0] > 0.5) + (direction[..., 1] < -0.8))[..., None], 3, 2)
+    sky(floor, pixels)
+    wall = floor.mesh([(0, -300, 0), (0, 300, 0), (0, 300, 1), (0, -300, 1)], [(0, 1, 2, 3)])
+    wall.visible_camera = False
+    floor.scene.candela.environment_light_directions = 4
+
+    def mean_and_noise():
+        pictures = []
+        for seed in range(6):
+            pictures.append(floor.render(16, seed=seed)["diffuse_direct"][..., 0].mean(axis=0, dtype=float))
+        return np.mean(pictures, axis=0), np.std(pictures, axis=0, ddof=1)
+
+    mean, noise = mean_and_noise()
+    monkeypatch.setattr(environment_light.EnvironmentLight, "_known", lambda self, frame, maps, share: maps)
+    plain, plain_noise = mean_and_noise()
+    np.testing.assert_allclose(mean, plain, atol=0.01 * plain.mean() + 3 * np.hypot(noise, plain_noise).max() / 6**0.5)
+    assert (noise**2).mean() < 0.7 * (plain_noise**2).mean()
+
+
 @pytest.mark.slow
 def test_rays_by_tiles_have_the_mean_of_shared_directions(stage, monkeypatch):
     monkeypatch.setattr(environment_light, "UNSHARED", np.inf)  # rays, whatever they leave
