@@ -92,8 +92,8 @@ class Environment:
 
         `usefulness`, (GUIDE_ROWS, GUIDE_COLUMNS), is the mean of visibility x cosine over probes, for cells of equal
         solid angle in the world's own frame. A tenth of the directions ignores it, so that what the probes missed is
-        still drawn. None: back to radiance alone. `openness`, of the same cells: the mean of visibility over probes that
-        face them.
+        still drawn. None: back to radiance alone. `openness`, of the same cells: the mean of visibility over probes
+        that face them.
         """
         self._known, self._openness = None, None
         if openness is not None:

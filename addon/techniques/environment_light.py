@@ -10,9 +10,9 @@ orthographic depth map along w over what the camera sees, so it converges to the
 
 What shared directions bring where nothing is in the way has a known mean, the irradiance of a normal
 (addon/frame/irradiance.py), and differs from it by noise that all pixels share. Diffuse surfaces have that noise taken
-off, as much of it as light arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl): an open
-floor has its exact light in every sample. Directions count there by how open the probes found the scene towards them;
-with what is hardly seen, and hardly drawn, counted in full, there would be more noise than before. relMSE of the
+off, as much of it as light arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl): an
+open floor has its exact light in every sample. Directions count there by how open the probes found the scene towards
+them; with what is hardly seen, and hardly drawn, counted in full, there would be more noise than before. relMSE of the
 picture, 256x192, 1, 4 and 16 samples, without and with: product .0558 .0134 .00199 and .0455 .0106 .00181, and its mean
 1.029 1.016 .997 and .993 1.000 .999 of Cycles'; instances .113 .0367 and .112 .0357; garden, foliage 0 to 3 % less.
 

@@ -23,7 +23,7 @@ SUN = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
 SKIES = {
     "even": np.ones((HEIGHT, WIDTH)),
     "sky above a ground": np.where(DIRECTIONS[..., 2] > 0, 0.3 + DIRECTIONS[..., 2], 0.1),
-    "sun": 0.2 + 5000.0 * (DIRECTIONS @ SUN > np.cos(np.radians(0.9))),
+    "sun": 0.2 + 5000.0 * (np.einsum("hwi,i->hw", DIRECTIONS, SUN) > np.cos(np.radians(0.9))),
     "window": 0.05 + 3.0 * ((np.abs(DIRECTIONS[..., 1]) < 0.3) & (np.abs(DIRECTIONS[..., 2]) < 0.4)),
     "night that takes light away": -0.5 - DIRECTIONS[..., 0] ** 2,
 }
