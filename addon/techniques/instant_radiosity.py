@@ -20,7 +20,10 @@ Every pixel looks at every other one of the virtual lights, as on a chess board 
 Twice as many for the same arithmetic: a mean over neighbours is one over all of them.
 
 Per pixel and sample, `rays` virtual lights are traced out of all, drawn in proportion to what they would bring: noise
-comes from visibility alone. Glossy surfaces trace one ray of their lobe, whose end is shaded in the same way.
+comes from visibility alone. Glossy surfaces trace a ray of their lobe, whose end is shaded in the same way; where the
+lobe is most of what is seen, as on metal, LOBE_RAYS of them: the noise of one is then the noise of the picture. relMSE
+of the picture, 256x192, 16 samples, with one, two and four: product .00181, .00160, .00151, garden .0037, .0034, .0033,
+instances .0127, .0124, .0122, in 1, 1.0 to 1.04 and 1.03 to 1.08 times the time.
 
 More than two of them do not pay from four samples on: what is left is noise of the virtual lights, which all pixels
 share. Eight have .5 to 5 % less error than two (seven sample scenes, 256x192, 16 samples), in 1.15 to 1.5 times the
@@ -30,7 +33,7 @@ time.
 |---|---|
 | virtual lights | see virtual_lights.py: 2112 candidates, `virtual_lights` kept |
 | rays per pixel | `rays` + 1 short one, + 2 for a surface within r and, in every other sample, for each after it |
-| of glossy surfaces | + 1 to 3 |
+| of glossy surfaces | + 1 to 3, on metal + 4 to 12 |
 | arithmetic per pixel | 1 kernel for every other virtual light, and one 32nd of that again for each ray |
 
 A pixel first chooses all virtual lights that it traces, then traces them: where every pixel traced as soon as its light
@@ -83,6 +86,7 @@ SUBSETS = 2  # of the virtual lights, of which each pixel looks at one
 SEVERAL = 2  # samples, from which on Denoise runs, and rays of pixels look farther
 FARTHER = 0.2  # median distances of what is seen: their reach then
 MORE_RAYS = 4  # times, in a picture of one sample
+LOBE_RAYS = 4  # of a pixel in a sample, where a glossy lobe is most of what is seen
 GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
 GATHER_CONSTANTS = (
     *PATH_CONSTANTS,
@@ -90,6 +94,7 @@ GATHER_CONSTANTS = (
     ("FLOAT", "near_radius"),
     ("FLOAT", "glossy_radius"),
     ("FLOAT", "deeper"),
+    ("INT", "lobe_rays"),
 )
 
 
@@ -153,7 +158,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     bindings["textures"]["virtual_lights"] = lights.image
     near = near_radius(frame, len(lights))
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
-    bindings["constants"]["deeper"] = deeper_weight(frame)
+    bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
     return bindings
 
 

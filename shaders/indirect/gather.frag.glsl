@@ -84,12 +84,17 @@ void main()
 #ifdef GLOSSY
   if (s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0) {
     Lobe lobe = lobe_begin(s, to_viewer);
-    vec3 weight;
-    roll = hash3(roll);
+    // Where the lobe is most of what is seen, on metal, it has the noise that is seen.
+    int count = (luminance(s.glossy_weight * s.glossy_tint) > luminance(s.diffuse)) ? lobe_rays : 1;
     vec2 u = vec2(scrambled(film_view.bits_z, salt.y), scrambled(film_view.bits_w, salt.x));
-    vec3 direction = lobe_sample(lobe, u, weight);
-    if (max_component(weight) > 0.0 && dot(direction, s.geometric_normal) > 0.0) {
-      out_glossy.rgb = weight * near_radiance(origin, direction, true, roll);
+    for (int k = 0; k < count; k++) {
+      float part = float(k) / float(count);
+      vec3 weight;
+      roll = hash3(roll);
+      vec3 direction = lobe_sample(lobe, vec2(u.x / float(count) + part, fract(u.y + 2.5 * part)), weight);
+      if (max_component(weight) > 0.0 && dot(direction, s.geometric_normal) > 0.0) {
+        out_glossy.rgb += weight * near_radiance(origin, direction, true, roll) / float(count);
+      }
     }
   }
 #endif
