@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+BITS = 63
 
-def morton_codes(points: np.ndarray) -> np.ndarray:
-    """63-bit Morton codes of (N, 3) points within their own bounds."""
+
+def morton_codes(points: np.ndarray, bounds: tuple[np.ndarray, np.ndarray] | None = None) -> np.ndarray:
+    """Morton codes, BITS long, of (N, 3) points within `bounds`, lowest and highest, or their own."""
     if not len(points):
         return np.zeros(0, np.uint64)
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
+    low, high = bounds or (points.min(axis=0), points.max(axis=0))
+    extent = max(float((high - low).max()), 1e-30)
     grid = np.clip((points - low) / extent * (2**21 - 1), 0, 2**21 - 1).astype(np.uint64)
     code = np.zeros(len(points), np.uint64)
     for axis in range(3):
