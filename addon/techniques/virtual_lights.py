@@ -190,9 +190,7 @@ class VirtualLights:
         grid = Grid.of(frame, count)
         found = self._candidates(frame, grid)
         point, normal, radiance, shorter = self._radiances(frame, grid, found)
-        geometry = frame.geometry
-        bounds = geometry.bounds_min - geometry.origin, geometry.bounds_max - geometry.origin
-        keep, weight = _resample(point, radiance, count, frame.random("virtual lights/keep")[0], bounds)
+        keep, weight = _resample(point, radiance, count, frame.random("virtual lights/keep")[0])
         density = self._densities(frame, grid, found, keep)
         for image in found.colors:
             images.pool.give(image)
@@ -387,22 +385,19 @@ def near_radius(frame: Frame, count: int) -> float:
     return NEAR * float(np.sqrt(128 / max(count, 1)) * np.median(frame.receivers.distance))
 
 
-def _resample(
-    point: np.ndarray, radiance: np.ndarray, count: int, u: float, bounds: tuple[np.ndarray, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
+def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the candidates that are kept, in an order in space, and how many candidates each stands for.
 
     Marks at equal steps of the importance run along a curve through space, so that what is kept is spread over the
-    surfaces as evenly as the candidates allow. They start anew in every cell of an octree over `bounds` that holds no
-    more than CELL of them: a candidate that another picture has or lacks then changes what is kept nearby, not all
-    that is kept.
+    surfaces as evenly as the candidates allow. They start anew in every cell of an octree that holds no more than
+    CELL of them: a candidate that another picture has or lacks then changes what is kept nearby, not all that is kept.
     """
     importance = np.abs(np.nan_to_num(radiance, posinf=0.0, neginf=0.0)) @ lights.LUMINANCE
     if not importance.sum() > 0:
         return np.zeros(0, int), np.zeros(0)
     importance = np.where(importance > 0, importance + FLOOR * importance.mean(), 0.0)
     expected = importance / importance.sum() * count
-    codes = morton_codes(point, bounds)
+    codes = morton_codes(point, _round_bounds(point))
     order = np.argsort(codes, kind="stable")
     first, start = _cells(codes[order], expected[order])
     sums = np.concatenate([[0.0], np.cumsum(expected[order])])
@@ -414,6 +409,14 @@ def _resample(
     place = np.flatnonzero(times)
     keep = order[place]
     return keep, times[place] / expected[keep]
+
+
+def _round_bounds(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of points that others of about the same bounds have, too."""
+    low, high = point.min(axis=0), point.max(axis=0)
+    side = 2.0 ** np.ceil(np.log2(max(float((high - low).max()), 1e-30)))
+    low = np.floor(low / side) * side
+    return low, low + 2.0 * side
 
 
 def _cells(codes: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.frame.rates import Rate
 from addon.techniques import environment_light
 from tests.techniques.conftest import places
 
@@ -162,6 +163,17 @@ def test_what_is_known_of_an_uneven_sky_needs_no_directions(floor):
     for seed in (1, 2):
         found = floor.render(1, seed=seed)["diffuse_direct"]
         np.testing.assert_allclose(found, known, rtol=0.02)  # the map is seen interpolated
+
+
+@pytest.mark.parametrize("exponent", [-2, 0, 3])
+def test_known_light_counts_once_however_often_directions_are_drawn(floor, monkeypatch, exponent):
+    height, width = 32, 64
+    direction, solid_angle = directions(height, width)
+    pixels = np.repeat((0.1 + np.maximum(direction[..., 2], 0) + 5.0 * (direction[..., 0] > 0.8))[..., None], 3, 2)
+    sky(floor, pixels)
+    known = (pixels[..., 0] * solid_angle * np.maximum(direction[..., 2], 0)).sum() / np.pi
+    monkeypatch.setattr(environment_light, "directions_rate", lambda frame: Rate(exponent))
+    np.testing.assert_allclose(diffuse(floor, 8), known, rtol=0.02)
 
 
 @pytest.mark.slow
