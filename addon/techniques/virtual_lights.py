@@ -79,6 +79,7 @@ OTHER_POINTS = (32, 24)  # of emissive surfaces and of the world: of one of them
 GROUP = 16  # candidates that share the next surfaces of their paths
 FLOOR = 1.0  # share of the mean importance that every candidate keeps
 CELL = 8  # virtual lights of a cell in which they are chosen by themselves
+FEW = 2048  # at least, of the lights of a cell times all of them
 MOST_VIRTUAL = 2048
 
 PATH_TEXTURES = (
@@ -391,6 +392,7 @@ def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> 
     Marks at equal steps of the importance run along a curve through space, so that what is kept is spread over the
     surfaces as evenly as the candidates allow. They start anew in every cell of an octree that holds no more than
     CELL of them: a candidate that another picture has or lacks then changes what is kept nearby, not all that is kept.
+    Few have larger cells: each cell keeps one more or less than it should, which shows in the sum of few.
     """
     importance = np.abs(np.nan_to_num(radiance, posinf=0.0, neginf=0.0)) @ lights.LUMINANCE
     if not importance.sum() > 0:
@@ -399,7 +401,7 @@ def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> 
     expected = importance / importance.sum() * count
     codes = morton_codes(point, _round_bounds(point))
     order = np.argsort(codes, kind="stable")
-    first, start = _cells(codes[order], expected[order])
+    first, start = _cells(codes[order], expected[order], max(CELL, FEW / count))
     sums = np.concatenate([[0.0], np.cumsum(expected[order])])
     lengths = np.diff(np.append(first, len(order)))
     along = sums[1:] - np.repeat(sums[first], lengths) + np.repeat((u + start) % 1.0, lengths)
@@ -419,13 +421,13 @@ def _round_bounds(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return low, low + 2.0 * side
 
 
-def _cells(codes: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where, among sorted codes, each cell of an octree begins that holds at most CELL expected; and a number for it
+def _cells(codes: np.ndarray, expected: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where, among sorted codes, each cell of an octree begins that holds at most `most` expected; and a number for it
     that the cell beside it makes up for: the bits of its place in reverse."""
     cell, place = np.zeros(len(codes), np.uint64), np.zeros(len(codes), np.uint64)
     for depth in range(1, BITS // 3 + 1):
         first = np.concatenate([[0], np.flatnonzero(np.diff(cell)) + 1])
-        full = np.repeat(np.add.reduceat(expected, first) > CELL, np.diff(np.append(first, len(codes))))
+        full = np.repeat(np.add.reduceat(expected, first) > most, np.diff(np.append(first, len(codes))))
         if not full.any():
             break
         shift = np.uint64(BITS - 3 * depth)
