@@ -138,4 +138,8 @@ void closures_end(inout Closures c)
   c.glossy_weight = finite_or_black(c.glossy_weight * c.glossy_sum);
   c.diffuse = finite_or_black(c.diffuse);
   c.emission = finite_or_black(c.emission);
+  c.transparency = finite_or_black(c.transparency);
+  // A lobe's colour may stand in its Fresnel terms instead of its weight.
+  c.glossy_tint = finite_or_black(c.glossy_tint);
+  c.glossy_edge = finite_or_black(c.glossy_edge);
 }

@@ -103,9 +103,10 @@ vec3 glass_passing(vec3 f0, float mu, float roughness, float ior)
 }
 
 // Factor on a rough dielectric that scatters once which restores what is scattered more than once, shared as the first
-// time (Turquin 2019); each further time costs the colour of what passes.
+// time (Turquin 2019); each further time costs the colour of what passes, of which more than 1 would grow without end.
 vec3 glass_multiscatter(vec3 transmitted, float mu, float roughness, float ior)
 {
+  transmitted = min(transmitted, vec3(1.0));
   float energy = max(glass_energy(mu, roughness, ior).x, 1e-4);
   float average = glass_energy_average(roughness, ior);
   vec3 again = transmitted * average / max(vec3(1.0) - transmitted * (1.0 - average), vec3(1e-6));
