@@ -97,7 +97,7 @@ from ..frame.technique import Param
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .cssm import ORDERS, SEARCH_OFFSET
-from .multires_radiosity import LEVELS, MANY_PIXELS, MultiresRadiosity, pixels_shown_alone, regions
+from .multires_radiosity import LEVELS, MANY_PIXELS, NEAR_BOUNCES, MultiresRadiosity, pixels_shown_alone, regions
 from .soft_maps import REFINE
 from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, BoundGather, Gather, VirtualLightSet
 
@@ -167,6 +167,7 @@ class ClusteredVisibility(MultiresRadiosity):
         Param("rays", "Rays", 8, "Rays of a region that correct the clusters in a sample; 0: none", 0, 64, draft=4),
         REFINE,
         LEVELS,
+        NEAR_BOUNCES,
     )  # fmt: skip
 
     def __init__(self):

@@ -77,7 +77,7 @@ from ..frame.technique import Param, Technique
 from ..gfx import geometry, images, passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .multires_radiosity import LEVELS, MultiresRadiosity, regions
+from .multires_radiosity import LEVELS, NEAR_BOUNCES, MultiresRadiosity, regions
 from .virtual_lights import BoundGather, Gather, VirtualLightSet
 
 FILL_LEVELS = 2
@@ -227,6 +227,7 @@ class ImperfectShadowMaps(MultiresRadiosity):
             0, 128, draft=1,
         ),
         LEVELS,
+        NEAR_BOUNCES,
     )  # fmt: skip
 
     def __init__(self):

@@ -45,7 +45,10 @@ lot does the same.
 
 Bias, all in diffuse indirect light: that of instant_radiosity.py; shadows of indirect light that are narrower than a
 region are blurred over it (the shift of the grid averages the blocks, not the blur); rough diffuse reflection counts as
-Lambertian.
+Lambertian. Without `near_bounces` what is reflected more than once between surfaces closer than the bound is missing,
+for less time and no more error of a picture that is noisy anyway: by the Fast preset, 256x192, three seeds, seconds,
+relMSE and mean with it and without: instances 1.6 .0869 .988 and 1.2 .0817 .964, foliage .96 .0225 1.001 and .77 .0224
+.999, window .74 .146 .955 and .61 .141 .946, garden .69 .0360 1.002 and .61 .0344 .999.
 """
 
 from __future__ import annotations
@@ -72,6 +75,10 @@ from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLig
 MANY_PIXELS = 60_000
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.4  # ranges within a region: share of its depth, and of each axis of unit normals
 LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
+NEAR_BOUNCES = Param(
+    "near_bounces", "Near bounces", True,
+    "Follow light that close surfaces reflect to each other more than once, as long as it goes", draft=False,
+)  # fmt: skip
 BOUNDS_CONSTANTS = (
     ("IVEC2", "grid_offset"), ("FLOAT", "depth_scale"), ("FLOAT", "depth_step"), ("FLOAT", "normal_step"),
 )  # fmt: skip
@@ -190,6 +197,7 @@ class MultiresRadiosity(InstantRadiosity):
             0, 1024, draft=8,
         ),
         LEVELS,
+        NEAR_BOUNCES,
     )  # fmt: skip
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
@@ -203,6 +211,8 @@ class MultiresRadiosity(InstantRadiosity):
         scale = float(np.median(frame.receivers.distance))
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
+        if not frame.settings.get(self, "near_bounces"):
+            bindings["constants"]["deeper"] = 0.0
         yield
         bound = self.visibility(frame, lights)
         yield

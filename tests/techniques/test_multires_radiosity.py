@@ -105,3 +105,11 @@ def test_a_picture_whose_atlas_is_too_large_for_an_image_gathers_every_pixel(gpu
     most = min(images.most_side(), 1 << multires_radiosity.REGION_BITS)
     assert multires_radiosity.fitting_levels((most - 8, 4), 3) == 0
     assert multires_radiosity.fitting_levels((most // 2, 4), 3) == 3
+
+
+def test_without_near_bounces_only_what_close_surfaces_reflect_more_than_once_is_missing(stage, render):
+    corner(stage, albedo=0.8)
+    once = [render(1, virtual_lights=32, near_bounces=follow) for follow in (True, False)]
+    np.testing.assert_array_equal(*once)
+    often, less = (render(8, virtual_lights=32, near_bounces=follow).mean() for follow in (True, False))
+    assert 0.85 * often < less < 0.99 * often

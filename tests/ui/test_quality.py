@@ -45,13 +45,15 @@ def test_finer_presets_take_more_of_everything(scene):
     assert all(a < b < c for a, b, c in zip(fast, balanced, fine, strict=True))
 
 
-def test_fast_has_no_soft_maps_and_fine_has_finer_maps_of_the_world(scene):
-    soft_maps, texels = [], []
+def test_fast_has_no_soft_maps_nor_near_bounces_and_fine_has_finer_maps_of_the_world(scene):
+    soft_maps, texels, bounces = [], [], []
     for name in NAMES:
         values(scene, name)
         soft_maps.append(scene.candela.shadows_by_light_soft_maps)
         texels.append(scene.candela.environment_light_texels_per_pixel)
-    assert soft_maps == [False, True, True]
+        bounces.append(scene.candela.multires_radiosity_near_bounces)
+        assert scene.candela.clustered_visibility_near_bounces == bounces[-1]
+    assert soft_maps == bounces == [False, True, True]
     assert texels == [1.0, 1.0, 2.0]
 
 
