@@ -287,6 +287,17 @@ def gathered(cells: list[Cell], machine: str, store: Store) -> list[dict]:
     return [store.found[key] for key in (cell.key(machine) for cell in cells) if key in store.found]
 
 
+def name_of(row: dict) -> str:
+    """Of a cell, in words."""
+    return f"{row['scene']}, {row['series']['label']}, {row['samples']}"
+
+
+def beside(rows: list[dict], before: list[dict]) -> list[dict]:
+    """The rows of a run of some cells, and those of the results so far whose cells this run did not measure."""
+    new = {name_of(row): row for row in rows}
+    return [new.pop(name_of(row), row) for row in before] + list(new.values())
+
+
 def write_results(path: Path, about: dict, references: dict, rows: list[dict], left_out: list[str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     data = {"about": about, "references": references, "left_out": left_out, "cells": rows}
@@ -414,7 +425,11 @@ def command(options: argparse.Namespace) -> int:
     }
     rows = gathered(cells, done.machine, store)
     references = {**before.get("references", {}), **done.references}  # those first that this run had no need to open
-    left_out = [f"{cell.scene.name}, {cell.series.label}, {cell.samples}" for cell in done.missing]
+    left_out = [name_of(described(cell)) for cell in done.missing]
+    measured_alike = all(before.get("about", {}).get(name) == about[name] for name in ("size", "reference_samples"))
+    if measured_alike and (options.scenes or options.series or options.samples or options.no_peers):
+        left_out += [name for name in before["left_out"] if name not in {name_of(described(cell)) for cell in cells}]
+        rows = beside(rows, before["cells"])
     write_results(options.results, about, references, rows, left_out)
     for failure in done.failures:
         print(failure, file=sys.stderr)

@@ -122,6 +122,15 @@ def test_what_auto_knows_is_part_of_the_key_only_where_auto_chooses(monkeypatch)
     assert pinned.key("m") == before[1]
 
 
+def test_a_run_of_some_cells_leaves_the_others_as_they_are():
+    def row(scene, samples, seconds):
+        return {"scene": scene, "series": {"label": "Candela"}, "samples": samples, "times": [seconds]}
+
+    before = [row("a", 1, 1.0), row("a", 4, 2.0), row("b", 1, 3.0)]
+    after = run.beside([row("c", 1, 7.0), row("a", 4, 9.0)], before)
+    assert after == [row("a", 1, 1.0), row("a", 4, 9.0), row("b", 1, 3.0), row("c", 1, 7.0)]
+
+
 def test_results_hold_five_digits_and_one_cell_per_line():
     text = run.one_row_per_line({"about": {"load": 1.23456789}, "cells": [{"a": [0.000123456789]}, {"a": None}]})
     assert '{"a": [0.00012346]},\n{"a": null}' in text
