@@ -115,6 +115,7 @@ class Expressions:
 
     def _emit(self, stack: list[str]) -> None:
         """Emit nodes and what they read, deepest first; a loop, because trees can be deep."""
+        waiting: set[str] = set()  # for what they read
         while stack:
             key = stack[-1]
             if key in self._scopes[-1].done:
@@ -125,12 +126,14 @@ class Expressions:
             missing = (
                 [] if found is None else [k for k in self._sources(source, found) if k not in self._scopes[-1].done]
             )
-            # A node on the stack waits for this one already: the reader cuts cycles, hand-made graphs may not.
-            missing = [k for k in missing if k not in stack]
+            # A node that waits is read by itself: the reader cuts cycles, hand-made graphs may not.
+            missing = [k for k in missing if k not in waiting and k != key]
             if missing:
+                waiting.add(key)
                 stack += missing[::-1]
                 continue
             stack.pop()
+            waiting.discard(key)
             self._scopes[-1].done.add(key)
             self._value_node(source, found)
 

@@ -63,10 +63,16 @@ from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..frame.view import VIEW
 from ..gfx import context, images, passes
-from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, InstantRadiosity, gather_bindings, gather_defines
+from .instant_radiosity import (
+    GATHER_CONSTANTS,
+    GATHER_TEXTURES,
+    InstantRadiosity,
+    gather_bindings,
+    gather_defines,
+    lobes_of,
+)
 from .neighbours import smooth
 from .surfaces import ANY_SURFACE, MARKS, surface_bindings
 from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
@@ -162,7 +168,7 @@ TRACED_REGIONS = regions(TRACED)
 
 
 @cache
-def shared_gather_program(kinds: int, glossy: bool) -> Program:
+def shared_gather_program(kinds: int, glossy: bool, soft: bool) -> Program:
     """As gather_program, for pixels whose regions have gathered the virtual lights."""
     return passes.fullscreen_program(
         "instant radiosity of regions",
@@ -171,11 +177,11 @@ def shared_gather_program(kinds: int, glossy: bool) -> Program:
         blocks=PATH_BLOCKS,
         constants=(*GATHER_CONSTANTS, ("IVEC2", "grid_offset")),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
-        defines=(("SHARED", ""), *gather_defines(kinds, glossy)),
+        defines=(("SHARED", ""), *gather_defines(kinds, glossy, soft)),
     )
 
 
-GATHERS_SHARED = (shared_gather_program(-1, True), shared_gather_program(0, False))
+GATHERS_SHARED = (shared_gather_program(-1, True, True), shared_gather_program(0, False, False))
 
 
 def pixels_shown_alone(snapshot: Snapshot, settings: Settings) -> int:
@@ -220,7 +226,7 @@ class MultiresRadiosity(InstantRadiosity):
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         bindings["textures"]["shared_irradiance"] = irradiance
         bindings["constants"]["grid_offset"] = offset
-        program = shared_gather_program(self.virtual_lights.kinds, to_hold(frame.materials.glossy, True))
+        program = shared_gather_program(self.virtual_lights.kinds, *lobes_of(frame))
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

@@ -3,7 +3,8 @@
 
 // A diffuse part and one lobe of microfacets, whose reflectance runs from `straight` at normal incidence to `grazing`.
 struct Reflection {
-  vec3 diffuse;  // albedo
+  vec3 diffuse;  // albedo, with what passes to the other side
+  float through; // share of it that passes
   vec3 straight;
   vec3 grazing;
   float alpha;
@@ -13,11 +14,19 @@ struct Reflection {
 // sees them is spread by more than that anyway (path regularisation after Kaplanyan & Dachsbacher 2013).
 #define LEAST_ALPHA 0.25
 
+// What a lobe without microfacets reflects of even light, over its weight: all of it but for velvet, whose fibres of spread
+// s, integrated numerically over light and view, reflect s^2 / (1 + 1.17 s^2) to within 2 % (.01 at .1, .19 at .5, .46 at 1).
+float soft_lobe_albedo(Surface s)
+{
+  float squared = s.glossy_roughness * s.glossy_roughness;
+  return (s.kind == LOBE_VELVET) ? squared / (1.0 + 1.17 * squared) : 1.0;
+}
+
 vec3 surface_albedo(Surface s, float mu)
 {
   vec3 albedo = s.diffuse;
   if (s.kind > LOBE_REFRACTION) {
-    albedo += s.glossy_weight;  // sheen, translucent, toon: the weight is their albedo
+    albedo += s.glossy_weight * soft_lobe_albedo(s);
   }
   else if (s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0) {
     vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
@@ -41,11 +50,15 @@ Reflection surface_reflection(Surface s, float mu)
 {
   Reflection r;
   r.diffuse = s.diffuse;
+  r.through = 0.0;
   r.straight = vec3(0.0);
   r.grazing = vec3(0.0);
   r.alpha = 1.0;
   if (s.kind > LOBE_REFRACTION) {
-    r.diffuse += s.glossy_weight;
+    r.diffuse += s.glossy_weight * soft_lobe_albedo(s);
+    if (s.kind == LOBE_TRANSLUCENT) {
+      r.through = luminance(s.glossy_weight) / max(luminance(r.diffuse), 1e-30);
+    }
   }
   else if (s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0) {
     vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);

@@ -31,7 +31,7 @@ void main()
   if (!trace_vertex(ray_origin(probe.position, probe.geometric_normal), direction, 1e29, roll.z, met, t)) {
     return;
   }
-  out_point = vec4(met.position, 1.0);
+  out_point = vec4(met.position, (dot(met.lit, met.normal) > 0.0) ? 1.0 : -1.0);  // 1: lit on the side that it lights
   out_normal = vec4(met.normal, 0.0);
   out_albedo = vec4(met.reflection.diffuse, 0.0);
   vec3 radiance = direct_reflected(met, -direction, 4, roll.x);
@@ -42,8 +42,8 @@ void main()
   vec3 throughput = vec3(1.0);
   for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
     roll = hash3(roll);
-    vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    vec3 reflected = PI * reflection_of(met.reflection, met.normal, onward, -direction);
+    vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
+    vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
     if (bounce == 2) {
       lobe = max(reflected - met.reflection.diffuse, vec3(0.0));
     }
@@ -57,7 +57,7 @@ void main()
       throughput /= chance;
     }
     direction = onward;
-    if (!trace_vertex(ray_origin(met.position, met.normal), direction, 1e29, roll.z, met, t)) {
+    if (!trace_vertex(ray_origin(met.position, met.lit), direction, 1e29, roll.z, met, t)) {
       break;
     }
     if (bounce == 2) {

@@ -8,6 +8,9 @@
 #ifndef SHARED
 #include "indirect/traced_gather.glsl"
 #endif
+#ifdef SOFT
+#include "lib/soft_lobe.glsl"
+#endif
 
 // Radiance that arrives along a ray from surfaces nearer than the bound (from all surfaces, if `whole`), each with the
 // share that virtual lights leave to it, and what reaches those surfaces in the same way: that last light, of which there is
@@ -35,8 +38,8 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
     sum += throughput * direct_reflected(met, -direction, 1, roll.x);
     if (bounce < bounces) {
       vec3 from;
-      vec3 arriving = virtual_irradiance(met.position, met.normal, reach, roll.z, from);
-      sum += throughput * arriving * reflection_of(met.reflection, met.normal, from, -direction);
+      vec3 arriving = virtual_irradiance(met.position, met.lit, reach, roll.z, from);
+      sum += throughput * arriving * reflection_of(met.reflection, met.lit, from, -direction);
     }
     if (bounce == 1) {
       if (deeper <= 0.0) {
@@ -45,10 +48,10 @@ vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
       throughput *= deeper;
     }
     roll = hash3(roll);
-    vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(met.reflection, met.normal, onward, -direction);
+    vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(met.reflection, met.lit, onward, -direction);
     direction = onward;
-    origin = ray_origin(met.position, met.normal);
+    origin = ray_origin(met.position, met.lit);
   }
   return sum;
 }
@@ -94,6 +97,28 @@ void main()
       vec3 direction = lobe_sample(lobe, vec2(u.x / float(count) + part, fract(u.y + 2.5 * part)), weight);
       if (max_component(weight) > 0.0 && dot(direction, s.geometric_normal) > 0.0) {
         out_glossy.rgb += weight * near_radiance(origin, direction, true, roll) / float(count);
+      }
+    }
+  }
+#endif
+#ifdef SOFT
+  SoftLobe soft = soft_lobe_begin(s, to_viewer);
+  if (soft.exists) {
+    // Cloth shines at grazing angles, leaves are lit from behind: virtual lights, which stand for diffuse reflection on the
+    // viewer's side, do not serve them. One ray does, of the cosine's density.
+    float side = (soft.kind == LOBE_TRANSLUCENT) ? -1.0 : 1.0;
+    roll = hash3(roll);
+    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), scrambled(film_view.bits_w, salt.x));
+    vec3 direction = cosine_direction(side * soft.normal, u);
+    if (side * dot(direction, s.geometric_normal) > 0.0) {
+      vec3 weight = soft_reflection(soft, direction) * PI / max(side * dot(direction, soft.normal), 1e-6);
+      vec3 start = ray_origin(s.position, side * s.geometric_normal);
+      vec3 light = weight * near_radiance(start, direction, true, roll);
+      if (soft.glossy) {
+        out_glossy.rgb += light;
+      }
+      else {
+        out_diffuse.rgb += light;
       }
     }
   }

@@ -17,10 +17,11 @@ void main()
   if (next.w == 0.0) {
     return;
   }
-  vec3 normal = candidate_normal_fetch(from).xyz;
+  vec4 point = candidate_point_fetch(from);
+  vec3 normal = candidate_normal_fetch(from).xyz * point.w;  // on the side from which light reaches it
   vec2 flat_part = vec2(candidate_normal_fetch(to).w, next_radiance_fetch(to).w);
   vec3 next_normal = vec3(flat_part, next.w * sqrt(max(1.0 - dot(flat_part, flat_part), 0.0)));
-  vec3 origin = ray_origin(candidate_point_fetch(from).xyz, normal);
+  vec3 origin = ray_origin(point.xyz, normal);
   uvec3 salt = uvec3(uint(own), uint(other), uint(film_view.sample_index));
   out_density = direction_density(origin, normal, normal, next.xyz, next_normal, own == other, salt);
 }

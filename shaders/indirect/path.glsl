@@ -12,7 +12,8 @@
 
 struct Vertex {
   vec3 position;
-  vec3 normal;  // of the triangle, on the side that the ray came from
+  vec3 normal;  // of the triangle, on the side that the ray came from, to which it sends light
+  vec3 lit;     // the same, or on the other side: that from which light reaches it
   Reflection reflection;
 };
 
@@ -55,7 +56,9 @@ Reflection mean_reflection(ivec2 hit)
   int rows = reflectance_size().y / REFLECTANCE_BANDS;
   vec4 straight = reflectance_fetch(place + ivec2(0, 2 * rows));
   Reflection mean;
-  mean.diffuse = reflectance_fetch(place + ivec2(0, rows)).rgb;
+  vec4 diffuse = reflectance_fetch(place + ivec2(0, rows));
+  mean.diffuse = diffuse.rgb;
+  mean.through = diffuse.a / max(luminance(diffuse.rgb), 1e-30);
   mean.straight = straight.rgb;
   mean.grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
   mean.alpha = straight.a;
@@ -94,6 +97,16 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     met.normal = -met.normal;
   }
   met.reflection = reflection_at(hit, met.position, met.normal);
+  met.lit = met.normal;
+  float through = met.reflection.through;
+  if (through > 0.0) {
+    // Leaves, paper: one of both sides is looked at, by lot.
+    bool passes = to_unit(hash3(uvec3(salt, uint(hit.x), uint(hit.y))).x) < through;
+    met.lit = passes ? -met.normal : met.normal;
+    float shine = passes ? 0.0 : 1.0 / max(1.0 - through, 1e-6);
+    met.reflection.straight *= shine;
+    met.reflection.grazing *= shine;
+  }
   return true;
 }
 
@@ -143,7 +156,7 @@ float light_visibility(Light light, vec3 origin, vec3 direction, uint salt)
 vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
 {
   vec3 position = met.position;
-  vec3 normal = met.normal;
+  vec3 normal = met.lit;
   vec3 origin = ray_origin(position, normal);
   vec3 sum = vec3(0.0);
   uint roll = salt;

@@ -1,5 +1,5 @@
 // Means of what a material reflects: over a cell of pixels, each of which shows some point of it. Bands of rows hold, one
-// above the other, all of it, its diffuse part, and of its lobe the reflectance at normal incidence, with alpha, and at
+// above the other, all of it, its diffuse part, with the luminance that passes to the other side, and of its lobe the reflectance at normal incidence, with alpha, and at
 // grazing incidence.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
@@ -18,7 +18,7 @@ void main()
         Surface s = SURFACE_READ(pixel);
         Reflection r = surface_reflection(s, view_cosine);
         sum += (band == 0) ? vec4(surface_albedo(s, view_cosine), 0.0)
-             : (band == 1) ? vec4(r.diffuse, 0.0)
+             : (band == 1) ? vec4(r.diffuse, r.through * luminance(r.diffuse))
              : (band == 2) ? vec4(r.straight, r.alpha)
                            : vec4(r.grazing, 0.0);
         count += 1.0;

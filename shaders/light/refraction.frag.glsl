@@ -163,8 +163,9 @@ void main()
     if (to_unit(roll.x) >= shape.y) {
       Vertex end;
       end.position = position;
-      end.normal = geometric_normal;
+      end.normal = end.lit = geometric_normal;
       end.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
+      end.reflection.through = 0.0;
       end.reflection.straight = vec3(0.0);
       end.reflection.grazing = vec3(0.0);
       end.reflection.alpha = 1.0;

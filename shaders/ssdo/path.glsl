@@ -17,15 +17,15 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
     sum += throughput * direct_reflected(met, -direction, 1, roll.x);
     float choice = to_unit(roll.z);
     roll = hash3(roll);
-    vec3 onward = cosine_direction(met.normal, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(met.reflection, met.normal, onward, -direction);
+    vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(met.reflection, met.lit, onward, -direction);
     float stay = min(max_component(throughput), 1.0);
     if (choice >= stay) {
       break;
     }
     throughput /= stay;
     direction = onward;
-    origin = ray_origin(met.position, met.normal);
+    origin = ray_origin(met.position, met.lit);
   }
   return sum;
 }

@@ -71,6 +71,20 @@ def test_a_shared_value_is_computed_once():
     assert body.count("math_multiply(") == 1
 
 
+def test_a_value_that_a_shader_reads_itself_is_computed_before_what_else_reads_it():
+    """Color hangs on the image over two nodes, Roughness directly: the image is asked for second, and needed first."""
+    material = compiled(
+        image("Image", "picture"),
+        math("Near", "ADD", ("Image", "Color"), 0.25),
+        math("Far", "MULTIPLY", ("Near", "Value"), 0.5),
+        diffuse(Color=("Far", "Value"), Roughness=("Image", "Alpha")),
+        surface=("Diffuse", "BSDF"),
+    )
+    body = material.glsl[material.glsl.index("void evaluate_material") :]
+    places = [body.index(call) for call in ("material_image0_flat(", "math_add(", "math_multiply(", "shader_diffuse(")]
+    assert places == sorted(places)
+
+
 def test_a_shared_shader_is_drawn_once_with_the_sum_of_its_weights():
     material = compiled(
         diffuse(),

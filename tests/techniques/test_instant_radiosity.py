@@ -197,6 +197,41 @@ def test_a_card_that_some_rays_pass_dims_the_bounce_as_in_cycles(stage, render, 
     assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
 
 
+@pytest.mark.parametrize(
+    ("kind", "light", "settings"),
+    [
+        ("ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),
+        ("ShaderNodeBsdfSheen", "diffuse_indirect", {"distribution": "MICROFIBER"}),
+        ("ShaderNodeBsdfSheen", "glossy_indirect", {"distribution": "ASHIKHMIN"}),
+        ("ShaderNodeBsdfToon", "diffuse_indirect", {"component": "DIFFUSE"}),
+    ],
+)
+@pytest.mark.parametrize("technique", ["instant_radiosity", "multires_radiosity"])
+def test_lobes_without_microfacets_get_the_light_of_other_surfaces_as_in_cycles(
+    stage, render, kind, light, settings, technique
+):
+    """A card before a room, which lights it from behind; from the front a low wall does, which a lamp shines at."""
+    corner(stage)
+    stage.mesh([(-1, -2, 0), (1, -2, 0), (1, -2, 0.8), (-1, -2, 0.8)], [(0, 1, 2, 3)], material=stage.diffuse(0.7))
+    stage.light("POINT", (0.0, -1.2, 0.4), energy=40.0, shadow_soft_size=0.1)
+    cloth = stage.material(kind, Color=(0.8, 0.8, 0.8, 1.0))
+    node = next(node for node in cloth.node_tree.nodes if node.bl_idname == kind)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    if settings.get("distribution"):
+        node.inputs["Roughness"].default_value = 0.6
+    stage.mesh(
+        [(-0.4, -0.5, 0.6), (0.4, -0.5, 0.6), (0.4, -0.5, 1.4), (-0.4, -0.5, 1.4)], [(0, 1, 2, 3)], material=cloth
+    )
+    expected = light_paths(stage.render(2048, (24, 24), engine="CYCLES", bounces=3))[light]
+    on_card = (slice(9, 15), slice(9, 15))
+    stage.scene.candela.slot_indirect = technique
+    stage.scene.candela.denoise_strength = 0.0  # the card is as wide as its filter
+    found = light_paths(stage.render(256, (24, 24), bounces=3))[light]
+    assert expected[on_card].mean() > 0.005
+    assert found[on_card].mean() == pytest.approx(expected[on_card].mean(), rel=0.05)
+
+
 def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_before(stage, gpu_context):
     """Material 0 stands for slots without one, of which there are none here."""
     stage.floor(material=stage.diffuse(0.5))
