@@ -123,6 +123,19 @@ def test_values_linked_to_the_emission_are_followed(stage):
     assert snapshot.notes == ()
 
 
+@pytest.mark.parametrize(("output", "smooth", "exact"), [("Quadratic", 0.0, True), ("Quadratic", 1.0, False),
+                                                         ("Linear", 0.0, False)])  # fmt: skip
+def test_light_falloff_with_the_square_is_its_strength_and_others_are_named(stage, output, smooth, exact):
+    placed = stage.light("POINT", energy=2.0)
+    tree, emission = emission_of(placed, stage)
+    falloff = tree.nodes.new("ShaderNodeLightFalloff")
+    falloff.inputs["Strength"].default_value, falloff.inputs["Smooth"].default_value = 30.0, smooth
+    tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
+    snapshot = stage.take()
+    assert only_light(snapshot).strength == pytest.approx([60, 60, 60])
+    assert (snapshot.notes == ()) == exact
+
+
 def test_emission_that_varies_over_the_light_is_named(stage):
     placed = stage.light("SPOT", energy=1.0)
     tree, emission = emission_of(placed, stage)
