@@ -10,7 +10,7 @@ list of a quad mesh another 100 ms (Blender copies it element by element).
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from .tangents import corner_tangents
 
 # Metres. Beyond it the squared length of a position overflows float32 on the GPU; such a vertex is as broken as NaN.
 FARTHEST = 1e18
+FOLDED = 1e-5  # 1 less the cosine between normals of a face and of its triangle, from which on they differ
 
 
 @dataclass(frozen=True)
@@ -63,11 +64,12 @@ class RawMesh:
     colors: dict[str, np.ndarray] = field(default_factory=dict)
     active_color: str = ""
     generated: np.ndarray | None = None  # (V, 3) float32
+    flat: bool = False  # no face is smooth
 
     def digest(self) -> bytes:
         """128 bits over everything that `build_mesh` uses; equal digests mean equal content."""
         state = hashlib.blake2b(digest_size=16)
-        head = (self.slots, self.active_uv, self.active_color, tuple(self.uv_maps), tuple(self.colors))
+        head = (self.slots, self.flat, self.active_uv, self.active_color, tuple(self.uv_maps), tuple(self.colors))
         state.update(repr((head, len(self.positions), len(self.corner_vertices), len(self.face_starts))).encode())
         arrays = [self.positions, self.corner_vertices, self.corner_normals, self.face_starts]
         arrays += [array for array in (self.face_slots, self.generated) if array is not None]
@@ -110,6 +112,7 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
         colors=colors,
         active_color=active_color,
         generated=_read_generated(mesh) if wanted.generated else None,
+        flat=mesh.normals_domain == "FACE",
     )
 
 
@@ -159,6 +162,8 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
     if order is not None:
         triangles, slots = triangles[order], slots[order]
     normals = _unit(raw.corner_normals)
+    if raw.flat:
+        raw, normals, triangles = _folded(raw, positions, normals, triangles)
     low, high = _bounds(positions, raw.corner_vertices, triangles)
     tangents = {}
     for name in sorted({name or raw.active_uv for name in wanted.tangents}):
@@ -183,6 +188,33 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
         bounds_max=high,
     )
     return made, notes
+
+
+def _folded(raw: RawMesh, positions: np.ndarray, normals: np.ndarray, triangles: np.ndarray):
+    """`raw`, its normals and triangles, with corners of their own for triangles of flat faces that are not planar.
+
+    A face that is not smooth has the normal of its whole polygon in Blender; Cycles shades each of its triangles by the
+    triangle's own.
+    """
+    if len(triangles) == len(raw.face_starts):
+        return raw, normals, triangles
+    a, b, c = np.moveaxis(positions[raw.corner_vertices[triangles]], 1, 0)
+    across = np.cross(b - a, c - a)
+    own = _unit(across)
+    folded = (np.einsum("ij,ij->i", own, normals[triangles[:, 0]]) < 1.0 - FOLDED) & across.any(axis=1)
+    if not folded.any():
+        return raw, normals, triangles
+    count = len(normals)
+    source = np.concatenate([np.arange(count), triangles[folded].reshape(-1)])
+    normals = np.concatenate([normals, np.repeat(own[folded], 3, axis=0)])
+    triangles = triangles.copy()
+    triangles[folded] = count + np.arange(len(source) - count, dtype=triangles.dtype).reshape(-1, 3)
+    at_corners = {
+        "corner_vertices": raw.corner_vertices[source],
+        "uv_maps": {name: values[source] for name, values in raw.uv_maps.items()},
+        "colors": {name: values[source] for name, values in raw.colors.items()},
+    }
+    return replace(raw, **at_corners), normals, triangles
 
 
 def _broken_note(subject: str, count: int) -> Note:

@@ -88,6 +88,28 @@ def test_corner_normals_are_blenders(stage):
     assert len({tuple(row) for row in np.round(expected, 4)}) > 4  # flat and smooth corners are both there
 
 
+@pytest.mark.parametrize("smooth", [False, True])
+def test_triangles_of_a_flat_face_that_is_folded_have_normals_of_their_own(stage, smooth):
+    """As in Cycles. Faces that are planar, or smooth, keep their corners."""
+    data = stage.mesh(
+        vertices=[(0, 0, 0), (1, 0, 0), (1, 1, 1), (0, 1, 0), (2, 0, 0), (2, 1, 1)], faces=[(0, 1, 2, 3), (1, 4, 5, 2)]
+    )
+    data.polygons.foreach_set("use_smooth", [smooth, smooth])
+    layer = data.uv_layers.new(name="map")
+    layer.data.foreach_set("uv", np.arange(16, dtype=np.float32))
+    stage.link("O", data)
+    mesh = only_mesh(stage.take())
+    corners = mesh.triangle_corners
+    a, b, c = np.moveaxis(mesh.positions[mesh.corner_vertices[corners]], 1, 0)
+    own = np.cross(b - a, c - a)
+    own /= np.linalg.norm(own, axis=1, keepdims=True)
+    assert np.allclose(mesh.corner_normals[corners], own[:, None], atol=1e-5) != smooth
+    assert len(mesh.corner_vertices) == len(mesh.corner_normals) == len(mesh.uv_maps["map"]) == (8 if smooth else 14)
+    expected = {(vertex, *layer.data[k].uv) for k, vertex in enumerate(loop.vertex_index for loop in data.loops)}
+    found = {(int(v), *map(float, uv)) for v, uv in zip(mesh.corner_vertices, mesh.uv_maps["map"])}
+    assert found == expected
+
+
 def test_custom_normals_are_kept(stage):
     data = stage.grid(1)
     wished = np.array([(0.6, 0.0, 0.8)] * 4, np.float32)
