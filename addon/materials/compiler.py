@@ -104,6 +104,7 @@ class _Compilation:
         x = f"{name}(surface_point_moved(point, vec2({width}, 0.0)))"
         y = f"{name}(surface_point_moved(point, vec2(0.0, {width})))"
         self.code.lines.append(f"point.normal = displaced_normal(point, {width}, {name}(point), {x}, {y});")
+        self.code.lines.append("closures.base_normal = point.normal;")
 
     def _surface(self) -> Summary:
         """Emit the shaders, parents before children, so that a shared shader gets the sum of all weights at once."""

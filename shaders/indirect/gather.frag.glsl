@@ -80,7 +80,7 @@ void main()
     vec3 direction = cosine_direction(s.normal, u);
     if (dot(direction, s.geometric_normal) > 0.0) {
       float cosine = max(dot(direction, s.normal), 1e-6);
-      vec3 weight = diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction) * (PI / cosine);
+      vec3 weight = surface_diffuse_reflection(s, to_viewer, direction) * (PI / cosine);
       out_diffuse.rgb += weight * near_radiance(origin, direction, false, roll);
     }
   }

@@ -76,7 +76,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       traced = chosen;
     }
     vec3 arriving = light.intensity * (bounded * step_size / chosen_share * visible);
-    sum += arriving * (reflected ? diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction)
+    sum += arriving * (reflected ? surface_diffuse_reflection(s, to_viewer, direction)
                                  : vec3(max(dot(s.normal, direction), 0.0)));
   }
   return sum * float(SUBSETS);

@@ -39,6 +39,25 @@ vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, ve
   return albedo * (nl * (a + b * t)) + albedo * multiple * (nl * (1.0 - view_term) * (1.0 - light_term));
 }
 
+// Share of the light along `light` that reaches a bumped surface over its own bumps: without, light that grazes the surface
+// ends abruptly where the normal turns it away from the shading. Smith's shadowing of GGX, as rough as the normal deviates
+// (Estevez, Lecocq & Stein, "A microfacet-based shadowing function to solve the bump terminator problem", 2019). As in
+// Cycles it dims what is diffuse; the surface's plane stands for its normal before the bump.
+float bump_shadowing(Surface s, vec3 light)
+{
+  if (s.bump <= 0.0) {
+    return 1.0;
+  }
+  float cosine = clamp(dot(s.geometric_normal, light), 1e-6, 1.0);  // none arrives from below
+  return 2.0 / (1.0 + sqrt(1.0 + s.bump * s.bump * (1.0 / (cosine * cosine) - 1.0)));
+}
+
+// f * cos of the diffuse closure.
+vec3 surface_diffuse_reflection(Surface s, vec3 view, vec3 light)
+{
+  return diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, view, light) * bump_shadowing(s, light);
+}
+
 // A GGX lobe in its own frame: z along the normal, x along the tangent. Energy compensation is in `scale`.
 struct Lobe {
   vec3 tangent;

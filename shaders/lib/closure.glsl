@@ -25,6 +25,7 @@ float dielectric_f0(float ior)
 }
 
 struct Closures {
+  vec3 base_normal;       // of the surface as it is displaced, before a shader's own normal bumps it
   vec3 diffuse;           // albedo weight
   float diffuse_roughness;
   vec3 diffuse_normal;
@@ -47,6 +48,7 @@ struct Closures {
 Closures closures_begin(vec3 normal, float random_number)
 {
   Closures c;
+  c.base_normal = normal;
   c.diffuse = vec3(0.0);
   c.diffuse_roughness = 0.0;
   c.diffuse_normal = normal;

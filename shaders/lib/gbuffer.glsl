@@ -23,6 +23,7 @@ struct Surface {
   vec3 diffuse;
   vec3 emission;
   float holdout;
+  float bump;             // how far a normal map or bump turns the diffuse closure's normal, see bump_encode
   int kind;               // of the lobe: FRESNEL_* or LOBE_*
   vec3 glossy_weight;     // 0: no lobe
   vec3 glossy_tint;
@@ -38,6 +39,19 @@ struct Surface {
   surface_decode(surface_position_fetch(pixel), surface_normal_fetch(pixel), \
                  surface_diffuse_fetch(pixel), surface_tint_fetch(pixel), \
                  surface_lobe_fetch(pixel), surface_emission_fetch(pixel))
+
+#define BUMP_STEPS 255.0
+
+// What w of the position holds for a surface: 1 + holdout, and the roughness of a surface of microfacets whose normals
+// deviate as the bumped normal does (bump_shadowing).
+float bump_encode(float holdout, vec3 normal, vec3 bumped)
+{
+  vec3 off = bumped - normal;
+  float cosine = clamp(abs(dot(normal, bumped)), 1e-3, 1.0);
+  float squared = clamp(0.125 * (1.0 / (cosine * cosine) - 1.0), 0.0, 1.0);
+  float bump = (dot(off, off) > 1e-10) ? sqrt(squared) : 0.0;
+  return 1.0 + holdout + 2.0 * floor(bump * BUMP_STEPS + 0.5);
+}
 
 // Three numbers in 0..1 in one float, `steps` + 1 levels each; and back.
 float pack_three(vec3 v, float steps)
@@ -85,7 +99,8 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   Surface s;
   s.hit = position.w != 0.0;
   s.position = position.xyz;
-  s.holdout = position.w - 1.0;
+  s.bump = floor((position.w - 1.0) * 0.5) / BUMP_STEPS;
+  s.holdout = position.w - 1.0 - 2.0 * BUMP_STEPS * s.bump;
   s.normal = octahedral_decode(normal.xy);
   s.geometric_normal = octahedral_decode(normal.zw);
   s.diffuse = diffuse.xyz;

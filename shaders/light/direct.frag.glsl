@@ -26,7 +26,7 @@ vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
   float cosine = dot(s.normal, direction);
   // From a middle below the horizon the part above it shines in along the surface.
   vec3 raised = (cosine > 0.05) ? direction : safe_normalize(direction + s.normal * (0.05 - cosine));
-  vec3 share = diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, raised);
+  vec3 share = surface_diffuse_reflection(s, to_viewer, raised);
   return share * irradiance / max(dot(s.normal, raised), 1e-3);
 }
 
@@ -93,7 +93,7 @@ void main()
 #endif
       if (on_diffuse && !whole) {
         from_diffuse += arriving *
-                        diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, to_viewer, direction);
+                        surface_diffuse_reflection(s, to_viewer, direction);
       }
       if (on_glossy) {
         float lobe_density;

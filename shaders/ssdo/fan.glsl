@@ -243,6 +243,6 @@ vec3 diffuse_weight(Surface s, vec3 viewer, vec3 direction)
     return vec3(1.0);
   }
   float cosine = max(dot(s.normal, direction), 1e-4);
-  return diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, viewer, direction) * (PI / cosine)
+  return surface_diffuse_reflection(s, viewer, direction) * (PI / cosine)
          / max(s.diffuse, vec3(1e-6));
 }
