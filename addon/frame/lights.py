@@ -29,6 +29,7 @@ BRIGHTEST = 1e30  # W / (m2 sr): a light that would be brighter at its size coun
 NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its inverse may not fit
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
 NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for it
+TRANSMISSION_FLAG = 256
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,7 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
     flags = (
         DIFFUSE_FLAG * light.visibility.diffuse + GLOSSY_FLAG * light.visibility.glossy
         + SHADOW_FLAG * light.cast_shadow + CAMERA_FLAG * light.visibility.camera
+        + TRANSMISSION_FLAG * light.visibility.transmission
     )  # fmt: skip
     power = float(np.abs(strength).max())
     smallest = max(SMALLEST, np.sqrt(power / BRIGHTEST) if light.normalize else 0.0)

@@ -91,14 +91,12 @@ FARTHER = 0.2  # median distances of what is seen: their reach then
 MORE_RAYS = 4  # times, in a picture of one sample
 LOBE_RAYS = 4  # of a pixel in a sample, where a glossy lobe is most of what is seen
 GATHER_TEXTURES = (("RGBA32F", "virtual_lights"), *PATH_TEXTURES)
-GATHER_CONSTANTS = (
-    *PATH_CONSTANTS,
-    ("INT", "virtual_count"),
-    ("FLOAT", "near_radius"),
-    ("FLOAT", "glossy_radius"),
+NEAR_CONSTANTS = (
+    ("INT", "bounces"), ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "glossy_radius"),
     ("FLOAT", "deeper"),
-    ("INT", "lobe_rays"),
-)
+)  # fmt: skip
+GATHER_CONSTANTS = (*dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)), ("INT", "lobe_rays"))
+OFFERED = "virtual_lights"  # what others may gather, too: bindings with that texture and NEAR_CONSTANTS
 
 
 @cache
@@ -163,12 +161,13 @@ def _may_reflect(graph) -> bool:
 
 
 def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet) -> dict:
-    """What shaders/indirect/lights.glsl needs: textures, blocks and constants of this sample."""
+    """What shaders/indirect/near.glsl needs: textures, blocks and constants of this sample. Offers it to others."""
     bindings = finder.path_bindings(frame)
     bindings["textures"]["virtual_lights"] = lights.image
     near = near_radius(frame, len(lights))
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
     bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
+    frame.services[OFFERED] = bindings
     return bindings
 
 
@@ -202,6 +201,7 @@ class InstantRadiosity(Technique):
     )  # fmt: skip
     reads = LIT_SURFACES
     writes = INDIRECT_WRITES
+    offers = (OFFERED,)
 
     def __init__(self):
         self.virtual_lights = VirtualLights()

@@ -1,60 +1,12 @@
-// Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out.
-//
-// Both kernels are shares of the same light: a virtual light at distance d counts min(1, d2 / r2), a ray that meets a
-// surface at distance d counts 1 - min(1, d2 / r2). With SHARED, regions of pixels have gathered the virtual lights
-// (region_gather.comp.glsl).
-#include "indirect/path.glsl"
-#include "indirect/lights.glsl"
+// Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out
+// (near.glsl). With SHARED, regions of pixels have gathered the virtual lights (region_gather.comp.glsl).
+#include "indirect/near.glsl"
 #ifndef SHARED
 #include "indirect/traced_gather.glsl"
 #endif
 #ifdef SOFT
 #include "lib/soft_lobe.glsl"
 #endif
-
-// Radiance that arrives along a ray from surfaces nearer than the bound (from all surfaces, if `whole`), each with the
-// share that virtual lights leave to it, and what reaches those surfaces in the same way: that last light, of which there is
-// little and which takes most of the time where small things stand close, only some samples look for (`deeper`: the
-// weight that it has in them, 0 in the others). Behind a `whole` ray, of a lobe, the bound is `glossy_radius`: paths between
-// surfaces that shine bring much by few, and no filter spreads that.
-vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
-{
-  vec3 sum = vec3(0.0);
-  vec3 throughput = vec3(1.0);
-  float reach = whole ? glossy_radius : near_radius;
-  for (int bounce = 1; bounce <= bounces; bounce++) {
-    Vertex met;
-    float t;
-    float limit = (whole && bounce == 1) ? 1e29 : reach;
-    if (!trace_vertex(origin, direction, limit, roll.z, met, t)) {
-      break;
-    }
-    float share = (whole && bounce == 1) ? 1.0 : 1.0 - t * t / (reach * reach);
-    throughput *= share;
-    if (max_component(throughput) <= 1e-4) {
-      break;
-    }
-    roll = hash3(roll);
-    sum += throughput * direct_reflected(met, -direction, 1, roll.x);
-    if (bounce < bounces) {
-      vec3 from;
-      vec3 arriving = virtual_irradiance(met.position, met.lit, reach, roll.z, from);
-      sum += throughput * arriving * reflection_of(met.reflection, met.lit, from, -direction);
-    }
-    if (bounce == 1) {
-      if (deeper <= 0.0) {
-        break;
-      }
-      throughput *= deeper;
-    }
-    roll = hash3(roll);
-    vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-    throughput *= PI * reflection_of(met.reflection, met.lit, onward, -direction);
-    direction = onward;
-    origin = ray_origin(met.position, met.lit);
-  }
-  return sum;
-}
 
 void main()
 {

@@ -51,11 +51,13 @@ float virtual_light_seen(VirtualLight light, vec3 origin, uint salt)
   return clear_path(origin, path / max(reach, 1e-30), reach, salt);
 }
 
-// Irradiance at a surface by virtual lights that may be reflected once more. Every n-th of them stands for n, such that
-// no more than PART are looked at; one of those is traced, along `direction`.
+// Irradiance at a surface by virtual lights; `shorter`: by the light in them that may be reflected once more. Every n-th of
+// them stands for n, such that no more than PART are looked at; one of those is traced, along `direction`.
+#ifndef PART
 #define PART 64
+#endif
 
-vec3 virtual_irradiance(vec3 position, vec3 normal, float reach, uint salt, out vec3 direction)
+vec3 virtual_irradiance(vec3 position, vec3 normal, float reach, bool shorter, uint salt, out vec3 direction)
 {
   direction = normal;
   int stride = (virtual_count + PART - 1) / PART;
@@ -65,7 +67,7 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, float reach, uint salt, out 
   int chosen = 0;
   uint roll = salt;
   for (int i = first; i < virtual_count; i += stride) {
-    float share = unblocked_share(i, position, normal, reach, true);
+    float share = unblocked_share(i, position, normal, reach, shorter);
     total += share;
     if (draw_passing(share, total, roll)) {
       chosen_share = share;
@@ -76,8 +78,8 @@ vec3 virtual_irradiance(vec3 position, vec3 normal, float reach, uint salt, out 
     return vec3(0.0);
   }
   VirtualLight light = virtual_light(chosen);
-  float shorter = virtual_lights_fetch(ivec2(chosen, 1)).w;
+  float part = shorter ? virtual_lights_fetch(ivec2(chosen, 1)).w : 1.0;
   float bounded = bounded_kernel(light, position, reach, direction) * max(dot(normal, direction), 0.0);
   float visible = virtual_light_seen(light, ray_origin(position, normal), salt);
-  return light.intensity * (shorter * bounded * (float(stride) * total / chosen_share) * visible);
+  return light.intensity * (part * bounded * (float(stride) * total / chosen_share) * visible);
 }

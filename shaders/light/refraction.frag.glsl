@@ -4,7 +4,8 @@
 //
 // What the first interface lets arrive is direct; all else is indirect, as in Cycles' passes.
 #include "lib/refraction.glsl"
-#include "indirect/path.glsl"
+#define PART 256  // virtual lights that a surface behind glass looks at: no filter spreads their noise
+#include "indirect/near.glsl"
 #include "lib/environment.glsl"
 
 // Share of a technique of density `density` against another one of density `other`.
@@ -24,6 +25,9 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   vec3 kept_light = vec3(0.0);
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
+    if ((light.flags & LIGHT_TRANSMISSION) == 0) {
+      continue;
+    }
     vec3 direction;
     float density;
     vec3 light_arriving = light_sample(light, position, direction, density);
@@ -69,7 +73,7 @@ vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit)
     float hit_distance;
     float density;
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
-    if (hit_distance <= limit) {
+    if (hit_distance <= limit && (light.flags & LIGHT_TRANSMISSION) != 0) {
       sum += radiance * ((lobe_density > 0.0) ? power_share(lobe_density, light.rate * density) : 1.0);
     }
   }
@@ -161,15 +165,19 @@ void main()
     bool leaves = dot(normal, direction) > 0.0;
     geometric_normal = leaves ? -normal : normal;
     if (to_unit(roll.x) >= shape.y) {
-      Vertex end;
-      end.position = position;
-      end.normal = end.lit = geometric_normal;
-      end.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
-      end.reflection.through = 0.0;
-      end.reflection.straight = vec3(0.0);
-      end.reflection.grazing = vec3(0.0);
-      end.reflection.alpha = 1.0;
-      out_indirect.rgb += throughput * direct_reflected(end, -direction, 1, roll.z);
+      Walk rest;
+      rest.direction = direction;
+      rest.bounce = 0;
+      rest.whole = false;
+      rest.has_met = true;
+      rest.met.position = rest.origin = position;
+      rest.met.normal = rest.met.lit = geometric_normal;
+      rest.met.reflection.diffuse = albedo_behind(hit, position, geometric_normal);
+      rest.met.reflection.through = 0.0;
+      rest.met.reflection.straight = vec3(0.0);
+      rest.met.reflection.grazing = vec3(0.0);
+      rest.met.reflection.alpha = 1.0;
+      out_indirect.rgb += throughput * radiance_along(rest, glossy_radius, roll);
       break;
     }
     smooth_normal = leaves ? -smooth_normal : smooth_normal;

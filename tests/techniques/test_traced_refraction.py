@@ -156,6 +156,26 @@ def test_surfaces_behind_glass_keep_their_texture(stage):
     assert found[:11].max() < 0.3 * passed < 0.6 * passed < found[-11:].min()
 
 
+@pytest.mark.parametrize("technique", ["instant_radiosity", pytest.param("clustered_visibility", marks=SLOW)])
+def test_surfaces_behind_glass_get_the_light_of_other_surfaces_as_in_cycles(stage, technique):
+    """A room that only its pane shows. Its ceiling, the upper part of the picture, has no light but that of the floor
+    and the wall."""
+    stage.scene.candela.slot_indirect = technique
+    stage.rectangle((-2, 0), (2, 4), material=stage.diffuse(0.7))
+    stage.rectangle((-2, 0), (2, 4), z=2.0, material=stage.diffuse(0.7))
+    stage.mesh([(-2, 4, 0), (2, 4, 0), (2, 4, 2), (-2, 4, 2)], [(0, 1, 2, 3)], material=stage.diffuse(0.5))
+    pane = [(-2, -0.05, 0), (2, -0.05, 0), (2, -0.05, 2), (-2, -0.05, 2)]
+    stage.mesh(pane, [(0, 1, 2, 3)], material=glass(stage))
+    stage.mesh([(x, 0.0, z) for x, _, z in pane], [(3, 2, 1, 0)], material=glass(stage))
+    lamp = stage.light("AREA", (0, 2, 1.9), size=1.0, energy=50.0)
+    lamp.visible_transmission = False
+    stage.camera((0, -1, 1), (np.pi / 2, 0, 0), 1.2)
+    ours = passing(stage.render(32, SIZE, bounces=4), "indirect")
+    cycles = passing(stage.render(1024, SIZE, engine="CYCLES", bounces=16), "indirect")
+    assert ours[17:].mean() == pytest.approx(cycles[17:].mean(), rel=0.04)
+    assert ((ours - cycles) ** 2).sum() < 0.01 * (cycles**2).sum()
+
+
 def test_scenes_without_glass_pay_nothing(stage):
     stage.floor(material=stage.principled())
     stage.light("SUN")

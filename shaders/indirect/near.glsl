@@ -1,0 +1,73 @@
+// What surfaces send along rays, of light that virtual lights leave to rays and of all.
+//
+// Virtual lights are bounded where they are near: one at distance d counts min(1, d2 / r2) of its light, a ray that meets a
+// surface at distance d counts 1 - min(1, d2 / r2) of what that sends. A program that includes this has the constants
+// `virtual_count`, `near_radius`, `glossy_radius` and `deeper` besides those of indirect/path.glsl.
+#include "indirect/path.glsl"
+#include "indirect/lights.glsl"
+
+// Where a ray is on its way.
+struct Walk {
+  vec3 origin;
+  vec3 direction;
+  int bounce;   // how often light of sources has been reflected when it comes along here to what the picture shows
+  bool whole;   // it brings all light of what it meets, however far that is
+  bool has_met; // it has met `met` already
+  Vertex met;
+};
+
+// Radiance that arrives along a walk's ray: light of sources that a surface reflects, virtual lights, and what surfaces
+// nearer to that one than `reach` send to it, each with the share that virtual lights leave to it, and what reaches those in
+// the same way: that last light, of which there is little and which takes most of the time where small things stand close,
+// only some samples look for (`deeper`: the weight that it has in them, 0 in the others).
+vec3 radiance_along(Walk walk, float reach, uvec3 roll)
+{
+  vec3 sum = vec3(0.0);
+  vec3 throughput = vec3(1.0);
+  for (; walk.bounce <= bounces; walk.bounce++) {
+    if (!walk.has_met) {
+      float t;
+      if (!trace_vertex(walk.origin, walk.direction, walk.whole ? 1e29 : reach, roll.z, walk.met, t)) {
+        break;
+      }
+      throughput *= walk.whole ? 1.0 : 1.0 - t * t / (reach * reach);
+      if (max_component(throughput) <= 1e-4) {
+        break;
+      }
+    }
+    walk.whole = walk.has_met = false;
+    roll = hash3(roll);
+    sum += throughput * direct_reflected(walk.met, -walk.direction, 1, roll.x);
+    if (walk.bounce < bounces) {
+      vec3 from;
+      vec3 arriving = virtual_irradiance(walk.met.position, walk.met.lit, reach, walk.bounce > 0, roll.z, from);
+      sum += throughput * arriving * reflection_of(walk.met.reflection, walk.met.lit, from, -walk.direction);
+    }
+    if (walk.bounce == 1) {
+      if (deeper <= 0.0) {
+        break;
+      }
+      throughput *= deeper;
+    }
+    roll = hash3(roll);
+    vec3 onward = cosine_direction(walk.met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
+    throughput *= PI * reflection_of(walk.met.reflection, walk.met.lit, onward, -walk.direction);
+    walk.direction = onward;
+    walk.origin = ray_origin(walk.met.position, walk.met.lit);
+  }
+  return sum;
+}
+
+// Radiance that arrives at a surface that the picture shows, along a ray from surfaces nearer than the bound (from all
+// surfaces, if `whole`). Behind a `whole` ray, of a lobe, the bound is `glossy_radius`: paths between surfaces that shine
+// bring much by few, and no filter spreads that.
+vec3 near_radiance(vec3 origin, vec3 direction, bool whole, uvec3 roll)
+{
+  Walk walk;
+  walk.origin = origin;
+  walk.direction = direction;
+  walk.bounce = 1;
+  walk.whole = whole;
+  walk.has_met = false;
+  return radiance_along(walk, whole ? glossy_radius : near_radius, roll);
+}
