@@ -17,10 +17,11 @@ not count as a bounce: it is followed through `interfaces` of them however few b
 | rays | per pixel of glass and interface 1 for the walk, 1 for lights; where it ends 2 to 4 |
 | fetches per ray | about 6 per node and 10 per leaf visited; 15 per interface |
 
-Surfaces behind glass reflect lights and world by this sample's points, and other surfaces by the virtual lights of the
+Surfaces behind glass reflect lights and world by this sample's points, and other surfaces by virtual lights of the
 technique of the indirect slot, where it has any, and by short rays, as pixels do (instant_radiosity.py), whose probes
-look through glass for that. Squared error relative to Cycles' of what passes a pane before a room lit through its window,
-16 samples: .39 and 29 % too dark with direct light only, .69 with paths instead of virtual lights, .11 with them.
+look through glass for that. Squared error relative to Cycles' of what passes a pane before a room lit through its
+window, 16 samples: .39 and 29 % too dark with direct light only, .69 with paths instead of virtual lights, .11 with
+them.
 
 Fails: above 4 million triangles nothing is traced, and glass lets light pass straight on (surfaces.py).
 
