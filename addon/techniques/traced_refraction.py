@@ -27,10 +27,10 @@ Fails: above 4 million triangles nothing is traced, and glass lets light pass st
 
 Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
 its bumps. Surfaces behind glass reflect evenly, by their albedo where they stand behind glass in the picture, too, and
-else by their material's mean (the boards of that room shine: 5 % too dark). Light falls through glass in straight lines,
-so glass casts grey shadows and no caustics. Against Cycles: within 2 % for a rough ball below a world of which Cycles
-draws no light samples; where it does, its own result for rough glass rises by up to 11 % (a world symmetric in x shows
-it).
+else by their material's mean (the boards of that room shine: 5 % too dark). Light falls through glass in straight
+lines, so glass casts grey shadows and no caustics. Against Cycles: within 2 % for a rough ball below a world of which
+Cycles draws no light samples; where it does, its own result for rough glass rises by up to 11 % (a world symmetric in x
+shows it).
 """
 
 from __future__ import annotations
