@@ -5,7 +5,8 @@
     MULTIPLE_SCATTERING                     four wavelengths and a fit of what is scattered more often: Garcia Linan,
                                             "Physically based sky" (fgarlin.com/posts/2024-12-06-spectral_sky)
     PREETHAM                                Preetham, Shirley & Smits, "A practical analytic model for daylight", 1999
-    HOSEK_WILKIE                            stands on a fitted data set; Preetham's model, HOSEK times as bright
+    HOSEK_WILKIE                            Hosek & Wilkie, "An analytic model for full spectral sky-dome radiance",
+                                            SIGGRAPH 2012, with the figures that they fitted (hosek_wilkie.npz)
 
 The first two integrate, along the ray from the viewer's altitude to the end of the atmosphere,
 
@@ -20,7 +21,9 @@ change quickly, so few azimuths suffice: about a second for a table of 512 x 256
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
+from math import comb
+from pathlib import Path
 
 import numpy as np
 
@@ -46,6 +49,7 @@ class Sky:
     aerosol: float = 1.0
     ozone: float = 1.0
     turbidity: float = 2.2
+    ground_albedo: float = 0.3
     level: bool = False  # the disc is seen down to the eye's level however high that is, as before Blender 5.0
 
     @property
@@ -74,7 +78,8 @@ def sky_of(settings: dict[str, object]) -> Sky:
         direction = np.asarray(settings["sun_direction"], float)
         x, y, z = direction / max(float(np.linalg.norm(direction)), 1e-30)
         elevation, rotation = float(np.arcsin(np.clip(z, -1.0, 1.0))), float(np.arctan2(x, y))
-        return Sky(model, elevation, rotation, turbidity=float(settings.get("turbidity", 2.2)))
+        turbidity, albedo = float(settings.get("turbidity", 2.2)), float(settings.get("ground_albedo", 0.3))
+        return Sky(model, elevation, rotation, turbidity=turbidity, ground_albedo=albedo)
     return Sky(
         "SINGLE_SCATTERING" if model == "NISHITA" else model,
         float(settings["sun_elevation"]),
@@ -153,7 +158,7 @@ def _radiance(sky: Sky, elevation: np.ndarray, azimuth: np.ndarray) -> np.ndarra
     """(E, A, 3) for elevations and azimuths from the sun."""
     directions = _directions(elevation, azimuth)
     if not sky.scatters:
-        return _preetham(sky, directions) * (HOSEK if sky.model == "HOSEK_WILKIE" else 1.0)
+        return (_hosek_wilkie if sky.model == "HOSEK_WILKIE" else _preetham)(sky, directions)
     mu = directions @ np.array([np.cos(sky.sun_elevation), 0.0, np.sin(sky.sun_elevation)])
     nodes = np.linspace(0.0, np.pi, AZIMUTHS)
     if sky.model == "MULTIPLE_SCATTERING":
@@ -378,7 +383,6 @@ PEREZ = np.array([
 ZENITH_X = np.array([[0.00166, -0.00375, 0.00209, 0], [-0.02903, 0.06377, -0.03202, 0.00394], [0.11693, -0.21196, 0.06052, 0.25886]])  # fmt: skip  # noqa: E501
 ZENITH_Y = np.array([[0.00275, -0.00610, 0.00317, 0], [-0.04214, 0.08970, -0.04153, 0.00516], [0.15346, -0.26756, 0.06670, 0.26688]])  # fmt: skip  # noqa: E501
 KILOCANDELA = 0.06  # radiance in Blender's units for a kilocandela per m2
-HOSEK = 0.14  # mean radiance of Blender's two models, at a turbidity of 3
 
 
 def _preetham(sky: Sky, directions: np.ndarray) -> np.ndarray:
@@ -403,3 +407,48 @@ def _preetham(sky: Sky, directions: np.ndarray) -> np.ndarray:
     y_luminance, x, y = np.moveaxis(zenith * perez(angle, gamma) / perez(0.0, sun_angle), -1, 0)
     xyz = np.stack([x / y * y_luminance, y_luminance, (1.0 - x - y) / y * y_luminance], axis=-1)
     return _rgb(xyz)
+
+
+# ----------------------------------------------------------------------------------------------- Hosek and Wilkie
+
+# terms (3, 2, 10, 6, 9) and radiance (3, 2, 10, 6) for X, Y and Z, ground albedos 0 and 1, turbidities 1 to 10, points
+# of a Bezier curve over the cube root of the sun's elevation: (c) 2012 Lukas Hosek and Alexander Wilkie, under the
+# 3-clause BSD licence.
+FITTED = Path(__file__).with_name("hosek_wilkie.npz")
+LUMENS = 683.0  # of a watt at 555 nm
+
+
+@cache
+def _fitted() -> dict[str, np.ndarray]:
+    with np.load(FITTED) as stored:
+        return {name: stored[name].astype(float) for name in stored.files}
+
+
+def _hosek_terms(sky: Sky) -> tuple[np.ndarray, np.ndarray]:
+    """(9, 3) terms of the formula and (3,) mean radiance for X, Y and Z."""
+    share = (max(sky.sun_elevation, 0.0) / (np.pi / 2)) ** (1.0 / 3.0)
+    curve = np.array([comb(5, k) * share**k * (1.0 - share) ** (5 - k) for k in range(6)])
+    albedo = float(np.clip(sky.ground_albedo, 0.0, 1.0))
+    turbidity = float(np.clip(sky.turbidity, 1.0, 10.0)) - 1.0
+    low = min(int(turbidity), 8)
+    weights = np.zeros((2, 10))
+    weights[:, low : low + 2] = np.outer([1.0 - albedo, albedo], [1.0 - (turbidity - low), turbidity - low])
+    fitted = _fitted()
+    return (
+        np.einsum("cabet,ab,e->tc", fitted["terms"], weights, curve),
+        np.einsum("cabe,ab,e->c", fitted["radiance"], weights, curve),
+    )
+
+
+def _hosek_wilkie(sky: Sky, directions: np.ndarray) -> np.ndarray:
+    """(…, 3) scene-linear radiance of unit directions in the sun's frame (equation 8 of the paper)."""
+    (a, b, c, d, e, f, g, i, h), mean = _hosek_terms(sky)
+    cosine = np.maximum(directions[..., 2], np.sin(0.001))[..., None]
+    elevation = max(sky.sun_elevation, 0.0)
+    sun = np.array([np.cos(elevation), 0.0, np.sin(elevation)])
+    near = np.clip(directions @ sun, -1.0, 1.0)[..., None]
+    gamma = np.arccos(near)
+    forward = (1.0 + near * near) / (1.0 + h * h - 2.0 * h * near) ** 1.5
+    zenith = 1.0 + a * np.exp(b / (cosine + 0.01))
+    around = c + d * np.exp(e * gamma) + f * near * near + g * forward + i * np.sqrt(cosine)
+    return _rgb(zenith * around * mean * (2.0 * np.pi / LUMENS))

@@ -13,7 +13,7 @@ def of(model, **values):
     return Sky(model, **{"sun_elevation": 0.5, "sun_size": 0.01, **values})
 
 
-@pytest.mark.parametrize("model", [*SCATTERING, "PREETHAM"])
+@pytest.mark.parametrize("model", [*SCATTERING, "PREETHAM", "HOSEK_WILKIE"])
 def test_a_sky_is_finite_and_symmetric_about_the_sun(model):
     pixels = sky_pixels(of(model))[:HEIGHT, :, :3]
     assert np.isfinite(pixels).all()
@@ -56,5 +56,7 @@ def test_settings_of_all_versions_are_read():
     assert (found.model, found.aerosol, found.level) == ("SINGLE_SCATTERING", 3.0, True)
     new = {**old, "sky_type": "MULTIPLE_SCATTERING", "aerosol_density": 4.0, "sun_disc": False}
     assert (sky_of(new).aerosol, sky_of(new).sun_size) == (4.0, 0.0)
+    hosek = sky_of({"sky_type": "HOSEK_WILKIE", "sun_direction": (0, 0, 2), "turbidity": 3.0, "ground_albedo": 0.8})
+    assert (hosek.sun_elevation, hosek.ground_albedo) == (pytest.approx(np.pi / 2), 0.8)
     preetham = sky_of({"sky_type": "PREETHAM", "sun_direction": (0.6, 0.0, 0.8), "turbidity": 3.0})
     assert preetham.sun == pytest.approx([0.6, 0.0, 0.8])

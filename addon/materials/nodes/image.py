@@ -185,9 +185,6 @@ ENTRIES = (
         (Socket("Vector", "VECTOR", implicit="@GENERATED"), POINT, Setting("sun_is_lamp")),
         (("Color", "COLOR"),),
         SKY_SOURCE,
-        setting_approximations=(
-            ("sky_type", ("HOSEK_WILKIE",), "The sky of Hosek and Wilkie is drawn by Preetham's model."),
-        ),
         image=True,
     ),
 )
