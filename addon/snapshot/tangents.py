@@ -18,7 +18,7 @@ def corner_tangents(positions, corner_vertices, corner_normals, uv, triangles) -
     """(C, 4) float32: unit tangent in the normal plane, and the sign of the bitangent cross(n, t) * w.
 
     positions (V, 3), corner_vertices (C,), corner_normals (C, 3) unit, uv (C, 2), triangles (T, 3) corners.
-    A corner whose UVs have no area gets some tangent of its normal plane and sign +1.
+    A corner whose UVs have no area gets the object's x axis in its normal plane, as in Cycles, and sign +1.
     """
     result = np.zeros((len(corner_vertices), 4), np.float32)
     result[:, 3] = 1.0
@@ -36,7 +36,7 @@ def corner_tangents(positions, corner_vertices, corner_normals, uv, triangles) -
         result[corners, :3] = _normalized(total).astype(np.float32)[group]
         result[corners, 3] = np.repeat(np.where(mirrored, np.float32(-1.0), np.float32(1.0)), 3)
     lost = np.flatnonzero(np.einsum("ij,ij->i", result[:, :3], result[:, :3]) < 0.5)
-    result[lost, :3] = _any_perpendicular(corner_normals[lost])
+    result[lost, :3] = _along_x(corner_normals[lost])
     return result
 
 
@@ -82,7 +82,7 @@ def _normalized(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.where(length > 0.0, length, 1.0)[..., None]
 
 
-def _any_perpendicular(normals: np.ndarray) -> np.ndarray:
-    """A unit vector in each normal's plane: the world axis that leans least on the normal, projected."""
-    axis = np.eye(3, dtype=np.float32)[np.argmin(np.abs(normals), axis=1)]
+def _along_x(normals: np.ndarray) -> np.ndarray:
+    """The object's x axis in each normal's plane, as a unit vector; its y axis where the normal is x itself."""
+    axis = np.where(np.abs(normals[:, :1]) < 0.9999, np.float32([1, 0, 0]), np.float32([0, 1, 0]))
     return _normalized(axis - normals * np.einsum("ij,ij->i", axis, normals)[:, None])

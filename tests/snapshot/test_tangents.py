@@ -76,13 +76,18 @@ def test_tangents_do_not_depend_on_the_size_of_the_mesh(size):
     assert np.allclose(tangents, [[0.8, -0.6, 0, 1]] * 3, atol=1e-6)
 
 
-def test_a_map_without_area_still_gives_unit_tangents_in_the_plane():
-    positions = np.array([(0, 0, 0), (2, 0, 0), (0, 3, 0)], np.float32)
-    corners = np.arange(3, dtype=np.int32)
-    normals = np.tile(np.float32((0, 0, 1)), (3, 1))
-    tangents = corner_tangents(positions, corners, normals, np.zeros((3, 2), np.float32), corners.reshape(1, 3))
-    assert np.linalg.norm(tangents[:, :3], axis=1) == pytest.approx([1, 1, 1])
-    assert tangents[:, 2].tolist() == [0, 0, 0]
+@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 2, 3), (-2, 1, 0.3), (1, 0, 0)])
+def test_a_map_without_area_gives_the_x_axis_in_the_plane(normal):
+    """As Cycles has it, but where that has no tangent, on what faces x."""
+    normal = np.float32(normal) / np.linalg.norm(normal).astype(np.float32)
+    across = np.cross(normal, np.roll(normal, 1) + np.float32([0.3, 0.1, 0]))
+    positions = np.stack([0 * across, across, np.cross(normal, across)])
+    corners = np.arange(3)
+    tangents = corner_tangents(
+        positions, corners, np.tile(normal, (3, 1)), np.zeros((3, 2), np.float32), corners[None]
+    )[:, :3]  # fmt: skip
+    expected = np.array([1, 0, 0]) - normal[0] * normal if normal[0] < 1 else np.array([0, 1, 0])
+    assert tangents == pytest.approx(np.tile(expected / np.linalg.norm(expected), (3, 1)), abs=1e-6)
 
 
 def test_polygons_that_blender_refuses_have_tangents_too(stage):
