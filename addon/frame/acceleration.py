@@ -30,7 +30,8 @@ NODE_TEXELS = 4
 # Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
 # emission r, g, b; material; shading normals of the three corners.
 LEAF_TEXELS = 17
-OPEN_TO_SHADOW, SHADOW_ALONE = 2.0, 4.0  # added to the opacity, read by shaders/trace/hierarchy.glsl
+# Added to the opacity, read by shaders/trace/hierarchy.glsl.
+OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = 2.0, 4.0, 6.0
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
 
@@ -58,17 +59,19 @@ def world_triangles(
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (what lets one of the two kinds of rays pass says so:
-    OPEN_TO_SHADOW, SHADOW_ALONE), mean emitted radiance, number of the material and packed corner normals."""
+    OPEN_TO_SHADOW, SHADOW_ALONE; WHOLE_SHADOW lets no ray to a light pass), mean emitted radiance, number of the
+    material and packed corner normals."""
     corners, looks = [], []
-    look = np.array([
-        (_opacity(m), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
-        for k, m in enumerate(materials)
-    ])  # fmt: skip
+    look = {
+        added: np.array([
+            (_opacity(m, added), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k) for k, m in enumerate(materials)
+        ])
+        for added in (0.0, OPEN_TO_SHADOW, SHADOW_ALONE)
+    }  # fmt: skip
     shown = [one for one in instances if _met(one, path) and meshes[one.mesh].triangle_count]
     for (key, slots, added), group in groupby(shown, lambda one: (one.mesh, one.materials, _added(one, path))):
         mesh, slots = meshes[key], np.asarray(slots)
-        look_of_triangle = look[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
-        look_of_triangle[:, 0] += np.copysign(added, look_of_triangle[:, 0])
+        look_of_triangle = look[added][slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
         copies, at_once = list(group), max(AT_ONCE // mesh.triangle_count, 1)
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
@@ -95,10 +98,15 @@ def _added(instance: Instance, path: str) -> float:
     return 0.0 if instance.visibility.shadow else OPEN_TO_SHADOW
 
 
-def _opacity(material: CompiledMaterial) -> float:
-    """Mean coverage for rays that pass at random, below 1 where some may; negative where rays may also be bent."""
+def _opacity(material: CompiledMaterial, added: float = 0.0) -> float:
+    """Mean coverage for rays that pass at random, below 1 where some may, and what is `added` to it (_added); negative
+    where rays may also be bent."""
     opacity = min(material.opacity, 0.999) if material.transparent else 1.0
-    return -max(opacity, 1e-3) if material.glass else opacity
+    if material.glass:
+        return -(max(opacity, 1e-3) + added)
+    if material.transparent and not material.casts_by_lot:
+        return {0.0: opacity + WHOLE_SHADOW, OPEN_TO_SHADOW: opacity + added, SHADOW_ALONE: 1.0 + added}[added]
+    return opacity + added
 
 
 def _cofactors(matrices: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ def clusters(
         return None
     known: dict[str, np.ndarray] = {}
     sorts: dict[bool, list[_Part]] = {True: [], False: []}  # closed or not
-    opaque = ~np.array([material.transparent for material in materials])
+    opaque = ~np.array([material.casts_by_lot for material in materials])
     for instance in instances:
         mesh = meshes[instance.mesh]
         if not instance.visibility.shadow or not mesh.triangle_count or not np.isfinite(instance.matrix).all():

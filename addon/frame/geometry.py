@@ -106,7 +106,7 @@ class SceneGeometry:
         changed = self._update_transforms(instances, snapshot)
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
-            tuple((m.attributes, m.transparent) for m in materials),
+            tuple((m.attributes, m.casts_by_lot) for m in materials),
         )
         self._placed = (instances, snapshot.meshes, materials)
         self.changes += changed or key != self._draw_key
@@ -234,7 +234,7 @@ class SceneGeometry:
                     [(0, mesh, slots)],
                     [(k, length, list(range(k, k + length))) for k, length in spans],
                 )
-        attributes = tuple((m.attributes, m.transparent) for m in materials)
+        attributes = tuple((m.attributes, m.casts_by_lot) for m in materials)
         self._shell = shell
         self._plan: list[tuple[list[int], int, object, int, int, bool]] = []
         kept = {}
@@ -275,7 +275,7 @@ class SceneGeometry:
             key = (mesh.key, mesh.version)
             if key not in kept:
                 kept[key] = self._closed[key] if key in self._closed else _closed(mesh)
-            shell[k] = kept[key] and not any(materials[slot].transparent for slot in instance.materials)
+            shell[k] = kept[key] and not any(materials[slot].casts_by_lot for slot in instance.materials)
         self._closed = kept
         return shell
 
@@ -338,7 +338,7 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
             batch.handle.vertbuf_add(extra[slot, attribute])
         surfaces.append((int(material), batch))
 
-    opaque = ~np.array([material.transparent for material in materials])[triangle_material]
+    opaque = ~np.array([material.casts_by_lot for material in materials])[triangle_material]
     if not opaque.any():
         return surfaces, []
     vertices = gfx_geometry.vertex_buffer(

@@ -310,7 +310,7 @@ class Renderer:
         wanted += [
             self.materials.caster_program(material)
             for material in shown
-            if self.materials.compiled[material].transparent
+            if self.materials.compiled[material].casts_by_lot
         ]
         wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
         return list(dict.fromkeys(wanted))

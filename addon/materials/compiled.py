@@ -34,6 +34,7 @@ class CompiledMaterial:
     images: tuple[str, ...]  # Image.key in sampler order
     values: np.ndarray  # (P, 4) float32, P >= 1
     transparent: bool  # some ray may pass: the surface is drawn with stochastic transparency
+    casts_by_lot: bool  # so may light on its way to a surface; else what is transparent casts a full shadow
     emissive: bool
     emission: tuple[float, float, float]  # mean radiance, for choosing and sampling emissive geometry
     opacity: float  # mean coverage 0..1, where a shader cannot be run per point

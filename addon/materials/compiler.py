@@ -66,6 +66,7 @@ class _Compilation:
         kinds = ",".join(attribute.kind for attribute in code.attributes)
         identity = f"{glsl}\0{kinds}\0{len(code.image_keys)}\0{len(values)}"
         passes, emission = summary.transparency, summary.emission
+        transparent = bool(np.any(passes.high > 1e-5))
         return CompiledMaterial(
             name=code.name,
             program_key=hashlib.sha256(identity.encode()).hexdigest()[:32],
@@ -73,7 +74,8 @@ class _Compilation:
             attributes=tuple(code.attributes),
             images=tuple(code.image_keys),
             values=values,
-            transparent=bool(np.any(passes.high > 1e-5)),
+            transparent=transparent,
+            casts_by_lot=transparent and (self.graph.transparent_shadow or summary.glass is not None),
             emissive=bool(np.any(emission.high > 0.0) or np.any(emission.low < 0.0)),
             emission=tuple(float(channel) for channel in emission.mean),
             opacity=float(np.clip(1.0 - passes.luminance().mean[0], 0.0, 1.0)),

@@ -35,3 +35,4 @@ class Graph:
     surface: tuple[str, str] | None = None  # what is linked to the output node: (node key, output identifier)
     volume: tuple[str, str] | None = None
     displacement: tuple[str, str] | None = None
+    transparent_shadow: bool = True  # light on its way to a surface passes where the surface is transparent

@@ -81,7 +81,8 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
         # A volume alone has no surface; only a tree without either is black.
         clear = Node("No surface", owner.name, "ShaderNodeBsdfTransparent", {"Color": WHITE}, {"BSDF": "SHADER"})
         found[clear.key], links["surface"] = clear, (clear.key, "BSDF")
-    return Graph(found, **links), tuple(dict.fromkeys(reading.notes))
+    shadow = bool(getattr(owner, "use_transparent_shadow", True))
+    return Graph(found, **links, transparent_shadow=shadow), tuple(dict.fromkeys(reading.notes))
 
 
 def _uses_nodes(owner) -> bool:

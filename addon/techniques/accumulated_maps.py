@@ -125,7 +125,7 @@ class DepthMapService:
     def alpha_casters(self, frame: Frame) -> depth_maps.AlphaCasters:
         """What lets some light pass, and how to draw it."""
         materials = frame.materials
-        draws = [draw for draw in frame.geometry.draws if materials.compiled[draw.material].transparent]
+        draws = [draw for draw in frame.geometry.draws if materials.compiled[draw.material].casts_by_lot]
         programs = {
             index: (passes.get(materials.caster_program(index)), materials.bindings(index, frame.geometry.instances))
             for index in {draw.material for draw in draws}

@@ -135,7 +135,7 @@ class SoftMaps(AccumulatedMaps):
         seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self))
         key = (*seen, *((view.rows.tobytes(), view.cell) for view in views))
         compiled = frame.materials.compiled
-        varies = any(compiled[draw.material].transparent for draw in frame.geometry.draws)  # alpha is drawn by lot
+        varies = any(compiled[draw.material].casts_by_lot for draw in frame.geometry.draws)  # alpha is drawn by lot
         if not varies and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
             return self._to_ask(frame, self._drawn[1])

@@ -7,7 +7,8 @@
 #define NODE_TEXELS 4
 #define DEEPEST 32  // nodes above each other, as in addon/frame/box_tree.py
 #define LEAF_TEXELS 17
-// Negative: the triangle may also bend what meets it. By 2 more: rays that look for a light pass; by 4: only they do not.
+// Negative: the triangle may also bend what meets it. By 2 more: rays that look for a light pass; by 4: only they do not;
+// by 6: they do not pass at random.
 #define OPACITY_TEXEL 9
 #define MATERIAL_TEXEL 13
 #define NORMAL_TEXEL 14
@@ -157,11 +158,13 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
       vec4 opacity = leaf_texel(place.index * LEAF_TEXELS + OPACITY_TEXEL);
-      vec4 blocks = floor(abs(opacity) * 0.5);  // 0: all rays, 1: not those that look for a light, 2: only those
+      // 0: all rays, 1: not those that look for a light, 2: only those, 3: all, and those for certain.
+      vec4 blocks = floor(abs(opacity) * 0.5);
       bvec4 passed = equal(blocks, vec4(shadow ? 1.0 : 2.0));
       opacity = (bent ? mix(abs(opacity) - 2.0 * blocks, vec4(1.0), lessThan(opacity, vec4(0.0)))
                       : abs(opacity) - 2.0 * blocks);
       opacity = mix(opacity, vec4(0.0), passed);
+      opacity = (shadow) ? mix(opacity, vec4(1.0), equal(blocks, vec4(3.0))) : opacity;
 #ifdef OPAQUE_ONLY
       opacity = floor(opacity);
 #endif

@@ -197,6 +197,17 @@ def test_a_card_that_some_rays_pass_dims_the_bounce_as_in_cycles(stage, render, 
     assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
 
 
+@pytest.mark.parametrize("passes", [False, True])
+def test_a_transparent_card_may_block_what_comes_from_lamps_only(stage, render, passes):
+    """Material setting "Transparent Shadows": off, the floor below is dark, but light of the wall still passes."""
+    corner(stage)
+    card = stage.see_through(0.2)
+    card.use_transparent_shadow = passes
+    stage.rectangle((-0.5, -0.5), (0.5, 0.5), z=0.8, material=card)
+    expected = light_paths(stage.render(256, (24, 24), engine="CYCLES", bounces=3))["diffuse_indirect"]
+    assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
+
+
 @pytest.mark.parametrize(
     ("kind", "light", "settings"),
     [

@@ -339,3 +339,19 @@ def test_round_light_larger_than_its_distance_does_not_shine_through_a_roof(stag
     images = stage.render(16, (16, 16), bounces=2)
     assert images["diffuse_direct"].max() == 0.0
     assert images["diffuse_indirect"].max() == 0.0
+
+
+@pytest.mark.parametrize("technique", ["accumulated_maps", "shadows_by_light"])
+def test_a_material_without_transparent_shadows_casts_a_whole_one(floor, technique):
+    """Its "Transparent Shadows" switched off: light is blocked, while the camera still sees through."""
+    floor.scene.candela.slot_shadow = technique
+    card = floor.see_through(0.25)
+    card.use_transparent_shadow = False
+    floor.rectangle((-1, -1), (1, 1), z=1.0, material=card)
+    floor.light("SUN", energy=np.pi)
+    images = floor.render(16, (32, 32))
+    assert images["diffuse_direct"][12:20, 12:20].max() == 0.0
+    assert images["diffuse_color"][12:20, 12:20, 0].mean() == pytest.approx(0.75, abs=0.02)
+    card.use_transparent_shadow = True
+    lit = floor.render(16, (32, 32))["diffuse_direct"][12:20, 12:20, 0].mean()
+    assert lit == pytest.approx(0.75, abs=0.05)
