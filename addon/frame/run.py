@@ -12,10 +12,12 @@ import numpy as np
 from ..gfx import context, images
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
+from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Snapshot
 from . import ledger as ledger_module
 from .acceleration import Hierarchy, HierarchyCache
 from .bands import Bands
+from .coverage import Coverage
 from .depth_maps import Receivers
 from .environment import Environment
 from .geometry import SceneGeometry
@@ -48,6 +50,7 @@ class Frame:
     ledger: Ledger
     view_block: Block
     hierarchies: HierarchyCache
+    coverage: Coverage
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -103,12 +106,17 @@ class Frame:
         x, y = (blackman_harris_offset(u, self.snapshot.film.filter_width) for u in self.random_at(number, FILM))
         return x, y
 
+    @cached_property
+    def measured_materials(self) -> list[CompiledMaterial]:
+        """The scene's materials, with the opacity that they have on average on the surfaces that show them."""
+        return self.coverage.of(self.materials, self.geometry)
+
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
         if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
             self._hierarchies[path] = self.hierarchies.get(
-                self.snapshot, self.materials.compiled, self.geometry.origin, path, self.settings.draft
+                self.snapshot, self.measured_materials, self.geometry.origin, path, self.settings.draft
             )
         return self._hierarchies[path]
 
@@ -148,7 +156,7 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
-        self._hierarchies = HierarchyCache()
+        self._hierarchies, self._coverage = HierarchyCache(), Coverage()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._frame_key: object = None
@@ -194,6 +202,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
+            self._coverage,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -310,7 +319,7 @@ class Renderer:
         wanted += [
             self.materials.caster_program(material)
             for material in shown
-            if self.materials.compiled[material].casts_by_lot
+            if self.materials.compiled[material].casts_by_lot or self.materials.compiled[material].uneven
         ]
         wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
         return list(dict.fromkeys(wanted))

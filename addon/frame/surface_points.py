@@ -58,7 +58,7 @@ class SurfacePoints:
         reach = float(np.exp2(np.ceil(np.log2(4 * max(distance, 1e-30)))))
         eye = frame.snapshot.camera.matrix[:3, 3] - frame.geometry.origin
         eye = np.round(eye / reach) * reach if np.isfinite(eye).all() else np.zeros(3)
-        snapshot, materials, origin = frame.snapshot, frame.materials.compiled, frame.geometry.origin
+        snapshot, materials, origin = frame.snapshot, frame.measured_materials, frame.geometry.origin
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.diffuse)
                   for i in snapshot.instances),

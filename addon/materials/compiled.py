@@ -38,6 +38,7 @@ class CompiledMaterial:
     emissive: bool
     emission: tuple[float, float, float]  # mean radiance, for choosing and sampling emissive geometry
     opacity: float  # mean coverage 0..1, where a shader cannot be run per point
+    uneven: bool  # it varies: what it is on average depends on the surfaces (frame/coverage.py)
     diffuse: bool  # has a diffuse closure
     glossy: bool  # has a glossy closure
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon

@@ -79,6 +79,7 @@ class _Compilation:
             emissive=bool(np.any(emission.high > 0.0) or np.any(emission.low < 0.0)),
             emission=tuple(float(channel) for channel in emission.mean),
             opacity=float(np.clip(1.0 - passes.luminance().mean[0], 0.0, 1.0)),
+            uneven=transparent and not passes.constant,
             diffuse=summary.diffuse,
             glossy=summary.glossy,
             soft=summary.soft,

@@ -1,8 +1,7 @@
 """Mean reflectance of each material: what surfaces out of the camera's sight reflect of the light that meets them.
 
 A node tree is only known as a program that runs per pixel. So each material is drawn once, all its surfaces over one
-another, from two slanted directions that between them see every face from the front or from behind at about the angle
-from which diffuse light comes (55 degrees for the faces of a box), and the pixels are averaged.
+another, from the two directions of frame/overview.py, and the pixels are averaged.
 
 | cost | once per set of materials and geometry |
 |---|---|
@@ -16,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..frame.culling import calls
-from ..frame.geometry import Draw
 from ..frame.materials import SURFACE_IMAGES
+from ..frame.overview import DIRECTIONS, overview, some
 from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
@@ -26,11 +25,9 @@ from .surfaces import STOCHASTIC, SURFACE_TEXTURES
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
-ENOUGH = 4096  # triangles of one mesh: its instances differ by little but their place
 MOST_CELLS = 32  # that are averaged one by one
 BANDS = 4  # of rows in the result, see shaders/indirect/reflectance.frag.glsl
 EVERY_FLAG = -1  # instances hidden from the camera reflect light too
-DIRECTIONS = np.array([[1.0, 0.9, 0.8], [-0.8, 1.0, 0.9]])
 VIEW_COSINE = 0.577  # between a view and the faces of a box, on average
 REFLECTANCE = passes.fullscreen_program(
     "reflectance",
@@ -70,7 +67,7 @@ class Reflectance:
         for number, direction in enumerate(DIRECTIONS):
             for material in changed:
                 corner = (material % COLUMNS * SIDE, (2 * (material // COLUMNS) + number) * SIDE)
-                self._draw(frame, target, (*corner, SIDE, SIDE), material, direction / np.linalg.norm(direction))
+                self._draw(frame, target, (*corner, SIDE, SIDE), material, direction)
         cells = [(k % COLUMNS, band * rows + k // COLUMNS, 1, 1) for k in changed for band in range(BANDS)]
         for viewport in cells if few else [None]:
             passes.fullscreen(
@@ -96,12 +93,12 @@ class Reflectance:
 
     def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
         all_draws = frame.geometry.draws
-        own = _some([k for k, draw in enumerate(all_draws) if draw.material == material], all_draws)
+        own = some([k for k, draw in enumerate(all_draws) if draw.material == material], all_draws)
         draws = [all_draws[k] for k in own]
         shader = passes.get(frame.materials.surface_program(material))
         bindings = frame.materials.bindings(material, frame.geometry.instances)
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
-        bindings["blocks"]["film_view"] = Block(VIEW, **_view(low, high, backward))
+        bindings["blocks"]["film_view"] = Block(VIEW, **_values(overview(low, high, backward)))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
             shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": STOCHASTIC, "glass_bends": 0})
             for call in calls(all_draws, own):
@@ -114,29 +111,9 @@ class Reflectance:
         self.image, self._keys = None, {}
 
 
-def _some(numbers: list[int], draws: list[Draw]) -> list[int]:
-    """Of a mesh that is shown in many groups of instances as many groups, evenly, as hold about ENOUGH triangles."""
-    by_batch: dict[int, list[int]] = {}
-    for k in numbers:
-        by_batch.setdefault(id(draws[k].batch), []).append(k)
-    chosen = []
-    for groups in by_batch.values():
-        chosen += groups[:: max(sum(draws[k].triangles for k in groups) // ENOUGH, 1)]
-    return sorted(chosen)
-
-
-def _view(low: np.ndarray, high: np.ndarray, backward: np.ndarray) -> dict:
-    """An orthographic view of a box from `backward`; fields of VIEW."""
-    right = np.cross([0.0, 0.0, 1.0], backward)
-    right /= np.linalg.norm(right)
-    up = np.cross(backward, right)
-    centre, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-30)
-    eye = centre + 2 * radius * backward
-    one = np.array([0.0, 0.0, 0.0, 1.0])
+def _values(view: dict) -> dict:
+    """Fields of VIEW for an overview."""
     return {
-        "row_x": np.append(right, -right @ centre) / radius, "row_y": np.append(up, -up @ centre) / radius,
-        "row_w": one, "row_q": 0.5 * one, "eye": (*eye, 1.0), "right": (*right, 0.0), "up": (*up, 0.0),
-        "backward": (*backward, 1.0), "frame": (-radius, radius, -radius, radius),
-        "film": (SIDE, SIDE, 0.0, 4 * radius), "sample_index": 0, "seed": 0,
+        **view, "film": (SIDE, SIDE, 0.0, 4 * view["frame"][1]), "sample_index": 0, "seed": 0,
         **dict.fromkeys(("bits_x", "bits_y", "bits_z", "bits_w"), 0), "visibility": EVERY_FLAG,
     }  # fmt: skip
