@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..gfx import images, library
@@ -124,6 +126,10 @@ class MaterialSet:
     def caster_program(self, index: int) -> Program:
         """Draws material `index`, which has alpha, into a depth map."""
         return _caster_program(self.compiled[index])
+
+    def emission_program(self, index: int) -> Program:
+        """Adds up what material `index` emits."""
+        return _emission_program(self.compiled[index])
 
     def bindings(self, index: int, instances: images.Image) -> dict:
         """Textures and blocks that both programs of a material need."""
@@ -248,6 +254,15 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
         defines=PROJECTION_DEFINES,
         **_shared(compiled),
+    )
+
+
+def _emission_program(compiled: CompiledMaterial) -> Program:
+    return replace(
+        _caster_program(compiled),
+        name=f"emission {compiled.program_key[:8]}",
+        fragment="surface/emission.frag.glsl",
+        outputs=(("VEC4", "out_emission"),),
     )
 
 

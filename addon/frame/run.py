@@ -17,7 +17,6 @@ from ..snapshot.scene import Snapshot
 from . import ledger as ledger_module
 from .acceleration import Hierarchy, HierarchyCache
 from .bands import Bands
-from .coverage import Coverage
 from .depth_maps import Receivers
 from .environment import Environment
 from .geometry import SceneGeometry
@@ -29,6 +28,7 @@ from .plan import Plan, make_plan
 from .rates import Rate
 from .sequence import FILM, LENS, point, third
 from .settings import Settings
+from .surface_means import SurfaceMeans
 from .technique import Technique
 from .view import VIEW, View, blackman_harris_offset
 from .world_tree import WorldTree
@@ -50,7 +50,7 @@ class Frame:
     ledger: Ledger
     view_block: Block
     hierarchies: HierarchyCache
-    coverage: Coverage
+    surface_means: SurfaceMeans
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -108,8 +108,8 @@ class Frame:
 
     @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:
-        """The scene's materials, with the opacity that they have on average on the surfaces that show them."""
-        return self.coverage.of(self.materials, self.geometry)
+        """The scene's materials, with the means that they have on the surfaces that show them."""
+        return self.surface_means.of(self.materials, self.geometry)
 
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
@@ -156,7 +156,7 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
-        self._hierarchies, self._coverage = HierarchyCache(), Coverage()
+        self._hierarchies, self._surface_means = HierarchyCache(), SurfaceMeans()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._frame_key: object = None
@@ -202,7 +202,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._coverage,
+            self._surface_means,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -321,6 +321,8 @@ class Renderer:
             for material in shown
             if self.materials.compiled[material].casts_by_lot or self.materials.compiled[material].uneven
         ]
+        varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
+        wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
         return list(dict.fromkeys(wanted))
 

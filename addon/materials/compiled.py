@@ -38,7 +38,9 @@ class CompiledMaterial:
     emissive: bool
     emission: tuple[float, float, float]  # mean radiance, for choosing and sampling emissive geometry
     opacity: float  # mean coverage 0..1, where a shader cannot be run per point
-    uneven: bool  # it varies: what it is on average depends on the surfaces (frame/coverage.py)
+    # Opacity, emission vary: what they are on average depends on the surfaces (frame/surface_means.py).
+    uneven: bool
+    uneven_emission: bool
     diffuse: bool  # has a diffuse closure
     glossy: bool  # has a glossy closure
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon

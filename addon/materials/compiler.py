@@ -80,6 +80,7 @@ class _Compilation:
             emission=tuple(float(channel) for channel in emission.mean),
             opacity=float(np.clip(1.0 - passes.luminance().mean[0], 0.0, 1.0)),
             uneven=transparent and not passes.constant,
+            uneven_emission=not emission.constant,
             diffuse=summary.diffuse,
             glossy=summary.glossy,
             soft=summary.soft,

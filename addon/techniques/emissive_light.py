@@ -13,7 +13,8 @@ As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissiv
 | maps | `points` x (1 view, or up to 6 cube faces) |
 | passes | 1 over the screen |
 
-Fails: emission from a texture is taken at its mean over the material; very many small emitters need many samples.
+Fails: emission that varies is taken at its mean over the surfaces that show the material; very many small emitters
+need many samples.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class EmissiveTriangles:
 
     def __init__(self, frame: Frame):
         corners, radiance = [], []
-        materials = frame.materials.compiled
+        materials = frame.measured_materials
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
             slots = np.array(

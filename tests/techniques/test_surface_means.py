@@ -1,4 +1,4 @@
-"""Mean opacity of materials over what shows them: a sheet of sprites of which surfaces show parts."""
+"""Means of materials over what shows them: opacity of parts of a sheet of sprites, emission of gradients."""
 
 import bpy
 import numpy as np
@@ -61,11 +61,11 @@ def test_what_shows_a_material_is_weighted_by_its_size(stage, sheet):
 
 
 def test_it_is_measured_once(stage, sheet, monkeypatch):
-    from addon.frame import coverage
+    from addon.frame import surface_means
 
     made = []
-    measured = coverage._measured
-    monkeypatch.setattr(coverage, "_measured", lambda *arguments: made.append(1) or measured(*arguments))
+    measured = surface_means._opacity
+    monkeypatch.setattr(surface_means, "_opacity", lambda *arguments: made.append(1) or measured(*arguments))
     placed = card(stage, sheet, 0.0, 1.0)
     stage.light("SUN")
     stage.camera_above()
@@ -88,3 +88,41 @@ def test_a_wall_that_shows_an_opaque_part_keeps_light_in(stage, sheet):
         for wall in walls:
             bpy.data.objects.remove(wall)
     assert found[0] == pytest.approx(found[1], rel=0.02)
+
+
+def ramp(stage, factor_of, ends):
+    """An emissive material whose strength runs between `ends` over a value that `factor_of` gives of its tree."""
+    material = stage.material("ShaderNodeEmission", Color=(1, 1, 1, 1))
+    tree = material.node_tree
+    blend = tree.nodes.new("ShaderNodeMapRange")
+    blend.inputs["To Min"].default_value, blend.inputs["To Max"].default_value = ends
+    tree.links.new(factor_of(tree), blend.inputs["Value"])
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(blend.outputs[0], emission.inputs["Strength"])
+    return material
+
+
+def along_u(tree):
+    apart = tree.nodes.new("ShaderNodeSeparateXYZ")
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["UV"], apart.inputs[0])
+    return apart.outputs["X"]
+
+
+def camera_ray(tree):
+    return tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
+
+
+@pytest.mark.parametrize(
+    ("factor_of", "ends", "expected"), [(along_u, (0.0, 8.0), 6.0), (camera_ray, (3.0, 0.0), 3.0)], ids=["u", "ray"]
+)
+def test_surfaces_get_what_a_material_emits_on_average(stage, factor_of, ends, expected):
+    """A panel high above a floor, that shows u from .5 to 1, or that the camera does not see shine."""
+    panel = card(stage, ramp(stage, factor_of, ends), 0.5, 1.0, location=(0.0, 0.0, 3.0))
+    panel.visible_camera = False
+    stage.floor()
+    stage.camera_above()
+    ours = stage.render(16, (16, 16))["diffuse_direct"][..., 0].mean()
+    found = [one for one in stage.renderer.frame.measured_materials if one.emissive]
+    assert found[0].emission == pytest.approx((expected,) * 3, rel=0.01)
+    cycles = stage.render(256, (16, 16), engine="CYCLES")["diffuse_direct"][..., 0].mean()
+    assert ours == pytest.approx(cycles, rel=0.03)

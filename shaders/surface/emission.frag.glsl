@@ -1,0 +1,17 @@
+// Radiance that a material emits towards surfaces that it lights, to be added up over all that shows it.
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#include "lib/closure.glsl"
+#include "lib/instance.glsl"
+#include "generated/material"
+#include "surface/point.glsl"
+
+void main()
+{
+  SurfacePoint point = surface_point(light_point.xyz, instance_read(instance_flat.x));
+  point.ray = RAY_LIGHT;
+  Closures c = closures_begin(point.normal, 0.5);
+  evaluate_material(point, c);
+  closures_end(c);
+  out_emission = is_finite(max_component(abs(c.emission))) ? vec4(c.emission, 1.0) : vec4(0.0);
+}
