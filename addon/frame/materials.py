@@ -257,12 +257,17 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+# What casts no shadow shines, too.
+EVERY_DEFINES = tuple((name, "-1" if name == "VISIBILITY_FLAG" else value) for name, value in PROJECTION_DEFINES)
+
+
 def _emission_program(compiled: CompiledMaterial) -> Program:
     return replace(
         _caster_program(compiled),
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
+        defines=EVERY_DEFINES,
     )
 
 

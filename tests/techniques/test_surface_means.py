@@ -118,7 +118,7 @@ def camera_ray(tree):
 def test_surfaces_get_what_a_material_emits_on_average(stage, factor_of, ends, expected):
     """A panel high above a floor, that shows u from .5 to 1, or that the camera does not see shine."""
     panel = card(stage, ramp(stage, factor_of, ends), 0.5, 1.0, location=(0.0, 0.0, 3.0))
-    panel.visible_camera = False
+    panel.visible_camera = panel.visible_shadow = False
     stage.floor()
     stage.camera_above()
     ours = stage.render(16, (16, 16))["diffuse_direct"][..., 0].mean()
