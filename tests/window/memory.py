@@ -18,7 +18,7 @@ def now():
     gc.collect()
     if sys.platform == "linux":
         ctypes.CDLL(None).malloc_trim(0)
-    images = [one for one in gc.get_objects() if type(one).__module__.endswith("candela.addon.gfx.images")]
+    images = [one for one in gc.get_objects() if str(type(one).__module__).endswith("candela.addon.gfx.images")]
     images = [one for one in images if type(one).__name__ == "Image"]
     return {
         "resident_mib": round(resident_mib(), 1),
