@@ -137,7 +137,9 @@ class SceneGeometry:
         matrices = _stacked([i.matrix for i in instances], (4, 4))
         if kinds != self._kinds or (matrices != self._matrices).any(axis=(1, 2)).sum() > MOST_MOVED:
             place = _neighbourhood(instances)
-            self._order = sorted(range(len(instances)), key=lambda k: (*kinds[k], place[k]))
+            # Not by the mesh's name, which holds a number of this session: what is drawn by lot depends on the order.
+            first = {mesh: k for k, mesh in enumerate(dict.fromkeys(mesh for mesh, _ in kinds))}
+            self._order = sorted(range(len(instances)), key=lambda k: (first[kinds[k][0]], kinds[k][1], place[k]))
             self._kinds, self._matrices = kinds, matrices
         return [instances[k] for k in self._order]
 

@@ -202,9 +202,9 @@ def footprint(area: float, points: float) -> float:
 
 
 def traceable(emitters: list[Emitter]) -> list[Emitter]:
-    """The lights that rays of narrow lobes look for: those with extent, the strongest where a block cannot hold all."""
-    extended = [e for e in emitters if e.extended]
-    return sorted(extended, key=lambda e: (-e.power, e.light.key))[:MOST_LIGHTS]
+    """The lights that rays of narrow lobes look for: those with extent, the strongest where a block cannot hold all.
+    Of equal strength those that come first."""
+    return sorted((e for e in emitters if e.extended), key=lambda e: -e.power)[:MOST_LIGHTS]
 
 
 class Sources:

@@ -19,7 +19,7 @@ def some(numbers: list[int], draws: list[Draw]) -> list[int]:
     """Of a mesh that is shown in many groups of instances as many groups, evenly, as hold about ENOUGH triangles."""
     by_batch: dict[int, list[int]] = {}
     for k in numbers:
-        by_batch.setdefault(id(draws[k].batch), []).append(k)
+        by_batch.setdefault(draws[k].batch.number, []).append(k)
     chosen = []
     for groups in by_batch.values():
         chosen += groups[:: max(sum(draws[k].triangles for k in groups) // ENOUGH, 1)]

@@ -53,7 +53,7 @@ class SurfaceMeans:
         prints, count, found, known = materials.fingerprint(), len(materials.compiled), list(materials.compiled), {}
         for material, numbers in shown.items():
             places = tuple(
-                (id(draw.batch), draw.first, draw.count) for draw in map(geometry.draws.__getitem__, numbers)
+                (draw.batch.number, draw.first, draw.count) for draw in map(geometry.draws.__getitem__, numbers)
             )
             for measure in _measures(found[material]):
                 key = measure, prints[material], prints[count:], places

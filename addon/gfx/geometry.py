@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, field
 
 import gpu
 import numpy as np
+
+_numbers = itertools.count()
 
 
 @dataclass(eq=False)
@@ -14,6 +17,7 @@ class Batch:
 
     handle: gpu.types.GPUBatch
     triangles: int
+    number: int = field(default_factory=_numbers.__next__)  # no other batch ever has it, as id() may be given again
 
 
 def vertex_buffer(**attributes: np.ndarray) -> gpu.types.GPUVertBuf:

@@ -88,7 +88,7 @@ class Reflectance:
         prints, count = frame.materials.fingerprint(), len(frame.materials.compiled)
         shown: dict[int, list] = {}
         for draw in frame.geometry.draws:
-            shown.setdefault(draw.material, []).append((id(draw.batch), draw.first, draw.count))
+            shown.setdefault(draw.material, []).append((draw.batch.number, draw.first, draw.count))
         return {material: (prints[material], prints[count:], shown[material]) for material in sorted(shown)}
 
     def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:

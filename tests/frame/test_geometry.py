@@ -9,6 +9,7 @@ import pytest
 from addon.frame import geometry
 from addon.frame.geometry import MOST_MOVED, SceneGeometry
 from addon.frame.materials import MaterialSet
+from addon.gfx import geometry as gfx_geometry
 from addon.gfx import images
 from addon.snapshot import SnapshotCache, take
 
@@ -106,3 +107,25 @@ def test_many_small_moves_end_in_the_same_list_as_one(snapshot):
         return rows[np.lexsort(rows.T)]
 
     np.testing.assert_array_equal(sorted_rows(made), sorted_rows(anew))
+
+
+def test_order_does_not_depend_on_the_numbers_in_names_of_meshes(snapshot):
+    """Names hold numbers of the session; what is drawn by lot depends on the order."""
+    orders = []
+    for start in (8, 99):  # 8, 9 and 99, 100: as text the larger one comes first
+        names = dict(zip(snapshot.meshes, (f"mesh {start}", f"mesh {start + 1}")))
+        named = replace(
+            snapshot,
+            meshes={names[key]: mesh for key, mesh in snapshot.meshes.items()},
+            instances=tuple(replace(one, mesh=names[one.mesh]) for one in snapshot.instances),
+        )
+        made = SceneGeometry()
+        updated(made, named)
+        orders.append(made.instance_rows)
+    np.testing.assert_array_equal(*orders)
+
+
+def test_no_batch_has_the_number_of_another(gpu_context):
+    vertices = gfx_geometry.vertex_buffer(position=np.eye(3, dtype=np.float32))
+    numbers = [gfx_geometry.triangle_batch(vertices, np.array([[0, 1, 2]])).number for _ in range(8)]
+    assert len(set(numbers)) == 8
