@@ -195,8 +195,11 @@ def _mesh_keys(first: dict[int, Place]) -> dict[int, str]:
     keys: dict[int, str] = {}
     taken: dict[str, int] = {}
     for pointer, place in first.items():
-        facts = place.source.facts
-        unmodified = facts.data_uid and not len(place.source.owner.original.modifiers)
+        source, facts = place.source, place.source.facts
+        if source.data.id_type == "HAIR":
+            keys[pointer] = f"hair {facts.uid} {source.data.number}"
+            continue
+        unmodified = facts.data_uid and not len(source.owner.original.modifiers)
         base = f"mesh {facts.data_uid}" if unmodified else f"object {facts.uid}"
         taken[base] = taken.get(base, 0) + 1
         keys[pointer] = base if taken[base] == 1 else f"{base} #{taken[base]}"
@@ -208,7 +211,8 @@ def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> 
     source, facts = place.source, place.source.facts
     mesh, entry = source.data, cache.meshes.get(key)
     asked = wanted.names
-    named = facts.uid in cache.changed or facts.data_uid in cache.changed
+    # Hair is dear to read, and never changes without a new evaluation.
+    named = mesh.id_type != "HAIR" and (facts.uid in cache.changed or facts.data_uid in cache.changed)
     # In edit mode the evaluated mesh is a shell around the edit mesh, which changes without a new evaluation.
     editing = mesh.id_type == "MESH" and mesh.is_editmode
     known = entry is not None and entry.asked == asked and not named and not editing

@@ -2,9 +2,9 @@
 
 Blender hands out every instance of a collection, geometry node, particle system or vertex/face instancer here, and
 also the meshes of curves, texts, surfaces and metaballs, as instances of their own object. The iterator's objects
-are temporary, so nothing of them is kept but the data-block of the mesh (or of hair curves or a point cloud, which
-strands.py makes a mesh), which lives as long as the evaluation. What an object says of itself is taken over from the
-last walk where the updates since then cannot concern it (see cache.py).
+are temporary, so nothing of them is kept but the data-block of the mesh, which lives as long as the evaluation: or of
+hair curves or a point cloud, which strands.py makes a mesh, or the particle system that grows hair (hair.py). What an
+object says of itself is taken over from the last walk where the updates since then cannot concern it (see cache.py).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 
 from .cache import SnapshotCache
+from .hair import HairSystem, hair_systems
 from .scene import Note, Visibility
 
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
@@ -47,7 +48,7 @@ class Source:
     """What is shown, as Blender has it during this walk."""
 
     facts: ObjectFacts
-    data: object  # evaluated mesh or light data-block
+    data: object  # evaluated mesh or light data-block, or a HairSystem
     pointer: int  # its address
     owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
     materials: tuple  # evaluated bpy materials (or None), one per slot
@@ -82,7 +83,7 @@ def walk(
     told = cache.informed and not cache.arranged and shown is None
     changed = cache.changed
     view_layer = depsgraph.view_layer_eval
-    hairy = len(bpy.data.particles) > 0
+    hairy, final = len(bpy.data.particles) > 0, depsgraph.mode == "RENDER"
     # Asked of each object only where some collection says so: these two are slower than all else.
     indirect_only, holdout = _collections_say(view_layer.layer_collection)
     for instance in depsgraph.object_instances:
@@ -93,59 +94,63 @@ def walk(
                 notes[_not_drawn(found, kind)] = None
             continue
         is_instance = instance.is_instance
-        if hairy and not is_instance and instance.show_particles:
-            _hair_notes(found, notes)
-        if not instance.show_self:
-            continue
-        data = found.data
-        if data is None:
-            continue
         owner, parent = (instance.instance_object, instance.parent) if is_instance else (found, None)
-        identity = (owner.as_pointer(), parent.as_pointer() if parent else 0, data.as_pointer())
-        source = known.get(identity)
-        if source is None:
-            original = owner.original
-            parent_uid = parent.original.session_uid if parent is not None else 0
-            own_data = original.data
-            # Geometry that a modifier instances has no data-block of its own in the file.
-            is_own = own_data is not None and (
-                not is_instance or (owner.data is not None and owner.data.as_pointer() == identity[2])
-            )
-            data_uid = own_data.session_uid if is_own else 0
-            name = original.session_uid, parent_uid, data_uid
-            facts = before.get(name)
-            if facts is None or not told or not changed.isdisjoint(name):
-                made = ObjectFacts(
-                    shown=shown is None or bool(shown(found)),
-                    name=original.name,
-                    uid=name[0],
-                    parent_uid=parent_uid,
-                    data_uid=data_uid,
-                    visibility=_visibility(owner, parent, view_layer if indirect_only else None),
-                    holdout=_is_holdout(owner, parent, view_layer if holdout else None),
-                    pass_index=owner.pass_index,
-                    random=_random_of_name(original.name),
-                    color=tuple(owner.color),
-                    notes=_object_notes(owner, kind, original.name),
+        shells = [found.data] if instance.show_self and found.data is not None else []
+        if hairy and instance.show_particles and kind == "MESH":
+            shells += hair_systems(owner, final)
+        for data in shells:
+            hair = isinstance(data, HairSystem)
+            pointer = data.pointer if hair else data.as_pointer()
+            identity = (owner.as_pointer(), parent.as_pointer() if parent else 0, pointer)
+            source = known.get(identity)
+            if source is None:
+                original = owner.original
+                parent_uid = parent.original.session_uid if parent is not None else 0
+                own_data = original.data
+                # Geometry that a modifier instances has no data-block of its own in the file.
+                is_own = own_data is not None and (
+                    not is_instance or (owner.data is not None and owner.data.as_pointer() == pointer)
                 )
-                if made != facts:
-                    facts = made
-            kept[name] = facts
-            materials = tuple([slot.material for slot in found.material_slots])
-            source = known[identity] = Source(facts, data, identity[2], owner, materials)
-            for note in facts.notes:
-                notes[note] = None
-        facts = source.facts
-        if not facts.shown:
-            continue
-        if is_instance:
-            ids = "-".join(str(number) for number in instance.persistent_id if number != _UNUSED_ID)
-            key = f"{facts.uid}/{facts.parent_uid}/{ids}"
-            random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
-            place = Place(source, key, random, instance.matrix_world.copy(), tuple(instance.orco), tuple(instance.uv))
-        else:
-            place = Place(source, str(facts.uid), facts.random, instance.matrix_world.copy())
-        (lights if kind == "LIGHT" else meshes).append(place)
+                data_uid = own_data.session_uid if is_own else 0
+                name = original.session_uid, parent_uid, data_uid
+                facts = before.get(name)
+                if facts is None or not told or not changed.isdisjoint(name):
+                    made = ObjectFacts(
+                        shown=shown is None or bool(shown(found)),
+                        name=original.name,
+                        uid=name[0],
+                        parent_uid=parent_uid,
+                        data_uid=data_uid,
+                        visibility=_visibility(owner, parent, view_layer if indirect_only else None),
+                        holdout=_is_holdout(owner, parent, view_layer if holdout else None),
+                        pass_index=owner.pass_index,
+                        random=_random_of_name(original.name),
+                        color=tuple(owner.color),
+                        notes=_object_notes(owner, kind, original.name),
+                    )
+                    if made != facts:
+                        facts = made
+                kept[name] = facts
+                materials = tuple([slot.material for slot in found.material_slots])
+                if hair and materials:
+                    materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
+                source = known[identity] = Source(facts, data, pointer, owner, materials)
+                for note in facts.notes:
+                    notes[note] = None
+            facts = source.facts
+            if not facts.shown:
+                continue
+            own = f"/hair {data.number}" if hair else ""
+            if is_instance:
+                ids = "-".join(str(number) for number in instance.persistent_id if number != _UNUSED_ID)
+                key = f"{facts.uid}/{facts.parent_uid}/{ids}{own}"
+                random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
+                place = Place(
+                    source, key, random, instance.matrix_world.copy(), tuple(instance.orco), tuple(instance.uv)
+                )
+            else:
+                place = Place(source, f"{facts.uid}{own}", facts.random, instance.matrix_world.copy())
+            (lights if kind == "LIGHT" else meshes).append(place)
     cache.facts = kept
     return meshes, lights, tuple(notes)
 
@@ -197,14 +202,6 @@ def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
 
 def _not_drawn(found, kind: str) -> Note:
     return Note(f"Object '{found.original.name}'", f"a {_NOT_DRAWN[kind]} object is not drawn.")
-
-
-def _hair_notes(found, notes: dict) -> None:
-    for system in found.particle_systems:
-        settings = system.settings
-        if settings.type == "HAIR" and settings.render_type == "PATH":
-            text = f"hair of particle system '{system.name}' is not drawn."
-            notes[Note(f"Object '{found.original.name}'", text)] = None
 
 
 def _object_notes(owner, kind: str, name: str) -> tuple[Note, ...]:

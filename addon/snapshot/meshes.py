@@ -16,6 +16,7 @@ import numpy as np
 
 from ..materials.nodes.inputs import ISLAND, POINTINESS
 from .cache import next_version
+from .hair import HairSystem, read_hair
 from .scene import Mesh, Note
 from .shape import island_numbers, pointiness
 from .strands import HAIR_RADIUS, POINT_RADIUS, spheres, tubes
@@ -79,7 +80,10 @@ class RawMesh:
 
 
 def read_mesh(mesh, wanted: Wanted) -> RawMesh:
-    """Copy the arrays of an evaluated Mesh, Curves or PointCloud. A mesh must hold data, not an edit-mode wrapper."""
+    """Copy the arrays of an evaluated Mesh, Curves or PointCloud, or of a HairSystem. A mesh must hold data, not an
+    edit-mode wrapper."""
+    if mesh.id_type == "HAIR":
+        return _read_particle_hair(mesh)
     if mesh.id_type != "MESH":
         return _read_strands(mesh, wanted)
     corners, faces = len(mesh.loops), len(mesh.polygons)
@@ -147,6 +151,19 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
     return RawMesh(
         positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
         colors=colors, generated=generated,
+    )  # fmt: skip
+
+
+def _read_particle_hair(system: HairSystem) -> RawMesh:
+    """Strands of a particle system as triangles (see hair.py, strands.py)."""
+    strands = read_hair(system)
+    positions, normals, triangles, source = tubes(strands.points, strands.radii, strands.offsets)
+    corners = triangles.reshape(-1)
+    curve = np.searchsorted(strands.offsets, source, side="right") - 1
+    return RawMesh(
+        positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
+        uv_maps={name: np.ascontiguousarray(values[curve[corners]]) for name, values in strands.uv_maps.items()},
+        active_uv=strands.active_uv, generated=np.ascontiguousarray(strands.generated[curve]),
     )  # fmt: skip
 
 

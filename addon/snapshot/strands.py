@@ -8,7 +8,8 @@ hair's), a sphere of triangles a little larger (its mean shadow, area / 4, is th
 Bias: a facet that turns away from a lamp shadows a rim that a round strand would light, 1 to 2 % of a tuft's light.
 
 Bulk numpy; the only loop runs along the points of the longest curve, for all curves at once. 10,000 hairs of 8 points
-are 1.1 million triangles and take 0.4 s.
+are 1.1 million triangles and take 0.4 s. Of more the tubes become coarser: one piece a segment, then three sides, then
+every other point.
 """
 
 from __future__ import annotations
@@ -19,19 +20,41 @@ import numpy as np
 
 SIDES = 4
 STEPS = 2  # pieces per segment of the spline, as many as Cycles draws by default
+FINENESS = ((STEPS, SIDES), (1, SIDES), (1, 3))  # pieces and sides: the first that is not too much
 HAIR_RADIUS = 0.005  # metres, where a curve or point has none: Cycles' defaults
 POINT_RADIUS = 0.01
-MOST_TRIANGLES = 1_500_000  # of a point cloud, before its spheres become coarser
-_WIDER = np.pi / (SIDES * np.sin(np.pi / SIDES))  # circumradius of a polygon whose perimeter is the circle's
+MOST_TRIANGLES = 1_500_000  # of a point cloud or of hair, before its spheres or tubes become coarser
 
 
 def tubes(points: np.ndarray, radii: np.ndarray, offsets: np.ndarray):
-    """Curves as tubes.
+    """Curves as tubes, coarser ones where there are many.
 
     `points` (P, 3) float32, `radii` (P,), `offsets` (C + 1,) int: curve k holds the points from offsets[k] up to
     offsets[k + 1].
     Returns positions (V, 3), normals (V, 3), triangles (T, 3) and the point that each vertex belongs to (V,).
     """
+    segments = int(np.maximum(np.diff(offsets) - 1, 0).sum())
+    steps, sides = next((f for f in FINENESS if 2 * f[0] * f[1] * segments <= MOST_TRIANGLES), FINENESS[-1])
+    if 2 * steps * sides * segments <= MOST_TRIANGLES:
+        return _tubes(points, radii, offsets, steps, sides)
+    kept = np.arange(len(points))
+    while 2 * sides * segments > MOST_TRIANGLES and (np.diff(offsets) > 2).any():
+        kept, offsets = _every_other(kept, offsets)
+        segments = int(np.maximum(np.diff(offsets) - 1, 0).sum())
+    positions, normals, triangles, source = _tubes(points[kept], radii[kept], offsets, steps, sides)
+    return positions, normals, triangles, kept[source]
+
+
+def _every_other(points: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half the points of each curve, ends included, and the offsets of what is left."""
+    curves = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    place = np.arange(len(points)) - offsets[curves]
+    keep = (place % 2 == 0) | (np.arange(len(points)) == offsets[curves + 1] - 1)
+    counts = np.bincount(curves[keep], minlength=len(offsets) - 1)
+    return points[keep], np.concatenate([[0], np.cumsum(counts)])
+
+
+def _tubes(points: np.ndarray, radii: np.ndarray, offsets: np.ndarray, pieces: int, sides: int):
     curves = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     keep = np.diff(offsets)[curves] >= 2
     last = offsets[curves + 1] - 1
@@ -39,9 +62,9 @@ def tubes(points: np.ndarray, radii: np.ndarray, offsets: np.ndarray):
     start = number[keep & (number < last)]  # of each segment
     first, final = offsets[curves[start]], last[start]
     before, after = np.maximum(start - 1, first), np.minimum(start + 2, final)
-    # Rings: STEPS per segment and one at each curve's tip.
-    steps = np.arange(STEPS) / STEPS
-    shape = (len(start), STEPS)
+    # Rings: one for each piece of a segment and one at each curve's tip.
+    steps = np.arange(pieces) / pieces
+    shape = (len(start), pieces)
     places = _catmull_rom(*(points[k].astype(np.float64) for k in (before, start, start + 1, after)), steps)
     width = radii[start][:, None] * (1 - steps) + radii[start + 1][:, None] * steps
     nearest = np.where(steps < 0.5, start[:, None], start[:, None] + 1)
@@ -54,16 +77,17 @@ def tubes(points: np.ndarray, radii: np.ndarray, offsets: np.ndarray):
     if not len(ring_place):
         return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), ring_point
     u, v = _frames(ring_place, ring_curve)
-    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    angle = 2.0 * np.pi * np.arange(sides) / sides
+    wider = np.pi / (sides * np.sin(np.pi / sides))  # circumradius of a polygon whose perimeter is the circle's
     normals = np.cos(angle)[None, :, None] * u[:, None] + np.sin(angle)[None, :, None] * v[:, None]
-    positions = ring_place[:, None] + normals * (_WIDER * ring_width)[:, None, None]
+    positions = ring_place[:, None] + normals * (wider * ring_width)[:, None, None]
     ring = np.flatnonzero(ring_curve[:-1] == ring_curve[1:])
-    side = np.arange(SIDES)
-    a, b = ring[:, None] * SIDES + side, ring[:, None] * SIDES + (side + 1) % SIDES
-    triangles = np.stack([a, b, b + SIDES, a, b + SIDES, a + SIDES], axis=-1).reshape(-1, 3)
+    side = np.arange(sides)
+    a, b = ring[:, None] * sides + side, ring[:, None] * sides + (side + 1) % sides
+    triangles = np.stack([a, b, b + sides, a, b + sides, a + sides], axis=-1).reshape(-1, 3)
     return (
         positions.reshape(-1, 3).astype(np.float32), normals.reshape(-1, 3).astype(np.float32),
-        triangles.astype(np.int32), np.repeat(ring_point, SIDES),
+        triangles.astype(np.int32), np.repeat(ring_point, sides),
     )  # fmt: skip
 
 

@@ -295,15 +295,6 @@ def test_what_is_not_drawn_is_named(stage):
     assert all("is not drawn" in text for text in said.values())
 
 
-def test_hair_particles_are_named(stage):
-    ground = stage.link("Ground", stage.grid(2))
-    ground.modifiers.new("Particles", "PARTICLE_SYSTEM")
-    ground.particle_systems[0].settings.type = "HAIR"
-    (note,) = stage.take().notes
-    assert note.subject == "Object 'Ground'"
-    assert "hair" in note.text
-
-
 def test_order_and_grouping_do_not_depend_on_names(stage):
     first, second = stage.mesh("zzz"), stage.mesh("aaa")
     for number, data in enumerate((first, second, first, second)):

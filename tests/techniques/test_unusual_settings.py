@@ -84,3 +84,18 @@ def test_hair_and_points_look_as_in_cycles(stage):
     stage.camera((3, -3, 3), (0.95, 0, 0.785), angle=0.7)
     stage.scene.cycles_curves.shape = "THICK"
     agree(stage, ("combined", "diffuse_color"), size=(48, 48), rel=0.02)
+
+
+@pytest.mark.slow
+def test_hair_of_particles_looks_as_in_cycles(stage):
+    ground = stage.floor(half=1.5, material=stage.diffuse(0.8))
+    ground.data.materials.append(stage.diffuse(0.4))
+    ground.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    hair = ground.particle_systems[0].settings
+    hair.type, hair.count, hair.hair_length, hair.material = "HAIR", 60, 1.0, 2
+    hair.child_type, hair.rendered_child_count, hair.child_radius = "SIMPLE", 6, 0.3
+    hair.root_radius, hair.tip_radius, hair.radius_scale, hair.shape = 1.0, 0.2, 0.08, 0.3
+    stage.light("POINT", (2, -2, 4), shadow_soft_size=0.3)
+    stage.camera((3, -3, 3), (0.95, 0, 0.785), angle=0.7)
+    stage.scene.cycles_curves.shape = "THICK"
+    agree(stage, ("combined", "diffuse_color"), size=(48, 48), rel=0.02)
