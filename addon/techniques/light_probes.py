@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..frame import acceleration, environment, lights
-from ..frame.rates import USUAL_SAMPLES, Rate, allocate, budget_for, directions_for
+from ..frame.rates import USUAL_SAMPLES, Rate, allocate, budget_for, directions_for, paying
 from ..frame.run import Frame
 from ..frame.sequence import point, third
 from ..frame.settings import Settings
@@ -160,10 +160,11 @@ class LightProbes(Technique):
         # Soft maps show a light as a whole: few samples need no more of them.
         points = AccumulatedMaps.name in (technique.name for technique in frame.plan.techniques)
         planned = samples if points else max(samples, USUAL_SAMPLES)
-        budget = budget_for(joint, planned, frame.settings.get(self, "maps"), film)
+        alone = not frame.plan.fills("indirect")
+        budget = budget_for(joint, planned, paying(frame.settings.get(self, "maps"), planned, alone), film)
         rates = dict(zip(distinct, allocate(joint, samples, budget, film)))
         if lit:
-            rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD])
+            rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD], alone)
         if any(material.transparent or material.soft for material in frame.materials.compiled):
             # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, directions_for, left
+from addon.frame.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, directions_for, left, paying
 
 
 @pytest.mark.parametrize(("exponent", "numbers"), [(0, [[0], [1], [2], [3]]), (1, [[0, 1], [2, 3], [4, 5], [6, 7]])])
@@ -86,3 +86,18 @@ def test_points_of_the_film_ask_for_no_more_than_one_point_in_a_sample():
 )
 def test_pictures_that_would_see_too_little_of_the_world_draw_more_of_it(variance, samples, exponent, expected):
     assert directions_for(variance, samples, Rate(exponent)) == Rate(expected)
+
+
+@pytest.mark.parametrize(
+    ("variance", "samples", "exponent", "expected"),
+    [(0.8, 1, 1, 4), (0.8, 16, 2, 2), (20.0, 16, 2, 3), (0.8, 64, 1, 2)],
+)
+def test_without_indirect_light_directions_of_the_world_are_doubled_where_they_leave_much(
+    variance, samples, exponent, expected
+):
+    assert directions_for(variance, samples, Rate(exponent), alone=True) == Rate(expected)
+
+
+def test_samples_without_indirect_light_share_out_fewer_maps_while_they_are_few():
+    assert [paying(8.0, samples, alone=True) for samples in (1, 16, 64)] == [5.0, 5.0, 8.0]
+    assert paying(3.0, 16, alone=True) == 3.0 and paying(8.0, 16, alone=False) == 8.0
