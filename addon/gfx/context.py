@@ -112,6 +112,11 @@ def masks_branches() -> bool:
     return _rasterises_in_software()
 
 
+def draws_slowly() -> bool:
+    """Whether a triangle of a depth map costs as much as a ray of a pixel: on no GPU, but in software."""
+    return _rasterises_in_software()
+
+
 def to_hold(needed, everything):
     """What a program should hold: what the scene needs, where branches are masked; else everything, so that no change
     of the scene compiles it anew."""

@@ -40,6 +40,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..frame import acceleration, depth_maps, lights
+from ..frame.ray_costs import rays_cost_less
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
@@ -47,6 +48,7 @@ from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Snapshot
 from . import repeated_light
+from .surfaces import TILE
 
 RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
@@ -63,6 +65,13 @@ EDGE_RAYS = Param(
     "Where the texels of a map do not agree and the penumbra is narrow, a ray tells whether a point is in shadow",
     draft=False,
 )  # fmt: skip
+BY_COST, BY_MAPS, BY_RAYS = "COST", "MAPS", "RAYS"
+SHADOWS_BY = Param(
+    "by", "Shadows by", BY_COST,
+    "What tells whether a point of a light is seen. Rays need opaque casters, and a hierarchy of all triangles",
+    items=((BY_COST, "What costs less", 0), (BY_MAPS, "Depth maps", 1), (BY_RAYS, "Rays", 2)),
+)  # fmt: skip
+PIXEL_SHARE = 0.1  # of a pixel's side on the nearest surfaces, by which rays may begin off them
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
 PART_TEXELS = 2**21  # after as many of a sample that is drawn in parts, a window answers
 
@@ -75,7 +84,8 @@ def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
 
 @dataclass(frozen=True)
 class Lookup:
-    """GLSL file with `float light_visibility(Light, vec3 position, vec3 normal)` and what else it binds."""
+    """GLSL file with `float light_visibility(Light, vec3 position, vec3 normal)` and what else it binds. `maps`: it
+    reads depth maps."""
 
     name: str
     file: str
@@ -83,13 +93,15 @@ class Lookup:
     constants: tuple[tuple[str, str], ...] = ()
     defines: tuple[tuple[str, str], ...] = ()
     blocks: tuple[tuple[Struct, str], ...] = ()
+    maps: bool = True
 
 
 @dataclass(frozen=True)
 class Maps:
-    """Depth maps that were drawn: the atlas, its views for the uniform block, and what the lookup binds besides."""
+    """Depth maps that were drawn: the atlas (None: rays take their place), its views for the uniform block, and what
+    the lookup binds besides."""
 
-    atlas: images.Image
+    atlas: images.Image | None
     views: np.ndarray  # (V, VIEW_TEXELS, 4)
     lookup: Lookup
     textures: dict[str, images.Image] = field(default_factory=dict)
@@ -107,6 +119,13 @@ EDGES = Lookup(
     textures=acceleration.HIERARCHY_TEXTURES,
     constants=RAY_CONSTANTS,
 )
+RAYS = Lookup(
+    "rays",
+    "light/ray_visibility.glsl",
+    textures=acceleration.HIERARCHY_TEXTURES,
+    constants=RAY_CONSTANTS,
+    maps=False,
+)
 
 
 def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, object]]:
@@ -114,6 +133,34 @@ def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, objec
     hierarchy = frame.hierarchy("shadow")
     textures = hierarchy.textures
     return textures, {"offset_size": 1e-6 * frame.geometry.size}
+
+
+def by_rays(frame: Frame, views: list, resolution: int) -> bool:
+    """Whether rays take the place of maps: of the depth maps with these views, for points like the one that they are
+    seen from."""
+    wanted = frame.settings.values.get((AccumulatedMaps.name, SHADOWS_BY.name), SHADOWS_BY.default)
+    if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
+        return False
+    # Of what lets some light pass rays know the mean alone.
+    if any(frame.materials.compiled[draw.material].casts_by_lot for draw in frame.geometry.draws):
+        return False
+    return wanted == BY_RAYS or (not _far_off(frame) and rays_cost_less(frame, views, resolution))
+
+
+def _far_off(frame: Frame) -> bool:
+    """Whether rays, which begin as far off a surface as float32 may be wrong about it, would pass below what touches it
+    in a way that the picture shows: in pixels with little of a huge scene."""
+    receivers = frame.receivers
+    sides = (receivers.high - receivers.low).max(axis=1)
+    return bool(len(sides)) and 1e-6 * frame.geometry.size > PIXEL_SHARE * float(np.percentile(sides, 10)) / TILE
+
+
+NO_VIEWS = np.zeros((0, lights.VIEW_TEXELS, 4))
+
+
+def traced_shadows(frame: Frame) -> Maps:
+    """What is asked in place of maps: rays."""
+    return Maps(None, NO_VIEWS, RAYS, *ray_bindings(frame))
 
 
 class DepthMapService:
@@ -185,7 +232,7 @@ class AccumulatedMaps(Technique):
     name = "accumulated_maps"
     label = "Accumulated shadow maps"
     slot = "shadow"
-    params = (RESOLUTION, CUTOFF, EDGE_RAYS)
+    params = (RESOLUTION, CUTOFF, EDGE_RAYS, SHADOWS_BY)
     atlas_texels = ATLAS_TEXELS
 
     def __init__(self):
@@ -250,6 +297,11 @@ class AccumulatedMaps(Technique):
     def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
         """The part of the light that point `number` of `points` stands for as a whole; None where it is a point."""
         return None
+
+    def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:
+        """Whether rays take the place of this light's maps."""
+        views = self.views(frame, emitter, emitter.middle(), 0)
+        return bool(views) and by_rays(frame, views, self.resolution(frame))
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""

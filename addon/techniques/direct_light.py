@@ -46,12 +46,14 @@ from .accumulated_maps import (
     EDGES,
     HARD,
     RAY_CONSTANTS,
+    RAYS,
     AccumulatedMaps,
     DepthMapService,
     Lookup,
     Maps,
     ray_bindings,
     rounds,
+    traced_shadows,
 )
 from .light_probes import rate_of
 from .repeated_light import Lit
@@ -79,7 +81,12 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
     return passes.fullscreen_program(
         f"direct light, {lookup.name}",
         "light/direct.frag.glsl",
-        textures=(*lookup.textures, ("RGBA32F", "depth_maps"), ("RGBA32F", "energy_table"), *SURFACE_TEXTURES),
+        textures=(
+            *lookup.textures,
+            *((("RGBA32F", "depth_maps"),) if lookup.maps else ()),
+            ("RGBA32F", "energy_table"),
+            *SURFACE_TEXTURES,
+        ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
         constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "light_share"), *lookup.constants),
         defines=(
@@ -94,7 +101,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
 
 
 LIGHTING = tuple(
-    lighting(lookup, soft_lobes) for lookup in (HARD, EDGES, RAYS_WHERE_NEAR) for soft_lobes in (False, True)
+    lighting(lookup, soft_lobes) for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS) for soft_lobes in (False, True)
 )
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
@@ -107,8 +114,9 @@ def shade(
 ) -> Iterator[None]:
     """Add the light of `rows` (each (TEXELS, 4)), of these `kinds`, to the radiance images, in
     parts."""
+    drawn = {} if maps.atlas is None else {"depth_maps": maps.atlas}
     bindings = {
-        "textures": {"depth_maps": maps.atlas, "energy_table": frame.materials.energy_table, **maps.textures},
+        "textures": {**drawn, "energy_table": frame.materials.energy_table, **maps.textures},
         "blocks": maps.blocks,
         "constants": {
             "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
@@ -151,10 +159,14 @@ class DirectLight(Technique):
             self._emitters = frame.emitters
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
+            shadow = frame.services.get("shadow")
+            served = [(emitter, shadow.serving(emitter)) for emitter in self._emitters] if shadow else []
+            self._by_rays = {emitter.light.key for emitter, maps in served if maps.traces(frame, emitter)}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         service = frame.services.get("shadow")
         items: dict[AccumulatedMaps | None, list] = {}
+        traced: list[np.ndarray] = []
         kinds = lights.kinds_of(self._emitters)
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
@@ -167,6 +179,11 @@ class DirectLight(Technique):
                 whole = cell >= 1.0 and emitter.extended
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
+                if emitter.light.key in self._by_rays:
+                    row = shown.row(sample, 0, 1, weight, rate.per_sample, points)
+                    row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
+                    traced.append(row)
+                    continue
                 by_rays = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
                 views = shadow.views(frame, shown, sample, number, cell) if shadow else []
                 row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
@@ -174,6 +191,9 @@ class DirectLight(Technique):
                 kinds |= whole << lights.WHOLE
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced) + lights.NEAR_FLAG * by_rays
                 items.setdefault(shadow, []).append((row, views))
+        for first in range(0, len(traced), lights.MOST_LIGHTS):
+            rows = traced[first : first + lights.MOST_LIGHTS]
+            yield from shade(frame, self, rows, kinds, self._sources, traced_shadows(frame))
         for shadow, own in items.items():
             resolution = shadow.resolution(frame) if shadow else 16
             for rows, views in rounds(frame, own, resolution, shadow.most_texels(frame) if shadow else ATLAS_TEXELS):

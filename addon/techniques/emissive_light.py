@@ -30,7 +30,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import RESOLUTION, DepthMapService, map_resolution, rounds
+from .accumulated_maps import RESOLUTION, DepthMapService, by_rays, map_resolution, rounds, traced_shadows
 from .direct_light import DIRECT_WRITES, shade
 from .surfaces import LIT_SURFACES
 
@@ -115,15 +115,21 @@ class EmissiveLight(Technique):
             number = frame.sample * count + k
             point, normal, radiance, density = self._triangles.draw(*frame.random_volume_at(number, "emissive"))
             jitter = (*frame.random_at(number, "map/emissive"), *frame.random_at(number, "map/emissive/turn"))
-            views = depth_maps.point_views(
-                point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution
-            )  # fmt: skip
+            views = []
+            if number == 0 or not self._traced:
+                views = depth_maps.point_views(
+                    point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution
+                )  # fmt: skip
+            if number == 0:
+                self._traced = by_rays(frame, views, resolution)
+            if self._traced:
+                views = []
             row = lights.surface_row(
-                point, normal, radiance, density * count, flags, 0, len(views), frame.settings.samples
+                point, normal, radiance, density * count, flags, 0, len(views) or self._traced, frame.settings.samples
             )
             items.append((row, views))
         for rows, views in rounds(frame, items, resolution):
-            maps = self.service.draw(frame, self, views, resolution)
+            maps = traced_shadows(frame) if self._traced else self.service.draw(frame, self, views, resolution)
             yield from maps.drawing
             yield
             yield from shade(frame, self, rows, 1 << lights.SURFACE, self._sources, maps)

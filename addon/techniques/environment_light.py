@@ -57,7 +57,20 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import HARD, RESOLUTION, DepthMapService, Lookup, Maps, map_resolution, rounds
+from .accumulated_maps import (
+    HARD,
+    NO_VIEWS,
+    RAY_CONSTANTS,
+    RAYS,
+    RESOLUTION,
+    DepthMapService,
+    Lookup,
+    Maps,
+    by_rays,
+    map_resolution,
+    rounds,
+    traced_shadows,
+)
 from .direct_light import DIRECT_WRITES, lighting, shade
 from .light_probes import WORLD
 from .surfaces import LIT_SURFACES
@@ -70,19 +83,29 @@ WORLD_RAYS = Lookup(
         ("R32F", "environment_density_map"), ("R32F", "world_edges"),
     ),
     constants=(
-        ("FLOAT", "offset_size"), ("IVEC2", "world_tiles"), ("IVEC2", "world_grid"),
+        *RAY_CONSTANTS, ("IVEC2", "world_tiles"), ("IVEC2", "world_grid"),
     ),
     defines=(("OWN_POINTS", "1"),),
     blocks=((environment.WORLD, "world_light"),),
+    maps=False,
 )  # fmt: skip
-KNOWN = Lookup(
-    "hard, irradiance known",
-    HARD.file,
-    textures=(("RGBA32F", "irradiance_table"), ("RG32F", "openness")),
-    constants=(("FLOAT", "known_share"), ("INT", "bright_count")),
-    defines=(("KNOWN_IRRADIANCE", "1"),),
+
+
+def _known(lookup: Lookup) -> Lookup:
+    """`lookup`, and what is missing of the world's irradiance."""
+    return replace(
+        lookup,
+        name=f"{lookup.name}, irradiance known",
+        textures=(*lookup.textures, ("RGBA32F", "irradiance_table"), ("RG32F", "openness")),
+        constants=(*lookup.constants, ("FLOAT", "known_share"), ("INT", "bright_count")),
+        defines=(("KNOWN_IRRADIANCE", "1"),),
+    )
+
+
+KNOWN = {lookup: _known(lookup) for lookup in (HARD, RAYS)}
+KNOWN_LIGHTING = tuple(
+    lighting(lookup, soft_lobes, 1 << lights.DIRECTION) for lookup in KNOWN.values() for soft_lobes in (False, True)
 )
-KNOWN_LIGHTING = tuple(lighting(KNOWN, soft_lobes, 1 << lights.DIRECTION) for soft_lobes in (False, True))
 OPENNESS = passes.fullscreen_program(
     "openness to the world",
     "light/openness.frag.glsl",
@@ -167,28 +190,37 @@ class EnvironmentLight(Technique):
             frame.count(self, "rays per pixel", rays)
             return
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
+        if frame.sample == 0:
+            self._traced = shadows and self._traces(frame, resolution)
         items = []
         for number in rate.points(frame.sample):
             direction, radiance, density = frame.environment.draw(*frame.random_at(number, "environment"))
             views = []
-            if shadows:
+            if shadows and not self._traced:
                 jitter = (
                     *frame.random_at(number, "map/environment"), *frame.random_at(number, "map/environment/turn")
                 )  # fmt: skip
                 views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, jitter, resolution)
             row = lights.direction_row(
-                direction, radiance / density, density, flags, 0, len(views), rate.per_sample,
+                direction, radiance / density, density, flags, 0, len(views) or self._traced, rate.per_sample,
                 float(frame.environment.openness(direction)),
             )  # fmt: skip
             items.append((row, views))
         for rows, views in rounds(frame, items, resolution):
-            maps = self.service.draw(frame, self, views, resolution)
+            maps = traced_shadows(frame) if self._traced else self.service.draw(frame, self, views, resolution)
             yield from maps.drawing
             yield
             maps = self._known(frame, maps, len(rows) / (len(items) * min(rate.per_sample, 1.0)))
             yield from shade(frame, self, rows, 1 << lights.DIRECTION, self._sources, maps)
         if items and frame.sample + 1 < frame.settings.samples:
             self._sum_openness(frame)
+
+    def _traces(self, frame: Frame, resolution: int) -> bool:
+        """Whether rays take the place of maps."""
+        direction, *_ = frame.environment.draw(*frame.random_at(0, "environment"))
+        middle = (0.5, 0.5, 0.0, 0.0)
+        views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, middle, resolution)
+        return by_rays(frame, views, resolution)
 
     def _known(self, frame: Frame, maps: Maps, share: float) -> Maps:
         """The same maps, asked for what is missing of `share` of the world's irradiance, too."""
@@ -198,8 +230,9 @@ class EnvironmentLight(Technique):
             self._openness[0].clear()
         table, bright = frame.environment.known_irradiance()
         return replace(
-            maps, lookup=KNOWN, textures={"irradiance_table": table, "openness": self._openness[0].colors[0]},
-            constants={"known_share": share, "bright_count": bright},
+            maps, lookup=KNOWN[maps.lookup],
+            textures={**maps.textures, "irradiance_table": table, "openness": self._openness[0].colors[0]},
+            constants={**maps.constants, "known_share": share, "bright_count": bright},
         )  # fmt: skip
 
     def _sum_openness(self, frame: Frame) -> None:
@@ -234,9 +267,8 @@ class EnvironmentLight(Technique):
 
     def _rays(self, frame: Frame) -> Maps:
         hierarchy, world = frame.hierarchy("shadow"), frame.environment
-        nothing = self.service.draw(frame, self, [], 16)
         return Maps(
-            nothing.atlas, nothing.views, WORLD_RAYS,
+            None, NO_VIEWS, WORLD_RAYS,
             textures={
                 **hierarchy.textures, "environment_map": world.map,
                 "environment_density_map": world.density_map, "world_edges": self._edges,

@@ -121,6 +121,9 @@ class SoftMaps(AccumulatedMaps):
             shift_x, shift_y = shift_y, shift_x
         return shift_x, shift_y, turn, other
 
+    def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:
+        return False
+
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         # A light without extent has no kernel: its map is asked for one texel.
         cell *= emitter.extended

@@ -15,5 +15,5 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   vec3 origin = ray_origin(position, normal);
   float reach = 0.9999 * light_distance(light, origin, direction);
   uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)));
-  return clear_path(origin, direction, reach, salt.x);
+  return clear_to_light(origin, direction, reach, salt.x);
 }

@@ -19,3 +19,10 @@ float clear_path(vec3 origin, vec3 direction, float reach, uint salt)
   ivec2 hit;
   return (trace_until(origin, direction, reach, reach, salt, hit) >= reach) ? 1.0 : 0.0;
 }
+
+// The same for a ray that looks for a light.
+float clear_to_light(vec3 origin, vec3 direction, float reach, uint salt)
+{
+  ivec2 hit;
+  return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? 1.0 : 0.0;
+}

@@ -97,6 +97,7 @@ def test_light_that_cannot_be_repeated_is_guessed_whole(stage, light_of, monkeyp
     half_in_shadow(stage)
     stage.light("SUN", energy=1.0, turn=(0.3, 0, 0))
     stage.world((1, 1, 1), 0.5)
+    stage.scene.candela.accumulated_maps_by = "MAPS"
     if why == "rounds":
         monkeypatch.setattr("addon.techniques.accumulated_maps.AccumulatedMaps.atlas_texels", 1)
     else:

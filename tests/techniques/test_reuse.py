@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from addon import engine
+from addon.frame import ray_costs
 from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, images, library
 
@@ -55,6 +56,7 @@ def test_lights_without_shadow_need_no_depth_maps(room):
 
 
 def test_what_ran_is_timed_and_counted(room):
+    room.scene.candela.accumulated_maps_by = "MAPS"
     room.render(4)
     assert room.ledger.samples == 4
     row = room.ledger.row("direct_light")
@@ -64,6 +66,22 @@ def test_what_ran_is_timed_and_counted(room):
     assert room.ledger.row("surfaces").counters["passes"] == 8  # each sample is drawn, and its pixels are marked
     assert room.ledger.row("accumulated_maps").counters["maps"] >= 4
     assert {"sync", "upload", "compile", "passes", "readback", "total"} <= room.ledger.times.keys()
+
+
+def test_rays_take_the_place_of_maps_that_cost_more(room, monkeypatch):
+    """As told by triangles, texels and pixels; what lets some light pass has maps, whatever they cost."""
+    maps = "accumulated_maps"
+    for costs, by_rays in (((1e9, 0.0, 0.0, 1.0), True), ((0.0, 0.0, 0.0, 1.0), False)):
+        monkeypatch.setattr(ray_costs, "IN_SOFTWARE", ray_costs.Costs(*costs))
+        monkeypatch.setattr(ray_costs, "ON_GPU", ray_costs.Costs(*costs))
+        room.render(2, seed=int(by_rays))
+        assert ("maps" in room.ledger.row(maps).counters) != by_rays
+    room.scene.candela.accumulated_maps_by = "RAYS"
+    room.render(2, seed=2)
+    assert "maps" not in room.ledger.row(maps).counters
+    room.boxes[0].data.materials[0] = room.see_through(0.5)
+    room.render(2, seed=3)
+    assert room.ledger.row(maps).counters["maps"] >= 2
 
 
 def test_a_second_render_of_an_unchanged_scene_draws_nothing(room):
@@ -136,6 +154,7 @@ def test_sliders_of_a_material_compile_nothing(room):
 def test_changing_lights_world_and_size_compiles_nothing(room, monkeypatch):
     """On GPUs; for software that masks branches, programs hold no more kinds of light than the scene has."""
     monkeypatch.setattr(context, "masks_branches", lambda: False)
+    monkeypatch.setattr(context, "draws_slowly", lambda: False)
     room.world((0.1, 0.1, 0.1))
     room.render(1)
     compiled = library.compile_count

@@ -71,6 +71,7 @@ def test_rays_make_hard_edges_exact_whatever_the_resolution_of_the_map(floor, ki
     for x in np.arange(-1.5, 1.6, 0.5):
         floor.blocker((x, -EVERYWHERE), (x + 0.21, EVERYWHERE), 0.3)
     settings, size = floor.scene.candela, (64, 16)
+    settings.accumulated_maps_by = "MAPS"
     shown = {}
     for texels, rays in ((16.0, True), (1.0, True), (1.0, False)):
         settings.accumulated_maps_texels_per_pixel, settings.accumulated_maps_edge_rays = texels, rays

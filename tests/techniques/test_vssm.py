@@ -72,6 +72,7 @@ def test_points_that_stand_for_parts_of_the_light_leave_less_error_than_points(f
 
     parts = errors()
     floor.scene.candela.slot_shadow = "accumulated_maps"
+    floor.scene.candela.accumulated_maps_by = "MAPS"
     points = errors()
     assert parts[0] < 0.8 * points[0]
     assert parts[1] < 0.7 * points[1]

@@ -1,0 +1,15 @@
+// Visibility of this sample's point of a light by a ray of each pixel, where that costs less than a depth map.
+#include "light/sources.glsl"
+#include "trace/rays.glsl"
+
+float light_visibility(Light light, vec3 position, vec3 normal)
+{
+  // Aimed from where the ray begins: one beside it would end behind the emissive triangle that the point lies on.
+  vec3 origin = ray_origin(position, normal);
+  vec3 direction;
+  float density;
+  light_sample(light, origin, direction, density);
+  float reach = 0.9999 * light_distance(light, origin, direction);
+  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)));
+  return clear_to_light(origin, direction, reach, salt.x);
+}
