@@ -63,6 +63,7 @@ def preset(name: str) -> tuple[tuple[str, float], ...]:
 
 OWN = Series("Candela", "CANDELA", SWEEP, main=True)
 FAST = Series("Candela, Fast preset", "CANDELA", (4, 1, 16), main=True, values=preset("Fast"))
+DRAFT = Series("Candela, Draft preset", "CANDELA", (1, 4), main=True, values=preset("Draft"))
 RAW = Series("Candela, raw", "CANDELA", (16, 4, 8, 32, 64), main=True, values=(("denoise_strength", 0.0),))
 PEERS = (
     Series("EEVEE", "BLENDER_EEVEE", EEVEE_SWEEP),
@@ -86,12 +87,12 @@ def choices(registry: Iterable) -> dict[str, list]:
 
 
 def own_series(registry: Iterable) -> tuple[Series, ...]:
-    """Candela as it comes, by its Fast preset, raw, without bounces, with the first technique of every slot, and with
+    """Candela as it comes, by its fast presets, raw, without bounces, with the first technique of every slot, and with
     each other instead.
 
     What is set by hand is set in every slot that has a choice, so that those series do not depend on what Auto knows.
     """
-    found = [OWN, FAST, Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
+    found = [OWN, FAST, DRAFT, Series("Candela, no bounces", "CANDELA", SWEEP, bounces=0)]
     if any(technique.name == "denoise" for technique in registry):
         found.append(RAW)
     slots = choices(registry)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-OWN, FAST = "Candela", "Candela, Fast preset"
+OWN, FAST, DRAFT = "Candela", "Candela, Fast preset", "Candela, Draft preset"
 MIDDLE = 16  # samples of Candela at which figures are quoted
 RESOLVED = 0.1  # of the reference's noise
 FLAT = (
@@ -71,8 +71,8 @@ class Results:
         return sorted(found, key=lambda point: point.samples)
 
     def own_curve(self, scene: str) -> list[Point]:
-        """Combined by Candela with its defaults, then by its Fast preset: what a peer is held against."""
-        return self.curve(scene, OWN) + self.curve(scene, FAST)
+        """Combined by Candela with its defaults, then by its Fast and Draft presets: what a peer is held against."""
+        return self.curve(scene, OWN) + self.curve(scene, FAST) + self.curve(scene, DRAFT)
 
     def floor(self, scene: str, path: str = "combined") -> float:
         """relMSE of the reference's own noise."""

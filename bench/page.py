@@ -77,7 +77,7 @@ READING = (
     "Seconds of a whole render to the right, relMSE of the picture upwards, both logarithmic: lower left is better. "
     "A marker is one setting, its line the staircase of settings that no other of its series beats. The grey band is "
     "the noise of the reference, below which no error is quoted; a dotted line is the error that a series tends to. "
-    "Peers are held against Candela's two curves together, by its defaults and by its Fast preset."
+    "Peers are held against Candela's curves together, by its defaults and by its Fast and Draft presets."
 )
 PROFILE = (
     "A render of 16 samples: cold, with compiled programs, and again with nothing changed; shares of a render under "

@@ -22,6 +22,8 @@ STYLES = {
     "Cycles, no bounces": ("#b9b9b9", "X", True),
 }
 
+SHOWN = ("Candela", "Candela, Fast preset", "Candela, Draft preset", "Candela, raw")  # beside peers
+
 
 def style(label: str, own: list[str]) -> dict:
     """Line and marker of a series; all of Candela's are warm diamonds."""
@@ -40,7 +42,7 @@ def time_error(axes, results: Results, scene: str, labels: list[str], path: str 
         points = results.curve(scene, label, path)
         if not points:
             continue
-        look, front = style(label, own), label in ("Candela", "Candela, Fast preset", "Candela, raw")
+        look, front = style(label, own), label in SHOWN
         steps = staircase(points)
         axes.step(
             [step.seconds for step in steps], [step.error for step in steps], where="post", color=look["color"],
@@ -69,12 +71,7 @@ def time_error(axes, results: Results, scene: str, labels: list[str], path: str 
 
 def overview(results: Results, path: Path) -> None:
     """All scenes, Combined: Candela as it comes and the peers."""
-    labels = [
-        "Candela",
-        "Candela, Fast preset",
-        "Candela, raw",
-        *(name for name in STYLES if name != "Cycles, no bounces"),
-    ]
+    labels = [*SHOWN, *(name for name in STYLES if name != "Cycles, no bounces")]
     columns = 4 if len(results.scenes) > 6 else 3
     rows = -(-len(results.scenes) // columns)
     figure, grid = plt.subplots(

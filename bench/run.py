@@ -26,6 +26,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from bench.cells import (
+    DRAFT,
     EXTRA,
     FAST,
     MAIN,
@@ -125,7 +126,7 @@ def guess(series: Series, samples: int, size: tuple[int, int]) -> float:
 
 def needed_seconds(scenes: int, size: tuple[int, int]) -> float:
     """Guessed seconds of what a page needs of so many scenes; without their references."""
-    main = [one for one in (OWN, FAST, RAW, *PEERS) if one.main]
+    main = [one for one in (OWN, FAST, DRAFT, RAW, *PEERS) if one.main]
     needed = [(one, samples) for one in main for samples in one.samples if samples in NEEDED_SAMPLES[one.engine]]
     return scenes * (OPENING + sum(guess(one, samples, size) for one, samples in needed))
 

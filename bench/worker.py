@@ -8,7 +8,8 @@ A time is that of a whole render with Combined alone, from Blender's call to the
 another render with the same seed, which is not timed (Candela hands out the passes of the frame that it has). Errors
 are against one reference with all bounces, so that what an engine leaves out shows as bias.
 
-Candela's programs compile in a render of one sample that is reported apart. EEVEE's first render counts: on a software
+Candela's programs compile in a render of one sample that is reported apart; what pictures of more samples compile
+besides, in one that is not counted. EEVEE's first render counts: on a software
 GPU its later ones of a scene take longer than the first (see bench/quick.py). Cycles compiles nothing here.
 """
 
@@ -27,6 +28,7 @@ from bench.cells import Scene, Series
 
 SHORT = 2.0  # seconds: renders that take less are repeated
 RUNS = 3
+ALIKE = 4  # samples from which on Candela's pictures need the same programs
 SEEDS_OF_ONE_SAMPLE = 6
 PATHS = (
     "combined", "direct_light", "diffuse_direct", "glossy_direct", "diffuse_indirect", "glossy_indirect",
@@ -196,9 +198,13 @@ def measure(opened: Open, series: Series, samples: int, size: tuple[int, int]) -
     """Times, errors per light path and, for Candela, stages and counters of one cell."""
     figures: dict = {"cold": None}
     kind = replace(series, label="", samples=(), main=False)
-    if series.own and kind not in opened.warm:
-        figures["cold"] = render(opened, series, 1, 1000, size)["seconds"]
-    opened.warm.add(kind)
+    if series.own:
+        if kind not in opened.warm:
+            figures["cold"] = render(opened, series, 1, 1000, size)["seconds"]
+        more = min(samples, ALIKE)
+        if more > 1 and (kind, more) not in opened.warm:
+            render(opened, series, more, 1000, size)
+        opened.warm |= {kind, (kind, more)}
     times, cpu, combined = [], [], []
     for run in range(RUNS):
         made = render(opened, series, samples, run + 1, size)

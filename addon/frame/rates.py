@@ -39,6 +39,7 @@ USUAL_SAMPLES = 16  # up to here a sample has the budget that was asked for
 MOST_ALONE = 5.0  # points per sample that up to here pay in pictures without indirect light
 LITTLE = 1e-4  # squared error that is left, relative: with it a budget is enough
 FEWEST_DIRECTIONS, MOST_DIRECTIONS = 32, 16  # of the world: in a whole picture, and in one of its samples
+PER_POINT = 4.0  # directions of a picture of few samples
 LITTLE_OF_WORLD = 2e-4  # squared error by directions of the world for which any picture draws twice as many
 LITTLE_OF_FEW = 1e-2  # squared error by directions of the world that goes unseen in a picture of few samples
 
@@ -78,10 +79,11 @@ def budget_for(variance: Sequence[float], samples: int, asked: float, film: Sequ
     return budget
 
 
-def directions_for(variance: float, samples: int, rate: Rate, alone: bool = False) -> Rate:
+def directions_for(variance: float, samples: int, rate: Rate, asked: float, alone: bool = False) -> Rate:
     """`rate` of the world, doubled where a picture of few samples would see too little of it, and once where any
-    picture would. `alone`: the picture has no indirect light."""
-    few = min(MOST_DIRECTIONS, FEWEST_DIRECTIONS / samples)
+    picture would. `asked`: points of lights that a sample shares out, of which directions are PER_POINT times as many
+    at most; `alone`: the picture has no indirect light."""
+    few = min(MOST_DIRECTIONS, FEWEST_DIRECTIONS / samples, PER_POINT * asked)
     little = LITTLE_OF_FEW if alone and samples <= USUAL_SAMPLES else LITTLE_OF_WORLD
     most, little = (few, LITTLE_OF_FEW) if few > rate.per_sample else (2 * rate.per_sample, little)
     while rate.per_sample < min(most, MOST_DIRECTIONS) and variance * (rate.per_sample * samples) ** -1.5 > little:

@@ -87,6 +87,16 @@ def upload(pixels: np.ndarray, image_format: str = "RGBA32F") -> Image:
     return Image(width, height, image_format, gpu.types.GPUTexture((width, height), format=image_format, data=buffer))
 
 
+def upload_varying(pixels: np.ndarray, image_format: str = "RGBA32F") -> Image:
+    """`upload` of what has another size in every sample, for shaders that do not ask for it.
+
+    llvmpipe compiles a shader anew, for a second or more, where a side of a texture is a power of two that was none
+    before: such sides are a row or column longer.
+    """
+    spare = [(0, 0 if side & (side - 1) else 1 + (side == 1)) for side in pixels.shape[:2]]
+    return upload(np.pad(pixels, (*spare, *[(0, 0)] * (pixels.ndim - 2))), image_format)
+
+
 LIST_WIDTH = 2048  # a power of two, so that shaders address lists by shift and mask
 
 

@@ -189,7 +189,7 @@ class ClusteredVisibility(MultiresRadiosity):
         columns = max(int(np.ceil(np.sqrt(count))), 1)
         extent = columns * side, max(-(-count // columns), 1) * side
         areas[:, 4, 0], areas[:, 4, 1] = np.arange(count) % columns * side, np.arange(count) // columns * side
-        lights_image = images.upload(_packed(found, label, areas))
+        lights_image = images.upload_varying(_packed(found, label, areas))
         maps = self._image("maps", extent, "RGBA32F")
         self._draw(frame, lights_image, maps, areas, side, columns)
         bound = BoundGather(

@@ -161,10 +161,11 @@ class LightProbes(Technique):
         points = AccumulatedMaps.name in (technique.name for technique in frame.plan.techniques)
         planned = samples if points else max(samples, USUAL_SAMPLES)
         alone = not frame.plan.fills("indirect")
-        budget = budget_for(joint, planned, paying(frame.settings.get(self, "maps"), planned, alone), film)
+        asked = frame.settings.get(self, "maps")
+        budget = budget_for(joint, planned, paying(asked, planned, alone), film)
         rates = dict(zip(distinct, allocate(joint, samples, budget, film)))
         if lit:
-            rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD], alone)
+            rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD], asked, alone)
         if any(material.transparent or material.soft for material in frame.materials.compiled):
             # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}

@@ -209,7 +209,7 @@ class VirtualLights:
             packed[2, :, 3] = footprints
             packed[1, :, 3] = shorter[keep] / np.maximum(whole, 1e-300)
         frame.count(technique, "virtual lights", len(keep))
-        return VirtualLightSet(point[keep], normal[keep], intensity, footprints, images.upload(packed))
+        return VirtualLightSet(point[keep], normal[keep], intensity, footprints, images.upload_varying(packed))
 
     def draw_sources(self, frame: Frame) -> None:
         """Points on light sources for this sample's paths, and what materials reflect: what `path_bindings` needs."""
@@ -329,7 +329,7 @@ class VirtualLights:
         bindings["constants"]["rays"] = grid.rays
         bindings["textures"] |= {
             "candidate_point": found.colors[0], "candidate_normal": found.colors[1], "next_point": found.colors[4],
-            "next_radiance": found.colors[5], "grouped": images.upload(groups.astype(np.float32), "R32F"),
+            "next_radiance": found.colors[5], "grouped": images.upload_varying(groups.astype(np.float32), "R32F"),
         }  # fmt: skip
         with images.borrowed(GROUP, groups.size, "R32F") as target:
             passes.fullscreen(PAIRS, target, **bindings)

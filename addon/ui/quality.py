@@ -1,4 +1,4 @@
-"""Quality presets, as Blender's own: the three that come with Candela, and those that the artist adds.
+"""Quality presets, as Blender's own: the four that come with Candela, and those that the artist adds.
 
 A preset holds the scene's samples and every parameter of the techniques: what costs time for less error, and not what
 is rendered (slots, tree, seed, bounces).

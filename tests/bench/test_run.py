@@ -103,7 +103,8 @@ def test_choice_of_techniques_comes_from_the_registry():
 
     series = cells.own_series([One, Two, Alone])
     assert [(one.label, one.slots) for one in series] == [
-        ("Candela", ()), ("Candela, Fast preset", ()), ("Candela, no bounces", ()), (cells.FIRST, (("shadow", "one"),)),
+        ("Candela", ()), ("Candela, Fast preset", ()), ("Candela, Draft preset", ()), ("Candela, no bounces", ()),
+        (cells.FIRST, (("shadow", "one"),)),
         ("Candela, two", (("shadow", "two"),)),
     ]  # fmt: skip
 

@@ -85,7 +85,7 @@ def test_points_of_the_film_ask_for_no_more_than_one_point_in_a_sample():
     ],
 )
 def test_pictures_that_would_see_too_little_of_the_world_draw_more_of_it(variance, samples, exponent, expected):
-    assert directions_for(variance, samples, Rate(exponent)) == Rate(expected)
+    assert directions_for(variance, samples, Rate(exponent), 8.0) == Rate(expected)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_pictures_that_would_see_too_little_of_the_world_draw_more_of_it(varianc
 def test_without_indirect_light_directions_of_the_world_are_doubled_where_they_leave_much(
     variance, samples, exponent, expected
 ):
-    assert directions_for(variance, samples, Rate(exponent), alone=True) == Rate(expected)
+    assert directions_for(variance, samples, Rate(exponent), 8.0, alone=True) == Rate(expected)
 
 
 def test_samples_without_indirect_light_share_out_fewer_maps_while_they_are_few():

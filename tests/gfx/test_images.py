@@ -94,3 +94,11 @@ def test_trimming_frees_what_nobody_holds_and_counts_it(gpu_context):
     pool.trim()
     assert pool.allocated_bytes == held.bytes
     assert pool.take(8, 8, "RGBA32F") is not idle
+
+
+def test_what_varies_in_size_never_has_a_power_of_two_as_a_side(gpu_context):
+    for height, width in ((1, 1), (3, 128), (16, 17), (5, 6)):
+        pixels = np.random.default_rng(1).uniform(size=(height, width, 4)).astype(np.float32)
+        image = images.upload_varying(pixels)
+        assert all(side & (side - 1) for side in image.size)
+        np.testing.assert_array_equal(images.read(image)[:height, :width], pixels)

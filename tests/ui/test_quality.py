@@ -5,7 +5,7 @@ import pytest
 
 from addon.ui import quality
 
-NAMES = ("Fast", "Balanced", "Fine")
+NAMES = ("Draft", "Fast", "Balanced", "Fine")
 
 
 def files():
@@ -41,11 +41,12 @@ def test_presets_come_with_candela(scene):
 
 
 def test_finer_presets_take_more_of_everything(scene):
-    fast, balanced, fine = (values(scene, name) for name in NAMES)
+    draft, fast, balanced, fine = (values(scene, name) for name in NAMES)
     assert all(a < b < c for a, b, c in zip(fast, balanced, fine, strict=True))
+    assert all(a <= b for a, b in zip(draft, fast, strict=True)) and sum(a < b for a, b in zip(draft, fast)) >= 6
 
 
-def test_fast_has_no_soft_maps_nor_near_bounces_and_fine_has_finer_maps_of_the_world(scene):
+def test_fast_presets_have_no_soft_maps_nor_near_bounces_and_fine_has_finer_maps_of_the_world(scene):
     soft_maps, texels, bounces = [], [], []
     for name in NAMES:
         values(scene, name)
@@ -53,8 +54,8 @@ def test_fast_has_no_soft_maps_nor_near_bounces_and_fine_has_finer_maps_of_the_w
         texels.append(scene.candela.environment_light_texels_per_pixel)
         bounces.append(scene.candela.multires_radiosity_near_bounces)
         assert scene.candela.clustered_visibility_near_bounces == bounces[-1]
-    assert soft_maps == bounces == [False, True, True]
-    assert texels == [1.0, 1.0, 2.0]
+    assert soft_maps == bounces == [False, False, True, True]
+    assert texels == [1.0, 1.0, 1.0, 2.0]
 
 
 def test_balanced_is_what_a_new_scene_has(scene):
