@@ -2,7 +2,7 @@
 
 A map costs its triangles, texels and calls, a ray the hierarchy's nodes on its way, and each pixel needs one.
 Nanoseconds by which the two are compared, as measured with two threads of llvmpipe at 256x192 pixels (whole renders of
-16 samples of direct light, by maps and by rays): a triangle 110 to 160, a texel 20, a ray 60 in rooms and 150 in a town
+16 samples of direct light, by maps and by rays): a triangle 110 to 160, a texel 20, a ray 60 in rooms and 200 in a town
 of 100,000 triangles. On GPUs only the order is known, from what others publish: a triangle .2 to .5, a texel .02, a ray
 1 to 3.
 """
@@ -26,18 +26,21 @@ class Costs:
     triangle: float
     texel: float
     view: float
-    ray: float
+    level: float  # of the hierarchy, which doubles the triangles, for a ray
 
 
-IN_SOFTWARE, ON_GPU = Costs(130.0, 20.0, 2e5, 80.0), Costs(0.3, 0.02, 5e3, 2.0)
+IN_SOFTWARE, ON_GPU = Costs(130.0, 20.0, 2e5, 8.0), Costs(0.3, 0.02, 5e3, 0.15)
+REPEATED = 0.15  # share of the pixels in which light is asked again for another point of the film, as rays cost there
 
 
-def rays_cost_less(frame: Frame, views: list[MapView], resolution: int) -> bool:
-    """Whether a ray of each pixel costs less than these views of a light, drawn with `resolution`."""
+def rays_cost_less(frame: Frame, views: list[MapView], resolution: int, repeats: int) -> bool:
+    """Whether a ray of each pixel costs less than these views of a light, drawn with `resolution`. `repeats`: so many
+    times their light is asked again at edges (techniques/repeated_light.py)."""
     costs = IN_SOFTWARE if context.draws_slowly() else ON_GPU
     boxes = Boxes.of(frame.geometry.opaque_casters)
     triangles = np.array([draw.triangles for draw in frame.geometry.opaque_casters], float)
     drawn = sum(float(triangles[boxes.seen(view.rows, view.least_q)].sum()) for view in views)
     texels = sum((resolution // view.scale) ** 2 for view in views)
     width, height = frame.size
-    return costs.ray * width * height < costs.triangle * drawn + costs.texel * texels + costs.view * len(views)
+    ray = costs.level * float(np.log2(frame.geometry.triangles + 2)) * (1.0 + REPEATED * repeats)
+    return ray * width * height < costs.triangle * drawn + costs.texel * texels + costs.view * len(views)

@@ -47,7 +47,7 @@ from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Snapshot
-from . import repeated_light
+from . import film_points, repeated_light
 from .surfaces import TILE
 
 RESOLUTION = Param(
@@ -144,7 +144,11 @@ def by_rays(frame: Frame, views: list, resolution: int) -> bool:
     # Of what lets some light pass rays know the mean alone.
     if any(frame.materials.compiled[draw.material].casts_by_lot for draw in frame.geometry.draws):
         return False
-    return wanted == BY_RAYS or (not _far_off(frame) and rays_cost_less(frame, views, resolution))
+    if wanted == BY_RAYS:
+        return True
+    points = frame.settings.values.get(("film", film_points.POINTS.name), film_points.POINTS.default)
+    repeats = film_points.points_of_sample(frame, points) - 1 if frame.settings.samples >= repeated_light.FEWEST else 0
+    return not _far_off(frame) and rays_cost_less(frame, views, resolution, repeats)
 
 
 def _far_off(frame: Frame) -> bool:

@@ -18,7 +18,7 @@ from ..frame import lights
 from ..frame.environment import WORLD
 from ..frame.materials import SURFACE_IMAGES
 from ..frame.run import Frame
-from ..frame.technique import Param, Technique, Write
+from ..frame.technique import Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.context import to_hold
@@ -36,7 +36,6 @@ SUMS = (
     Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
-LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
 LIGHT = tuple(f"radiance.{path}" for path in PATHS)
 
 
@@ -96,13 +95,9 @@ class Film(Technique):
     name = "film"
     label = "Film"
     params = (
-        Param(
-            "points", "Film points", 64,
-            "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
-            1, 1024, draft=1,
-        ),
+        film_points.POINTS,
         repeated_light.EDGES,
-    )  # fmt: skip
+    )
     reads = SURFACES
     closes = LIGHT
     writes = (
@@ -137,7 +132,7 @@ class Film(Technique):
                 textures={"surface_position": frame.images["surface.position"]},
                 blocks={"film_view": frame.view_block},
             )
-        count = self._points(frame)
+        count = film_points.points_of_sample(frame, frame.settings.get(self, film_points.POINTS.name))
         sums = frame.target(*(f"film.{path}" for path in self._paths))
         self._collect(frame, surface_bindings(frame), 1.0 / count)
         film_points.add(frame, self._paths, sums, 1.0 / count)
@@ -150,15 +145,6 @@ class Film(Technique):
         repeated_light.forget(frame)
         for path in self._paths:
             frame.shown[f"radiance.{path}"] = f"film.{path}"
-
-    def _points(self, frame: Frame) -> int:
-        """How many points of the film a sample shows: one where all of them would show the same."""
-        by_lot = any(material.transparent for material in frame.materials.compiled)
-        if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
-            return 1
-        count = film_points.count_of(frame.settings.get(self, "points"), frame.settings.samples)
-        # Without indirect light a sample costs hardly more than a point.
-        return count if frame.plan.fills("indirect") else -(-count // 4)
 
     def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
         """The same sample's light at other points of the film."""

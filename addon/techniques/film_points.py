@@ -31,11 +31,18 @@ the next pixel on the surface; in pixels where light and texture change together
 from __future__ import annotations
 
 from ..frame.run import Frame
+from ..frame.technique import Param
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.library import Program
 from .surfaces import refracts
 
+POINTS = Param(
+    "points", "Film points", 64,
+    "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
+    1, 1024, draft=1,
+)  # fmt: skip
+LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
 MOST = 8  # points of the film that share a sample's light
 PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in ("diffuse", "glossy", "transmission"))
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
@@ -45,6 +52,16 @@ GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 def count_of(points: int, samples: int) -> int:
     """How many points of the film a sample shows where the picture is to have that many in all."""
     return min(max(-(-points // max(samples, 1)), 1), MOST)
+
+
+def points_of_sample(frame: Frame, points: int) -> int:
+    """How many of the picture's `points` of the film a sample shows: one where all of them would show the same."""
+    by_lot = any(material.transparent for material in frame.materials.compiled)
+    if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
+        return 1
+    count = count_of(points, frame.settings.samples)
+    # Without indirect light a sample costs hardly more than a point.
+    return count if frame.plan.fills("indirect") else -(-count // 4)
 
 
 def lit_paths(frame: Frame) -> tuple[str, ...]:
