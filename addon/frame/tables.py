@@ -16,7 +16,8 @@ texel fetch 2.3); on a GPU the loads of a chunk come from the cache.
 | bytes per texel | 16 kept and 16 borrowed (pyramid: 4) |
 
 Measured with 1024x1024 RGBA32F on a software GPU, processor time in one process: 37 to 40 ms from image to table (9
-more for a source); one thread per row and column 118 to 130 ms. Chunks of 4 or 16 texels take 5 % longer.
+more for a source); one thread per row and column 118 to 130 ms. Chunks of 4 or 16 texels take 5 % longer. On a
+processor with faster stores 35 to 38 ms and 89 ms: half of the table's time is writing two images there.
 
 Source: Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984; the chunks are the reduce-then-scan of Sengupta
 et al., "Scan primitives for GPU computing", 2007, with the last step as a loop.
@@ -31,6 +32,7 @@ from ..gfx.library import Program
 from ..gfx.struct import Struct
 
 CHUNK = 8
+FEW = 32  # entries whose running sums one pass adds up
 _STEPS = ("ivec2(1, 0)", "ivec2(0, 1)")
 
 
@@ -59,8 +61,8 @@ def _output(integer: bool) -> tuple[tuple[str, str], ...]:
     return ((_VALUES[integer].upper(), "out_value"),)
 
 
-def _along(axis: int, integer: bool) -> tuple[tuple[str, str], ...]:
-    return (("STEP", _STEPS[axis]), ("CHUNK", str(CHUNK)), ("TABLE_VALUE", _VALUES[integer]))
+def _along(axis: int, integer: bool, chunk: int = CHUNK) -> tuple[tuple[str, str], ...]:
+    return (("STEP", _STEPS[axis]), ("CHUNK", str(chunk)), ("TABLE_VALUE", _VALUES[integer]))
 
 
 def _sums(axis: int, integer: bool) -> Program:
@@ -79,7 +81,7 @@ def _prefix(axis: int, integer: bool, chunks: bool) -> Program:
         f"running sums, axis {axis}, {_VALUES[integer]}, {'many chunks' if chunks else 'one chunk'}",
         "table/prefix.frag.glsl",
         textures=tuple((_FORMATS[integer], name) for name in ("summed", *(("chunk_sums",) if chunks else ()))),
-        defines=(*_along(axis, integer), *((("CHUNKS", "1"),) if chunks else ())),
+        defines=(*_along(axis, integer), ("CHUNKS", "1")) if chunks else _along(axis, integer, FEW),
         outputs=_output(integer),
     )
 
@@ -108,7 +110,7 @@ def _run_along(axis: int, integer: bool, summed: images.Image, target: images.Ta
     """Running sums of `summed` along an axis into a target of its size."""
     kind = _KINDS.index((axis, integer))
     length = summed.size[axis]
-    if length <= CHUNK:
+    if length <= FEW:
         passes.fullscreen(PREFIX_OF_ONE[kind], target, textures={"summed": summed})
         return
     chunks = list(summed.size)

@@ -10,7 +10,7 @@ As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissiv
 
 | cost | per sample |
 |---|---|
-| maps | `points` x (1 view, or up to 6 cube faces) |
+| maps | `points` x (1 view, or up to 6 cube faces), or a ray per pixel for each where that costs less |
 | passes | 1 over the screen |
 
 Fails: emission that varies is taken at its mean over the surfaces that show the material; very many small emitters

@@ -69,6 +69,7 @@ class Scene:
     unit: float = 1.0  # metres to one unit of everything above
     transparent: bool = False
     slots: tuple[tuple[str, str], ...] = ()  # technique by slot, where not Auto
+    shadows_by: str = "COST"  # maps or rays
     bounces: int = 0
     samples: int = 2
 
@@ -132,6 +133,7 @@ def build(stage, scene: Scene) -> None:
     _camera(stage, scene.viewer, unit)
     stage.scene.render.film_transparent = scene.transparent
     stage.scene.candela.bounces = scene.bounces
+    stage.scene.candela.accumulated_maps_by = scene.shadows_by
     for slot, technique in scene.slots:
         setattr(stage.scene.candela, f"slot_{slot}", technique)
 

@@ -107,6 +107,7 @@ def scenes(slots: dict[str, list[str]]) -> st.SearchStrategy[Scene]:
         viewer=VIEWER,
         unit=_one_of(1.0, 1.0, 1.0, 1e-3, 1e3),
         transparent=st.booleans(),
+        shadows_by=_one_of("COST", "RAYS", "MAPS"),
         slots=chosen.map(lambda names: tuple(sorted(names.items()))),
         bounces=_one_of(0, 1, 3),
         samples=_one_of(2, 1, 4),
