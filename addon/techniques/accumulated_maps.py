@@ -18,9 +18,9 @@ stored per texel (shaders/lib/shadow.glsl). Casters with alpha are drawn stochas
 Where a ray of each pixel costs less than the maps of a light, or of the world's directions, or of points on emissive
 surfaces, rays take their place (addon/frame/ray_costs.py): the same points of the light, without texels. Seconds and
 relMSE of direct light, 256x192, 16 samples, llvmpipe, by maps and by rays: instances 2.95 .0214 and 2.16 .0212, garden
-1.79 .0067 and 1.60 .0066, Cornell box .82 .0019 and .44 .0018, door 1.10 .0329 and .53 .0319, window 1.80 .0652 and 1.46
-.0643; with all light, where points of the film at edges ask again, Cornell box 3.1 and 2.4, door 4.2 and 3.1, garden
-and window alike.
+1.79 .0067 and 1.60 .0066, Cornell box .82 .0019 and .44 .0018, door 1.10 .0329 and .53 .0319, window 1.80 .0652 and
+1.46 .0643; with all light, where points of the film at edges ask again, Cornell box 3.1 and 2.4, door 4.2 and 3.1,
+garden and window alike.
 
 Edge rays (shaders/lib/edge_visibility.glsl; Lauterbach, Mo, Manocha 2009) take the map's resolution out of sharp edges
 and of contacts: without them a pixel just behind a blocker that it touches is lit at every resolution. relMSE of direct
