@@ -11,7 +11,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.ticker import LogFormatterSciNotation, NullFormatter
 
-from bench.figures import Results, bias_floor, staircase
+from bench.figures import DRAFT, FAST, OWN, Results, bias_floor, staircase
 
 OWN_COLORS = ("#c8501e", "#e09b32", "#8c3b6d", "#3d8f6f", "#b5651d", "#7a7f2e", "#c06a8a")
 STYLES = {
@@ -22,7 +22,7 @@ STYLES = {
     "Cycles, no bounces": ("#b9b9b9", "X", True),
 }
 
-SHOWN = ("Candela", "Candela, Fast preset", "Candela, Draft preset", "Candela, raw")  # beside peers
+SHOWN = (OWN, FAST, DRAFT, "Candela, raw")  # beside peers
 
 
 def style(label: str, own: list[str]) -> dict:

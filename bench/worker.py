@@ -9,8 +9,8 @@ another render with the same seed, which is not timed (Candela hands out the pas
 are against one reference with all bounces, so that what an engine leaves out shows as bias.
 
 Candela's programs compile in a render of one sample that is reported apart; what pictures of more samples compile
-besides, in one that is not counted. EEVEE's first render counts: on a software
-GPU its later ones of a scene take longer than the first (see bench/quick.py). Cycles compiles nothing here.
+besides, in one that is not counted. EEVEE's first render counts: on a software GPU its later ones of a scene take
+longer than the first (see bench/quick.py). Cycles compiles nothing here.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Open:
     scene: object  # bpy Scene
     layer: object
     truth: object  # compare.cache.Reference
-    warm: set
+    warm: set  # of settings and numbers of samples: what Candela compiles for them is compiled
 
 
 def main() -> int:
@@ -199,12 +199,11 @@ def measure(opened: Open, series: Series, samples: int, size: tuple[int, int]) -
     figures: dict = {"cold": None}
     kind = replace(series, label="", samples=(), main=False)
     if series.own:
-        if kind not in opened.warm:
-            figures["cold"] = render(opened, series, 1, 1000, size)["seconds"]
-        more = min(samples, ALIKE)
-        if more > 1 and (kind, more) not in opened.warm:
-            render(opened, series, more, 1000, size)
-        opened.warm |= {kind, (kind, more)}
+        for count in dict.fromkeys((1, min(samples, ALIKE))):
+            if (kind, count) not in opened.warm:
+                seconds = render(opened, series, count, 1000, size)["seconds"]
+                figures["cold"] = seconds if count == 1 else figures["cold"]
+                opened.warm.add((kind, count))
     times, cpu, combined = [], [], []
     for run in range(RUNS):
         made = render(opened, series, samples, run + 1, size)

@@ -42,12 +42,13 @@ texel, f texels, are 2 f^2 instead of f wide: at most an eighth of a texel is mi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..frame import acceleration, depth_maps, lights
+from ..frame.geometry import Draw
 from ..frame.ray_costs import rays_cost_less
 from ..frame.run import Frame
 from ..frame.settings import Settings
@@ -56,6 +57,7 @@ from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Snapshot
 from . import film_points, repeated_light
+from .film import Film
 from .surfaces import TILE
 
 RESOLUTION = Param(
@@ -143,20 +145,25 @@ def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, objec
     return textures, {"offset_size": 1e-6 * frame.geometry.size}
 
 
-def by_rays(frame: Frame, views: list, resolution: int) -> bool:
-    """Whether rays take the place of maps: of the depth maps with these views, for points like the one that they are
-    seen from."""
-    wanted = frame.settings.values.get((AccumulatedMaps.name, SHADOWS_BY.name), SHADOWS_BY.default)
+def drawn_by_lot(frame: Frame) -> list[Draw]:
+    """Casters that let some light pass."""
+    return [draw for draw in frame.geometry.draws if frame.materials.compiled[draw.material].casts_by_lot]
+
+
+def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:
+    """Whether rays take the place of maps. `views` makes those of such a map, where they are asked for; without any
+    there is no shadow to trace."""
+    wanted = frame.settings.get(AccumulatedMaps, SHADOWS_BY.name)
     if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
         return False
-    # Of what lets some light pass rays know the mean alone.
-    if any(frame.materials.compiled[draw.material].casts_by_lot for draw in frame.geometry.draws):
+    if drawn_by_lot(frame):  # rays know the mean alone
         return False
-    if wanted == BY_RAYS:
-        return True
-    points = frame.settings.values.get(("film", film_points.POINTS.name), film_points.POINTS.default)
-    repeats = film_points.points_of_sample(frame, points) - 1 if frame.settings.samples >= repeated_light.FEWEST else 0
-    return not _far_off(frame) and rays_cost_less(frame, views, resolution, repeats)
+    asked = views()
+    if not asked or wanted == BY_RAYS:
+        return bool(asked)
+    points = film_points.points_of_sample(frame, frame.settings.get(Film, film_points.POINTS.name))
+    repeats = points - 1 if frame.settings.samples >= repeated_light.FEWEST else 0
+    return not _far_off(frame) and rays_cost_less(frame, asked, resolution, repeats)
 
 
 def _far_off(frame: Frame) -> bool:
@@ -183,8 +190,7 @@ class DepthMapService:
 
     def alpha_casters(self, frame: Frame) -> depth_maps.AlphaCasters:
         """What lets some light pass, and how to draw it."""
-        materials = frame.materials
-        draws = [draw for draw in frame.geometry.draws if materials.compiled[draw.material].casts_by_lot]
+        materials, draws = frame.materials, drawn_by_lot(frame)
         programs = {
             index: (passes.get(materials.caster_program(index)), materials.bindings(index, frame.geometry.instances))
             for index in {draw.material for draw in draws}
@@ -312,8 +318,7 @@ class AccumulatedMaps(Technique):
 
     def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:
         """Whether rays take the place of this light's maps."""
-        views = self.views(frame, emitter, emitter.middle(), 0)
-        return bool(views) and by_rays(frame, views, self.resolution(frame))
+        return by_rays(frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame))
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""

@@ -144,6 +144,7 @@ class DirectLight(Technique):
 
     def __init__(self):
         self._emitters: list[lights.Emitter] = []
+        self._by_rays: dict[str, bool] = {}  # lights by key, of this frame
         self._unshadowed = DepthMapService()
         self._sources = lights.Sources()
 
@@ -159,9 +160,7 @@ class DirectLight(Technique):
             self._emitters = frame.emitters
             self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
             self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
-            shadow = frame.services.get("shadow")
-            served = [(emitter, shadow.serving(emitter)) for emitter in self._emitters] if shadow else []
-            self._by_rays = {emitter.light.key for emitter, maps in served if maps.traces(frame, emitter)}
+            self._by_rays = {}
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         service = frame.services.get("shadow")
@@ -172,6 +171,13 @@ class DirectLight(Technique):
             shadow = service.serving(emitter) if service else None
             rate = self._rate(frame, emitter, weight, shadow)
             points = rate.per_sample * frame.settings.samples / weight
+            if shadow and self._has_rays(frame, emitter, shadow):
+                for number in rate.points(frame.sample):
+                    sample = emitter.sample(*frame.random_volume_at(number, "light"))
+                    row = emitter.row(sample, 0, 1, weight, rate.per_sample, points)
+                    row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
+                    traced.append(row)
+                continue
             for number in rate.points(frame.sample):
                 part = shadow.part(frame, emitter, number, points) if shadow else None
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
@@ -179,17 +185,12 @@ class DirectLight(Technique):
                 whole = cell >= 1.0 and emitter.extended
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
-                if emitter.light.key in self._by_rays:
-                    row = shown.row(sample, 0, 1, weight, rate.per_sample, points)
-                    row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-                    traced.append(row)
-                    continue
-                by_rays = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
+                near = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
                 views = shadow.views(frame, shown, sample, number, cell) if shadow else []
-                row = shown.row(sample, 0, len(views) or by_rays, weight, rate.per_sample * share, points * share)
+                row = shown.row(sample, 0, len(views) or near, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole
                 kinds |= whole << lights.WHOLE
-                row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced) + lights.NEAR_FLAG * by_rays
+                row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced) + lights.NEAR_FLAG * near
                 items.setdefault(shadow, []).append((row, views))
         for first in range(0, len(traced), lights.MOST_LIGHTS):
             rows = traced[first : first + lights.MOST_LIGHTS]
@@ -206,6 +207,13 @@ class DirectLight(Technique):
                     yield from shade(frame, self, others, kinds, self._sources, maps)
                 if near:
                     yield from shade(frame, self, near, kinds, self._sources, self._with_rays(frame, maps))
+
+    def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: AccumulatedMaps) -> bool:
+        """Whether the light has rays in place of maps; asked when it is first drawn, as one of many may never be."""
+        key = emitter.light.key
+        if key not in self._by_rays:
+            self._by_rays[key] = shadow.traces(frame, emitter)
+        return self._by_rays[key]
 
     def _rate(self, frame: Frame, emitter: lights.Emitter, weight: float, shadow) -> Rate:
         """Points per sample: one where each would be the whole light, seen from its middle again and again."""

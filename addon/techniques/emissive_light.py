@@ -92,6 +92,7 @@ class EmissiveLight(Technique):
         self.service = DepthMapService()
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
+        self._traced = False  # rays take the place of maps
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         used = {slot for instance in snapshot.instances for slot in instance.materials}
@@ -114,16 +115,9 @@ class EmissiveLight(Technique):
         for k in range(count):
             number = frame.sample * count + k
             point, normal, radiance, density = self._triangles.draw(*frame.random_volume_at(number, "emissive"))
-            jitter = (*frame.random_at(number, "map/emissive"), *frame.random_at(number, "map/emissive/turn"))
-            views = []
-            if number == 0 or not self._traced:
-                views = depth_maps.point_views(
-                    point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution
-                )  # fmt: skip
             if number == 0:
-                self._traced = by_rays(frame, views, resolution)
-            if self._traced:
-                views = []
+                self._traced = by_rays(frame, lambda place=point: _views(frame, place, 0, resolution), resolution)
+            views = [] if self._traced else _views(frame, point, number, resolution)
             row = lights.surface_row(
                 point, normal, radiance, density * count, flags, 0, len(views) or self._traced, frame.settings.samples
             )
@@ -143,3 +137,9 @@ class EmissiveLight(Technique):
         self.service.release()
         self._sources.release()
         self._triangles = None
+
+
+def _views(frame: Frame, point: np.ndarray, number: int, resolution: int) -> list[depth_maps.MapView]:
+    """Of the map of a point, which is the picture's point `number`."""
+    jitter = (*frame.random_at(number, "map/emissive"), *frame.random_at(number, "map/emissive/turn"))
+    return depth_maps.point_views(point, None, np.inf, frame.receivers, frame.geometry, jitter, resolution)

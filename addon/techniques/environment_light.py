@@ -70,6 +70,7 @@ from .accumulated_maps import (
     Maps,
     by_rays,
     map_resolution,
+    ray_bindings,
     rounds,
     traced_shadows,
 )
@@ -93,7 +94,7 @@ WORLD_RAYS = Lookup(
 )  # fmt: skip
 
 
-def _known(lookup: Lookup) -> Lookup:
+def _with_known(lookup: Lookup) -> Lookup:
     """`lookup`, and what is missing of the world's irradiance."""
     return replace(
         lookup,
@@ -104,7 +105,7 @@ def _known(lookup: Lookup) -> Lookup:
     )
 
 
-KNOWN = {lookup: _known(lookup) for lookup in (HARD, RAYS)}
+KNOWN = {lookup: _with_known(lookup) for lookup in (HARD, RAYS)}
 KNOWN_LIGHTING = tuple(
     lighting(lookup, soft_lobes, 1 << lights.DIRECTION) for lookup in KNOWN.values() for soft_lobes in (False, True)
 )
@@ -165,6 +166,7 @@ class EnvironmentLight(Technique):
         self.service = DepthMapService()
         self._sources = lights.Sources()
         self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
+        self._traced = False  # directions are shared, and rays take the place of their maps
         self._openness: list[images.Target] = []  # sums before this sample, and a place for those after it
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -221,8 +223,11 @@ class EnvironmentLight(Technique):
         """Whether rays take the place of maps."""
         direction, *_ = frame.environment.draw(*frame.random_at(0, "environment"))
         middle = (0.5, 0.5, 0.0, 0.0)
-        views = depth_maps.directional_views(direction, frame.receivers, frame.geometry, middle, resolution)
-        return by_rays(frame, views, resolution)
+        return by_rays(
+            frame,
+            lambda: depth_maps.directional_views(direction, frame.receivers, frame.geometry, middle, resolution),
+            resolution,
+        )
 
     def _known(self, frame: Frame, maps: Maps, share: float) -> Maps:
         """The same maps, asked for what is missing of `share` of the world's irradiance, too."""
@@ -258,8 +263,8 @@ class EnvironmentLight(Technique):
         if useful is None or asked or layered or not denoised or not frame.settings.whole:
             return None
         moments = frame.environment.guide_moments()
-        by_rays, by_shared = world_tiles.variances(useful, moments)
-        if by_shared < FRAGMENTED or by_rays >= UNSHARED * by_shared / min(rate.per_sample, USUAL):
+        own, shared = world_tiles.variances(useful, moments)
+        if shared < FRAGMENTED or own >= UNSHARED * shared / min(rate.per_sample, USUAL):
             return None
         if frame.hierarchy("shadow") is None:
             return None
@@ -268,16 +273,16 @@ class EnvironmentLight(Technique):
         return images.upload(world_tiles.lower_edges(chance), "R32F")
 
     def _rays(self, frame: Frame) -> Maps:
-        hierarchy, world = frame.hierarchy("shadow"), frame.environment
+        world, (textures, constants) = frame.environment, ray_bindings(frame)
         return Maps(
             None, NO_VIEWS, WORLD_RAYS,
             textures={
-                **hierarchy.textures, "environment_map": world.map,
+                **textures, "environment_map": world.map,
                 "environment_density_map": world.density_map, "world_edges": self._edges,
             },
             constants={
-                "offset_size": 1e-6 * frame.geometry.size,
-                "world_tiles": self._tiles, "world_grid": (environment.GUIDE_COLUMNS, environment.GUIDE_ROWS),
+                **constants, "world_tiles": self._tiles,
+                "world_grid": (environment.GUIDE_COLUMNS, environment.GUIDE_ROWS),
             },
             blocks={"world_light": world.block},
         )  # fmt: skip

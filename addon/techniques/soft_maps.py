@@ -32,6 +32,7 @@ from .accumulated_maps import (
     AccumulatedMaps,
     Lookup,
     Maps,
+    drawn_by_lot,
     map_resolution,
     ray_bindings,
 )
@@ -137,9 +138,7 @@ class SoftMaps(AccumulatedMaps):
     def draw(self, frame: Frame, views: list) -> Maps:
         seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self))
         key = (*seen, *((view.rows.tobytes(), view.cell) for view in views))
-        compiled = frame.materials.compiled
-        varies = any(compiled[draw.material].casts_by_lot for draw in frame.geometry.draws)  # alpha is drawn by lot
-        if not varies and self._drawn is not None and self._drawn[0] == key:
+        if not drawn_by_lot(frame) and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
             return self._to_ask(frame, self._drawn[1])
         maps = self.service.draw(frame, self, views, self.resolution(frame))

@@ -10,6 +10,7 @@ from addon import engine
 from addon.frame import ray_costs
 from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, images, library
+from addon.techniques.accumulated_maps import AccumulatedMaps
 
 
 @pytest.fixture
@@ -82,6 +83,17 @@ def test_rays_take_the_place_of_maps_that_cost_more(room, monkeypatch):
     room.boxes[0].data.materials[0] = room.see_through(0.5)
     room.render(2, seed=3)
     assert room.ledger.row(maps).counters["maps"] >= 2
+
+
+def test_of_many_lights_those_that_are_drawn_are_asked_for_rays(room, monkeypatch):
+    """It takes a thousandth of a second each: not to be spent on what a sample leaves out."""
+    for k in range(40):
+        room.light("POINT", (k / 20 - 1, 0, 2))
+    asked, traces = [], AccumulatedMaps.traces
+    monkeypatch.setattr(AccumulatedMaps, "traces", lambda *given: asked.append(given[2]) or traces(*given))
+    room.scene.candela.direct_light_lights_per_sample = 4
+    room.render(2)
+    assert 0 < len(asked) <= 2 * 5 and len({emitter.light.key for emitter in asked}) == len(asked)
 
 
 def test_a_second_render_of_an_unchanged_scene_draws_nothing(room):
