@@ -45,9 +45,10 @@ class Entrant:
 
 
 VSSM, CSSM, POINTS = "vssm", "cssm", "accumulated_maps"
+BY_MAPS, BY_RAYS = (("by", "MAPS"),), (("by", "RAYS"),)  # what tells whether a point of a light is seen
 ENTRANTS = (
     Entrant("Auto, 1 sample", "AUTO", shared=6.0),
-    Entrant("maps, 1 sample, 6 shared", POINTS, shared=6.0),
+    Entrant("maps, 1 sample, 6 shared", POINTS, BY_MAPS, shared=6.0),
     Entrant("VSSM", VSSM),
     Entrant("VSSM, rule of the source", VSSM, (("rule", "MEAN"),)),
     Entrant("VSSM, 5 cells", VSSM, (("cells", 5),)),
@@ -64,10 +65,12 @@ ENTRANTS = (
     Entrant("CSSM, 1 cell", CSSM, (("cells", 1),)),
     Entrant("CSSM, 5 cells", CSSM, (("cells", 5),)),
     Entrant("CSSM, 16 samples", CSSM, samples=16),
-    Entrant("maps, 1 sample", POINTS),
-    Entrant("maps, 4 samples", POINTS, samples=4),
-    Entrant("maps, 16 samples", POINTS, samples=16),
-    Entrant("maps, 64 samples", POINTS, samples=64),
+    Entrant("maps, 1 sample", POINTS, BY_MAPS),
+    Entrant("maps, 4 samples", POINTS, BY_MAPS, samples=4),
+    Entrant("maps, 16 samples", POINTS, BY_MAPS, samples=16),
+    Entrant("maps, 64 samples", POINTS, BY_MAPS, samples=64),
+    Entrant("rays, 1 sample", POINTS, BY_RAYS),
+    Entrant("rays, 16 samples", POINTS, BY_RAYS, samples=16),
 )
 
 
@@ -134,7 +137,7 @@ def truth(family: str, scene, size: tuple[int, int], maps: int = REFERENCE_MAPS)
     """Visibility by the mean of `maps` accumulated maps, from the cache where it was made before."""
     from addon.compare.reference import cache_folder
 
-    values = (("texels_per_pixel", REFERENCE_TEXELS), ("edge_rays", False))  # what needs no hierarchy to be right
+    values = (*BY_MAPS, ("texels_per_pixel", REFERENCE_TEXELS), ("edge_rays", False))  # what needs no hierarchy to be right
     entrant = Entrant("truth", POINTS, values, maps)
     made_of = Path(soft_scenes.__file__).read_bytes() + repr((family, size, entrant, LEAST_LIGHT)).encode()
     path = cache_folder() / f"soft_{hashlib.sha256(made_of).hexdigest()[:16]}.npy"

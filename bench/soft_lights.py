@@ -83,7 +83,7 @@ def seconds(scene, entrant: soft.Entrant, samples: int, size: tuple[int, int], s
 
 def shadow_seconds(scene, size: tuple[int, int], runs: int) -> dict[str, float]:
     """By label: one sample of each kind, and a further sample of accumulated maps."""
-    maps = soft.Entrant("maps", soft.POINTS)
+    maps = soft.Entrant("maps", soft.POINTS, soft.BY_MAPS)
     cases = [(kind, 1) for kind in KINDS] + [(maps, 1), (maps, 1 + MORE)]
     found: dict[tuple, list[float]] = {}
     for seed in range(1, 2 + runs):  # the first run compiles
@@ -125,7 +125,7 @@ def main(arguments: list[str]) -> int:
         def error(entrant):
             return soft.rms(soft.visibility(scene, entrant, ERROR_SIZE), expected)
 
-        errors = [error(soft.Entrant("maps", soft.POINTS, samples=n)) for n in SAMPLES]
+        errors = [error(soft.Entrant("maps", soft.POINTS, soft.BY_MAPS, samples=n)) for n in SAMPLES]
         equal = {kind.label: equal_samples(error(kind), SAMPLES, errors) for kind in KINDS}
     cases = [(count, 0) for count in options.lights] + [(options.lights[0], level) for level in options.levels]
     for count, level in cases:
