@@ -154,6 +154,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--results", default=RESULTS, type=Path, metavar="PATH")
 
 
+def kept(results: Path, about: dict) -> list[dict]:
+    """Rows of an earlier run that can stand beside those of this one: of the same machine, size and samples."""
+    if not results.is_file():
+        return []
+    earlier = json.loads(results.read_text(encoding="utf-8"))
+    alike = ("device", "cpu", "samples", "size")
+    return earlier["rows"] if all(earlier["about"].get(name) == about.get(name) for name in alike) else []
+
+
+def joined(earlier: list[dict], rows: list[dict]) -> list[dict]:
+    """Both by scene, of the same scene the later."""
+    found = {row["scene"]: row for row in (*earlier, *rows)}
+    return [found[name] for name in sorted(found)]
+
+
 def command(options: argparse.Namespace) -> int:
     import bpy  # noqa: F401
     from tqdm import tqdm
@@ -174,6 +189,7 @@ def command(options: argparse.Namespace) -> int:
     about |= {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"), "load": load()}
     about |= {"samples": options.samples, "size": list(options.size)}
     options.results.parent.mkdir(parents=True, exist_ok=True)
+    rows = joined(kept(options.results, about), rows)
     text = json.dumps(rounded({"about": about, "rows": rows}), indent=1, ensure_ascii=False)
     options.results.write_text(text + "\n", encoding="utf-8")
     print(aligned(table(rows)))

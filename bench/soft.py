@@ -137,7 +137,8 @@ def truth(family: str, scene, size: tuple[int, int], maps: int = REFERENCE_MAPS)
     """Visibility by the mean of `maps` accumulated maps, from the cache where it was made before."""
     from addon.compare.reference import cache_folder
 
-    values = (*BY_MAPS, ("texels_per_pixel", REFERENCE_TEXELS), ("edge_rays", False))  # what needs no hierarchy to be right
+    # What needs no hierarchy to be right.
+    values = (*BY_MAPS, ("texels_per_pixel", REFERENCE_TEXELS), ("edge_rays", False))
     entrant = Entrant("truth", POINTS, values, maps)
     made_of = Path(soft_scenes.__file__).read_bytes() + repr((family, size, entrant, LEAST_LIGHT)).encode()
     path = cache_folder() / f"soft_{hashlib.sha256(made_of).hexdigest()[:16]}.npy"
