@@ -41,6 +41,7 @@ def show():
     """Candela in the viewport of the file that is open now."""
     scene = window().scene
     scene.render.engine = ENGINE
+    scene.candela.accumulated_maps_by = "MAPS"  # memory that is seen to come and go: rays need a sixth of it
     scene.candela.viewport_samples = SAMPLES
     scene.candela.bounces = 0  # indirect light takes its time without a GPU
     space = viewport_area().spaces.active
