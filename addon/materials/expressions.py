@@ -55,7 +55,8 @@ class Expressions:
         self.fallbacks: dict[tuple[str, str], None] = {}
         self.values = ValueBlock()
         self.attributes: list[Attribute] = []
-        self.image_keys: dict[str, str] = {}  # in sampler order, with the file that their functions call
+        # In sampler order, with the files that their functions call: of one, unless nodes of two kinds read an image.
+        self.image_keys: dict[str, dict[str, None]] = {}
         self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
         self._scopes = [_Scope()]
         self._functions: list[str] = []
@@ -76,8 +77,8 @@ class Expressions:
     def text(self) -> str:
         """The whole source: includes, the images' functions, evaluate_material."""
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
-        sources = enumerate(self.image_keys.values())
-        functions = "".join("\n" + FUNCTIONS[source].format(k=k) for k, source in sources)
+        wanted = [(k, source) for k, sources in enumerate(self.image_keys.values()) for source in sources]
+        functions = "".join("\n" + FUNCTIONS[source].format(k=k) for k, source in wanted)
         functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
         head = "void evaluate_material(SurfacePoint point, inout Closures closures)"
@@ -186,7 +187,8 @@ class Expressions:
             if len(self.image_keys) >= MAX_IMAGES:
                 self.note(node, f"The material reads more than {MAX_IMAGES} images; '{node.label}' is drawn pink.")
                 return False
-            self.image_keys[node.image] = entry.include
+            self.image_keys[node.image] = {}
+        self.image_keys[node.image].setdefault(entry.include)
         return True
 
     def include(self, entry: Entry) -> None:

@@ -287,8 +287,21 @@ def shader_alone(kind, **values):
     return Graph({"N": Node("N", "N", kind, inputs, {"Shader": "SHADER"}, {}, "")}, ("N", "Shader"))
 
 
+def two_kinds_of_lookup():
+    """A Sky and an Image Texture that read the same image, found to fail once."""
+    at = {"Vector": Input("VECTOR", (0.0, 0.0, 0.0), None)}
+    sky = Node("S", "S", "ShaderNodeTexSky", at, {"Color": "COLOR"}, {}, "picture")
+    where = {"Vector": Input("VECTOR", (0.0, 0.0, 0.0), ("S", "Color"))}
+    outputs = {"Color": "COLOR", "Alpha": "FLOAT"}
+    picture = Node("I", "I", "ShaderNodeTexImage", where, outputs, {"projection": "FLAT"}, "picture")
+    color = {"Color": Input("COLOR", (0.0, 0.0, 0.0), ("I", "Color"))}
+    diffuse = Node("D", "D", "ShaderNodeBsdfDiffuse", color, {"Shader": "SHADER"}, {}, "")
+    return Graph({"S": sky, "I": picture, "D": diffuse}, ("D", "Shader"))
+
+
 @hypothesis.settings(max_examples=30, deadline=None, suppress_health_check=list(hypothesis.HealthCheck))
 @hypothesis.given(trees())
+@hypothesis.example(two_kinds_of_lookup())
 @hypothesis.example(shader_alone("ShaderNodeBsdfAnisotropic", Rotation=float("inf")))
 @hypothesis.example(shader_alone("ShaderNodeBsdfPrincipled", **{"Coat Weight": 1.0, "Coat IOR": float("inf")}))
 @hypothesis.example(shader_alone("ShaderNodeBsdfPrincipled", **{"Transmission Weight": 1.0, "IOR": float("inf")}))
