@@ -128,6 +128,16 @@ def sample_scenes() -> tuple[Scene, ...]:
     return tuple(Scene(path.stem) for path in sorted(SCENES.glob("*.blend")))
 
 
+def named_scenes(names: list[str] | None) -> tuple[Scene, ...]:
+    """Sample scenes of these names, all without; ValueError where one is unknown."""
+    scenes = sample_scenes()
+    unknown = set(names or ()) - {scene.name for scene in scenes}
+    if unknown:
+        known = ", ".join(scene.name for scene in scenes)
+        raise ValueError(f"There is no scene {', '.join(sorted(unknown))}; there is {known}.")
+    return tuple(scene for scene in scenes if not names or scene.name in names)
+
+
 @dataclass(frozen=True)
 class Cell:
     """One point of a plot. `size` is (width, height) in pixels."""

@@ -8,6 +8,8 @@ and waiting for it, "readback" is fetching pixels after the last sample, "Blende
 On a busy machine, where whoever is interrupted looks slow, the processor seconds of the warm render still tell: those
 of Python's own thread (which also hands draws to the driver) beside those of all threads, a software GPU's included.
 
+A run of some scenes leaves the rows of the others.
+
 Targets: Python and sync together below 15 % of a render of 16 samples; an unchanged scene at least twice as fast.
 """
 
@@ -18,10 +20,11 @@ import cProfile
 import datetime as dt
 import json
 import pstats
+import sys
 import time
 from pathlib import Path
 
-from bench.cells import ROOT, Scene, Series, sample_scenes
+from bench.cells import ROOT, Scene, Series, named_scenes
 
 RESULTS = ROOT / "bench" / "results" / "profile.json"
 MOST_PYTHON = 0.15
@@ -179,8 +182,12 @@ def command(options: argparse.Namespace) -> int:
     from bench.quick import table as aligned
     from bench.run import load, rounded
 
+    try:
+        scenes = named_scenes(options.scenes)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
     addon.register()
-    scenes = [scene for scene in sample_scenes() if not options.scenes or scene.name in options.scenes]
     with quiet() as terminal:
         about = worker.about()
         bar = tqdm(scenes, file=terminal, disable=not terminal.isatty(), unit="scene")

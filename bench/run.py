@@ -351,14 +351,9 @@ def chosen(options: argparse.Namespace) -> list[Cell]:
     import bpy  # noqa: F401  (the registry's programs need Blender's gpu module)
 
     from addon.techniques import REGISTRY
-    from bench.cells import PEERS, own_series, sample_scenes
+    from bench.cells import PEERS, named_scenes, own_series
 
-    scenes = sample_scenes()
-    names = options.scenes or [scene.name for scene in scenes]
-    unknown = set(names) - {scene.name for scene in scenes}
-    if unknown:
-        known = ", ".join(scene.name for scene in scenes)
-        raise ValueError(f"There is no scene {', '.join(sorted(unknown))}; there is {known}.")
+    scenes = named_scenes(options.scenes)
     series = own_series(REGISTRY) + (() if options.no_peers else PEERS)
     if options.series:
         wanted = [text.lower() for text in options.series]
@@ -369,7 +364,6 @@ def chosen(options: argparse.Namespace) -> list[Cell]:
     return [
         Cell(scene, one, samples, options.size, options.reference_samples)
         for scene in scenes
-        if scene.name in names
         for one in series
         for samples in one.samples
         if not options.samples or samples in options.samples

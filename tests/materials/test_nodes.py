@@ -14,7 +14,7 @@ from addon.materials.nodes.entry import Attribute, Rows, Setting, Socket
 from addon.materials.reader import read_graph
 from addon.snapshot.scene import Image
 from tests.materials.cycles import new_material, render_patches
-from tests.materials.graphs import diffuse, emission, graph, math, mix, node, principled, transparent
+from tests.materials.graphs import diffuse, emission, graph, image, math, mix, node, principled, transparent
 from tests.materials.probe import points
 
 VALUE_ENTRIES = [entry for entry in REGISTRY if entry.outputs]
@@ -289,14 +289,10 @@ def shader_alone(kind, **values):
 
 def two_kinds_of_lookup():
     """A Sky and an Image Texture that read the same image, found to fail once."""
-    at = {"Vector": Input("VECTOR", (0.0, 0.0, 0.0), None)}
-    sky = Node("S", "S", "ShaderNodeTexSky", at, {"Color": "COLOR"}, {}, "picture")
-    where = {"Vector": Input("VECTOR", (0.0, 0.0, 0.0), ("S", "Color"))}
-    outputs = {"Color": "COLOR", "Alpha": "FLOAT"}
-    picture = Node("I", "I", "ShaderNodeTexImage", where, outputs, {"projection": "FLAT"}, "picture")
-    color = {"Color": Input("COLOR", (0.0, 0.0, 0.0), ("I", "Color"))}
-    diffuse = Node("D", "D", "ShaderNodeBsdfDiffuse", color, {"Shader": "SHADER"}, {}, "")
-    return Graph({"S": sky, "I": picture, "D": diffuse}, ("D", "Shader"))
+    sky = node("Sky", "ShaderNodeTexSky", {"Color": "COLOR"}, "picture")
+    seen = image("Image", "picture", projection="FLAT")
+    seen.inputs["Vector"] = Input("VECTOR", (0.0, 0.0, 0.0), ("Sky", "Color"))
+    return graph(sky, seen, diffuse(Color=("Image", "Color")), surface=("Diffuse", "BSDF"))
 
 
 @hypothesis.settings(max_examples=30, deadline=None, suppress_health_check=list(hypothesis.HealthCheck))
