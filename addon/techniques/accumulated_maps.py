@@ -109,7 +109,7 @@ class Lookup:
 @dataclass(frozen=True)
 class Maps:
     """Depth maps that were drawn: the atlas (None: rays take their place), its views for the uniform block, and what
-    the lookup binds besides."""
+    the lookup binds besides. `sparse`: they are asked at some pixels, and between where that does not suffice."""
 
     atlas: images.Image | None
     views: np.ndarray  # (V, VIEW_TEXELS, 4)
@@ -117,6 +117,7 @@ class Maps:
     textures: dict[str, images.Image] = field(default_factory=dict)
     constants: dict[str, object] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
+    sparse: bool = False
     drawing: Iterator[None] = field(default_factory=lambda: iter(()))  # to be exhausted before they are asked
 
 

@@ -44,7 +44,8 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps, soft_lookup, with_contacts
+from .shared_visibility import looking
+from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SPARSE, SoftMaps, soft_lookup, with_contacts
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
 PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
@@ -83,7 +84,12 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
 
 
 DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, _, _ in PREFILTERS)
-LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
+LOOKUPS = tuple(
+    program
+    for lookup in DEFAULTS
+    for one in (lookup, with_contacts(lookup))
+    for program in (lighting(one, False), looking(one))
+)
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
 BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
 
@@ -100,6 +106,7 @@ class ConvolutionSoftShadows(SoftMaps):
         Param("cells", "Cells", 4, "Boxes along each side of a kernel", 1, 6),
         REFINE,
         CONTACTS,
+        SPARSE,
     )  # fmt: skip
 
     def resolution(self, frame: Frame) -> int:

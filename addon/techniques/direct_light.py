@@ -40,7 +40,7 @@ from ..frame.view import VIEW
 from ..gfx import passes
 from ..gfx.library import Program
 from ..snapshot.scene import Snapshot
-from . import repeated_light
+from . import repeated_light, shared_visibility
 from .accumulated_maps import (
     ATLAS_TEXELS,
     EDGES,
@@ -101,7 +101,9 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
 
 
 LIGHTING = tuple(
-    lighting(lookup, soft_lobes) for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS) for soft_lobes in (False, True)
+    lighting(lookup, soft_lobes)
+    for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS, shared_visibility.BETWEEN)
+    for soft_lobes in (False, True)
 )
 DIRECT_WRITES = (
     Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
@@ -124,8 +126,14 @@ def shade(
         },
     }  # fmt: skip
     program = lighting(maps.lookup, frame.materials.soft, kinds)
-    yield from repeated_light.add(frame, technique, sources, Lit(program, ANY_SURFACE, bindings, rows, maps.views))
-    frame.count(technique, "passes")
+    lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
+    if maps.sparse:
+        between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
+        yield from shared_visibility.add(frame, technique, rows, kinds, sources, maps, program, between)
+        repeated_light.keep(frame, lit)
+    else:
+        yield from repeated_light.add(frame, technique, sources, lit)
+        frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
 
 

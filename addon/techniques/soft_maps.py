@@ -26,6 +26,7 @@ from ..frame import acceleration, depth_maps, lights, tables
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images
+from . import shared_visibility
 from .accumulated_maps import (
     PART_TEXELS,
     RAY_CONSTANTS,
@@ -45,6 +46,10 @@ REFINE = Param(
 CONTACTS = Param(
     "contacts", "Contact rays", True,
     "Short rays look for blockers close to the receiver, where a depth map cannot tell", draft=False,
+)  # fmt: skip
+SPARSE = Param(
+    "sparse", "Sparse lookups", True,
+    "In large pictures of few samples look up shadows at every fourth pixel, and between where they or surfaces vary",
 )  # fmt: skip
 FEWEST_POINTS = (
     16  # fewer parts that do not tile the light, at points of a low-discrepancy set, are worse than all of it
@@ -151,15 +156,23 @@ class SoftMaps(AccumulatedMaps):
     def _to_ask(self, frame: Frame, maps: Maps) -> Maps:
         """`maps` with the lookup, and with what its rays bind where short rays look for near blockers."""
         lookup = self.lookup(frame)
+        maps = replace(maps, lookup=lookup, sparse=len(maps.views) > 0 and self._sparse(frame))
         contacts = self.contact_side > 0 and frame.settings.get(self, "contacts") and len(maps.views) > 0
         if not contacts or acceleration.too_many(frame.snapshot):
-            return replace(maps, lookup=lookup)
+            return maps
         textures, constants = ray_bindings(frame)
         constants["contact_side"] = self.contact_side if frame.settings.samples < FEWEST_POINTS else 1
         return replace(
             maps, lookup=with_contacts(lookup), textures=maps.textures | textures,
             constants=maps.constants | constants,
         )  # fmt: skip
+
+    def _sparse(self, frame: Frame) -> bool:
+        """Whether shadows are looked up at some pixels, and between where that does not suffice."""
+        width, height = frame.size
+        few, many = frame.settings.samples < FEWEST_POINTS, width * height >= shared_visibility.MANY_PIXELS
+        # Of layers that are lit from both sides a pixel shows light of either.
+        return few and many and not frame.materials.soft and frame.settings.get(self, "sparse")
 
     def _with_bounds(self, frame: Frame, views: list, maps: Maps) -> Maps:
         """Pyramid, limits and filtered maps of the part of the atlas that holds views."""

@@ -55,7 +55,8 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SoftMaps, soft_lookup, with_contacts
+from .shared_visibility import looking
+from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SPARSE, SoftMaps, soft_lookup, with_contacts
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
 MOMENTS = tables.TableSource(
@@ -77,7 +78,12 @@ def _lookup(rule: str, cells: int) -> Lookup:
 
 
 DEFAULTS = tuple(_lookup(rule, 3) for rule, _, _ in RULES)
-LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
+LOOKUPS = tuple(
+    program
+    for lookup in DEFAULTS
+    for one in (lookup, with_contacts(lookup))
+    for program in (lighting(one, False), looking(one))
+)
 MOMENT_VALUES = tables.values_program(MOMENTS)
 
 
@@ -94,6 +100,7 @@ class VarianceSoftShadows(SoftMaps):
         ),
         REFINE,
         CONTACTS,
+        SPARSE,
     )  # fmt: skip
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:

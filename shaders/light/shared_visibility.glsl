@@ -1,0 +1,17 @@
+// Visibility between the corners of a cell (light/visibility_cells.frag.glsl).
+#include "light/sources.glsl"
+
+float light_visibility(Light light, vec3 position, vec3 normal)
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 cell = pixel / RATE;
+  int index = light.base / LIGHT_TEXELS;
+  vec4 known = (index < 2) ? ((index == 0) ? first_fetch(cell) : second_fetch(cell))
+                           : ((index == 2) ? third_fetch(cell) : fourth_fetch(cell));
+  vec2 span = vec2(max(min(ivec2(RATE), surface_position_size() - 1 - cell * RATE), ivec2(1)));
+  vec2 place = vec2(pixel - cell * RATE) / span;
+  vec4 weights = vec4(1.0 - place.x, place.x, 1.0 - place.x, place.x) * vec4(vec2(1.0 - place.y), vec2(place.y));
+  weights *= step(vec4(0.0), known);
+  float whole = dot(weights, vec4(1.0));
+  return (whole > 0.0) ? clamp(dot(weights, known) / whole, 0.0, 1.0) : max_component(vec3(max(known.x, known.y), known.zw));
+}
