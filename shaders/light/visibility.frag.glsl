@@ -12,12 +12,11 @@ void main()
     return;
   }
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-  float found[4] = float[4](1.0, 1.0, 1.0, 1.0);
+  out_visibility = vec4(1.0);
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
     if ((light.flags & LIGHT_SHADOW) != 0) {
-      found[i] = light_visibility(light, position.xyz, normal);
+      out_visibility[i] = light_visibility(light, position.xyz, normal);
     }
   }
-  out_visibility = vec4(found[0], found[1], found[2], found[3]);
 }
