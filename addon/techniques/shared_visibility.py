@@ -79,7 +79,7 @@ CELLS = passes.fullscreen_program(
 MARKS = passes.fullscreen_program(
     "marks of shared visibility",
     "light/visibility_marks.frag.glsl",
-    textures=(*SEEN, ("RGBA32F", "plane")),
+    textures=(*SEEN, ("RGBA32F", "cell_plane")),
     blocks=((VIEW, "film_view"),),
     defines=DEFINES,
     writes_depth=True,
@@ -125,7 +125,7 @@ class _Cells:
         )  # fmt: skip
         cells = images.Target((plane, *self.corners))
         passes.fullscreen(CELLS, cells, textures={**seen, "visibility": visibility}, blocks=view)
-        passes.fullscreen(MARKS, images.Target((), self.marks), textures={**seen, "plane": plane}, blocks=view)
+        passes.fullscreen(MARKS, images.Target((), self.marks), textures={**seen, "cell_plane": plane}, blocks=view)
         images.pool.give(visibility)
         images.pool.give(plane)
 

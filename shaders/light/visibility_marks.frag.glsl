@@ -7,7 +7,7 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 position = surface_position_fetch(pixel);
-  vec4 plane = plane_fetch(pixel / RATE);
+  vec4 plane = cell_plane_fetch(pixel / RATE);
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
   float off = abs(dot(position.xyz, plane.xyz) - plane.w);
   bool within = dot(plane.xyz, normal) > FACING && off < OFF_PLANE * pixel_size_at(position.xyz);
