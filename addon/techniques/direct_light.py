@@ -129,8 +129,7 @@ def shade(
     lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
     if maps.sparse:
         between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
-        yield from shared_visibility.add(frame, technique, rows, kinds, sources, maps, program, between)
-        repeated_light.keep(frame, lit)
+        yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
     else:
         yield from repeated_light.add(frame, technique, sources, lit)
         frame.count(technique, "passes")

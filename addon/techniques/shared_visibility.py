@@ -54,10 +54,7 @@ RATE = 4  # pixels between lookups, along both axes
 ALIKE = 0.1  # difference of visibility between a cell's corners up to which pixels within it interpolate
 MANY_PIXELS = 100_000
 LIGHTS = 4  # whose visibility one image holds
-KNOWN, UNKNOWN = (
-    "GREATER",
-    "LESS",
-)  # `where` of passes.fullscreen: the marks are 0, and 1, of pixels that show a surface
+KNOWN, UNKNOWN = "GREATER", "LESS"  # `where` of passes.fullscreen: the marks are 0, and 1
 CORNERS = ("first", "second", "third", "fourth")  # light: what its cells know
 DEFINES = (("RATE", str(RATE)), ("ALIKE", str(ALIKE)), ("FACING", "0.9"), ("OFF_PLANE", "2.0"))
 SEEN = tuple(texture for texture in SURFACE_TEXTURES if texture[1] in ("surface_position", "surface_normal"))
@@ -135,29 +132,30 @@ class _Cells:
 
 
 def add(
-    frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps,
-    own: Program, between: Program,
+    frame: Frame, technique: Technique, sources: lights.Sources, lit: repeated_light.Lit, kinds: int, maps: Maps,
+    between: Program,
 ) -> Iterator[None]:  # fmt: skip
-    """Add the light of `rows` to the sample's radiance, in parts: by the program `own` where pixels look for
-    visibility themselves, which `maps` tell, and by `between`, with the lookup BETWEEN, elsewhere."""
-    shared = {"energy_table": frame.materials.energy_table}
-    constants = {"traced_roughness": frame.services.get("traced_roughness", -1.0)}
-    for first in range(0, len(rows), LIGHTS):
-        some = rows[first : first + LIGHTS]
-        constants["light_count"] = len(some)
+    """Add this light to the sample's radiance, in parts, and keep it for other points of the film: as it is where
+    pixels ask `maps` themselves, and by the program `between`, with the lookup BETWEEN, elsewhere."""
+    bindings = lit.bindings
+    for first in range(0, len(lit.rows), LIGHTS):
+        some = lit.rows[first : first + LIGHTS]
+        constants = {**bindings["constants"], "light_count": len(some)}
         cells = _Cells()
         try:
             cells.find(frame, some, kinds, sources, maps)
             yield
-            known = {"textures": {**shared, **dict(zip(CORNERS, cells.corners))}, "blocks": {}, "constants": constants}
-            asked = {
-                "textures": {**shared, "depth_maps": maps.atlas, **maps.textures}, "blocks": maps.blocks,
-                "constants": {**constants, **maps.constants},
-            }  # fmt: skip
-            for program, where, bindings in ((between, KNOWN, known), (own, UNKNOWN, asked)):
-                lit = repeated_light.Lit(program, where, bindings, some, maps.views)
-                yield from repeated_light.add(frame, technique, sources, lit, cells.marks)
+            known = {
+                "textures": {"energy_table": frame.materials.energy_table, **dict(zip(CORNERS, cells.corners))},
+                "blocks": {},
+                "constants": {name: constants[name] for name in ("light_count", "traced_roughness")},
+            }
+            asked = {**bindings, "constants": constants}
+            for program, where, bound in ((between, KNOWN, known), (lit.program, UNKNOWN, asked)):
+                part = repeated_light.Lit(program, where, bound, some, lit.views)
+                yield from repeated_light.add(frame, technique, sources, part, cells.marks)
         finally:
             cells.give()
         frame.count(technique, "passes", 5)
         frame.count(technique, "shared lookups", len(some))
+    repeated_light.keep(frame, lit)
