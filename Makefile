@@ -31,15 +31,17 @@ samples: ## write the sample scenes anew, with Blender 4.5, so that every suppor
 	.venv-4.5/bin/python sample_blends/make.py
 
 test: environment ## every test that needs no window
-	$(PYTHON) -m pytest $(PARALLEL) -m "not window"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing"
+	$(PYTHON) -m pytest -m timing
 
 test-fast: environment ## the tests that take seconds
-	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not slow"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing and not slow"
+	$(PYTHON) -m pytest -m "timing and not slow"
 
 check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff format --check --quiet .
 	$(PYTHON) -m ruff check --quiet .
-	$(PYTHON) -m pytest -q $(PARALLEL) -m "not window and not slow"
+	$(PYTHON) -m pytest -q $(PARALLEL) -m "not window and not timing and not slow"
 
 package: environment ## the extension as a zip, in build/
 	$(PYTHON) tools/package.py --output build

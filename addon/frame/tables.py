@@ -17,7 +17,8 @@ texel fetch 2.3); on a GPU the loads of a chunk come from the cache.
 
 Measured with 1024x1024 RGBA32F on a software GPU, processor time in one process: 37 to 40 ms from image to table (9
 more for a source); one thread per row and column 118 to 130 ms. Chunks of 4 or 16 texels take 5 % longer. On a
-processor with faster stores 35 to 38 ms and 89 ms: half of the table's time is writing two images there.
+processor with faster stores 35 to 38 ms and 89 ms: half of the table's time is writing two images there. On one with
+slower memory 45 to 55 ms and 100 to 124 ms, the same with chunks of 4, 5, 6 and 8 and with loads instead of branches.
 
 Source: Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984; the chunks are the reduce-then-scan of Sengupta
 et al., "Scan primitives for GPU computing", 2007, with the last step as a loop.

@@ -12,10 +12,10 @@
 #define NOISE_RIDGED_MULTIFRACTAL 3
 #define NOISE_HETERO_TERRAIN 4
 
-// The sum of type `type` over the octaves of `detail`, whose last fades in with the fraction. One loop for all types,
-// so that the noise itself is written once (see perlin.glsl).
+// The sum of type `type` over the octaves of `detail`, whose last fades in with the fraction, or the noise alone where
+// `alone`. One loop for all types, so that the noise itself is written once (see perlin.glsl).
 float noise_sum(vec4 start, int dimensions, int type, bool normalized, float detail, float roughness,
-                float lacunarity, float offset, float gain)
+                float lacunarity, float offset, float gain, bool alone)
 {
   int whole = int(detail);
   float fraction = (type == NOISE_RIDGED_MULTIFRACTAL) ? 0.0 : detail - floor(detail);
@@ -30,6 +30,9 @@ float noise_sum(vec4 start, int dimensions, int type, bool normalized, float det
   for (int i = 0; i <= last; i++) {
     float share = (i > whole) ? fraction : 1.0;
     float n = perlin_noise(p, dimensions);
+    if (alone) {
+      return n;
+    }
     if (type == NOISE_FBM) {
       if (i <= whole) {
         whole_value += power * n;
@@ -88,20 +91,31 @@ void noise_texture(vec3 vector, float w, float scale, float detail, float roughn
   vec4 p = scale * ((dimensions == 1) ? vec4(w, 0.0, 0.0, 0.0) : vec4(vector, w));
   float octaves = clamp(detail, 0.0, 15.0);
   float rough = max(roughness, 0.0);
-  if (distortion != 0.0) {
-    vec4 start = p;
-    for (int i = 0; i < dimensions; i++) {
-      float pushed = distortion * perlin_noise(start + noise_seed(i, dimensions), dimensions);
-      p += pushed * vec4(float(i == 0), float(i == 1), float(i == 2), float(i == 3));
+  vec4 start = p;
+  color = vec3(0.0);
+  // What pushes the point along its axes, then the channels: one loop, since each call of the noise is written out.
+  for (int k = (distortion != 0.0) ? -dimensions : 0; k < (color_used ? 3 : 1); k++) {
+    bool pushes = k < 0;
+    vec4 q = pushes ? start : p;
+    if (k != 0) {
+      q += noise_seed(pushes ? dimensions + k : dimensions + k - 1, dimensions);
+    }
+    float n = noise_sum(q, dimensions, type, normalized, octaves, rough, lacunarity, offset, gain, pushes);
+    if (pushes) {
+      int axis = dimensions + k;
+      p += distortion * n * vec4(float(axis == 0), float(axis == 1), float(axis == 2), float(axis == 3));
+    }
+    else if (k == 0) {
+      color = vec3(n);
+    }
+    else if (k == 1) {
+      color.y = n;
+    }
+    else {
+      color.z = n;
     }
   }
-  float channels[3];
-  for (int i = 0; i < (color_used ? 3 : 1); i++) {
-    vec4 q = (i == 0) ? p : p + noise_seed(dimensions + i - 1, dimensions);
-    channels[i] = noise_sum(q, dimensions, type, normalized, octaves, rough, lacunarity, offset, gain);
-  }
-  value = channels[0];
-  color = color_used ? vec3(channels[0], channels[1], channels[2]) : vec3(value);
+  value = color.x;
 }
 
 void white_noise_texture(vec3 vector, float w, int dimensions, out float value, out vec3 color)
@@ -152,7 +166,8 @@ void wave_texture(vec3 vector, float scale, float distortion, float detail, floa
   if (distortion != 0.0) {
     float octaves = clamp(detail, 0.0, 15.0);
     n += distortion
-         * (2.0 * noise_sum(vec4(p * detail_scale, 0.0), 3, NOISE_FBM, true, octaves, detail_roughness, 2.0, 0.0, 1.0)
+         * (2.0 * noise_sum(vec4(p * detail_scale, 0.0), 3, NOISE_FBM, true, octaves, detail_roughness, 2.0, 0.0, 1.0,
+                           false)
             - 1.0);
   }
   if (profile == WAVE_SINE) {

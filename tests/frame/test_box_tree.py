@@ -99,6 +99,7 @@ def test_large_boxes_among_small_ones_do_not_enlarge_their_nodes():
     assert visits[1] < visits[0] + 16
 
 
+@pytest.mark.timing
 def test_building_takes_few_microseconds_per_box():
     low, high = random_boxes(100_000)
     started = time.perf_counter()

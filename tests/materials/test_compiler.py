@@ -212,6 +212,7 @@ def test_more_sliders_than_a_uniform_block_holds_still_compile():
     assert any("uniform block" in sentence for _, sentence in material.fallbacks)
 
 
+@pytest.mark.timing
 def test_300_nodes_compile_in_a_fifth_of_a_second():
     chain = [math(f"M{k}", "MULTIPLY_ADD", (f"M{k - 1}", "Value") if k else 1.0) for k in range(300)]
     tree = graph(*chain, principled(Base_Color=("M299", "Value")), surface=("Principled", "BSDF"))

@@ -59,6 +59,7 @@ def large_tree(value):
 
 
 @pytest.mark.slow
+@pytest.mark.timing
 def test_a_tree_of_300_nodes_compiles_in_two_seconds_and_its_sliders_in_none(gpu_context):
     from addon.gfx import library
     from tests.materials.probe import material_program

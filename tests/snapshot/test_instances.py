@@ -306,6 +306,7 @@ def test_order_and_grouping_do_not_depend_on_names(stage):
     )
 
 
+@pytest.mark.timing
 def test_three_thousand_instances_sync_in_time(stage):
     """Half of them objects of their own, half instances of a collection's."""
     data = stage.mesh()

@@ -290,6 +290,7 @@ def test_curves_texts_surfaces_and_metaballs_are_drawn_through_their_meshes(stag
     assert all(count > 0 for count in drawn.values())
 
 
+@pytest.mark.timing
 def test_the_million_triangle_mesh_syncs_in_time(stage):
     data = stage.grid(708)
     data.uv_layers.new()
