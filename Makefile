@@ -21,7 +21,7 @@ environment: ## the virtual environment, with Blender as a Python module
 	@$(PYTHON3) tools/environment.py --blender $(BLENDER)
 
 demo: environment ## a sample scene by Candela and by Cycles, and a page that compares them
-	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --output out/demo
+	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --reference-samples 128 --output out/demo
 
 pictures: demo ## the README's picture, from the demo
 	$(PYTHON) tools/pictures.py out/demo docs/images/demo.png
