@@ -52,10 +52,14 @@ void main()
       microfacets = false;
     }
     if (microfacets) {
-      vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
       float mu = max(dot(s.glossy_normal, -direction), 0.0);
-      out_glossy_color.rgb = s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior,
-                                                             sqrt(sqrt(alpha.x * alpha.y)), mu);
+      float roughness = lobe_roughness(lobe_alpha(s.glossy_roughness, s.glossy_anisotropy));
+      out_glossy_color.rgb = s.glossy_weight *
+                             glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness, mu);
+      if (s.distribution != DISTRIBUTION_MULTI_GGX) {
+        // As Cycles has it: the share that is lost is in the light, not in the colour.
+        out_glossy_color.rgb /= max(ggx_energy(mu, roughness), 1e-4);
+      }
     }
 #endif
     if (max_component(s.diffuse) <= 0.0 && max_component(s.glossy_weight) > 0.0) {

@@ -29,9 +29,9 @@ vec3 surface_albedo(Surface s, float mu)
     albedo += s.glossy_weight * soft_lobe_albedo(s);
   }
   else if (s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0) {
-    vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
-    albedo += s.glossy_weight * glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior,
-                                              sqrt(sqrt(alpha.x * alpha.y)), mu);
+    float roughness = lobe_roughness(lobe_alpha(s.glossy_roughness, s.glossy_anisotropy));
+    albedo += s.glossy_weight *
+              glossy_albedo(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, roughness, mu);
   }
   return max(albedo, vec3(0.0));
 }
@@ -64,7 +64,7 @@ Reflection surface_reflection(Surface s, float mu)
     vec2 alpha = lobe_alpha(s.glossy_roughness, s.glossy_anisotropy);
     r.alpha = max(sqrt(alpha.x * alpha.y), LEAST_ALPHA);
     if (s.kind == FRESNEL_DIELECTRIC) {
-      float roughness = sqrt(sqrt(alpha.x * alpha.y));
+      float roughness = lobe_roughness(alpha);
       r.diffuse *= (1.0 - min(lobe_albedo(s, roughness, MEAN_COSINE), 0.9)) / (1.0 - min(lobe_albedo(s, roughness, mu), 0.9));
     }
     vec3 scale = s.glossy_weight * multiscatter_scale(s.kind, s.glossy_tint, s.glossy_edge, s.glossy_ior, sqrt(r.alpha), mu);

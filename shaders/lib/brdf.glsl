@@ -1,4 +1,5 @@
-// Reflection as Cycles has it: Lambert and energy-preserving Oren-Nayar, GGX with multiple-scattering compensation.
+// Reflection as Cycles has it: Lambert and energy-preserving Oren-Nayar, GGX with multiple-scattering compensation, and
+// the distributions of before it.
 // All return f * cos(normal, light); vectors are unit and point away from the surface.
 #include "lib/math.glsl"
 #include "lib/energy.glsl"
@@ -58,7 +59,7 @@ vec3 surface_diffuse_reflection(Surface s, vec3 view, vec3 light)
   return diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, view, light) * bump_shadowing(s, light);
 }
 
-// A GGX lobe in its own frame: z along the normal, x along the tangent. Energy compensation is in `scale`.
+// A lobe of microfacets in its own frame: z along the normal, x along the tangent. Energy compensation is in `scale`.
 struct Lobe {
   vec3 tangent;
   vec3 bitangent;
@@ -69,6 +70,7 @@ struct Lobe {
   vec3 tint;
   vec3 edge;
   float ior;
+  int distribution;
   vec3 view;   // in the lobe's frame
 };
 
@@ -92,7 +94,7 @@ Lobe lobe_begin(Surface s, vec3 view)
   vec3 t;
   vec3 b;
   orthonormal_basis(s.glossy_normal, t, b);
-  float angle = 2.0 * PI * s.tangent_angle;
+  float angle = PI * s.tangent_angle;
   lobe.tangent = cos(angle) * t + sin(angle) * b;
   lobe.bitangent = cross(s.glossy_normal, lobe.tangent);
   lobe.normal = s.glossy_normal;
@@ -101,8 +103,9 @@ Lobe lobe_begin(Surface s, vec3 view)
   lobe.tint = s.glossy_tint;
   lobe.edge = s.glossy_edge;
   lobe.ior = s.glossy_ior;
+  lobe.distribution = s.distribution;
   lobe.view = lobe_to_local(lobe, view);
-  float roughness = sqrt(sqrt(lobe.alpha.x * lobe.alpha.y));
+  float roughness = lobe_roughness(lobe.alpha);
   lobe.scale = s.glossy_weight * multiscatter_scale(s.kind, lobe.tint, lobe.edge, lobe.ior, roughness, lobe.view.z);
   return lobe;
 }
@@ -125,6 +128,32 @@ bool lobe_is_mirror(Lobe lobe)
   return lobe.alpha.x * lobe.alpha.y <= MIRROR_ALPHA;
 }
 
+// What a facet of the distributions other than GGX reflects, f * cos without Fresnel and scale. Walter et al.,
+// "Microfacet models for refraction", 2007: Beckmann's with Smith's shadowing, its rational fit; Ashikhmin & Shirley, "An
+// anisotropic Phong BRDF model", 2000, whose exponents are 2 / alpha^2 - 2.
+float beckmann_lambda(vec3 w, vec2 alpha)
+{
+  float a = abs(w.z) / max(length(w.xy * alpha), 1e-20);
+  return (a < 1.6) ? (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a) : 0.0;
+}
+
+float other_facet(Lobe lobe, vec3 h, vec3 light)
+{
+  vec2 alpha = max(lobe.alpha, vec2(1e-4));
+  float up = clamp(h.z, 1e-6, 1.0);
+  if (lobe.distribution == DISTRIBUTION_BECKMANN) {
+    vec2 slope = h.xy / (alpha * up);
+    float distribution = exp(-dot(slope, slope)) / (PI * alpha.x * alpha.y * up * up * up * up);
+    float shadowing = 1.0 + beckmann_lambda(lobe.view, alpha) + beckmann_lambda(light, alpha);
+    return distribution / (4.0 * lobe.view.z * shadowing);
+  }
+  vec2 exponents = max(2.0 / (alpha * alpha) - 2.0, vec2(0.0));
+  float aside = dot(h.xy, h.xy);
+  float exponent = (aside > 1e-10) ? dot(exponents, h.xy * h.xy) / aside : exponents.x;
+  float norm = sqrt((exponents.x + 1.0) * (exponents.y + 1.0)) / (8.0 * PI);
+  return light.z * norm * pow(up, exponent) / max(max(dot(h, light), 1e-6) * max(light.z, lobe.view.z), 1e-6);
+}
+
 // f * cos for a light direction in world space; `pdf` is the density per steradian of lobe_sample for it.
 vec3 lobe_reflection(Lobe lobe, vec3 light_world, out float pdf)
 {
@@ -141,7 +170,12 @@ vec3 lobe_reflection(Lobe lobe, vec3 light_world, out float pdf)
   float facet = distribution / (4.0 * view.z);
   pdf = facet / (1.0 + lambda_view);
   vec3 fresnel = fresnel_reflectance(lobe.kind, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
-  return lobe.scale * fresnel * (facet / (1.0 + lambda_view + lambda_light));
+  float reflected = facet / (1.0 + lambda_view + lambda_light);
+  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  for (int k = DISTRIBUTION_MULTI_GGX; k < lobe.distribution; k = lobe.distribution) {
+    reflected = other_facet(lobe, h, light);
+  }
+  return lobe.scale * fresnel * reflected;
 }
 
 // A microfacet's normal among those that `view` sees, all in the frame of the surface (Dupuy & Benyoub 2023, spherical
@@ -173,6 +207,10 @@ vec3 lobe_sample(Lobe lobe, vec2 u, out vec3 weight)
     if (!mirror) {
       float lambda_view = ggx_lambda(view, lobe.alpha);
       masking = (1.0 + lambda_view) / (1.0 + lambda_view + ggx_lambda(light, lobe.alpha));
+    }
+    for (int k = DISTRIBUTION_MULTI_GGX; k < lobe.distribution && !mirror; k = lobe.distribution) {
+      float density = ggx_distribution(h, lobe.alpha) / (4.0 * view.z * (1.0 + ggx_lambda(view, lobe.alpha)));
+      masking = other_facet(lobe, h, light) / max(density, 1e-30);
     }
     weight = lobe.scale * masking * fresnel_reflectance(lobe.kind, lobe.tint, lobe.edge, lobe.ior, dot(h, view));
   }

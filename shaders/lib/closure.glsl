@@ -24,6 +24,27 @@ float dielectric_f0(float ior)
   return root * root;
 }
 
+// Of microfacets. All are evaluated with multiple scattering, which the weight of all but the first takes out again.
+#define DISTRIBUTION_GGX 0
+#define DISTRIBUTION_MULTI_GGX 1
+#define DISTRIBUTION_BECKMANN 2
+#define DISTRIBUTION_ASHIKHMIN_SHIRLEY 3
+
+// Half widths of the lobe (alpha) along tangent and bitangent. Anisotropy is 1 - sqrt of their ratio, as that of the
+// Glossy node is.
+vec2 lobe_alpha(float roughness, float anisotropy)
+{
+  float alpha = roughness * roughness;
+  float narrow = 1.0 - clamp(anisotropy, 0.0, 0.99);
+  return clamp(vec2(alpha / narrow, alpha * narrow), vec2(0.0), vec2(1.0));
+}
+
+// Roughness of the round lobe that is as wide: energy and albedo are those of this one.
+float lobe_roughness(vec2 alpha)
+{
+  return sqrt(sqrt(alpha.x * alpha.y));
+}
+
 struct Closures {
   vec3 base_normal;       // of the surface as it is displaced, before a shader's own normal bumps it
   vec3 diffuse;           // albedo weight
@@ -38,9 +59,10 @@ struct Closures {
   vec3 glossy_edge;       // F82 only
   float glossy_ior;
   float glossy_roughness; // alpha = roughness^2
-  float glossy_anisotropy;
+  float glossy_anisotropy; // see lobe_alpha
   vec3 glossy_tangent;
   vec3 glossy_normal;
+  int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
   float glossy_sum;       // reservoir state
   float random;           // uniform 0..1, reused by rescaling
 };
@@ -64,6 +86,7 @@ Closures closures_begin(vec3 normal, float random_number)
   c.glossy_anisotropy = 0.0;
   c.glossy_tangent = vec3(0.0);
   c.glossy_normal = normal;
+  c.distribution = DISTRIBUTION_MULTI_GGX;
   c.glossy_sum = 0.0;
   c.random = random_number;
   return c;
@@ -101,10 +124,12 @@ bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
   return false;
 }
 
-void closure_glossy(inout Closures c, vec3 weight, float importance, int kind, vec3 tint, vec3 edge, float ior,
+// True if this lobe is the one that is kept so far.
+bool closure_glossy(inout Closures c, vec3 weight, float importance, int kind, vec3 tint, vec3 edge, float ior,
                     float roughness, float anisotropy, vec3 tangent, vec3 normal)
 {
-  if (closure_glossy_choose(c, weight, importance)) {
+  bool chosen = closure_glossy_choose(c, weight, importance);
+  if (chosen) {
     c.kind = kind;
     // Kept with probability w / glossy_sum: the division by it is completed in closures_end, when the sum is final.
     float w = max(max(weight.x, weight.y), weight.z) * max(importance, 1e-4);
@@ -116,7 +141,9 @@ void closure_glossy(inout Closures c, vec3 weight, float importance, int kind, v
     c.glossy_anisotropy = anisotropy;
     c.glossy_tangent = tangent;
     c.glossy_normal = normal;
+    c.distribution = DISTRIBUTION_MULTI_GGX;
   }
+  return chosen;
 }
 
 void closure_emission(inout Closures c, vec3 radiance)

@@ -4,7 +4,8 @@
 //   normal    octahedral shading normal of the diffuse closure (xy) and of the triangle (zw)
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
 //   tint      weight of the lobe; w: square root of its reflectance at normal incidence, 8 bits each
-//   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each); w: ior
+//   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each); w: ior, below 0
+//             for distributions other than GGX with multiple scattering
 //   emission  radiance; w: glossy roughness
 //
 // Colours stand alone in rgb so that transparent layers in front can tint them by blending (techniques/surfaces.py);
@@ -31,8 +32,9 @@ struct Surface {
   float glossy_ior;
   float glossy_roughness;
   float glossy_anisotropy;
-  float tangent_angle;    // of the tangent in the frame of orthonormal_basis(glossy_normal), 0..1 turns
+  float tangent_angle;    // of the tangent in the frame of orthonormal_basis(glossy_normal), 0..1 half turns
   vec3 glossy_normal;
+  int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
 };
 
 #define SURFACE_READ(pixel) \
@@ -88,6 +90,15 @@ vec4 tint_encode(int kind, vec3 weight, vec3 tint, float ior)
   return vec4(weight, pack_three(root, 255.0));
 }
 
+// The lobe's index of refraction and distribution in one float: those whose reflectance depends on the index are GGX.
+#define OTHER_DISTRIBUTION 4e5  // above any index
+
+float ior_encode(float ior, int distribution)
+{
+  float other = -OTHER_DISTRIBUTION * (float(distribution) + 0.5);
+  return (distribution == DISTRIBUTION_MULTI_GGX) ? ior : ((distribution == DISTRIBUTION_GGX) ? -ior : other);
+}
+
 // Whether a lobe without microfacets belongs to the glossy passes.
 bool soft_lobe_is_glossy(Surface s)
 {
@@ -113,18 +124,12 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   float kind = floor(lobe.z / 2097152.0);
   s.kind = int(kind);
   s.glossy_edge = unpack_three(lobe.z - kind * 2097152.0, 127.0);
-  s.glossy_ior = lobe.w;
+  s.glossy_ior = abs(lobe.w);
+  s.distribution = (lobe.w < 0.0) ? int(s.glossy_ior / OTHER_DISTRIBUTION) : DISTRIBUTION_MULTI_GGX;
+  s.glossy_ior = (s.distribution > DISTRIBUTION_MULTI_GGX) ? 1.5 : s.glossy_ior;
   vec3 root = unpack_three(tint.w, 255.0);
   s.glossy_tint = root * root * stored_tint_scale(s.kind, s.glossy_ior);
   s.emission = emission.xyz;
   s.glossy_roughness = emission.w;
   return s;
-}
-
-// Half widths of the GGX lobe (alpha) along tangent and bitangent, after Cycles' two rules.
-vec2 lobe_alpha(float roughness, float anisotropy)
-{
-  float alpha = roughness * roughness;
-  float stretch = sqrt(1.0 - 0.9 * clamp(anisotropy, 0.0, 1.0));
-  return clamp(vec2(alpha / stretch, alpha * stretch), vec2(0.0), vec2(1.0));
 }

@@ -7,8 +7,6 @@
 
 #define MOST_IOR 1e5  // of an index of refraction: it mirrors all but a hundred-thousandth, and more would leave float32
 
-#define DISTRIBUTION_SINGLE 0  // GGX as it is, which loses energy when rough
-#define DISTRIBUTION_MULTIPLE 1
 
 // A layer with less weight than this is not worth a lobe.
 #define SMALLEST_WEIGHT 1e-5
@@ -68,15 +66,18 @@ vec3 add_glossy(inout Closures closures, SurfacePoint point, vec3 weight, int di
                 vec3 edge, float ior, float roughness, float anisotropy, vec3 tangent, vec3 normal)
 {
   float mu = view_cosine(point, normal);
-  vec3 albedo = glossy_albedo(fresnel, tint, edge, ior, roughness, mu);
+  float wide = lobe_roughness(lobe_alpha(roughness, anisotropy));  // less than `roughness` where alpha is cut off at 1
+  vec3 albedo = glossy_albedo(fresnel, tint, edge, ior, wide, mu);
   vec3 lobe_weight = weight;
-  if (distribution == DISTRIBUTION_SINGLE) {
+  if (distribution != DISTRIBUTION_MULTI_GGX) {
     // The lobe is evaluated with multiple scattering, which the node excludes: taken out again by its weight.
-    albedo /= max(multiscatter_darkening(fresnel, tint, edge, ior, roughness, mu), vec3(1e-4));
-    lobe_weight /= multiscatter_scale(fresnel, tint, edge, ior, roughness, mu);
+    albedo /= max(multiscatter_darkening(fresnel, tint, edge, ior, wide, mu), vec3(1e-4));
+    lobe_weight /= multiscatter_scale(fresnel, tint, edge, ior, wide, mu);
   }
-  closure_glossy(closures, lobe_weight, color_luminance(albedo), fresnel, tint, edge, ior, roughness, anisotropy,
-                 tangent, normal);
+  if (closure_glossy(closures, lobe_weight, color_luminance(albedo), fresnel, tint, edge, ior, roughness, anisotropy,
+                     tangent, normal)) {
+    closures.distribution = distribution;
+  }
   return weight * albedo;
 }
 
@@ -133,17 +134,22 @@ void shader_toon(inout Closures closures, SurfacePoint point, vec3 weight, vec3 
 }
 
 // Glossy node: reflectance is the colour at all angles. Its anisotropy stretches the other way round than that of
-// Principled, ax = a (1 - A), ay = a / (1 - A), while closures use ax = a / sqrt(1 - 0.9 A'), ay = a sqrt(1 - 0.9 A').
+// Principled: ax = a (1 - A), ay = a / (1 - A).
 void shader_glossy(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness,
                    float anisotropy, float rotation, vec3 normal, vec3 tangent, int distribution)
 {
   vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
   float amount = clamp(anisotropy, -0.99, 0.99);
-  float narrow = 1.0 - abs(amount);
   float quarter = (amount > 0.0) ? 0.25 : 0.0;
   vec3 t = rotated_tangent(tangent, n, rotation + quarter);
   add_glossy(closures, point, weight, distribution, FRESNEL_NONE, max(color, vec3(0.0)), vec3(1.0), 1.5,
-             clamp(roughness, 0.0, 1.0), (1.0 - narrow * narrow) / 0.9, t, n);
+             clamp(roughness, 0.0, 1.0), abs(amount), t, n);
+}
+
+// Of Principled and metals: ax = a / sqrt(1 - 0.9 A), ay = a sqrt(1 - 0.9 A).
+float lobe_anisotropy(float anisotropy)
+{
+  return 1.0 - sqrt(1.0 - 0.9 * clamp(anisotropy, 0.0, 1.0));
 }
 
 void shader_metallic(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 edge, float roughness,
@@ -152,7 +158,7 @@ void shader_metallic(inout Closures closures, SurfacePoint point, vec3 weight, v
   vec3 n = reflecting_normal(point, unit_or(normal, point.normal));
   vec3 t = rotated_tangent(tangent, n, rotation);
   add_glossy(closures, point, weight, distribution, FRESNEL_F82, clamp(color, vec3(0.0), vec3(1.0)),
-             clamp(edge, vec3(0.0), vec3(1.0)), 1.5, clamp(roughness, 0.0, 1.0), clamp(anisotropy, 0.0, 1.0), t, n);
+             clamp(edge, vec3(0.0), vec3(1.0)), 1.5, clamp(roughness, 0.0, 1.0), lobe_anisotropy(anisotropy), t, n);
 }
 
 float conductor_reflectance(float cos_i, float n, float k)
@@ -210,7 +216,7 @@ void add_glass(inout Closures closures, SurfacePoint point, vec3 weight, vec3 re
   vec3 mirrored = glass_mirrored(f0, mu, r, ior);
   vec3 through = glass_passing(f0, mu, r, ior);
   vec3 scale = weight;
-  if (distribution == DISTRIBUTION_MULTIPLE) {
+  if (distribution == DISTRIBUTION_MULTI_GGX) {
     scale *= glass_multiscatter(transmitted, mu, r, ior);
   }
   if (largest(reflected) > 0.0) {
@@ -296,7 +302,7 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 {
   vec3 n = reflecting_normal(point, coat_normal);
   float ior = clamp(coat_ior, 1.0, MOST_IOR);
-  vec3 albedo = add_glossy(closures, point, weight * coat_weight, DISTRIBUTION_MULTIPLE, FRESNEL_DIELECTRIC,
+  vec3 albedo = add_glossy(closures, point, weight * coat_weight, DISTRIBUTION_MULTI_GGX, FRESNEL_DIELECTRIC,
                            vec3(dielectric_f0(ior)), vec3(1.0), ior, clamp(coat_roughness, 0.0, 1.0), 0.0,
                            default_tangent(n), n);
   vec3 below = below_layer(weight, albedo);
@@ -336,7 +342,7 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   }
   closure_emission(closures, w * emission_color * emission_strength);
 
-  float stretch = clamp(anisotropy, 0.0, 1.0);
+  float stretch = lobe_anisotropy(anisotropy);
   vec3 t = (stretch > 0.0) ? rotated_tangent(tangent, mirror_normal, rotation) : default_tangent(mirror_normal);
   float metal = clamp(metallic, 0.0, 1.0);
   if (metal > SMALLEST_WEIGHT) {

@@ -41,16 +41,16 @@ void main()
   vec3 tangent;
   vec3 bitangent;
   orthonormal_basis(c.glossy_normal, tangent, bitangent);
-  float turns = 0.0;
+  float half_turns = 0.0;
   if (dot(c.glossy_tangent, c.glossy_tangent) > 0.0) {
-    turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / (2.0 * PI) + 1.0);
+    half_turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / PI + 1.0);
   }
 
   out_position = vec4(world_position, bump_encode(holdout, c.base_normal, c.diffuse_normal));
   out_normal = vec4(octahedral_encode(c.diffuse_normal), octahedral_encode(point.geometric_normal));
-  out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, turns), 255.0));
+  out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, half_turns), 255.0));
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
   out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
-                  c.glossy_ior);
+                  ior_encode(c.glossy_ior, c.distribution));
   out_emission = vec4(c.emission * covered, c.glossy_roughness);
 }

@@ -56,6 +56,27 @@ def test_principled_in_a_white_furnace_has_cycles_albedo(stage, degrees):
     assert ours.max() < 1.0
 
 
+DISTRIBUTIONS = {
+    "metal of one scattering": ("ShaderNodeBsdfMetallic", {"Base_Color": COLOR, "Roughness": 0.8}, "GGX"),
+    "stretched gloss": ("ShaderNodeBsdfAnisotropic", {"Roughness": 0.7, "Anisotropy": 0.6}, "GGX"),
+    "Beckmann": ("ShaderNodeBsdfAnisotropic", {"Roughness": 0.5}, "BECKMANN"),
+    "stretched Beckmann": ("ShaderNodeBsdfAnisotropic", {"Roughness": 0.6, "Anisotropy": 0.6}, "BECKMANN"),
+    "Beckmann metal": ("ShaderNodeBsdfMetallic", {"Base_Color": COLOR, "Roughness": 0.6}, "BECKMANN"),
+    "Ashikhmin-Shirley": ("ShaderNodeBsdfAnisotropic", {"Roughness": 0.5}, "ASHIKHMIN_SHIRLEY"),
+    "stretched Ashikhmin-Shirley": (
+        "ShaderNodeBsdfAnisotropic", {"Roughness": 0.6, "Anisotropy": 0.6, "Rotation": 0.1}, "ASHIKHMIN_SHIRLEY",
+    ),
+}  # fmt: skip
+
+
+def distributions(stage):
+    """Name -> material of microfacets of a distribution that is not GGX with multiple scattering."""
+    return {
+        name: with_setting(stage.material(node, **inputs), distribution=distribution)
+        for name, (node, inputs, distribution) in DISTRIBUTIONS.items()
+    }
+
+
 def single_closures(stage):
     """Name -> material with one closure, or with a layer that no other test looks at."""
     made = stage.material
@@ -74,6 +95,7 @@ def single_closures(stage):
         ),
         "refraction": made("ShaderNodeBsdfRefraction", Color=COLOR, Roughness=0.4),
         "coloured transparency": made("ShaderNodeBsdfTransparent", Color=COLOR),
+        **distributions(stage),
         "conductor": with_setting(made("ShaderNodeBsdfMetallic", Roughness=0.3), fresnel_type="PHYSICAL_CONDUCTOR"),
         "edge tint": made("ShaderNodeBsdfMetallic", Base_Color=COLOR, Edge_Tint=(0.5, 0.6, 0.7, 1.0), Roughness=0.4),
         "tinted sheen": stage.principled(Base_Color=COLOR, **sheen),
@@ -93,6 +115,8 @@ def single_closures(stage):
 def test_closures_in_a_white_furnace_have_cycles_albedo(stage, degrees):
     wanted = single_closures(stage)
     del wanted["glossy toon"]  # its narrow cone at the horizon takes thousands of directions; see the suns below
+    # Under a world Cycles has up to a quarter more of it than the integral of the lobe that both have under suns.
+    del wanted["stretched Ashikhmin-Shirley"]
     size = strips(stage, list(wanted.values()), degrees)
     ours, cycles = stage.render(256, size), stage.render(512, size, engine="CYCLES")
     found, expected = means(ours, "combined"), means(cycles, "combined")
@@ -108,8 +132,10 @@ def test_closures_in_a_white_furnace_have_cycles_albedo(stage, degrees):
                 assert a == pytest.approx(b, abs=tolerance), (name, color)
 
 
-@pytest.mark.parametrize("kind", ["sheen", "velvet", "translucent", "toon", "glossy toon", "tinted sheen"])
-def test_soft_lobes_reflect_a_sun_as_in_cycles(stage, kind):
+@pytest.mark.parametrize(
+    "kind", ["sheen", "velvet", "translucent", "toon", "glossy toon", "tinted sheen", *DISTRIBUTIONS]
+)
+def test_lobes_reflect_a_sun_as_in_cycles(stage, kind):
     """The value of f cos itself, for one direction to the viewer and several to the sun."""
     stage.rectangle((-99, -99), (99, 99), material=single_closures(stage)[kind])
     camera = stage.camera_above(4.0)

@@ -20,10 +20,8 @@ from .entry import Approximation, Choice, Entry, Expression, Socket
 WHITE = (1.0, 1.0, 1.0)
 GREY = (0.8, 0.8, 0.8)
 
-DISTRIBUTION = Choice("distribution", {"GGX": 0, "MULTI_GGX": 1, "BECKMANN": 0, "ASHIKHMIN_SHIRLEY": 0}, missing=1)
-OTHER_DISTRIBUTIONS = (
-    ("distribution", ("BECKMANN", "ASHIKHMIN_SHIRLEY"), "This distribution of microfacets is drawn as GGX."),
-)
+DISTRIBUTION = Choice("distribution", {"GGX": 0, "MULTI_GGX": 1, "BECKMANN": 2, "ASHIKHMIN_SHIRLEY": 3}, missing=1)
+BECKMANN_GLASS = (("distribution", ("BECKMANN",), "Glass of Beckmann's distribution of microfacets is drawn as GGX."),)
 NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
 TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
@@ -183,7 +181,6 @@ ENTRIES = (
         "shader_glossy",
         (Socket("Color", "COLOR", GREY), *GLOSSY_SHAPE),
         include="material/shader.glsl",
-        setting_approximations=OTHER_DISTRIBUTIONS,
         summary=_glossy,
     ),
     Entry(
@@ -193,7 +190,6 @@ ENTRIES = (
         include="material/shader.glsl",
         when={"fresnel_type": "F82"},
         approximations=(THIN_FILM,),
-        setting_approximations=OTHER_DISTRIBUTIONS,
         summary=_glossy,
     ),
     Entry(
@@ -203,7 +199,6 @@ ENTRIES = (
         + GLOSSY_SHAPE,
         include="material/shader.glsl",
         approximations=(THIN_FILM,),
-        setting_approximations=OTHER_DISTRIBUTIONS,
         note="The reflectance of the physical conductor is fitted by an F82 curve.",
         summary=_glossy,
     ),
@@ -275,7 +270,7 @@ ENTRIES = (
         ),
         include="material/shader.glsl",
         approximations=(THIN_FILM,),
-        setting_approximations=OTHER_DISTRIBUTIONS,
+        setting_approximations=BECKMANN_GLASS,
         summary=_glass,
     ),
     Entry(
@@ -283,7 +278,7 @@ ENTRIES = (
         "shader_refraction",
         (Socket("Color", "COLOR", WHITE), Socket("Roughness", "FLOAT"), Socket("IOR", "FLOAT", 1.45), NORMAL),
         include="material/shader.glsl",
-        setting_approximations=OTHER_DISTRIBUTIONS,
+        setting_approximations=BECKMANN_GLASS,
         summary=_refraction,
     ),
     Entry(
