@@ -170,7 +170,7 @@ class Denoise(Technique):
         """Those that a technique of the plan adds light to; Film only clears them."""
         writers = [technique for technique in frame.plan.techniques if technique.name not in ("film", self.name)]
         written = {write.name for technique in writers for write in technique.writes}
-        if not any(map(may_be_glossy, frame.snapshot.materials[1:])):
+        if not may_be_glossy(frame.snapshot):
             written.discard("radiance.glossy_indirect")
         return [path for path in FILTERS if f"radiance.{path}" in written]
 

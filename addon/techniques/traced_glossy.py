@@ -83,7 +83,7 @@ class TracedGlossy(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
             return "the scene has no surface"
-        if not any(may_be_glossy(material) for material in snapshot.materials[1:]):
+        if not may_be_glossy(snapshot):
             return "no material has a glossy closure"
         lit = np.any(snapshot.world.color) and snapshot.world.visibility.glossy
         emits = any(may_emit(material.graph) for material in snapshot.materials)
@@ -134,7 +134,13 @@ class TracedGlossy(Technique):
         self._sources.release()
 
 
-def may_be_glossy(material) -> bool:
+def may_be_glossy(snapshot: Snapshot) -> bool:
+    """Whether a material that is shown may have a glossy lobe; that of empty slots has one since Blender 5.0."""
+    shown = {index for instance in snapshot.instances for index in instance.materials or (0,)}
+    return any(_material_may_be_glossy(snapshot.materials[index]) for index in shown)
+
+
+def _material_may_be_glossy(material) -> bool:
     return any("Bsdf" in node.type and node.type not in _NEVER_GLOSSY for node in material.graph.nodes.values())
 
 

@@ -95,7 +95,8 @@ void main()
         from_diffuse += arriving *
                         surface_diffuse_reflection(s, to_viewer, direction);
       }
-      if (on_glossy) {
+      // As in Cycles, facets reflect nothing from below the surface itself, wherever the shading normal points.
+      if (on_glossy && dot(direction, s.geometric_normal) > 0.0) {
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
         if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
