@@ -43,13 +43,13 @@ vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, ve
 // Share of the light along `light` that reaches a bumped surface over its own bumps: without, light that grazes the surface
 // ends abruptly where the normal turns it away from the shading. Smith's shadowing of GGX, as rough as the normal deviates
 // (Estevez, Lecocq & Stein, "A microfacet-based shadowing function to solve the bump terminator problem", 2019). As in
-// Cycles it dims what is diffuse; the surface's plane stands for its normal before the bump.
+// Cycles it dims what is diffuse.
 float bump_shadowing(Surface s, vec3 light)
 {
   if (s.bump <= 0.0) {
     return 1.0;
   }
-  float cosine = clamp(dot(s.geometric_normal, light), 1e-6, 1.0);  // none arrives from below
+  float cosine = clamp(dot(s.base_normal, light), 1e-6, 1.0);  // none arrives from below
   return 2.0 / (1.0 + sqrt(1.0 + s.bump * s.bump * (1.0 / (cosine * cosine) - 1.0)));
 }
 

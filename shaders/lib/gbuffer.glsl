@@ -25,6 +25,7 @@ struct Surface {
   vec3 emission;
   float holdout;
   float bump;             // how far a normal map or bump turns the diffuse closure's normal, see bump_encode
+  vec3 base_normal;       // that it turns it from: of the triangle, or of the surface as it is displaced
   int kind;               // of the lobe: FRESNEL_* or LOBE_*
   vec3 glossy_weight;     // 0: no lobe
   vec3 glossy_tint;
@@ -45,14 +46,24 @@ struct Surface {
 #define BUMP_STEPS 255.0
 
 // What w of the position holds for a surface: 1 + holdout, and the roughness of a surface of microfacets whose normals
-// deviate as the bumped normal does (bump_shadowing).
-float bump_encode(float holdout, vec3 normal, vec3 bumped)
+// deviate as the bumped normal does (bump_shadowing). Where displacement has turned the normal before, fewer bits of that
+// and, on a grid of BASE_STEPS x BASE_STEPS, the octahedral normal.
+#define BASE_STEPS 32.0
+#define BASE_BUMP_STEPS 31.0
+
+float bump_encode(float holdout, vec3 normal, vec3 bumped, bool displaced)
 {
   vec3 off = bumped - normal;
   float cosine = clamp(abs(dot(normal, bumped)), 1e-3, 1.0);
   float squared = clamp(0.125 * (1.0 / (cosine * cosine) - 1.0), 0.0, 1.0);
   float bump = (dot(off, off) > 1e-10) ? sqrt(squared) : 0.0;
-  return 1.0 + holdout + 2.0 * floor(bump * BUMP_STEPS + 0.5);
+  float stored = floor(bump * BUMP_STEPS + 0.5);
+  if (displaced && bump > 0.0) {
+    vec2 cell = min(floor((octahedral_encode(normal) * 0.5 + 0.5) * BASE_STEPS), vec2(BASE_STEPS - 1.0));
+    float few = max(floor(bump * BASE_BUMP_STEPS + 0.5), 1.0);
+    stored = BUMP_STEPS + 1.0 + few + (BASE_BUMP_STEPS + 1.0) * (cell.x + BASE_STEPS * cell.y);
+  }
+  return 1.0 + holdout + 2.0 * stored;
 }
 
 // Three numbers in 0..1 in one float, `steps` + 1 levels each; and back.
@@ -110,10 +121,18 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   Surface s;
   s.hit = position.w != 0.0;
   s.position = position.xyz;
-  s.bump = floor((position.w - 1.0) * 0.5) / BUMP_STEPS;
-  s.holdout = position.w - 1.0 - 2.0 * BUMP_STEPS * s.bump;
+  float stored = floor((position.w - 1.0) * 0.5);
+  s.holdout = position.w - 1.0 - 2.0 * stored;
   s.normal = octahedral_decode(normal.xy);
   s.geometric_normal = octahedral_decode(normal.zw);
+  s.bump = stored / BUMP_STEPS;
+  s.base_normal = s.geometric_normal;
+  if (stored > BUMP_STEPS) {
+    float code = floor((stored - BUMP_STEPS - 1.0) / (BASE_BUMP_STEPS + 1.0));
+    s.bump = (stored - BUMP_STEPS - 1.0 - (BASE_BUMP_STEPS + 1.0) * code) / BASE_BUMP_STEPS;
+    float row = floor(code / BASE_STEPS);
+    s.base_normal = octahedral_decode((vec2(code - BASE_STEPS * row, row) + 0.5) * (2.0 / BASE_STEPS) - 1.0);
+  }
   s.diffuse = diffuse.xyz;
   vec3 shape = unpack_three(diffuse.w, 255.0);
   s.diffuse_roughness = shape.x;

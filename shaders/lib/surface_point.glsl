@@ -7,6 +7,7 @@
 struct SurfacePoint {
   vec3 position;          // world space, metres, relative to the render origin
   vec3 normal;            // shading normal, unit, on the viewer's side
+  vec3 mesh_normal;       // the shading normal before displacement turns it
   vec3 geometric_normal;  // unit, on the viewer's side
   vec3 incoming;          // unit, towards the viewer
   bool backfacing;

@@ -47,11 +47,11 @@ vec3 normal_map_vector(vec3 color, bool directx)
 }
 
 // Tangent-space normal map. `tangent` is in object space with the bitangent's sign in w; the map is defined on the
-// front of the surface, so the point's normal is turned there and the result turned back.
+// front of the surface, so the mesh's normal is turned there and the result turned back. Displacement does not turn it.
 void normal_map_tangent(SurfacePoint point, vec4 tangent, float strength, vec3 color, bool directx, out vec3 normal)
 {
   float side = point.backfacing ? -1.0 : 1.0;
-  vec3 n = side * object_from_world_normal(point, point.normal);
+  vec3 n = side * object_from_world_normal(point, point.mesh_normal);
   vec3 bitangent = tangent.w * cross(n, tangent.xyz);
   vec3 mapped = normal_map_vector(color, directx);
   mapped.xy *= strength;

@@ -39,6 +39,7 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
     shading_normal = -shading_normal;
   }
   point.normal = shading_normal;
+  point.mesh_normal = shading_normal;
   point.ray = RAY_CAMERA;
   point.refracts = false;
   point.object_row0 = instance.row0;

@@ -46,7 +46,8 @@ void main()
     half_turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / PI + 1.0);
   }
 
-  out_position = vec4(world_position, bump_encode(holdout, c.base_normal, c.diffuse_normal));
+  bool displaced = dot(c.base_normal, point.mesh_normal) < 0.9999;
+  out_position = vec4(world_position, bump_encode(holdout, c.base_normal, c.diffuse_normal, displaced));
   out_normal = vec4(octahedral_encode(c.diffuse_normal), octahedral_encode(point.geometric_normal));
   out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, half_turns), 255.0));
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);

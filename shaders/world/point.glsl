@@ -6,6 +6,7 @@ SurfacePoint world_point(vec3 direction, int ray)
   SurfacePoint point;
   point.position = direction;
   point.normal = -direction;
+  point.mesh_normal = -direction;
   point.geometric_normal = -direction;
   point.incoming = -direction;
   point.backfacing = false;

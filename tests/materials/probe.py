@@ -38,6 +38,7 @@ void main()
   SurfacePoint point;
   point.position = vec3(0.0);
   point.normal = texelFetch(points, ivec2(0, row), 0).xyz;
+  point.mesh_normal = point.normal;
   point.geometric_normal = texelFetch(points, ivec2(1, row), 0).xyz;
   point.incoming = texelFetch(points, ivec2(2, row), 0).xyz;
   point.backfacing = texelFetch(points, ivec2(3, row), 0).x > 0.5;
