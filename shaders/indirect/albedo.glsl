@@ -5,6 +5,7 @@
 struct Reflection {
   vec3 diffuse;  // albedo, with what passes to the other side
   float through; // share of it that passes
+  float rough;   // of the diffuse part
   vec3 straight;
   vec3 grazing;
   float alpha;
@@ -22,9 +23,17 @@ float soft_lobe_albedo(Surface s)
   return (s.kind == LOBE_VELVET) ? squared / (1.0 + 1.17 * squared) : 1.0;
 }
 
+// What a rough diffuse surface reflects of even light to all sides: less than its colour says, of dark ones a sixth.
+vec3 rough_albedo(vec3 color, float roughness)
+{
+  float average = oren_nayar_average(roughness);
+  vec3 rho = clamp(color, vec3(0.0), vec3(1.0));
+  return color * average / (vec3(1.0) - rho * (1.0 - average));
+}
+
 vec3 surface_albedo(Surface s, float mu)
 {
-  vec3 albedo = s.diffuse;
+  vec3 albedo = rough_albedo(s.diffuse, s.diffuse_roughness);
   if (s.kind > LOBE_REFRACTION) {
     albedo += s.glossy_weight * soft_lobe_albedo(s);
   }
@@ -50,6 +59,7 @@ Reflection surface_reflection(Surface s, float mu)
 {
   Reflection r;
   r.diffuse = s.diffuse;
+  r.rough = s.diffuse_roughness;
   r.through = 0.0;
   r.straight = vec3(0.0);
   r.grazing = vec3(0.0);
@@ -81,6 +91,10 @@ vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
   vec3 sum = r.diffuse / PI;
   float nl = dot(normal, light);
   float nv = dot(normal, viewer);
+  // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
+  for (float rough = min(r.rough, min(nl, nv) * 1e5); rough > 1e-4; rough = 0.0) {
+    sum = diffuse_reflection(r.diffuse, r.rough, normal, viewer, light) / nl;
+  }
   if (max_component(r.grazing) > 0.0 && nl > 0.0 && nv > 0.0) {
     vec3 middle = safe_normalize(light + viewer);
     float squared = r.alpha * r.alpha;

@@ -60,7 +60,9 @@ Reflection mean_reflection(ivec2 hit)
   mean.diffuse = diffuse.rgb;
   mean.through = diffuse.a / max(luminance(diffuse.rgb), 1e-30);
   mean.straight = straight.rgb;
-  mean.grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
+  vec4 grazing = reflectance_fetch(place + ivec2(0, 3 * rows));
+  mean.grazing = grazing.rgb;
+  mean.rough = grazing.a;
   mean.alpha = straight.a;
   return mean;
 }

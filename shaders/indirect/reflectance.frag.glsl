@@ -1,6 +1,6 @@
 // Means of what a material reflects: over a cell of pixels, each of which shows some point of it. Bands of rows hold, one
 // above the other, all of it, its diffuse part, with the luminance that passes to the other side, and of its lobe the reflectance at normal incidence, with alpha, and at
-// grazing incidence.
+// grazing incidence, with the roughness of the diffuse part.
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
@@ -20,7 +20,7 @@ void main()
         sum += (band == 0) ? vec4(surface_albedo(s, view_cosine), 0.0)
              : (band == 1) ? vec4(r.diffuse, r.through * luminance(r.diffuse))
              : (band == 2) ? vec4(r.straight, r.alpha)
-                           : vec4(r.grazing, 0.0);
+                           : vec4(r.grazing, r.rough);
         count += 1.0;
       }
     }

@@ -18,6 +18,13 @@ float oren_nayar_albedo_term(float c)
   return s * (theta - 2.0 / 3.0 - s * c) + (2.0 / 3.0) * (s / c) * (1.0 - s * s * s);
 }
 
+// Share of even light that is reflected once.
+float oren_nayar_average(float roughness)
+{
+  float sigma = clamp(roughness, 0.0, 1.0);
+  return (PI + sigma * (2.0 * PI - 5.6) / 3.0) / (PI + sigma * (PI * 0.5 - 2.0 / 3.0));
+}
+
 vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, vec3 light)
 {
   float nl = max(dot(normal, light), 0.0);
@@ -34,7 +41,7 @@ vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, ve
   }
   float view_term = PI * a + b * oren_nayar_albedo_term(nv);
   float light_term = PI * a + b * oren_nayar_albedo_term(nl);
-  float average = PI * a + b * (2.0 * PI - 5.6) / 3.0;
+  float average = oren_nayar_average(sigma);
   vec3 rho = clamp(albedo, vec3(0.0), vec3(1.0));
   vec3 multiple = rho * rho * (average / (PI * max(1.0 - average, 1e-6))) / max(vec3(1.0) - rho * (1.0 - average), vec3(1e-6));
   return albedo * (nl * (a + b * t)) + albedo * multiple * (nl * (1.0 - view_term) * (1.0 - light_term));

@@ -243,6 +243,24 @@ def test_lobes_without_microfacets_get_the_light_of_other_surfaces_as_in_cycles(
     assert found[on_card].mean() == pytest.approx(expected[on_card].mean(), rel=0.05)
 
 
+@pytest.mark.parametrize("sun", [-1.0, 1.0])
+def test_rough_diffuse_surfaces_send_on_what_they_do_in_cycles(stage, sun):
+    """A floor in the sun lights a wall: rough, it sends less there than its colour says, and more back to the sun."""
+    rough = stage.material("ShaderNodeBsdfDiffuse", Color=(0.3, 0.3, 0.3, 1.0), Roughness=1.0)
+    stage.rectangle((-2, -4), (2, 0), material=rough)
+    stage.rectangle((-2, 0), (2, 0.5), material=rough, turn=(np.pi / 2, 0, 0))
+    stage.light("SUN", turn=(sun, 0.0, 0.0), energy=3.0)
+    camera = stage.camera_above(4.0)
+    camera.location, camera.rotation_euler = (0, -8, 2), (1.4, 0, 0)
+
+    def light(samples, **options):
+        return light_paths(stage.render(samples, (24, 24), bounces=2, **options))["diffuse_indirect"].mean()
+
+    expected = light(512, engine="CYCLES")
+    assert expected > 1e-4
+    assert light(64) == pytest.approx(expected, rel=0.06)
+
+
 def test_mean_of_a_material_that_nothing_shows_is_black_whatever_the_image_held_before(stage, gpu_context):
     """Material 0 stands for slots without one, of which there are none here."""
     stage.floor(material=stage.diffuse(0.5))
