@@ -95,7 +95,7 @@ void main()
         from_diffuse += arriving *
                         surface_diffuse_reflection(s, to_viewer, direction);
       }
-      // As in Cycles, facets reflect nothing from below the surface itself, wherever the shading normal points.
+      // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       if (on_glossy && dot(direction, s.geometric_normal) > 0.0) {
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);

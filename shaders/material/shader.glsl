@@ -7,7 +7,6 @@
 
 #define MOST_IOR 1e5  // of an index of refraction: it mirrors all but a hundred-thousandth, and more would leave float32
 
-
 // A layer with less weight than this is not worth a lobe.
 #define SMALLEST_WEIGHT 1e-5
 
