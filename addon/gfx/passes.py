@@ -10,9 +10,8 @@ import numpy as np
 from .context import on_release, overtakes_draws
 from .geometry import Batch
 from .images import Image, Target, finish
-from .library import Program, Shader, get
+from .library import FULLSCREEN_VERTEX, Program, Shader, get
 
-FULLSCREEN_VERTEX = "lib/fullscreen.vert.glsl"
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
 FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
 
