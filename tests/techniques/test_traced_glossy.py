@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.frame.ledger import RAN
 from tests.techniques.conftest import places
 
 SPAN = 4.0
@@ -94,3 +95,15 @@ def test_tracing_changes_the_noise_of_a_lobe_and_not_its_mean(stage, roughness):
         settings.traced_glossy_roughness = traced
         means.append(glossy(stage, samples=256).mean())
     assert means[1] == pytest.approx(means[0], rel=0.02)
+
+
+def test_what_has_no_material_traces_rays_where_it_is_glossy(stage):
+    """As it is since Blender 5.0."""
+    stage.floor()
+    stage.world((0.5, 0.5, 0.5))
+    stage.camera((0, -4, 0.6), (1.4, 0, 0))
+    shines, found = (
+        stage.render(64, engine=engine)["glossy_direct"][:12, :, 0].astype(float) for engine in ("CYCLES", "CANDELA")
+    )
+    assert (stage.ledger.row("traced_glossy").state == RAN) == shines.any()
+    assert found.mean() == pytest.approx(shines.mean(), rel=0.02)
