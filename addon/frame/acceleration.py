@@ -27,11 +27,12 @@ HIERARCHY_TEXTURES = (("RGBA32F", "trace_nodes"), ("RGBA32F", "trace_leaves"))
 # The node's grid; lower and upper corners of the four children on it; number of the first child that is a node, of the
 # first one that is a leaf, and how many are nodes: those come first.
 NODE_TEXELS = 4
-# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity, negative for what bends light;
-# emission r, g, b; material; shading normals of the three corners.
+# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity (see _opacity_code); emission r, g,
+# b; material; shading normals of the three corners.
 LEAF_TEXELS = 17
-# Added to the opacity, read by shaders/trace/hierarchy.glsl.
-OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = 2.0, 4.0, 6.0
+# Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
+ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
+SIDE_STEPS = 2047  # of the opacity of a side: those of two, and the above, are exact in one float
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
 
@@ -58,20 +59,21 @@ def world_triangles(
     path: str = "glossy",
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
-    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (what lets one of the two kinds of rays pass says so:
-    OPEN_TO_SHADOW, SHADOW_ALONE; WHOLE_SHADOW lets no ray to a light pass), mean emitted radiance, number of the
+    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_opacity_code), mean emitted radiance, number of the
     material and packed corner normals."""
     corners, looks = [], []
     look = {
-        added: np.array([
-            (_opacity(m, added), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k) for k, m in enumerate(materials)
+        (rays, mirrored): np.array([
+            (_opacity_code(m, rays, mirrored), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
+            for k, m in enumerate(materials)
         ])
-        for added in (0.0, OPEN_TO_SHADOW, SHADOW_ALONE)
+        for rays in (ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE)
+        for mirrored in (False, True)
     }  # fmt: skip
     shown = [one for one in instances if _met(one, path) and meshes[one.mesh].triangle_count]
-    for (key, slots, added), group in groupby(shown, lambda one: (one.mesh, one.materials, _added(one, path))):
+    for (key, slots, rays, mirrored), group in groupby(shown, lambda one: _alike(one, path)):
         mesh, slots = meshes[key], np.asarray(slots)
-        look_of_triangle = look[added][slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        look_of_triangle = look[rays, mirrored][slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
         copies, at_once = list(group), max(AT_ONCE // mesh.triangle_count, 1)
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
@@ -91,22 +93,35 @@ def _met(instance: Instance, path: str) -> bool:
     return getattr(instance.visibility, path) or instance.visibility.shadow
 
 
-def _added(instance: Instance, path: str) -> float:
-    """What is added to the opacity of an instance that only one kind of rays meets."""
+def _alike(instance: Instance, path: str) -> tuple:
+    """What instances have in common whose triangles look the same."""
+    return instance.mesh, instance.materials, _rays(instance, path), bool(np.linalg.det(instance.matrix[:3, :3]) < 0)
+
+
+def _rays(instance: Instance, path: str) -> int:
+    """Which rays meet an instance."""
     if not getattr(instance.visibility, path):
         return SHADOW_ALONE
-    return 0.0 if instance.visibility.shadow else OPEN_TO_SHADOW
+    return ALL_RAYS if instance.visibility.shadow else OPEN_TO_SHADOW
 
 
-def _opacity(material: CompiledMaterial, added: float = 0.0) -> float:
-    """Mean coverage for rays that pass at random, below 1 where some may, and what is `added` to it (_added); negative
-    where rays may also be bent."""
-    opacity = min(material.opacity, 0.999) if material.transparent else 1.0
-    if material.glass:
-        return -(max(opacity, 1e-3) + added)
-    if material.transparent and not material.casts_by_lot:
-        return {0.0: opacity + WHOLE_SHADOW, OPEN_TO_SHADOW: opacity + added, SHADOW_ALONE: 1.0 + added}[added]
-    return opacity + added
+def _opacity_code(material: CompiledMaterial, rays: int = ALL_RAYS, mirrored: bool = False) -> float:
+    """What decides whether rays pass a triangle, as shaders/trace/hierarchy.glsl reads it: the mean coverage of its two
+    sides by which they pass at random, below 1 where some may, and which `rays` that is about; negative where rays may
+    also be bent. `mirrored`: the triangle's corners run the other way round."""
+    sides = np.array([material.opacity_behind, material.opacity][:: 1 if mirrored else -1])
+    steps = np.clip(np.rint(sides * SIDE_STEPS), 0, SIDE_STEPS - 1) if material.transparent else [SIDE_STEPS] * 2
+    if material.transparent and not material.casts_by_lot and not material.glass:
+        rays = WHOLE_SHADOW if rays == ALL_RAYS else rays
+        steps = [SIDE_STEPS] * 2 if rays == SHADOW_ALONE else steps
+    code = float((rays * (SIDE_STEPS + 1) + steps[0]) * (SIDE_STEPS + 1) + steps[1])
+    return -max(code, 1.0) if material.glass else code
+
+
+def coverage(codes: np.ndarray) -> np.ndarray:
+    """(N,) mean of the two sides' opacity, of what world_triangles says of (N,) triangles."""
+    sides = np.abs(codes) % (SIDE_STEPS + 1) ** 2
+    return (sides // (SIDE_STEPS + 1) + sides % (SIDE_STEPS + 1)) / (2 * SIDE_STEPS)
 
 
 def _cofactors(matrices: np.ndarray) -> np.ndarray:
@@ -226,12 +241,12 @@ class HierarchyCache:
         if too_many(snapshot):
             return None
         kinds = {id(i.visibility): i for i in snapshot.instances}
-        alike = all(_met(i, path) and not _added(i, path) for i in kinds.values())
+        alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in kinds.values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))
         key = shown, (
-            None if alike else tuple(_added(i, path) for i in shown),
+            None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            tuple((_opacity(m), m.emissive and m.emission) for m in materials), tuple(origin),
+            tuple((_opacity_code(m), m.emissive and m.emission) for m in materials), tuple(origin),
         )  # fmt: skip
         tree = self._kept.get(key)
         if tree is None and draft:

@@ -127,6 +127,10 @@ class MaterialSet:
         """Draws material `index`, which has alpha, into a depth map."""
         return _caster_program(self.compiled[index])
 
+    def opacity_program(self, index: int) -> Program:
+        """Adds up how much material `index` covers, by the side that is seen."""
+        return _opacity_program(self.compiled[index])
+
     def emission_program(self, index: int) -> Program:
         """Adds up what material `index` emits."""
         return _emission_program(self.compiled[index])
@@ -262,11 +266,19 @@ EVERY_DEFINES = tuple((name, "-1" if name == "VISIBILITY_FLAG" else value) for n
 
 
 def _emission_program(compiled: CompiledMaterial) -> Program:
+    return _sum_program(compiled, "emission")
+
+
+def _opacity_program(compiled: CompiledMaterial) -> Program:
+    return _sum_program(compiled, "opacity")
+
+
+def _sum_program(compiled: CompiledMaterial, what: str) -> Program:
     return replace(
         _caster_program(compiled),
-        name=f"emission {compiled.program_key[:8]}",
-        fragment="surface/emission.frag.glsl",
-        outputs=(("VEC4", "out_emission"),),
+        name=f"{what} {compiled.program_key[:8]}",
+        fragment=f"surface/{what}.frag.glsl",
+        outputs=(("VEC4", f"out_{what}"),),
         defines=EVERY_DEFINES,
     )
 

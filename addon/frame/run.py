@@ -319,8 +319,9 @@ class Renderer:
         wanted += [
             self.materials.caster_program(material)
             for material in shown
-            if self.materials.compiled[material].casts_by_lot or self.materials.compiled[material].uneven
+            if self.materials.compiled[material].casts_by_lot
         ]
+        wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]

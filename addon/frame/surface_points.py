@@ -62,7 +62,8 @@ class SurfacePoints:
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.diffuse)
                   for i in snapshot.instances),
-            tuple(m.opacity if m.transparent else 1.0 for m in materials), tuple(origin), tuple(eye), reach, points,
+            tuple((m.opacity, m.opacity_behind) if m.transparent else 1.0 for m in materials),
+            tuple(origin), tuple(eye), reach, points,
         )  # fmt: skip
         if key == self._key:
             return False
@@ -70,7 +71,7 @@ class SurfacePoints:
         corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse")
         meshes = [snapshot.meshes[i.mesh] for i in shown]
         surfaces = Surfaces(
-            corners, np.abs(look[:, 0]) % acceleration.OPEN_TO_SHADOW,
+            corners, acceleration.coverage(look[:, 0]),
             np.repeat(np.arange(len(shown)), [mesh.triangle_count for mesh in meshes]),
             np.array([np.sign(np.linalg.det(i.matrix[:3, :3])) * frame.geometry.is_closed(m)
                       for i, m in zip(shown, meshes)]),

@@ -37,7 +37,9 @@ class CompiledMaterial:
     casts_by_lot: bool  # so may light on its way to a surface; else what is transparent casts a full shadow
     emissive: bool
     emission: tuple[float, float, float]  # mean radiance, for choosing and sampling emissive geometry
-    opacity: float  # mean coverage 0..1, where a shader cannot be run per point
+    # Mean coverage 0..1 of sides that face the ray and of those turned away, where a shader cannot be run per point.
+    opacity: float
+    opacity_behind: float
     # Opacity, emission vary: what they are on average depends on the surfaces (frame/surface_means.py).
     uneven: bool
     uneven_emission: bool

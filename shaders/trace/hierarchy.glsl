@@ -7,9 +7,8 @@
 #define NODE_TEXELS 4
 #define DEEPEST 32  // nodes above each other, as in addon/frame/box_tree.py
 #define LEAF_TEXELS 17
-// Negative: the triangle may also bend what meets it. By 2 more: rays that look for a light pass; by 4: only they do not;
-// by 6: they do not pass at random.
-#define OPACITY_TEXEL 9
+#define OPACITY_TEXEL 9  // opacity_of_four
+#define SIDES 2048.0     // one more than what an opaque side has
 #define MATERIAL_TEXEL 13
 #define NORMAL_TEXEL 14
 
@@ -23,8 +22,9 @@ vec4 leaf_texel(int index)
   return trace_leaves_fetch(ivec2(index & 2047, index >> 11));
 }
 
-// Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed.
-vec4 intersect_four(int leaf, vec3 origin, vec3 direction)
+// Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed. `facing`: above 0 where the corners
+// run anticlockwise, seen from the origin.
+vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
 {
   int base = leaf * LEAF_TEXELS;
   vec4 e1x = leaf_texel(base + 3);
@@ -49,7 +49,26 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction)
   vec4 t = (e2x * qx + e2y * qy + e2z * qz) * inverse;
   bvec4 inside = lessThanEqual(max(max(-u, -v), max(u + v - vec4(1.0), -t)), vec4(0.0));
   t = mix(vec4(1e30), t, inside);
+  facing = determinant;
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
+}
+
+// The share of rays that four triangles stop. Codes are negative where the triangle may also bend what meets it; they hold
+// which rays it is about, 0: all, 1: not those that look for a light, 2: those alone, 3: all, and those for certain; and
+// the coverage of either side.
+vec4 opacity_of_four(int leaf, vec4 facing, bool bent, bool shadow)
+{
+  vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
+  vec4 rays = floor(abs(code) / (SIDES * SIDES));
+  vec4 sides = abs(code) - rays * (SIDES * SIDES);
+  vec4 front = floor(sides / SIDES);
+  vec4 covered = mix(sides - SIDES * front, front, greaterThan(facing, vec4(0.0)));
+  vec4 opacity = min(covered * (1.0001 / (SIDES - 1.0)), vec4(1.0));
+  if (bent) {
+    opacity = mix(opacity, vec4(1.0), lessThan(code, vec4(0.0)));
+  }
+  opacity = mix(opacity, vec4(0.0), equal(rays, vec4(shadow ? 1.0 : 2.0)));
+  return shadow ? mix(opacity, vec4(1.0), equal(rays, vec4(3.0))) : opacity;
 }
 
 // A place in the tree: a node, or a leaf.
@@ -154,17 +173,11 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     if (!more) {
       break;
     }
-    vec4 t = intersect_four(place.index, origin, direction);
+    vec4 facing;
+    vec4 t = intersect_four(place.index, origin, direction, facing);
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
-      vec4 opacity = leaf_texel(place.index * LEAF_TEXELS + OPACITY_TEXEL);
-      // 0: all rays, 1: not those that look for a light, 2: only those, 3: all, and those for certain.
-      vec4 blocks = floor(abs(opacity) * 0.5);
-      bvec4 passed = equal(blocks, vec4(shadow ? 1.0 : 2.0));
-      opacity = (bent ? mix(abs(opacity) - 2.0 * blocks, vec4(1.0), lessThan(opacity, vec4(0.0)))
-                      : abs(opacity) - 2.0 * blocks);
-      opacity = mix(opacity, vec4(0.0), passed);
-      opacity = (shadow) ? mix(opacity, vec4(1.0), equal(blocks, vec4(3.0))) : opacity;
+      vec4 opacity = opacity_of_four(place.index, facing, bent, shadow);
 #ifdef OPAQUE_ONLY
       opacity = floor(opacity);
 #endif

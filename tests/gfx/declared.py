@@ -42,5 +42,5 @@ def programs() -> list[Program]:
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)
         made += [materials._surface_program(with_file), materials._caster_program(with_file)]
-        made += [materials._emission_program(with_file)]
+        made += [materials._emission_program(with_file), materials._opacity_program(with_file)]
     return sorted(dict.fromkeys(made), key=lambda program: (program.name, program.fragment, program.compute))

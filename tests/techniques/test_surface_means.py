@@ -126,3 +126,58 @@ def test_surfaces_get_what_a_material_emits_on_average(stage, factor_of, ends, e
     assert found[0].emission == pytest.approx((expected,) * 3, rel=0.01)
     cycles = stage.render(256, (16, 16), engine="CYCLES")["diffuse_direct"][..., 0].mean()
     assert ours == pytest.approx(cycles, rel=0.03)
+
+
+@pytest.fixture
+def one_sided(stage):
+    """Diffuse where it faces the ray, and not there at all from behind."""
+    material = stage.diffuse(0.8)
+    tree = material.node_tree
+    diffuse, output = (next(n for n in tree.nodes if n.type == kind) for kind in ("BSDF_DIFFUSE", "OUTPUT_MATERIAL"))
+    mix, nothing = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], mix.inputs[0])
+    tree.links.new(diffuse.outputs[0], mix.inputs[1])
+    tree.links.new(nothing.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def test_sides_have_an_opacity_each(stage, one_sided):
+    stage.blocker((-1, -1), (1, 1), 1.0, material=one_sided)
+    stage.floor()
+    stage.light("SUN")
+    stage.camera_above()
+    stage.render(1, (16, 16))
+    material = next(one for one in stage.renderer.frame.measured_materials if one.name == one_sided.name)
+    assert (material.opacity, material.opacity_behind) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_rays_meet_the_side_that_is_there(stage, one_sided, mirrored, upside_down):
+    """What a mirror shows of a card above it that is there from one side only."""
+    stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.0))
+    stage.rectangle(
+        (-1, -1), (1, 1), material=one_sided, location=(0, 0, 1), turn=(np.pi * upside_down, 0, 0),
+        scale=(-1 if mirrored else 1, 1, 1),
+    ).visible_camera = False  # fmt: skip
+    stage.world()
+    stage.camera_above()
+    direct = stage.render(16, (16, 16))["glossy_direct"][6:10, 6:10, 0].mean()
+    cycles = stage.render(16, (16, 16), engine="CYCLES")["glossy_direct"][6:10, 6:10, 0].mean()
+    assert cycles == pytest.approx(0.0 if upside_down else 1.0, abs=0.01)
+    assert direct == pytest.approx(cycles, abs=0.01)
+
+
+def test_a_room_whose_walls_are_seen_through_from_outside_keeps_its_light(stage, one_sided):
+    """A box with its faces turned inwards and a lamp in it, seen through its own wall: as if it were opaque."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]
+    faces = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
+    stage.mesh(corners, faces, material=one_sided)
+    stage.light("AREA", (0, 0, 1.9), size=0.5)
+    stage.camera((0, -5, 1), (np.pi / 2, 0, 0), angle=0.5)
+    ours, cycles = (
+        stage.render(samples, (24, 24), bounces=6, engine=engine)["diffuse_indirect"][..., :3].mean()
+        for engine, samples in (("CANDELA", 16), ("CYCLES", 64))
+    )
+    assert ours == pytest.approx(cycles, rel=0.03)
