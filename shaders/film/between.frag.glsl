@@ -16,8 +16,26 @@ struct Seen {
   vec3 color;   // of all that is diffuse
   bool soft;    // with a diffuse lobe in it
   int kind;     // of the other lobe
-  vec3 weight;  // of it; 0: there is none
+  vec3 weight;  // of it, times about what it reflects towards the viewer; 0: there is none
 };
+
+// About what share of the light a lobe reflects towards the viewer. Of several lobes of a surface each pixel has drawn one:
+// a coat that hardly reflects, drawn seldom and of great weight, or the metal below it. Light that is passed on by the
+// weights alone would be far too bright.
+vec3 lobe_reflectance(Surface s)
+{
+  vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+  float cosine = clamp(abs(dot(s.glossy_normal, to_viewer)), 0.0, 1.0);
+  if (s.kind == FRESNEL_DIELECTRIC) {
+    float least = dielectric_f0(s.glossy_ior);
+    float rise = (fresnel_dielectric(cosine, s.glossy_ior) - least) / max(1.0 - least, 1e-6);
+    return mix(s.glossy_tint, vec3(1.0), clamp(rise, 0.0, 1.0));
+  }
+  if (s.kind == FRESNEL_F82) {
+    return mix(s.glossy_tint, vec3(1.0), pow(1.0 - cosine, 5.0));
+  }
+  return (s.kind == FRESNEL_NONE) ? s.glossy_tint : vec3(1.0);
+}
 
 Seen seen_of(Surface s)
 {
@@ -28,7 +46,7 @@ Seen seen_of(Surface s)
   seen.kind = s.kind;
   seen.soft = max_component(s.glossy_weight) > 0.0 && s.kind > LOBE_REFRACTION && !soft_lobe_is_glossy(s);
   seen.color = max(s.diffuse, vec3(0.0)) + (seen.soft ? s.glossy_weight : vec3(0.0));
-  seen.weight = seen.soft ? vec3(0.0) : s.glossy_weight;
+  seen.weight = seen.soft ? vec3(0.0) : s.glossy_weight * lobe_reflectance(s);
   return seen;
 }
 

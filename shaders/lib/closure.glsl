@@ -24,6 +24,20 @@ float dielectric_f0(float ior)
   return root * root;
 }
 
+// Unpolarised reflectance of a smooth dielectric; ior is inside over outside, total reflection gives 1.
+float fresnel_dielectric(float cos_h, float ior)
+{
+  float c = abs(cos_h);
+  float g_squared = ior * ior - 1.0 + c * c;
+  if (g_squared <= 0.0) {
+    return 1.0;
+  }
+  float g = sqrt(g_squared);
+  float a = (g - c) / max(g + c, 1e-20);
+  float b = ((g + c) * c - 1.0) / ((g - c) * c + 1.0);
+  return 0.5 * a * a * (1.0 + b * b);
+}
+
 // Of microfacets. All are evaluated with multiple scattering, which the weight of all but the first takes out again.
 #define DISTRIBUTION_GGX 0
 #define DISTRIBUTION_MULTI_GGX 1

@@ -125,20 +125,6 @@ float schlick_layer_shape(float mu, float roughness)
   return energy_bilinear(ivec2(32, 0), energy_cell(roughness, mu, LAYER_NODES)).z;
 }
 
-// Unpolarised reflectance of a smooth dielectric; ior is inside over outside, total reflection gives 1.
-float fresnel_dielectric(float cos_h, float ior)
-{
-  float c = abs(cos_h);
-  float g_squared = ior * ior - 1.0 + c * c;
-  if (g_squared <= 0.0) {
-    return 1.0;
-  }
-  float g = sqrt(g_squared);
-  float a = (g - c) / max(g + c, 1e-20);
-  float b = ((g + c) * c - 1.0) / ((g - c) * c + 1.0);
-  return 0.5 * a * a * (1.0 + b * b);
-}
-
 // Fresnel term of a lobe at cos_h = view . half vector; the kinds are explained in lib/closure.glsl.
 vec3 fresnel_reflectance(int fresnel, vec3 tint, vec3 edge, float ior, float cos_h)
 {

@@ -124,6 +124,17 @@ def test_a_mix_of_lobes_keeps_its_light(stage, light_of):
         assert shared.mean() == pytest.approx(truth.mean(), rel=0.02)
 
 
+@pytest.mark.parametrize("inputs", [{"Coat_Weight": 0.25}, {"Coat_Weight": 1.0}, {"IOR": 1.2}], ids=str)
+@pytest.mark.parametrize("metal", [0.5, 1.0])
+def test_lobes_that_reflect_unlike_keep_their_light(stage, light_of, metal, inputs):
+    """A coat hardly reflects, and is drawn by lot seldom and with great weight; the metal below it nearly all."""
+    stage.floor(material=stage.principled(Base_Color=(0.8, 0.6, 0.4, 1), Metallic=metal, Roughness=0.5, **inputs))
+    stage.light("SUN", turn=(0.3, 0.2, 0), energy=2.0)
+    stage.world((1, 1, 1), 0.5)
+    truth, shared = (light_of("glossy_direct", samples, points, bounces=1) for samples, points in ((64, 64), (8, 64)))
+    assert shared.mean() == pytest.approx(truth.mean(), rel=0.02)
+
+
 def test_layers_are_drawn_by_lot_at_every_point(stage, light_of):
     """A half transparent card: coverage of one sample with eight points is that of eight samples."""
     stage.rectangle((-2, -2), (2, 2), material=stage.see_through(0.5))
