@@ -6,10 +6,11 @@ mirrored or bent by lot, in proportion to Fresnel's reflectance; a light, the wo
 
     L_t(v) = sum over interfaces k of  T_k (light of this sample's points through k  +  what the walk finds behind k)
 
-T_k is the product of f |cos| / p up to k. Points on lights and directions of the walk find the same light at rough
-interfaces, weighted by the power heuristic (Veach 1997); at smooth ones, only the walk finds what has an extent. What
-the first interface brings is Transmission Direct of Cycles' passes, the rest Transmission Indirect. Here, glass does
-not count as a bounce: it is followed through `interfaces` of them however few bounces the scene allows.
+T_k is the product of f |cos| / p up to k, and of exp(-a t) for what insides of solids absorb on the way. Points on lights
+and directions of the walk find the same light at rough interfaces, weighted by the power heuristic (Veach 1997); at
+smooth ones, only the walk finds what has an extent. What the first interface brings is Transmission Direct of Cycles'
+passes, the rest Transmission Indirect. Here, glass does not count as a bounce: it is followed through `interfaces` of
+them however few bounces the scene allows.
 
 | cost | per sample |
 |---|---|
@@ -26,9 +27,9 @@ them.
 Fails: above 4 million triangles nothing is traced, and glass lets light pass straight on (surfaces.py).
 
 Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
-its bumps. Surfaces behind glass reflect evenly, by their albedo where they stand behind glass in the picture, too, and
-else by their material's mean (the boards of that room shine: 5 % too dark). Light falls through glass in straight
-lines, so glass casts grey shadows and no caustics. Against Cycles: within 2 % for a rough ball below a world of which
+its bumps. Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo
+where they stand behind glass in the picture, too, and else by their material's mean (the boards of that room shine: 5 %
+too dark). Light falls through glass in straight lines, so glass casts grey shadows and no caustics. Against Cycles: within 2 % for a rough ball below a world of which
 Cycles draws no light samples; where it does, its own result for rough glass rises by up to 11 % (a world symmetric in x
 shows it).
 """
@@ -116,14 +117,17 @@ class TracedRefraction(Technique):
         return tuple(material.graph for material in snapshot.materials)
 
     def prepare(self, frame: Frame) -> None:
-        """Tell the shader how the materials behind the first interface bend light: two texels for each."""
-        table = np.zeros((len(frame.materials.compiled), 2, 4), np.float32)
+        """Tell the shader how the materials behind the first interface bend light, and what their insides absorb: three
+        texels for each."""
+        table = np.zeros((len(frame.materials.compiled), 3, 4), np.float32)
         for row, material in zip(table, frame.materials.compiled):
             if material.glass:
                 glass = material.glass
                 row[0] = *glass.color, glass.ior
                 losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
                 row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
+            if material.medium:
+                row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
         self._interfaces = images.upload(table)
 
     def run(self, frame: Frame) -> None:

@@ -164,6 +164,9 @@ void main()
     normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
     bool leaves = dot(normal, direction) > 0.0;
     geometric_normal = leaves ? -normal : normal;
+    if (leaves) {
+      throughput *= exp(-interface_table_fetch(ivec2(2, material)).rgb * t);
+    }
     if (to_unit(roll.x) >= shape.y) {
       Walk rest;
       rest.direction = direction;

@@ -176,6 +176,31 @@ def test_surfaces_behind_glass_get_the_light_of_other_surfaces_as_in_cycles(stag
     assert ((ours - cycles) ** 2).sum() < 0.01 * (cycles**2).sum()
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.3])
+def test_what_a_solid_of_glass_absorbs_is_missing_as_in_cycles(stage, roughness):
+    """A block of coloured glass before a white world: exp(-d (1 - c) t) of it on a straight path."""
+    color, density, depth = np.array([0.9, 0.5, 0.1]), 0.8, 1.5
+    material = glass(stage, roughness, 1.3)
+    tree = material.node_tree
+    volume = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    volume.inputs["Color"].default_value, volume.inputs["Density"].default_value = (*color, 1), density
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, depth)]
+    faces = [(0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (4, 6, 7, 5), (1, 5, 7, 3), (0, 2, 6, 4)]
+    stage.mesh(corners, faces, material=material)
+    stage.world()
+    stage.camera_above(1.0)
+    ours, cycles = (
+        passing(stage.render(samples, (16, 16), bounces=12, engine=engine), "indirect").mean(axis=(0, 1))
+        for engine, samples in (("CANDELA", 64), ("CYCLES", 256))
+    )
+    assert ours == pytest.approx(cycles, rel=0.03)
+    if not roughness:
+        straight = np.exp(-density * (1 - color) * depth)
+        assert ours[0] / ours[2] == pytest.approx(straight[0] / straight[2], rel=0.05)
+
+
 def test_scenes_without_glass_pay_nothing(stage):
     stage.floor(material=stage.principled())
     stage.light("SUN")
