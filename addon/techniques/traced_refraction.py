@@ -6,11 +6,11 @@ mirrored or bent by lot, in proportion to Fresnel's reflectance; a light, the wo
 
     L_t(v) = sum over interfaces k of  T_k (light of this sample's points through k  +  what the walk finds behind k)
 
-T_k is the product of f |cos| / p up to k, and of exp(-a t) for what insides of solids absorb on the way. Points on lights
-and directions of the walk find the same light at rough interfaces, weighted by the power heuristic (Veach 1997); at
-smooth ones, only the walk finds what has an extent. What the first interface brings is Transmission Direct of Cycles'
-passes, the rest Transmission Indirect. Here, glass does not count as a bounce: it is followed through `interfaces` of
-them however few bounces the scene allows.
+T_k is the product of f |cos| / p up to k, and of exp(-a t) for what insides of solids absorb on the way. Points on
+lights and directions of the walk find the same light at rough interfaces, weighted by the power heuristic (Veach 1997);
+at smooth ones, only the walk finds what has an extent. What the first interface brings is Transmission Direct of
+Cycles' passes, the rest Transmission Indirect. Here, glass does not count as a bounce: it is followed through
+`interfaces` of them however few bounces the scene allows.
 
 | cost | per sample |
 |---|---|
@@ -29,9 +29,9 @@ Fails: above 4 million triangles nothing is traced, and glass lets light pass st
 Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
 its bumps. Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo
 where they stand behind glass in the picture, too, and else by their material's mean (the boards of that room shine: 5 %
-too dark). Light falls through glass in straight lines, so glass casts grey shadows and no caustics. Against Cycles: within 2 % for a rough ball below a world of which
-Cycles draws no light samples; where it does, its own result for rough glass rises by up to 11 % (a world symmetric in x
-shows it).
+too dark). Light falls through glass in straight lines, so glass casts grey shadows and no caustics. Against Cycles:
+within 2 % for a rough ball below a world of which Cycles draws no light samples; where it does, its own result for
+rough glass rises by up to 11 % (a world symmetric in x shows it).
 """
 
 from __future__ import annotations
