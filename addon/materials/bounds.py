@@ -53,7 +53,8 @@ class Bounds:
             image = (self._code.images or {}).get(node.image)
             if image is None or image.pixels.size == 0:
                 return unknown()
-            return image_estimate(image, node.properties.get("extension") == "CLIP", link[1])
+            clipped = node.properties.get("extension") == "CLIP" and not image.missing
+            return image_estimate(image, clipped, link[1])
         if entry.estimate is None:
             return unknown()
         outputs = entry.estimate(NodeBounds(self, node, entry, depth + 1))

@@ -183,6 +183,8 @@ class Expressions:
         if node.image == "" or (self.images is not None and node.image not in self.images):
             self.note(node, f"The image of '{node.label}' is missing; it is drawn pink.")
             return False
+        if self.images is not None and self.images[node.image].missing:
+            return False  # whoever read the scene has said so
         if node.image not in self.image_keys:
             if len(self.image_keys) >= MAX_IMAGES:
                 self.note(node, f"The material reads more than {MAX_IMAGES} images; '{node.label}' is drawn pink.")

@@ -76,7 +76,8 @@ class ImageTable:
             self.reused += 1
             return ImageEntry(old.image, state, (*notes, *space_notes))
         self.read += 1
-        made = Image(key, next_version(), pixels, encoding, alpha, original.name)
+        missing = pixels.shape == (1, 1, 4) and not len(original.pixels)
+        made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing)
         return ImageEntry(made, state, (*notes, *space_notes))
 
 

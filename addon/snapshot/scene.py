@@ -105,6 +105,7 @@ class Image:
     encoding: str = "LINEAR"
     alpha_mode: str = "STRAIGHT"  # STRAIGHT, PREMUL, CHANNEL_PACKED, NONE
     name: str = ""
+    missing: bool = False  # it could not be read: the pixels stand in for it, wherever it is asked
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from addon.materials.compiler import compile_material
 from addon.materials.reader import read_graph
 from addon.snapshot.scene import Image
 from tests.materials.cycles import new_material, render_patches
+from tests.materials.graphs import emission, graph
+from tests.materials.graphs import image as node_of_image
 from tests.materials.probe import points
 
 RESOLUTION = 12
@@ -98,3 +100,15 @@ def test_wild_coordinates_stay_finite(evaluate, empty_scene, extension):
     compiled = compile_material("Test", read_graph(material, lambda image, user: image.name)[0], {"Straight": pixels})
     wild = np.array([[1e9, -1e9, 0, 1], [-1e30, 1e30, 0, 1], [1e-30, -1e-30, 0, 1], [16777217.0, 0.5, 0, 1]])
     assert np.isfinite(evaluate(compiled, points(4, attributes=[wild]), {"Straight": pixels})["emission"]).all()
+
+
+@pytest.mark.parametrize("extension", ["REPEAT", "CLIP"])
+def test_what_cannot_be_read_is_magenta_everywhere(evaluate, extension):
+    """As in Cycles, also where an image that is there would end."""
+    lost = Image("lost", 1, np.array([[(1.0, 0.0, 1.0, 1.0)]], np.float32), missing=True)
+    tree = graph(node_of_image("Image", "lost", extension=extension), emission(Color=("Image", "Color")),
+                 surface=("Emission", "Emission"))  # fmt: skip
+    material = compile_material("Test", tree, {"lost": lost})
+    found = evaluate(material, points(3, attributes=[[(-1.0, 0.5, 0, 1), (0.01, 0.5, 0, 1), (0.5, 0.5, 0, 1)]]))
+    np.testing.assert_allclose(found["emission"], [(1.0, 0.0, 1.0)] * 3)
+    assert not material.images and not material.fallbacks

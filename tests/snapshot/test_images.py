@@ -97,6 +97,7 @@ def test_a_missing_image_is_magenta_and_named(stage, tmp_path):
     shown(stage, image)
     snapshot = stage.take()
     assert only_image(snapshot).pixels.tolist() == [[[1, 0, 1, 1]]]
+    assert only_image(snapshot).missing
     (note,) = snapshot.notes
     assert "file.png" in note.subject
     assert "missing" in note.text
