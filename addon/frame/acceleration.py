@@ -27,11 +27,12 @@ HIERARCHY_TEXTURES = (("RGBA32F", "trace_nodes"), ("RGBA32F", "trace_leaves"))
 # The node's grid; lower and upper corners of the four children on it; number of the first child that is a node, of the
 # first one that is a leaf, and how many are nodes: those come first.
 NODE_TEXELS = 4
-# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity (see _opacity_code); emission r, g,
-# b; material; shading normals of the three corners.
+# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity (_opacity_code); emission r, g, b;
+# material (and _emission); shading normals of the three corners.
 LEAF_TEXELS = 17
 # Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
 ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
+FRONT_ALONE = 0.25  # added to the material's number
 SIDE_STEPS = 2047  # of the opacity of a side: those of two, and the above, are exact in one float
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
@@ -60,11 +61,11 @@ def world_triangles(
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_opacity_code), mean emitted radiance, number of the
-    material and packed corner normals."""
+    material (with the side that emits, _emission) and packed corner normals."""
     corners, looks = [], []
     look = {
         (rays, mirrored): np.array([
-            (_opacity_code(m, rays, mirrored), *(m.emission if m.emissive else (0.0, 0.0, 0.0)), k)
+            (_opacity_code(m, rays, mirrored), *_emission(m, mirrored)[0], k + _emission(m, mirrored)[1])
             for k, m in enumerate(materials)
         ])
         for rays in (ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE)
@@ -116,6 +117,18 @@ def _opacity_code(material: CompiledMaterial, rays: int = ALL_RAYS, mirrored: bo
         steps = [SIDE_STEPS] * 2 if rays == SHADOW_ALONE else steps
     code = float((rays * (SIDE_STEPS + 1) + steps[0]) * (SIDE_STEPS + 1) + steps[1])
     return -max(code, 1.0) if material.glass else code
+
+
+def _emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple[float, float, float], float]:
+    """Mean radiance that a triangle emits, and what is added to the number of its material where it does so to one side
+    only: FRONT_ALONE or -FRONT_ALONE. Of two sides that both shine the mean stands for either."""
+    front, behind = material.emission, material.emission_behind
+    if not material.emissive:
+        return (0.0, 0.0, 0.0), 0.0
+    if front == behind or (any(front) and any(behind)):
+        return tuple((a + b) / 2 for a, b in zip(front, behind)), 0.0
+    side = FRONT_ALONE if any(front) else -FRONT_ALONE
+    return (front if any(front) else behind), -side if mirrored else side
 
 
 def coverage(codes: np.ndarray) -> np.ndarray:
@@ -246,7 +259,7 @@ class HierarchyCache:
         key = shown, (
             None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            tuple((_opacity_code(m), m.emissive and m.emission) for m in materials), tuple(origin),
+            tuple((_opacity_code(m), _emission(m)) for m in materials), tuple(origin),
         )  # fmt: skip
         tree = self._kept.get(key)
         if tree is None and draft:

@@ -30,6 +30,7 @@ NO_BLEND = 1e-7  # of a cone's cosine: float32 holds no narrower edge, and its i
 DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHOLE_FLAG = 1, 2, 4, 8, 16, 32, 64
 NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for it
 TRANSMISSION_FLAG = 256
+SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
 
 
 @dataclass(frozen=True)
@@ -260,7 +261,7 @@ def surface_row(
     point, normal, radiance, density, flags, first_view: int, view_count: int, samples: float = np.inf
 ) -> np.ndarray:
     """A row for a point on an emissive surface, drawn with `density` per m2 in each of `samples` samples; it shines to
-    both sides."""
+    both sides, but for SIDED_FLAG."""
     rows = np.zeros((TEXELS, 4))
     rows[0] = SURFACE, flags if view_count else flags & ~SHADOW_FLAG, first_view, view_count
     rows[1, :3] = point

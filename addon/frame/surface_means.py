@@ -3,12 +3,12 @@
 The mean of an image says little about that: a wall that shows the opaque corner of a sheet of sprites blocks all light,
 and of a colour ramp over noise nothing is known at all. A node tree is only known as a program, so the surfaces of each
 material that varies are drawn over one another from the directions of overview.py, with what they cover and what they
-emit added up. What they cover is known for the two sides apart: walls that are seen through from outside close the room
-that they surround.
+emit added up, for the two sides apart: walls that are seen through from outside close the room that they surround, and
+a panel may shine to one side only.
 
 | cost | once per set of materials and geometry |
 |---|---|
-| draws | of each such material's meshes (not of all of their instances), 4 for opacity, 4 for emission |
+| draws | of each such material's meshes (not of all of their instances), 4 for opacity, 8 for emission |
 | readback | 4 x SIDE x SIDE pixels of each |
 
 Against Cycles: a room textured from a sheet of which some is transparent had .28 of its indirect light, now .98.
@@ -84,15 +84,15 @@ def _opacity(materials: MaterialSet, geometry: SceneGeometry, material: int, num
 
 
 def _emission(materials: MaterialSet, geometry: SceneGeometry, material: int, numbers: list[int]) -> dict[str, object]:
-    bindings = materials.bindings(material, geometry.instances)
-    *radiance, drawn = _sum(geometry, numbers, materials.emission_program(material), bindings)
-    if not (drawn > 0 and np.isfinite(radiance).all()):
-        return {}
-    return {"emission": tuple(float(channel / drawn) for channel in radiance)}
+    program, bindings = materials.emission_program(material), materials.bindings(material, geometry.instances)
+    sums = [_sum(geometry, numbers, program, bindings, side) for side in (0, 1)]
+    means = [tuple(map(float, of[:3] / of[3])) if of[3] > 0 and np.isfinite(of).all() else None for of in sums]
+    front, behind = means[0] or means[1], means[1] or means[0]
+    return {"emission": front, "emission_behind": behind} if front else {}
 
 
-def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings: dict) -> np.ndarray:
-    """(4,) what a program draws in all pixels of all views together."""
+def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings: dict, side: int = 0) -> np.ndarray:
+    """(4,) what a program draws in all pixels of all views together; `side` as emission.frag.glsl reads it."""
     own = some(numbers, geometry.draws)
     draws = [geometry.draws[k] for k in own]
     low, high = np.min([draw.low for draw in draws], axis=0), np.max([draw.high for draw in draws], axis=0)
@@ -102,7 +102,7 @@ def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings
         for number, backward in enumerate(VIEWS):
             view = overview(low, high, backward)
             constants = {name: view[name] for name in ("row_x", "row_y", "row_w", "row_q")}
-            constants |= {"near": 0.5, "first_instance": 0, "light_point": (*backward, 0.0), "sample_index": number}
+            constants |= {"near": 0.5, "first_instance": 0, "light_point": (*backward, 0.0), "sample_index": side}
             state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
             with passes.drawing(target, viewport=(0, number * SIDE, SIDE, SIDE), **state):
                 shader.bind(**bindings, constants=constants)

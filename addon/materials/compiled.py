@@ -36,7 +36,9 @@ class CompiledMaterial:
     transparent: bool  # some ray may pass: the surface is drawn with stochastic transparency
     casts_by_lot: bool  # so may light on its way to a surface; else what is transparent casts a full shadow
     emissive: bool
-    emission: tuple[float, float, float]  # mean radiance, for choosing and sampling emissive geometry
+    # Mean radiance of the side that faces the viewer and of the other one, for choosing and sampling emissive geometry.
+    emission: tuple[float, float, float]
+    emission_behind: tuple[float, float, float]
     # Mean coverage 0..1 of sides that face the ray and of those turned away, where a shader cannot be run per point.
     opacity: float
     opacity_behind: float

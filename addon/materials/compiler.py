@@ -67,6 +67,7 @@ class _Compilation:
         identity = f"{glsl}\0{kinds}\0{len(code.image_keys)}\0{len(values)}"
         passes, emission = summary.transparency, summary.emission
         transparent = bool(np.any(passes.high > 1e-5))
+        shining = tuple(float(channel) for channel in emission.mean)
         opacity = float(np.clip(1.0 - passes.luminance().mean[0], 0.0, 1.0))
         return CompiledMaterial(
             name=code.name,
@@ -78,7 +79,8 @@ class _Compilation:
             transparent=transparent,
             casts_by_lot=transparent and (self.graph.transparent_shadow or summary.glass is not None),
             emissive=bool(np.any(emission.high > 0.0) or np.any(emission.low < 0.0)),
-            emission=tuple(float(channel) for channel in emission.mean),
+            emission=shining,
+            emission_behind=shining,
             opacity=opacity,
             opacity_behind=opacity,
             uneven=transparent and not passes.constant,

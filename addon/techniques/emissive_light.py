@@ -28,12 +28,15 @@ from ..frame import depth_maps, lights
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
+from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from .accumulated_maps import RESOLUTION, DepthMapService, by_rays, map_resolution, rounds, traced_shadows
 from .direct_light import DIRECT_WRITES, shade
 from .surfaces import LIT_SURFACES
 
+BOTH, FRONT, BEHIND = "both", "front", "behind"
+SIDES = ((BOTH, 1.0), (FRONT, 1.0), (BEHIND, -1.0))  # with the sign of the normal
 FEWEST_POINTS, MOST_POINTS = 32, 16  # in a whole picture, and in one of its samples
 
 
@@ -41,40 +44,61 @@ class EmissiveTriangles:
     """World-space triangles that emit, ready to draw points from."""
 
     def __init__(self, frame: Frame):
-        corners, radiance = [], []
+        corners, radiance, normals, sided = [], [], [], []
         materials = frame.measured_materials
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
-            slots = np.array(
-                [materials[m].emission if materials[m].emissive else (0, 0, 0) for m in instance.materials]
-            )
-            if not np.any(slots) or not mesh.triangle_count:
-                continue
-            emission = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]
-            shining = np.abs(emission).max(axis=1) > 0
-            matrix = instance.matrix.copy()
-            matrix[:3, 3] -= frame.geometry.origin
-            world = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[shining]]] @ matrix[:3, :3].T
-            corners.append(world + matrix[:3, 3])
-            radiance.append(emission[shining])
+            for side, sign in SIDES:
+                slots = np.array([_emission(materials[m], side) for m in instance.materials])
+                if not np.any(slots) or not mesh.triangle_count:
+                    continue
+                emission = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]
+                shining = np.abs(emission).max(axis=1) > 0
+                matrix = instance.matrix.copy()
+                matrix[:3, 3] -= frame.geometry.origin
+                world = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[shining]]] @ matrix[:3, :3].T
+                corners.append(world + matrix[:3, 3])
+                radiance.append(emission[shining])
+                # A mirrored triangle's corners run the other way round.
+                normals.append(np.full(len(world), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
+                sided.append(np.full(len(world), side != BOTH))
         self.corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
         self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
+        self.sided = np.concatenate(sided) if sided else np.zeros(0, bool)
         normal = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         double_area = np.linalg.norm(normal, axis=1)
         self.normal = normal / np.maximum(double_area, 1e-30)[:, None]
+        if normals:
+            self.normal *= np.concatenate(normals)[:, None]
         weight = np.abs(self.radiance) @ lights.LUMINANCE * double_area / 2
         weight = np.where(np.isfinite(weight), weight, 0.0)
         self.power = float(weight.sum())
         self._edges = np.concatenate([[0.0], np.cumsum(weight)])
 
-    def draw(self, x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """From three uniform numbers: point, normal, radiance, density per m2."""
+    def row(
+        self, numbers: tuple[float, float, float], share: float, flags: int, views: int = 1, samples: float = np.inf
+    ) -> np.ndarray:
+        """Of a point drawn by three uniform numbers, one of `share` in each of `samples` samples; see lights.py."""
+        point, normal, radiance, density, sided = self.draw(*numbers)
+        flags += lights.SIDED_FLAG * sided
+        return lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
+
+    def draw(self, x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, bool]:
+        """From three uniform numbers: point, normal, radiance, density per m2, and whether it shines to the normal's
+        side only."""
         k = int(np.clip(np.searchsorted(self._edges, x * self.power, side="right") - 1, 0, len(self.radiance) - 1))
         root = np.sqrt(y)
         a, b, c = self.corners[k]
         point = (1 - root) * a + root * (1 - z) * b + root * z * c
         density = float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
-        return point, self.normal[k], self.radiance[k], density
+        return point, self.normal[k], self.radiance[k], density, bool(self.sided[k])
+
+
+def _emission(material: CompiledMaterial, side: str) -> tuple[float, float, float]:
+    """What a material emits to one of its sides, or to both: it does either, or none."""
+    if not material.emissive or (side == BOTH) != (material.emission == material.emission_behind):
+        return 0.0, 0.0, 0.0
+    return material.emission_behind if side == BEHIND else material.emission
 
 
 class EmissiveLight(Technique):
@@ -114,13 +138,12 @@ class EmissiveLight(Technique):
         items = []
         for k in range(count):
             number = frame.sample * count + k
-            point, normal, radiance, density = self._triangles.draw(*frame.random_volume_at(number, "emissive"))
+            numbers = frame.random_volume_at(number, "emissive")
+            point = self._triangles.draw(*numbers)[0]
             if number == 0:
                 self._traced = by_rays(frame, lambda place=point: _views(frame, place, 0, resolution), resolution)
             views = [] if self._traced else _views(frame, point, number, resolution)
-            row = lights.surface_row(
-                point, normal, radiance, density * count, flags, 0, len(views) or self._traced, frame.settings.samples
-            )
+            row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
             items.append((row, views))
         for rows, views in rounds(frame, items, resolution):
             maps = traced_shadows(frame) if self._traced else self.service.draw(frame, self, views, resolution)

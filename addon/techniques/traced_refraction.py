@@ -227,8 +227,7 @@ class TracedRefraction(Technique):
             for k in range(EMISSIVE_POINTS):
                 index = frame.sample * EMISSIVE_POINTS + k
                 drawn = frame.random_volume_at(index, "refraction/emissive")
-                point, normal, radiance, density = self._triangles.draw(*drawn)
-                rows.append(lights.surface_row(point, normal, radiance, density * EMISSIVE_POINTS, seen, 0, 1))
+                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, seen))
         if self._world_flags:
             seen = lights.SHADOW_FLAG + self._world_flags
             for k in range(WORLD_DIRECTIONS):

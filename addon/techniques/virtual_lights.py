@@ -255,10 +255,8 @@ class VirtualLights:
         numbers = range(frame.sample * share, (frame.sample + 1) * share)
         if self._emissive is not None:
             for index in numbers:
-                point, normal, radiance, density = self._emissive.draw(
-                    *frame.random_volume_at(index, "virtual lights/emissive")
-                )
-                rows.append(lights.surface_row(point, normal, radiance, density * share, seen, 0, 1, total / share))
+                drawn = frame.random_volume_at(index, "virtual lights/emissive")
+                rows.append(self._emissive.row(drawn, share, seen, samples=total / share))
         if self._world:
             chosen = np.array([frame.random_at(index, "virtual lights/world") for index in numbers])
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):

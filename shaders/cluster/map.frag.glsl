@@ -25,7 +25,5 @@ void main()
   if (t >= c.range) {
     return;
   }
-  vec3 normal;
-  triangle_emission(hit, normal);
-  out_seen = vec4(t / c.range, octahedral_encode(cluster_local(c, normal)), 1.0);
+  out_seen = vec4(t / c.range, octahedral_encode(cluster_local(c, triangle_normal(hit))), 1.0);
 }

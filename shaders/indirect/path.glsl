@@ -94,7 +94,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     return false;
   }
   met.position = origin + t * direction;
-  triangle_emission(hit, met.normal);
+  met.normal = triangle_normal(hit);
   if (dot(met.normal, direction) > 0.0) {
     met.normal = -met.normal;
   }

@@ -29,7 +29,7 @@ Probe probe_read(int index)
     probe.receives = t < 1e29;
     if (probe.receives) {
       probe.position = origin + t * onward;
-      triangle_emission(hit, probe.normal);
+      probe.normal = triangle_normal(hit);
       probe.normal *= (dot(probe.normal, onward) > 0.0) ? -1.0 : 1.0;
       probe.geometric_normal = probe.normal;
     }

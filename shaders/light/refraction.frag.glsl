@@ -139,7 +139,7 @@ void main()
       goes_on = t < 1e29;
     }
     if (goes_on) {
-      vec3 emission = triangle_emission(hit, normal);
+      vec3 emission = triangle_emission(hit, direction, normal);
       float light_density = luminance(abs(emission)) * t * t
                             / max(emissive_power * abs(dot(normal, direction)), 1e-30);
       gained += throughput * emission

@@ -29,6 +29,7 @@
 #define LIGHT_CAMERA 16
 #define LIGHT_TRACED 32  // rays of narrow lobes look for it (light/traced.frag.glsl)
 #define LIGHT_TRANSMISSION 256
+#define LIGHT_SIDED 512
 
 // What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/frame/lights.py). What
 // is left out some drivers would compute and mask.
@@ -136,7 +137,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     squared = max(squared, sources.light[light.base + 7].w);
     float cos_light = -dot(direction, light.axis);
     if (LIGHT_IS(light, LIGHT_SURFACE)) {
-      cos_light = abs(cos_light);  // meshes emit to both sides
+      cos_light = ((light.flags & LIGHT_SIDED) != 0) ? cos_light : abs(cos_light);
     }
     if (cos_light <= 0.0) {
       return vec3(0.0);

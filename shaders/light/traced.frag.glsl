@@ -116,7 +116,7 @@ void main()
     float t = trace_nearest(origin, direction, 1e29, layers, hit);
     if (t < 1e29) {
       vec3 normal;
-      vec3 emission = triangle_emission(hit, normal);
+      vec3 emission = triangle_emission(hit, direction, normal);
       float share = 1.0;
       if (!mirror && max_component(abs(emission)) > 0.0) {
         float lobe_density;

@@ -1,4 +1,5 @@
-// Radiance that a material emits towards surfaces that it lights, to be added up over all that shows it.
+// Radiance that a material emits towards surfaces that it lights, to be added up over all that shows it from the front, or,
+// where sample_index is 1, from behind.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "lib/closure.glsl"
@@ -13,5 +14,6 @@ void main()
   Closures c = closures_begin(point.normal, 0.5);
   evaluate_material(point, c);
   closures_end(c);
-  out_emission = is_finite(max_component(abs(c.emission))) ? vec4(c.emission, 1.0) : vec4(0.0);
+  bool counts = point.backfacing == (sample_index != 0) && is_finite(max_component(abs(c.emission)));
+  out_emission = counts ? vec4(c.emission, 1.0) : vec4(0.0);
 }

@@ -9,7 +9,7 @@
 #define LEAF_TEXELS 17
 #define OPACITY_TEXEL 9  // opacity_of_four
 #define SIDES 2048.0     // one more than what an opaque side has
-#define MATERIAL_TEXEL 13
+#define MATERIAL_TEXEL 13  // its number; .25 more or less: the triangle emits to its front or to its back alone
 #define NORMAL_TEXEL 14
 
 vec4 node_texel(int index)
@@ -218,15 +218,25 @@ float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ive
   return trace_until(origin, direction, limit, 0.0, salt, hit);
 }
 
-// Radiance that a triangle emits (mean over its material), and its unit normal.
-vec3 triangle_emission(ivec2 hit, out vec3 normal)
+// Unit normal of a triangle.
+vec3 triangle_normal(ivec2 hit)
 {
   int base = hit.x * LEAF_TEXELS;
   int k = hit.y;
   vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
   vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
-  normal = safe_normalize(cross(e1, e2));
-  return vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
+  return safe_normalize(cross(e1, e2));
+}
+
+// Radiance that a triangle emits (mean over its material) to where a ray along `direction` comes from; and its normal.
+vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)
+{
+  int base = hit.x * LEAF_TEXELS;
+  int k = hit.y;
+  normal = triangle_normal(hit);
+  float material = leaf_texel(base + MATERIAL_TEXEL)[k];
+  bool dark = (material - floor(material + 0.5)) * dot(normal, direction) > 0.0;
+  return dark ? vec3(0.0) : vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
 }
 
 // Unit shading normal of a triangle where a ray meets it, interpolated between its corners.

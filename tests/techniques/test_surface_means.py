@@ -181,3 +181,28 @@ def test_a_room_whose_walls_are_seen_through_from_outside_keeps_its_light(stage,
         for engine, samples in (("CANDELA", 16), ("CYCLES", 64))
     )
     assert ours == pytest.approx(cycles, rel=0.03)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("down", [False, True])
+def test_a_panel_that_shines_to_one_side_lights_that_side(stage, down, mirrored):
+    """Between a floor and a ceiling: what it shines at is as bright as in Cycles, the other side dark; and so is what a
+    mirror sees of it."""
+    material = stage.material("ShaderNodeEmission", Color=(1, 1, 1, 1))
+    tree = material.node_tree
+    strength = tree.nodes.new("ShaderNodeMapRange")
+    strength.inputs["To Min"].default_value, strength.inputs["To Max"].default_value = 4.0, 0.0
+    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], strength.inputs["Value"])
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(strength.outputs[0], emission.inputs["Strength"])
+    panel = stage.rectangle(
+        (-0.5, -0.5), (0.5, 0.5), material=material, location=(0, 0, 1), turn=(np.pi * down, 0, 0),
+        scale=(-1 if mirrored else 1, 1, 1),
+    )  # fmt: skip
+    panel.visible_camera = False
+    stage.floor(material=stage.principled(Base_Color=(0.8, 0.8, 0.8, 1), Metallic=0.5, Roughness=0.2))
+    stage.camera_above()
+    ours, cycles = (stage.render(n, (16, 16), engine=engine) for engine, n in (("CANDELA", 16), ("CYCLES", 256)))
+    for path in ("diffuse_direct", "glossy_direct"):
+        assert (cycles[path].max() > 0.1) == down
+        assert ours[path][..., 0].mean() == pytest.approx(cycles[path][..., 0].mean(), rel=0.03, abs=1e-6)
