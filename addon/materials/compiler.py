@@ -26,7 +26,7 @@ from .graph import Graph, Input, Node
 from .nodes.entry import Entry
 from .nodes.shader import IMPLICIT_EMISSION, UNKNOWN_SHADER
 from .values import glsl_number
-from .volume import medium_of
+from .volume import Medium, medium_of
 
 BUMP_FILTER_WIDTH = 0.1  # pixels between the heights that a displacement's normal is made of, as in Cycles
 
@@ -61,7 +61,8 @@ class _Compilation:
     def result(self) -> CompiledMaterial:
         self._displacement()
         summary = self._surface()
-        self._unused_slots()
+        medium = medium_of(self.graph)
+        self._unused_slots(medium, summary.glass is not None)
         code, glsl, values = self.code, self.code.text(), self.code.values.array()
         kinds = ",".join(attribute.kind for attribute in code.attributes)
         identity = f"{glsl}\0{kinds}\0{len(code.image_keys)}\0{len(values)}"
@@ -90,13 +91,18 @@ class _Compilation:
             soft=summary.soft,
             tinted=summary.tinted,
             glass=summary.glass,
-            medium=medium_of(self.graph),
+            medium=medium,
             fallbacks=tuple(code.fallbacks),
         )
 
-    def _unused_slots(self) -> None:
-        if self.code.exists(self.graph.volume):
-            self.code.note(self.graph.nodes[self.graph.volume[0]], "The volume of the material is not drawn.")
+    def _unused_slots(self, medium: Medium | None, glass: bool) -> None:
+        if medium is not None:
+            node, text = self.graph.nodes[self.graph.volume[0]], "The volume of the material is not drawn."
+            if glass:
+                text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
+            absorbs_alone = medium.even and not (medium.scattering.any() or medium.emission.any() or medium.glow)
+            if not (glass and absorbs_alone):
+                self.code.note(node, text)
         if self.code.values.overflow:
             sentence = "The material has more sliders than fit a uniform block; the last ones recompile it."
             self.code.fallbacks.setdefault((self.code.name, sentence))

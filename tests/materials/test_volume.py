@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.materials.compiler import compile_material
 from addon.materials.graph import Graph, Input, Node
 from addon.materials.volume import medium_of
 
@@ -65,3 +66,19 @@ def test_a_texture_in_the_density_makes_a_medium_uneven():
     medium = medium_of(graph(node("s", "VolumeScatter", [noise], Color=(1.0, 1.0, 1.0, 1.0))))
     assert not medium.even
     assert medium.scattering == pytest.approx(np.full(3, 1.5))
+
+
+@pytest.mark.parametrize(
+    ("surface", "volume", "said"),
+    [
+        ("BsdfDiffuse", node("v", "VolumeAbsorption", Density=1.0), "is not drawn"),
+        ("BsdfGlass", node("v", "VolumeAbsorption", Density=1.0), ""),
+        ("BsdfGlass", node("v", "VolumeScatter", Density=1.0), "only what it absorbs"),
+    ],
+    ids=["diffuse", "absorbing", "scattering"],
+)
+def test_what_is_not_drawn_of_a_volume_is_said(surface, volume, said):
+    shader = Node("s", "s", f"ShaderNode{surface}", {}, {"BSDF": "SHADER"})
+    compiled = compile_material("Test", graph(volume, shader, surface=("s", "BSDF")))
+    texts = " ".join(text for _, text in compiled.fallbacks)
+    assert (said in texts) if said else not texts
