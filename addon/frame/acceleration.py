@@ -72,10 +72,13 @@ def world_triangles(
         for mirrored in (False, True)
     }  # fmt: skip
     shown = [one for one in instances if _met(one, path) and meshes[one.mesh].triangle_count]
-    for (key, slots, rays, mirrored), group in groupby(shown, lambda one: _alike(one, path)):
+    # Of instances with equal kinds all triangles look the same.
+    turns = np.linalg.det([one.matrix[:3, :3] for one in shown]) if shown else ()
+    kinds = zip(shown, ((one.mesh, one.materials, _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)))
+    for (key, slots, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
         mesh, slots = meshes[key], np.asarray(slots)
-        look_of_triangle = look[rays, mirrored][slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
-        copies, at_once = list(group), max(AT_ONCE // mesh.triangle_count, 1)
+        look_of_triangle = look[rays, bool(mirrored)][slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        copies, at_once = [one for one, _ in group], max(AT_ONCE // mesh.triangle_count, 1)
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
             matrices = np.stack([one.matrix[:3] for one in some])
@@ -92,11 +95,6 @@ def world_triangles(
 
 def _met(instance: Instance, path: str) -> bool:
     return getattr(instance.visibility, path) or instance.visibility.shadow
-
-
-def _alike(instance: Instance, path: str) -> tuple:
-    """What instances have in common whose triangles look the same."""
-    return instance.mesh, instance.materials, _rays(instance, path), bool(np.linalg.det(instance.matrix[:3, :3]) < 0)
 
 
 def _rays(instance: Instance, path: str) -> int:

@@ -34,6 +34,7 @@ from .overview import DIRECTIONS, overview, some
 
 SIDE = 32  # pixels of one view
 VIEWS = np.concatenate([DIRECTIONS, -DIRECTIONS])  # of both sides
+ALIKE = 0.1  # relative difference of the sides' emission that the views alone may make
 Measure = Callable[[MaterialSet, SceneGeometry, int, list[int]], dict[str, object]]
 
 
@@ -88,7 +89,11 @@ def _emission(materials: MaterialSet, geometry: SceneGeometry, material: int, nu
     sums = [_sum(geometry, numbers, program, bindings, side) for side in (0, 1)]
     means = [tuple(map(float, of[:3] / of[3])) if of[3] > 0 and np.isfinite(of).all() else None for of in sums]
     front, behind = means[0] or means[1], means[1] or means[0]
-    return {"emission": front, "emission_behind": behind} if front else {}
+    if front is None:
+        return {}
+    if np.allclose(front, behind, rtol=ALIKE, atol=ALIKE * max(map(abs, (*front, *behind)))):
+        front = behind = tuple((a + b) / 2 for a, b in zip(front, behind))
+    return {"emission": front, "emission_behind": behind}
 
 
 def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings: dict, side: int = 0) -> np.ndarray:

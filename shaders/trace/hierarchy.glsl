@@ -59,16 +59,16 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
 vec4 opacity_of_four(int leaf, vec4 facing, bool bent, bool shadow)
 {
   vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
-  vec4 rays = floor(abs(code) / (SIDES * SIDES));
-  vec4 sides = abs(code) - rays * (SIDES * SIDES);
+  vec4 stopped = floor(abs(code) / (SIDES * SIDES));
+  vec4 sides = abs(code) - stopped * (SIDES * SIDES);
   vec4 front = floor(sides / SIDES);
   vec4 covered = mix(sides - SIDES * front, front, greaterThan(facing, vec4(0.0)));
   vec4 opacity = min(covered * (1.0001 / (SIDES - 1.0)), vec4(1.0));
   if (bent) {
     opacity = mix(opacity, vec4(1.0), lessThan(code, vec4(0.0)));
   }
-  opacity = mix(opacity, vec4(0.0), equal(rays, vec4(shadow ? 1.0 : 2.0)));
-  return shadow ? mix(opacity, vec4(1.0), equal(rays, vec4(3.0))) : opacity;
+  opacity = mix(opacity, vec4(0.0), equal(stopped, vec4(shadow ? 1.0 : 2.0)));
+  return shadow ? mix(opacity, vec4(1.0), equal(stopped, vec4(3.0))) : opacity;
 }
 
 // A place in the tree: a node, or a leaf.
