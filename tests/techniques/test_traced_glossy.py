@@ -99,7 +99,7 @@ def test_tracing_changes_the_noise_of_a_lobe_and_not_its_mean(stage, roughness):
 
 def test_what_has_no_material_traces_rays_where_it_is_glossy(stage):
     """As it is since Blender 5.0."""
-    stage.floor()
+    stage.rectangle((-20, -20), (20, 20))
     stage.world((0.5, 0.5, 0.5))
     stage.camera((0, -4, 0.6), (1.4, 0, 0))
     shines, found = (
