@@ -65,8 +65,9 @@ def world_triangles(
     corners, looks = [], []
     look = {
         (rays, mirrored): np.array([
-            (_opacity_code(m, rays, mirrored), *_emission(m, mirrored)[0], k + _emission(m, mirrored)[1])
+            (_opacity_code(m, rays, mirrored), *radiance, k + side)
             for k, m in enumerate(materials)
+            for radiance, side in [_emission(m, mirrored)]
         ])
         for rays in (ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE)
         for mirrored in (False, True)

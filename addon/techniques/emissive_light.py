@@ -45,15 +45,18 @@ class EmissiveTriangles:
 
     def __init__(self, frame: Frame):
         corners, radiance, normals, sided = [], [], [], []
-        materials = frame.measured_materials
+        of_side = {side: np.array([_emission(m, side) for m in frame.measured_materials]) for side, _ in SIDES}
+        emissive = {k for emission in of_side.values() for k in np.flatnonzero(emission.any(axis=1))}
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
+            if emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
+                continue
+            slots = np.array(instance.materials)[np.minimum(mesh.triangle_slots, len(instance.materials) - 1)]
             for side, sign in SIDES:
-                slots = np.array([_emission(materials[m], side) for m in instance.materials])
-                if not np.any(slots) or not mesh.triangle_count:
-                    continue
-                emission = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]
+                emission = of_side[side][slots]
                 shining = np.abs(emission).max(axis=1) > 0
+                if not shining.any():
+                    continue
                 matrix = instance.matrix.copy()
                 matrix[:3, 3] -= frame.geometry.origin
                 world = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[shining]]] @ matrix[:3, :3].T
