@@ -56,7 +56,9 @@ def compare(cases: list[Case], pixels: int = 32) -> list[Difference]:
     """Render all cases on tiles of `pixels` x `pixels` with both engines."""
     scene, side = tile_scene(cases)
     size = (side * pixels, side * pixels)
-    scene.candela.film_points = 1  # the pixels' middles, as Cycles' first sample
+    # The pixels' middles alone, as Cycles' first sample.
+    scene.candela.film_points = 1
+    scene.render.filter_size = 0.01
     ours, theirs = (render_passes(scene, engine, 1, size=size, direct_only=True) for engine in ("CANDELA", "CYCLES"))
     found = []
     # The lens sees a little more than the grid, and pixels where only one engine meets the object do not count.

@@ -283,6 +283,19 @@ def _sum_program(compiled: CompiledMaterial, what: str) -> Program:
     )
 
 
+def may_be_glossy(snapshot: Snapshot) -> bool:
+    """Whether a material that is shown may have a glossy lobe; that of empty slots has one since Blender 5.0."""
+    shown = {index for instance in snapshot.instances for index in instance.materials or (0,)}
+    return any(_material_may_be_glossy(snapshot.materials[index]) for index in shown)
+
+
+def _material_may_be_glossy(material) -> bool:
+    return any("Bsdf" in node.type and node.type not in _NEVER_GLOSSY for node in material.graph.nodes.values())
+
+
+_NEVER_GLOSSY = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfTranslucent"}
+
+
 def compile_programs(programs: list[Program], progress=None) -> None:
     """Compile what is not compiled yet. `progress(done, total)` returns True to stop."""
     for done, program in enumerate(programs):

@@ -109,12 +109,17 @@ class View:
         }  # fmt: skip
 
 
+def blackman_harris(t: np.ndarray) -> np.ndarray:
+    """The pixel filter at places t, whose support is -1..1; 1 in the middle."""
+    phase = np.pi * (np.clip(t, -1.0, 1.0) + 1.0)
+    return 0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)
+
+
 @cache
 def _blackman_harris() -> tuple[np.ndarray, np.ndarray]:
     """2,049 places in -1..1, and the filter's integral up to each."""
     t = np.linspace(-1.0, 1.0, 2049)
-    phase = np.pi * (t + 1.0)
-    density = 0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)
+    density = blackman_harris(t)
     cumulative = np.cumsum((density[1:] + density[:-1]) * 0.5)
     return t, np.concatenate([[0.0], cumulative / cumulative[-1]])
 

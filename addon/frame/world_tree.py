@@ -61,11 +61,8 @@ class WorldTree:
             )
             return images.read(target.colors[0])[..., :3].astype(np.float64)
 
-    def add_background(
-        self, target: images.Target, view: View, view_block: Block, surfaces: dict, share: float
-    ) -> None:
-        """Add `share` of what the camera sees where no surface is, to the environment pass. `surfaces`: images by
-        name."""
+    def add_background(self, target: images.Target, view: View, view_block: Block, surfaces: dict) -> None:
+        """Add what the camera sees where no surface is. `surfaces`: images by name."""
         camera, (left, right, bottom, top) = view.camera, view.camera.frame
         self._scene.update(
             **{
@@ -82,7 +79,6 @@ class WorldTree:
             blend="ADDITIVE_PREMULT",
             textures={**self._textures, **{name: surfaces[name] for name in SEEN}},
             blocks={"material_values": self._values, "material_scene": self._scene, "film_view": view_block},
-            constants={"film_share": share},
         )
 
 
@@ -96,8 +92,7 @@ def bake_program(compiled: CompiledMaterial) -> Program:
 
 def background_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a world's tree where the camera sees it."""
-    constants = (("FLOAT", "film_share"),)
-    return _program(compiled, "world background", "world/background.frag.glsl", SEEN, ((VIEW, "film_view"),), constants)
+    return _program(compiled, "world background", "world/background.frag.glsl", SEEN, ((VIEW, "film_view"),))
 
 
 def _program(
@@ -106,7 +101,6 @@ def _program(
     fragment: str,
     textures: tuple = (),
     blocks: tuple = (),
-    constants: tuple = (),
 ) -> Program:
     fill = "".join(
         f"  point.attributes[{k}] = vec4(point.position, 1.0);\n"
@@ -120,7 +114,6 @@ def _program(
         fragment,
         textures=tuple(("RGBA32F", name) for name in (*textures, *own)),
         blocks=(*blocks, (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=constants,
         outputs=(("VEC4", "out_radiance"),),
         snippets=(("generated/material", f"{compiled.glsl}\n{head}\n{{\n{fill}}}\n"),),
     )

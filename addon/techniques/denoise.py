@@ -61,6 +61,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..frame.materials import may_be_glossy
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -68,7 +69,6 @@ from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import no_diffuse_light
-from .traced_glossy import may_be_glossy
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
             *SURFACE_TEXTURES,
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
-        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "light_share"), *lookup.constants),
+        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
         defines=(
             *TRACED_DEFINES,
             *SOFT_DEFINES[soft_lobes],

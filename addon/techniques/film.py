@@ -5,25 +5,27 @@ of the glossy lobe. Light is stored with its colour; engine.py divides, after th
 extent that the camera may see are intersected analytically and land in emission.
 
 Techniques add the light of one sample to the images `radiance.*`, all at one point of each pixel's filter. When all
-have done so it goes into the sums, at several such points where the picture has few samples (film_points.py).
+have done so it goes into the sums of all pixels whose filter covers that point (film_filter.py), at several such points
+where the picture has few samples (film_points.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 
 from ..frame import lights
 from ..frame.environment import WORLD
-from ..frame.materials import SURFACE_IMAGES
+from ..frame.materials import SURFACE_IMAGES, may_be_glossy
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from . import film_points, repeated_light
+from . import film_filter, film_points, repeated_light
 from .film_points import PATHS
 from .neighbours import shown_sum
 from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_sample, surface_bindings
@@ -36,6 +38,7 @@ SUMS = (
     Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
+WORLD_SUM = 1  # in SUMS
 LIGHT = tuple(f"radiance.{path}" for path in PATHS)
 
 
@@ -61,7 +64,7 @@ def collect_program(seen: Seen) -> Program:
             ("R32F", "environment_density_map"),
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("FLOAT", "film_share")),
+        constants=(("INT", "light_count"),),
         defines=(
             *SOFT_DEFINES[seen.soft], *((name, "1") for name, is_seen in shown if is_seen),
             ("LIGHT_KINDS", str(seen.kinds)),
@@ -122,6 +125,7 @@ class Film(Technique):
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
             self._light_count = len(seen)
+            self._shown = self._not_black(frame, bool(seen))
             shown = frame.snapshot.world.visibility.camera and frame.environment.power > 0
             world = frame.environment.tree is None and shown
             glossy, world = to_hold((frame.materials.glossy, world), (True, True))
@@ -133,55 +137,54 @@ class Film(Technique):
                 blocks={"film_view": frame.view_block},
             )
         count = film_points.points_of_sample(frame, frame.settings.get(self, film_points.POINTS.name))
-        sums = frame.target(*(f"film.{path}" for path in self._paths))
-        self._collect(frame, surface_bindings(frame), 1.0 / count)
-        film_points.add(frame, self._paths, sums, 1.0 / count)
-        frame.count(self, "passes", 2)
+        with _borrowed(frame, len(SUMS)) as collected:
+            self._collect(frame, surface_bindings(frame), collected)
+            light = {path: frame.images[f"radiance.{path}"] for path in self._paths}
+            self._filter(frame, collected, light, frame.sample, 1.0 / count)
         frame.count(self, "points", count)
         if count > 1:
             yield
-            yield from self._between(frame, count, sums)
+            yield from self._between(frame, count)
         frame.target(*(f"radiance.{path}" for path in self._paths)).clear()
         repeated_light.forget(frame)
         for path in self._paths:
             frame.shown[f"radiance.{path}"] = f"film.{path}"
 
-    def _between(self, frame: Frame, count: int, sums: images.Target) -> Iterator[None]:
+    def _between(self, frame: Frame, count: int) -> Iterator[None]:
         """The same sample's light at other points of the film."""
-        drawn = [images.pool.take(*frame.size, "RGBA32F") for _ in SURFACES]
-        depth = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
-        target = images.Target(tuple(drawn), depth)
-        surfaces = dict(zip(SURFACE_IMAGES, drawn))
         # The first numbers are those of the samples' own points, so that all together are a prefix of the sequence.
         first = frame.settings.samples + frame.sample * (count - 1)
         repeated = frame.settings.get(self, "edges") and repeated_light.possible(frame)
-        marked = images.Target(sums.colors, depth)
-        direct = images.Target(tuple(frame.images[f"film.{path}"] for path in repeated_light.PATHS), depth)
-        share = 1.0 / count
-        try:
-            for point in range(first, first + count - 1):
-                frame.look(film=point)
-                draw_sample(frame, self, target)
-                bindings = {f"surface_{name}": image for name, image in surfaces.items()}
-                self._collect(frame, bindings, share)
-                into = marked if repeated else sums
-                film_points.add_between(frame, self._paths, into, surfaces, share, point, repeated)
-                frame.count(self, "passes", 2)
-                if repeated:
-                    repeated_light.repeat(frame, self._repeated, bindings, direct, share)
-                    frame.count(self, "passes", len(frame.services["lit"]))
-                yield
-        finally:
-            frame.look()
-            for image in (*drawn, depth):
-                images.pool.give(image)
+        with (
+            _borrowed(frame, len(SURFACES)) as drawn,
+            _borrowed(frame, len(SUMS)) as collected,
+            _borrowed(frame, len(self._paths)) as light,
+            _borrowed(frame, 1, "DEPTH_COMPONENT32F") as (depth,),
+        ):
+            target, marked = images.Target(drawn, depth), images.Target(light, depth)
+            surfaces, by_path = dict(zip(SURFACE_IMAGES, drawn)), dict(zip(self._paths, light))
+            direct = images.Target(tuple(by_path[path] for path in repeated_light.PATHS), depth)
+            try:
+                for point in range(first, first + count - 1):
+                    frame.look(film=point)
+                    draw_sample(frame, self, target)
+                    bindings = {f"surface_{name}": image for name, image in surfaces.items()}
+                    self._collect(frame, bindings, collected)
+                    film_points.light_between(frame, self._paths, marked, surfaces, point, repeated)
+                    frame.count(self, "passes")
+                    if repeated:
+                        repeated_light.repeat(frame, self._repeated, bindings, direct)
+                        frame.count(self, "passes", len(frame.services["lit"]))
+                    self._filter(frame, collected, by_path, point, 1.0 / count)
+                    yield
+            finally:
+                frame.look()
 
-    def _collect(self, frame: Frame, surfaces: dict[str, images.Image], share: float) -> None:
-        """Add what needs no light, at the point of the film that the frame looks at."""
+    def _collect(self, frame: Frame, surfaces: dict[str, images.Image], collected: tuple[images.Image, ...]) -> None:
+        """Draw what needs no light, at the point of the film that is looked at, into an image for each of SUMS."""
         passes.fullscreen(
             self._collecting,
-            frame.target(*(write.name for write in SUMS)),
-            blend="ADDITIVE_PREMULT",
+            images.Target(collected),
             textures={
                 **surfaces, "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
@@ -189,17 +192,60 @@ class Film(Technique):
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
-            constants={"light_count": self._light_count, "film_share": share},
+            constants={"light_count": self._light_count},
         )  # fmt: skip
+        frame.count(self, "passes")
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
-            frame.environment.tree.add_background(
-                frame.target("radiance.environment"), frame.view, frame.view_block, surfaces, share
-            )
+            world = images.Target((collected[WORLD_SUM],))
+            frame.environment.tree.add_background(world, frame.view, frame.view_block, surfaces)
             frame.count(self, "passes")
+
+    def _filter(
+        self,
+        frame: Frame,
+        collected: tuple[images.Image, ...],
+        light: dict[str, images.Image],
+        point: int,
+        share: float,
+    ) -> None:
+        """Add what one point of the film shows to the sums."""
+        seen = [image for image, write in zip(collected, SUMS) if write.name in self._shown]
+        sums = [frame.images[write.name] for write in SUMS if write.name in self._shown]
+        seen += [image for path, image in light.items() if path in self._shown]
+        sums += [frame.images[f"film.{path}"] for path in light if path in self._shown]
+        passes_made = film_filter.add(frame, seen, sums, frame.film_offset(point), share)
+        frame.count(self, "passes", passes_made)
+
+    def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:
+        """Those of SUMS and of the light paths in which something may be seen."""
+        reflects = may_be_glossy(frame.snapshot)
+        techniques = [technique for technique in frame.plan.techniques if technique is not self]
+        written = {write.name for technique in techniques for write in technique.writes}
+        shown = {path for path in self._paths if f"radiance.{path}" in written}
+        shown |= {"radiance.environment", "color.diffuse", "surface.normal_sum"}
+        if lights_seen or any(material.emissive for material in frame.materials.compiled):
+            shown.add("radiance.emission")
+        if "transmission_direct" in self._paths:
+            shown.add("color.transmission")
+        if reflects:
+            shown.add("color.glossy")
+        else:
+            shown -= {path for path in shown if path.startswith("glossy")}
+        return frozenset(shown)
 
     def release(self) -> None:
         self._sources.release()
         self._repeated.release()
+
+
+@contextmanager
+def _borrowed(frame: Frame, count: int, image_format="RGBA32F") -> Iterator[tuple[images.Image, ...]]:
+    taken = tuple(images.pool.take(*frame.size, image_format) for _ in range(count))
+    try:
+        yield taken
+    finally:
+        for image in taken:
+            images.pool.give(image)
 
 
 def check_tree(names: Collection[str] | None) -> None:

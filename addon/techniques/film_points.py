@@ -1,31 +1,31 @@
-"""Film points: one sample of light reaches the eye from several points of each pixel's filter.
+"""Film points: where a picture has few samples, each reaches the eye from several points of the film.
 
-Light costs far more than what reflects it, and is smoother: in scenes full of edges most of the error of a picture of
-few samples is how far edges and textures cover its pixels (at 16 samples nine tenths of it in `instances`, three
-quarters in `soft_shadow_garden`). So each sample draws its surfaces K times, and lights them once:
+Light costs more than what reflects it, and is smoother. So each of a few samples draws its surfaces K times, and lights
+them once:
 
     L = 1/K sum over points k  color(k) E(k)
 
-E(k) is the light that arrives at the pixel's own point of the sample, if that lies on the surface that point k sees, so
-inside of surfaces nothing is spread. Else it is that of the pixels around which lie on that surface (normals within 37
-degrees, two pixels of the tangent plane), and where none does, as on wires, that of what is near, most of what faces
-alike. Glossy lobes take it over by their weights, of lobes of the same kind. Emission, the visible world, and the
-colours are exact at every point.
+E(k) is the light that arrives at the pixel whose own point lies next to point k, if that is on the surface that point k
+sees. Else it is that of the pixels around which lie on that surface (normals within 37 degrees, two pixels of the
+tangent plane), and where none does, as on wires, that of what is near, most of what faces alike. Glossy lobes take it
+over by their weights times reflectance, of lobes of the same kind. Emission, the visible world, and the colours are
+exact at every point.
 
-K = points / samples, from 1 to MOST: with as many samples as points each point is lit by itself again. Pictures without
-indirect light have a quarter of that, since there a point costs nearly as much as a sample: with half, 16 samples of
-the Cornell box took 1.8 times as long, and `soft_shadow_garden` erred as much as with more samples in the same time.
+K = points / samples, from 1 to MOST. Eight points a picture, as a sample beyond them pays better than a point: since
+points go to all pixels whose filter covers them (film_filter.py), edges need no more. Pictures without indirect light
+have a quarter of that, since there a point costs nearly as much as a sample.
 
-relMSE of direct light at 256x192, 4 and 16 samples, one point a sample, and eight and four: garden .031 .0061 and .016
-.0043, instances .089 .0185 and .038 .0125, foliage .049 .0106 and .018 .0055, in 1.1 to 1.25 times the time.
+relMSE at 256x192 and seconds, all light, one point a sample, and K as here: one sample, garden .033 1.2, .015 1.5;
+window .086 1.1, .054 1.3; four samples, garden .0087 1.4, .0072 1.6; window .0201 1.9, .0176 2.1. With four points at
+16 samples garden has .0019 for .0018, window .0060 for .0060, in 1.4 times the time.
 
 | cost | per point of the film beside the sample's own |
 |---|---|
-| draws | those of the surface pass, one pass of the film and one of this |
+| draws | those of the surface pass, two passes of the film and one of this |
 | fetches per pixel | 10 + 4, at edges 9 x 9 |
 
 Bias: at edges, of indirect light, and of direct light where it is not repeated (repeated_light.py), which is that of
-the next pixel on the surface; in pixels where light and texture change together. It ends where K = 1.
+the next pixel on the surface; light's own edges are half a pixel wider. It ends where K = 1.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from ..gfx.library import Program
 from .surfaces import refracts
 
 POINTS = Param(
-    "points", "Film points", 64,
+    "points", "Film points", 8,
     "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
     1, 1024, draft=1,
 )  # fmt: skip
@@ -69,16 +69,21 @@ def lit_paths(frame: Frame) -> tuple[str, ...]:
     return PATHS if refracts(frame) else REFLECTED
 
 
-def _programs(name: str, file: str, guides: bool, repeated: bool = False) -> tuple[Program, Program]:
+def _programs(repeated: bool) -> tuple[Program, Program]:
     """Without light through glass, and with it."""
-    seen = tuple(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES) if guides else ()
     return tuple(
         passes.fullscreen_program(
-            name,
-            file,
-            textures=tuple(("RGBA32F", texture) for texture in (*seen, *(f"light_{path}" for path in paths))),
-            blocks=((VIEW, "film_view"),) if guides else (),
-            constants=(("FLOAT", "film_share"), *((("VEC2", "offset"),) if guides else ())),
+            "film light between points, edges marked" if repeated else "film light between points",
+            "film/between.frag.glsl",
+            textures=tuple(
+                ("RGBA32F", texture)
+                for texture in (
+                    *(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES),
+                    *(f"light_{path}" for path in paths),
+                )
+            ),
+            blocks=((VIEW, "film_view"),),
+            constants=(("VEC2", "offset"),),
             defines=(*defines, *((("REPEATED", "1"),) if repeated else ())),
             writes_depth=repeated,
             outputs=tuple(("VEC4", f"out_{path}") for path in paths),
@@ -87,37 +92,25 @@ def _programs(name: str, file: str, guides: bool, repeated: bool = False) -> tup
     )
 
 
-ADD = _programs("film light", "film/add.frag.glsl", False)
-BETWEEN = _programs("film light between points", "film/between.frag.glsl", True)
-MARKING = _programs("film light between points, edges marked", "film/between.frag.glsl", True, True)
+BETWEEN, MARKING = _programs(False), _programs(True)
 
 
-def add(frame: Frame, paths: tuple[str, ...], target: images.Target, share: float) -> None:
-    """Add this sample's light as it was found at the pixels' own points, `share` of it, to the sums in `target`."""
-    light = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
-    passes.fullscreen(
-        ADD[len(paths) == len(PATHS)], target, blend="ADDITIVE_PREMULT", textures=light,
-        constants={"film_share": share},
-    )  # fmt: skip
-
-
-def add_between(
+def light_between(
     frame: Frame,
     paths: tuple[str, ...],
     target: images.Target,
     surfaces: dict[str, images.Image],
-    share: float,
     point: int,
     repeated: bool,
 ) -> None:
-    """Add what `surfaces` (by names of SURFACE_IMAGES), seen at this point of the film, reflect of this sample's
-    light. `repeated`: direct light at edges is left to repeated_light.py; the target's depth marks them by 1."""
+    """Draw into `target`, an image for each path, what `surfaces` (by names of SURFACE_IMAGES), seen at this point of
+    the film, reflect of this sample's light. `repeated`: direct light at edges is left to repeated_light.py; the
+    target's depth marks them by 1."""
     between = tuple(there - own for there, own in zip(frame.film_offset(point), frame.film_offset(frame.sample)))
     textures = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
     textures |= {f"surface_{guide}": surfaces[guide] for guide in GUIDES}
     textures |= {f"known_{guide}": frame.images[f"surface.{guide}"] for guide in GUIDES}
     passes.fullscreen(
-        (MARKING if repeated else BETWEEN)[len(paths) == len(PATHS)], target,
-        blend="ADDITIVE_PREMULT", textures=textures, blocks={"film_view": frame.view_block},
-        constants={"film_share": share, "offset": between},
+        (MARKING if repeated else BETWEEN)[len(paths) == len(PATHS)], target, textures=textures,
+        blocks={"film_view": frame.view_block}, constants={"offset": between},
     )  # fmt: skip

@@ -49,7 +49,7 @@ MARKED = "LESS"  # `where` of passes.fullscreen: the marks are 1 of 0
 
 @dataclass(frozen=True)
 class Lit:
-    """A pass of light over the surfaces of a sample. `bindings` lack the surfaces, the view, the share and the block
+    """A pass of light over the surfaces of a sample. `bindings` lack the surfaces, the view and the block
     `sources`, which is filled from `rows` and `views`."""
 
     program: Program
@@ -58,15 +58,13 @@ class Lit:
     rows: list[np.ndarray]
     views: np.ndarray | None = None
 
-    def bound(
-        self, frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image], share: float
-    ) -> dict[str, dict]:
-        """All bindings of the pass that adds `share` of the light on `surfaces` (by their bindings)."""
+    def bound(self, frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image]) -> dict[str, dict]:
+        """All bindings of the pass that adds the light on `surfaces` (by their bindings)."""
         block = sources.set(self.rows, self.views)
         return {
             "textures": {**surfaces, **self.bindings["textures"]},
             "blocks": {"film_view": frame.view_block, "sources": block, **self.bindings["blocks"]},
-            "constants": {**self.bindings["constants"], "light_share": share},
+            "constants": self.bindings["constants"],
         }
 
 
@@ -80,7 +78,7 @@ def add(
         target = frame.target(*names, depth=MARKS)
     else:
         target = images.Target(tuple(frame.images[name] for name in names), marks)
-    bindings = lit.bound(frame, sources, surface_bindings(frame), 1.0)
+    bindings = lit.bound(frame, sources, surface_bindings(frame))
     for band in frame.bands(technique):
         passes.fullscreen(lit.program, target, blend="ADDITIVE_PREMULT", where=lit.where, rows=band, **bindings)
         yield
@@ -104,12 +102,10 @@ def possible(frame: Frame) -> bool:
     return allowed and bool(frame.services.get("lit"))
 
 
-def repeat(
-    frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image], target: images.Target, share: float
-) -> None:
-    """Add `share` of the sample's direct light on `surfaces` where the depth of `target` marks it."""
+def repeat(frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image], target: images.Target) -> None:
+    """Add the sample's direct light on `surfaces` where the depth of `target` marks it."""
     for lit in frame.services["lit"]:
-        bindings = lit.bound(frame, sources, surfaces, share)
+        bindings = lit.bound(frame, sources, surfaces)
         passes.fullscreen(lit.program, target, blend="ADDITIVE_PREMULT", where=MARKED, **bindings)
 
 

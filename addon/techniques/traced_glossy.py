@@ -31,6 +31,7 @@ import numpy as np
 
 from ..frame import acceleration, lights
 from ..frame.environment import WORLD
+from ..frame.materials import may_be_glossy
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
@@ -54,7 +55,7 @@ TRACED = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
     constants=(
-        ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"), ("FLOAT", "light_share"),
+        ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
     ),
     defines=TRACED_DEFINES,
@@ -132,19 +133,6 @@ class TracedGlossy(Technique):
 
     def release(self) -> None:
         self._sources.release()
-
-
-def may_be_glossy(snapshot: Snapshot) -> bool:
-    """Whether a material that is shown may have a glossy lobe; that of empty slots has one since Blender 5.0."""
-    shown = {index for instance in snapshot.instances for index in instance.materials or (0,)}
-    return any(_material_may_be_glossy(snapshot.materials[index]) for index in shown)
-
-
-def _material_may_be_glossy(material) -> bool:
-    return any("Bsdf" in node.type and node.type not in _NEVER_GLOSSY for node in material.graph.nodes.values())
-
-
-_NEVER_GLOSSY = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfTranslucent"}
 
 
 def _has_extent(light) -> bool:

@@ -137,6 +137,8 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = known_position_size();
+  ivec2 nearest = clamp(pixel + ivec2(floor(offset + 0.5)), ivec2(0), size - 1);  // whose own point lies next to this one
+  vec2 beside = offset - vec2(nearest - pixel);
 #ifdef REPEATED
   gl_FragDepth = 0.0;
 #endif
@@ -178,7 +180,7 @@ void main()
   for (int reach = 0; reach <= REACH && !(light_found && lobe_found); reach++) {
     for (int y = -reach; y <= reach; y++) {
       for (int x = -reach; x <= reach; x++) {
-        ivec2 other = pixel + ivec2(x, y);
+        ivec2 other = nearest + ivec2(x, y);
         if (max(abs(x), abs(y)) < reach) {
           continue;  // looked at before
         }
@@ -189,7 +191,7 @@ void main()
         if (!there.hit) {
           continue;
         }
-        vec2 off = abs(vec2(float(x), float(y)) - offset);
+        vec2 off = abs(vec2(float(x), float(y)) - beside);
         float weight = max(1.5 - off.x, 0.01) * max(1.5 - off.y, 0.01);
         float facing = dot(here.normal, there.normal);
         bool equal = facing > 0.8 && abs(dot(here.normal, there.position - here.position)) < tolerance;
@@ -244,11 +246,11 @@ void main()
     direct = vec3(0.0);
   }
 #endif
-  out_diffuse_direct.rgb = film_share * here.color * direct;
-  out_diffuse_indirect.rgb = film_share * here.color * indirect;
+  out_diffuse_direct.rgb = here.color * direct;
+  out_diffuse_indirect.rgb = here.color * indirect;
   arriving_mean(same_lobe, nearby_lobe, direct, indirect);
-  direct *= film_share * here.weight;
-  indirect *= film_share * here.weight;
+  direct *= here.weight;
+  indirect *= here.weight;
 #ifdef TRANSMISSION
   if (refracts) {
     out_transmission_direct.rgb = direct;

@@ -86,10 +86,4 @@ void main()
     }
   }
 #endif
-  out_emission *= film_share;
-  out_environment *= film_share;
-  out_diffuse_color *= film_share;
-  out_glossy_color *= film_share;
-  out_transmission_color *= film_share;
-  out_normal *= film_share;
 }

@@ -129,13 +129,13 @@ void main()
 #endif
     }
   }
-  out_diffuse = vec4(light_share * diffuse, 0.0);
-  out_glossy = vec4(light_share * glossy, 0.0);
+  out_diffuse = vec4(diffuse, 0.0);
+  out_glossy = vec4(glossy, 0.0);
 #ifdef KNOWN_IRRADIANCE
   if (known) {
     float all = luminance(abs(drawn));
     vec3 missing = known_share * known_irradiance(s.normal) - drawn;
-    out_diffuse.rgb += light_share * openness_of(pixel, arrived, all) * missing * s.diffuse / PI;
+    out_diffuse.rgb += openness_of(pixel, arrived, all) * missing * s.diffuse / PI;
     out_diffuse.w = arrived;
     out_glossy.w = all;
   }

@@ -103,7 +103,7 @@ void main()
       vec2 ignored;
       float limit = (blocked < kept_span.y) ? blocked : 1e29;
       vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
-      out_glossy.rgb = kept_weight * light * (light_share * total / (kept_importance * float(count)));
+      out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
     }
   }
   if (emissive_power > 0.0) {
@@ -126,7 +126,7 @@ void main()
         float ratio = emissive_points * light_density / max(lobe_density, 1e-30);
         share = 1.0 / (1.0 + ratio * ratio);
       }
-      out_glossy.rgb += weight * emission * (light_share * share);
+      out_glossy.rgb += weight * emission * share;
     }
   }
 }

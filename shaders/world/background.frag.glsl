@@ -11,6 +11,6 @@ void main()
   out_radiance = vec4(0.0);
   if (surface_position_fetch(pixel).w == 0.0) {
     vec3 passed = surface_emission_fetch(pixel).rgb;
-    out_radiance.rgb = world_radiance(view_direction(gl_FragCoord.xy), RAY_CAMERA) * passed * film_share;
+    out_radiance.rgb = world_radiance(view_direction(gl_FragCoord.xy), RAY_CAMERA) * passed;
   }
 }

@@ -69,13 +69,17 @@ def test_nothing_is_drawn_twice_where_all_points_are_one(stage, light_of):
     assert stage.ledger.row("film").counters["points"] == 2
 
 
-def test_light_on_one_colour_is_as_it_is_at_the_pixels_own_points(stage, light_of):
-    """A shadow's edge on a plane: no point of the film sees another surface, so nothing is spread."""
+@pytest.mark.parametrize("samples", [1, 8])
+def test_a_shadows_edge_on_one_colour_is_as_sharp_as_without(stage, light_of, samples):
+    """No point of the film sees another surface, so light moves by the half pixel to the next one's point at most."""
     stage.floor()
     stage.blocker((-2, -2), (0.05, 2), 1.0)
     stage.light("SUN", energy=3.0)
-    own, shared = (light_of("diffuse_direct", 8, points, bounces=1) for points in (1, 32))
-    np.testing.assert_allclose(shared, own, atol=1e-5)
+    truth, own, shared = (
+        light_of("diffuse_direct", count, points, bounces=1)
+        for count, points in ((256, 1), (samples, 1), (samples, 64))
+    )
+    assert error(shared, truth) < 1.2 * error(own, truth)
 
 
 @pytest.mark.parametrize("colors", [((0, 0, 0, 1), (1, 1, 1, 1)), ((1, 0, 0, 1), (0, 1, 1, 1))], ids=["black", "red"])

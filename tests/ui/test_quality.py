@@ -27,7 +27,7 @@ def set_by_presets(scene):
     return (
         own.samples, own.viewport_samples, own.accumulated_maps_texels_per_pixel, own.instant_radiosity_virtual_lights,
         own.instant_radiosity_rays, own.light_probes_maps, own.multires_radiosity_virtual_lights,
-        own.multires_radiosity_rays, own.clustered_visibility_virtual_lights, own.film_points,
+        own.multires_radiosity_rays, own.clustered_visibility_virtual_lights,
     )  # fmt: skip
 
 

@@ -13,6 +13,5 @@ candela.multires_radiosity_rays = 64
 candela.multires_radiosity_near_bounces = True
 candela.clustered_visibility_virtual_lights = 1024
 candela.clustered_visibility_near_bounces = True
-candela.film_points = 64
 candela.environment_light_texels_per_pixel = 1.0
 candela.shadows_by_light_soft_maps = True

@@ -13,6 +13,5 @@ candela.multires_radiosity_rays = 2
 candela.multires_radiosity_near_bounces = False
 candela.clustered_visibility_virtual_lights = 128
 candela.clustered_visibility_near_bounces = False
-candela.film_points = 6
 candela.environment_light_texels_per_pixel = 1.0
 candela.shadows_by_light_soft_maps = False

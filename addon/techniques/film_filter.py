@@ -1,0 +1,115 @@
+"""Film filter: what a sample sees goes to every pixel whose filter covers it.
+
+A sample looks at the same place x of every pixel, so that its points are a grid one pixel apart. The filter w of a
+pixel (Blackman-Harris, as in Cycles) is some pixels wide, and covers points of the pixels around as well. Where places
+are drawn in proportion to w, a point at y from a pixel's middle may be the pixel's own or that of one k pixels away,
+and the balance heuristic (Veach and Guibas, "Optimally combining sampling techniques for Monte Carlo rendering",
+SIGGRAPH 1995) gives it in this pixel
+
+    W(y) = w(y) / sum over k of w(y - k)
+
+The weights of a sample's points in a pixel sum to one: what is even stays even, also in a single sample. Each pixel has
+several times as many points, most of them in the filter's tails, where its own are few and each counted in full: there
+lay the error at edges between very bright and dark.
+
+Within twice the filter's reach of the picture's rim, where some of the pixels around are missing, only own points
+count, along the axis that leads to the rim. So the mean of all samples is the filtered picture in every pixel.
+
+relMSE of direct light at 256x192, own points alone, and so: 16 samples window .073 .019, hall .093 .041, instances .024
+.0075, garden .0068 .0026, Cornell box .0019 .0003, foliage .0102 .0042, product .0076 .0042; 64 samples .0065 .0013,
+.0039 .0022, .0024 .0008, .0008 .0003, .0002 .00005, .0012 .0005, .0008 .0003.
+
+| cost | per point of the film |
+|---|---|
+| passes | 1 for up to 6 images |
+| fetches per pixel and image | 9 (filters of up to 1.5 pixels' radius), 25 (up to 2.5), else 1 |
+
+Bias: none. Wider and very narrow filters (below half a pixel) have own points only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.view import blackman_harris
+from ..gfx import images, passes
+from ..gfx.library import Program
+
+FARTHEST = 2  # pixels on each side: wider filters would cost more than samples
+MOST_IMAGES = 6  # that Blender lets a pass draw into
+
+
+def reach(width: float) -> int:
+    """How many pixels on each side share a point with one, for a filter of that radius in pixels; 0: none do."""
+    pixels = int(np.ceil(width - 0.5))
+    return max(pixels, 0) if pixels <= FARTHEST else 0
+
+
+def taps(place: float, width: float) -> tuple[int, np.ndarray]:
+    """The pixel (counted from the own one) that `place`, in pixels from the own one's middle, lies in, and the weights
+    (2 reach + 1) of the points in the pixels -reach..reach around any pixel, which sum to 1."""
+    pixel = int(np.floor(place + 0.5)) if reach(width) else 0
+    around = np.arange(-reach(width), reach(width) + 1) + place - pixel
+    weights = blackman_harris(around / width) if reach(width) else np.ones(1)
+    return pixel, weights / weights.sum()
+
+
+@cache
+def program(count: int, pixels: int) -> Program:
+    """Adds `count` images of a sample to as many sums; `pixels` as of `reach`."""
+    each = range(count)
+    return passes.fullscreen_program(
+        f"film filter, {count} images, {2 * pixels + 1} pixels wide",
+        "film/filter.frag.glsl",
+        textures=tuple(("RGBA32F", f"seen_{i}") for i in each),
+        constants=(
+            ("FLOAT", "film_share"), ("IVEC2", "film_pixel"), ("VEC4", "weights_x"), ("VEC4", "weights_y"),
+            ("VEC2", "last_weights"),
+        ),
+        defines=(
+            ("PIXELS", str(pixels)),
+            ("BEGIN_ALL", " ".join(f"vec4 sum_{i} = vec4(0.0);" for i in each)),
+            ("GATHER_ALL", " ".join(f"sum_{i} += weight * seen_{i}_fetch(place);" for i in each)),
+            ("END_ALL", " ".join(f"out_{i} = film_share * sum_{i};" for i in each)),
+        ),
+        outputs=tuple(("VEC4", f"out_{i}") for i in each),
+    )  # fmt: skip
+
+
+PROGRAMS = tuple(program(count, pixels) for count in (1, MOST_IMAGES) for pixels in range(FARTHEST + 1))
+
+
+def add(
+    frame: Frame, seen: Sequence[images.Image], sums: Sequence[images.Image], place: tuple[float, float], share: float
+) -> int:
+    """Add `share` of images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset), to
+    the images `sums`, one for each. Returns the number of passes."""
+    width = frame.snapshot.film.filter_width
+    pixels = reach(width)
+    (x, across), (y, up) = (taps(one, width) for one in place)
+    across, up = (np.append(weights, np.zeros(2 * FARTHEST + 1 - len(weights))) for weights in (across, up))
+    count = -(-len(seen) // MOST_IMAGES)
+    for part in range(count):
+        some, into = seen[part::count], tuple(sums[part::count])
+        passes.fullscreen(
+            program(len(some), pixels),
+            _target(frame, into),
+            blend="ADDITIVE_PREMULT",
+            textures={f"seen_{i}": image for i, image in enumerate(some)},
+            constants={
+                "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
+                "last_weights": (across[4], up[4]),
+            },
+        )  # fmt: skip
+    return count
+
+
+def _target(frame: Frame, sums: tuple[images.Image, ...]) -> images.Target:
+    targets = frame.services.setdefault("film filter targets", {})
+    if sums not in targets:
+        targets[sums] = images.Target(sums)
+    return targets[sums]
