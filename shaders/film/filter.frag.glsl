@@ -2,14 +2,12 @@
 // (techniques/film_filter.py). `film_pixel`: which pixel, counted from the own one, it lies in.
 #define TAPS (2 * PIXELS + 1)
 
-// Weights of the points around along one axis. At the picture's rim, where pixels around are missing, of the own alone.
-void weigh(int at, int size, int own, vec4 first, float last, out float weights[TAPS])
+// Weight of the point `tap` pixels from the first one around, along one axis. At the picture's rim, where pixels around
+// are missing, only the own point counts.
+float weight_of(int tap, bool inside, int own, vec4 first, float last)
 {
-  bool inside = at >= 2 * PIXELS && at < size - 2 * PIXELS;
-  for (int i = 0; i < TAPS; i++) {
-    float tap = (i < 4) ? first[i] : last;
-    weights[i] = inside ? tap : ((i - PIXELS == own) ? 1.0 : 0.0);
-  }
+  float around = (tap < 4) ? first[min(tap, 3)] : last;
+  return inside ? around : ((tap - PIXELS == own) ? 1.0 : 0.0);
 }
 
 void main()
@@ -22,13 +20,12 @@ void main()
   ivec2 place = pixel;
   GATHER_ALL
 #else
-  float across[TAPS];
-  float up[TAPS];
-  weigh(pixel.x, size.x, film_pixel.x, weights_x, last_weights.x, across);
-  weigh(pixel.y, size.y, film_pixel.y, weights_y, last_weights.y, up);
+  bvec2 inside = bvec2(pixel.x >= 2 * PIXELS && pixel.x < size.x - 2 * PIXELS,
+                       pixel.y >= 2 * PIXELS && pixel.y < size.y - 2 * PIXELS);
   for (int y = 0; y < TAPS; y++) {
+    float up = weight_of(y, inside.y, film_pixel.y, weights_y, last_weights.y);
     for (int x = 0; x < TAPS; x++) {
-      float weight = across[x] * up[y];
+      float weight = up * weight_of(x, inside.x, film_pixel.x, weights_x, last_weights.x);
       ivec2 place = clamp(pixel + ivec2(x, y) - PIXELS - film_pixel, ivec2(0), size - 1);
       GATHER_ALL
     }
