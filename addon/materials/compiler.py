@@ -79,7 +79,7 @@ class _Compilation:
             values=values,
             transparent=transparent,
             casts_by_lot=transparent and (self.graph.transparent_shadow or summary.glass is not None),
-            emissive=bool(np.any(emission.high > 0.0) or np.any(emission.low < 0.0)),
+            emissive=not np.all((emission.high <= 0.0) & (emission.low >= 0.0)),  # not known: it may be
             emission=shining,
             emission_behind=shining,
             opacity=opacity,

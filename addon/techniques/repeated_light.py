@@ -6,7 +6,9 @@ shows a highlight. So pixels are marked whose own point lies elsewhere, unless t
 neighbours on the surface differs by less than 30 %, and the passes of light run again in them alone: the same points
 on lights, the same depth maps, which hold until the next sample.
 
-relMSE of direct light, 256x192, 16 samples (4 points each), by the guess and repeated, with seconds of the render:
+relMSE at 256x192, four samples of two points each, all light, by the guess and repeated: garden .0080 and .0072, window
+.0184 and .0176. Before points went to all pixels whose filter covers them, direct light at 16 samples (4 points each),
+with seconds of the render:
 
 | | guess | repeated | every edge repeated |
 |---|---|---|---|
