@@ -61,13 +61,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..frame.materials import may_be_glossy
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..snapshot.scene import Snapshot
+from .film_points import shown_paths
 from .instant_radiosity import no_diffuse_light
 
 
@@ -167,12 +167,8 @@ class Denoise(Technique):
                 frame.shown[f"radiance.{path}"] = f"denoise.{path}"
 
     def _paths(self, frame: Frame) -> list[str]:
-        """Those that a technique of the plan adds light to; Film only clears them."""
-        writers = [technique for technique in frame.plan.techniques if technique.name not in ("film", self.name)]
-        written = {write.name for technique in writers for write in technique.writes}
-        if not may_be_glossy(frame.snapshot):
-            written.discard("radiance.glossy_indirect")
-        return [path for path in FILTERS if f"radiance.{path}" in written]
+        shown = shown_paths(frame)
+        return [path for path in FILTERS if path in shown]
 
     def _filter(self, frame: Frame, path: str, count: int) -> Iterator[None]:
         sums = {"sum_now": frame.images[f"film.{path}"], "color_sum": frame.images[f"color.{path.split('_')[0]}"]}

@@ -12,7 +12,7 @@ where the picture has few samples (film_points.py).
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 
@@ -209,28 +209,21 @@ class Film(Technique):
         share: float,
     ) -> None:
         """Add what one point of the film shows to the sums."""
-        seen = [image for image, write in zip(collected, SUMS) if write.name in self._shown]
-        sums = [frame.images[write.name] for write in SUMS if write.name in self._shown]
-        seen += [image for path, image in light.items() if path in self._shown]
-        sums += [frame.images[f"film.{path}"] for path in light if path in self._shown]
-        passes_made = film_filter.add(frame, seen, sums, frame.film_offset(point), share)
-        frame.count(self, "passes", passes_made)
+        seen = {write.name: image for write, image in zip(SUMS, collected)}
+        seen |= {f"film.{path}": image for path, image in light.items()}
+        seen = {name: image for name, image in seen.items() if name in self._shown}
+        frame.count(self, "passes", film_filter.add(frame, seen, frame.film_offset(point), share))
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:
-        """Those of SUMS and of the light paths in which something may be seen."""
-        reflects = may_be_glossy(frame.snapshot)
-        techniques = [technique for technique in frame.plan.techniques if technique is not self]
-        written = {write.name for technique in techniques for write in technique.writes}
-        shown = {path for path in self._paths if f"radiance.{path}" in written}
+        """Those of SUMS and of the sums of light in which something may be seen."""
+        shown = {f"film.{path}" for path in film_points.shown_paths(frame)}
         shown |= {"radiance.environment", "color.diffuse", "surface.normal_sum"}
         if lights_seen or any(material.emissive for material in frame.materials.compiled):
             shown.add("radiance.emission")
         if "transmission_direct" in self._paths:
             shown.add("color.transmission")
-        if reflects:
+        if may_be_glossy(frame.snapshot):
             shown.add("color.glossy")
-        else:
-            shown -= {path for path in shown if path.startswith("glossy")}
         return frozenset(shown)
 
     def release(self) -> None:
@@ -240,12 +233,9 @@ class Film(Technique):
 
 @contextmanager
 def _borrowed(frame: Frame, count: int, image_format="RGBA32F") -> Iterator[tuple[images.Image, ...]]:
-    taken = tuple(images.pool.take(*frame.size, image_format) for _ in range(count))
-    try:
-        yield taken
-    finally:
-        for image in taken:
-            images.pool.give(image)
+    with ExitStack() as stack:
+        targets = [stack.enter_context(images.borrowed(*frame.size, image_format)) for _ in range(count)]
+        yield tuple(target.colors[0] for target in targets)
 
 
 def check_tree(names: Collection[str] | None) -> None:

@@ -29,7 +29,6 @@ Bias: none. Wider and very narrow filters (below half a pixel) have own points o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -52,9 +51,11 @@ def reach(width: float) -> int:
 def taps(place: float, width: float) -> tuple[int, np.ndarray]:
     """The pixel (counted from the own one) that `place`, in pixels from the own one's middle, lies in, and the weights
     (2 reach + 1) of the points in the pixels -reach..reach around any pixel, which sum to 1."""
-    pixel = int(np.floor(place + 0.5)) if reach(width) else 0
-    around = np.arange(-reach(width), reach(width) + 1) + place - pixel
-    weights = blackman_harris(around / width) if reach(width) else np.ones(1)
+    pixels = reach(width)
+    if not pixels:
+        return 0, np.ones(1)
+    pixel = int(np.floor(place + 0.5))
+    weights = blackman_harris((np.arange(-pixels, pixels + 1) + place - pixel) / width)
     return pixel, weights / weights.sum()
 
 
@@ -83,33 +84,23 @@ def program(count: int, pixels: int) -> Program:
 PROGRAMS = tuple(program(count, pixels) for count in (1, MOST_IMAGES) for pixels in range(FARTHEST + 1))
 
 
-def add(
-    frame: Frame, seen: Sequence[images.Image], sums: Sequence[images.Image], place: tuple[float, float], share: float
-) -> int:
-    """Add `share` of images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset), to
-    the images `sums`, one for each. Returns the number of passes."""
+def add(frame: Frame, seen: dict[str, images.Image], place: tuple[float, float], share: float) -> int:
+    """Add `share` of the images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset),
+    to the frame's images of these names. Returns the number of passes."""
     width = frame.snapshot.film.filter_width
-    pixels = reach(width)
     (x, across), (y, up) = (taps(one, width) for one in place)
     across, up = (np.append(weights, np.zeros(2 * FARTHEST + 1 - len(weights))) for weights in (across, up))
     count = -(-len(seen) // MOST_IMAGES)
     for part in range(count):
-        some, into = seen[part::count], tuple(sums[part::count])
+        names = tuple(seen)[part::count]
         passes.fullscreen(
-            program(len(some), pixels),
-            _target(frame, into),
+            program(len(names), reach(width)),
+            frame.target(*names),
             blend="ADDITIVE_PREMULT",
-            textures={f"seen_{i}": image for i, image in enumerate(some)},
+            textures={f"seen_{i}": seen[name] for i, name in enumerate(names)},
             constants={
                 "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
                 "last_weights": (across[4], up[4]),
             },
         )  # fmt: skip
     return count
-
-
-def _target(frame: Frame, sums: tuple[images.Image, ...]) -> images.Target:
-    targets = frame.services.setdefault("film filter targets", {})
-    if sums not in targets:
-        targets[sums] = images.Target(sums)
-    return targets[sums]

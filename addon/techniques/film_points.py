@@ -30,6 +30,7 @@ the next pixel on the surface; light's own edges are half a pixel wider. It ends
 
 from __future__ import annotations
 
+from ..frame.materials import may_be_glossy
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..frame.view import VIEW
@@ -67,6 +68,14 @@ def points_of_sample(frame: Frame, points: int) -> int:
 def lit_paths(frame: Frame) -> tuple[str, ...]:
     """Light paths that techniques of the plan may add to: diffuse and glossy always, through glass by need."""
     return PATHS if refracts(frame) else REFLECTED
+
+
+def shown_paths(frame: Frame) -> set[str]:
+    """Light paths that techniques of the plan add to and some material may show; Film only clears them."""
+    writers = [technique for technique in frame.plan.techniques if technique.name != "film"]
+    written = {write.name for technique in writers for write in technique.writes}
+    glossy = may_be_glossy(frame.snapshot)
+    return {path for path in PATHS if f"radiance.{path}" in written and (glossy or not path.startswith("glossy"))}
 
 
 def _programs(repeated: bool) -> tuple[Program, Program]:

@@ -1,7 +1,7 @@
 // What a surface seen at another point of the film sends to the eye, of the light that was found at the pixels' own
-// points (`known`): light arrives there as at the pixel's own point where that lies on the same surface, else as at the
+// points (`known`): light arrives there as at the nearest of those where that lies on the same surface, else as at the
 // pixels around it that do, else as nearby; and leaves by the colours of the surface that is seen.
-// REPEATED: where the pixel's own point lies elsewhere, and the light of pixels around that lie there is not even, direct
+// REPEATED: where the nearest own point lies elsewhere, and the light of pixels around that lie there is not even, direct
 // light is left out, but for that through glass, and the pixel marked by its depth (techniques/repeated_light.py).
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
