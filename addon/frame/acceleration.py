@@ -18,6 +18,7 @@ from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
 from . import box_tree
 from .box_tree import LEAF
+from .opacity_maps import OpacityMaps
 
 LARGEST = 4_000_000  # triangles
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
@@ -27,15 +28,17 @@ HIERARCHY_TEXTURES = (("RGBA32F", "trace_nodes"), ("RGBA32F", "trace_leaves"))
 # The node's grid; lower and upper corners of the four children on it; number of the first child that is a node, of the
 # first one that is a leaf, and how many are nodes: those come first.
 NODE_TEXELS = 4
-# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity (_opacity_code); emission r, g, b;
+# Corner x, y, z, first edge x, y, z, second edge x, y, z of four triangles; opacity (_codes); emission r, g, b;
 # material (and _emission); shading normals of the three corners.
 LEAF_TEXELS = 17
 # Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
 ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
+MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
 FRONT_ALONE = 0.25  # added to the material's number
 SIDE_STEPS = 2047  # of the opacity of a side: those of two, and the above, are exact in one float
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
+NO_TILES = np.zeros((0, 4), np.float32)
 
 
 @dataclass(frozen=True)
@@ -58,14 +61,15 @@ def world_triangles(
     materials: list[CompiledMaterial],
     origin: np.ndarray,
     path: str = "glossy",
+    maps: OpacityMaps | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
-    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_opacity_code), mean emitted radiance, number of the
-    material (with the side that emits, _emission) and packed corner normals."""
+    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_codes), mean emitted radiance, number of the material
+    (with the side that emits, _emission) and packed corner normals."""
     corners, looks = [], []
     look = {
         (rays, mirrored): np.array([
-            (_opacity_code(m, rays, mirrored), *radiance, k + side)
+            (_mean_code(m, rays, mirrored), *radiance, k + side)
             for k, m in enumerate(materials)
             for radiance, side in [_emission(m, mirrored)]
         ])
@@ -78,8 +82,11 @@ def world_triangles(
     kinds = zip(shown, ((one.mesh, one.materials, _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)))
     for (key, slots, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
         mesh, slots = meshes[key], np.asarray(slots)
-        look_of_triangle = look[rays, bool(mirrored)][slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        of_triangle = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]
+        look_of_triangle = look[rays, bool(mirrored)][of_triangle]
         copies, at_once = [one for one, _ in group], max(AT_ONCE // mesh.triangle_count, 1)
+        if maps is not None:
+            _refine(look_of_triangle, of_triangle, materials, maps.of(copies[0]), rays, bool(mirrored))
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
             matrices = np.stack([one.matrix[:3] for one in some])
@@ -87,8 +94,8 @@ def world_triangles(
             world = mesh.positions @ turned.transpose(0, 2, 1).astype(np.float32) + moved[:, None]
             corners.append(world[:, mesh.corner_vertices[mesh.triangle_corners]].reshape(-1, 3, 3))
             normals = _packed_normals(mesh.corner_normals @ _cofactors(turned).transpose(0, 2, 1))
-            of_triangle = np.broadcast_to(look_of_triangle, (len(some), *look_of_triangle.shape))
-            looks.append(np.concatenate([of_triangle, normals[:, mesh.triangle_corners]], axis=2).reshape(-1, 8))
+            of_copies = np.broadcast_to(look_of_triangle, (len(some), *look_of_triangle.shape))
+            looks.append(np.concatenate([of_copies, normals[:, mesh.triangle_corners]], axis=2).reshape(-1, 8))
     if not corners:
         return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
     return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
@@ -105,17 +112,46 @@ def _rays(instance: Instance, path: str) -> int:
     return ALL_RAYS if instance.visibility.shadow else OPEN_TO_SHADOW
 
 
-def _opacity_code(material: CompiledMaterial, rays: int = ALL_RAYS, mirrored: bool = False) -> float:
-    """What decides whether rays pass a triangle, as shaders/trace/hierarchy.glsl reads it: the mean coverage of its two
-    sides by which they pass at random, below 1 where some may, and which `rays` that is about; negative where rays may
-    also be bent. `mirrored`: the triangle's corners run the other way round."""
-    sides = np.array([material.opacity_behind, material.opacity][:: 1 if mirrored else -1])
-    steps = np.clip(np.rint(sides * SIDE_STEPS), 0, SIDE_STEPS - 1) if material.transparent else [SIDE_STEPS] * 2
-    if material.transparent and not material.casts_by_lot and not material.glass:
-        rays = WHOLE_SHADOW if rays == ALL_RAYS else rays
-        steps = [SIDE_STEPS] * 2 if rays == SHADOW_ALONE else steps
-    code = float((rays * (SIDE_STEPS + 1) + steps[0]) * (SIDE_STEPS + 1) + steps[1])
-    return -max(code, 1.0) if material.glass else code
+def _mean_code(material: CompiledMaterial, rays: int = ALL_RAYS, mirrored: bool = False) -> float:
+    """The code of triangles of a material of which no more is known than its mean opacity."""
+    if not material.transparent:
+        return float(_codes(rays, np.ones(2), False, False))
+    # Some ray may pass, however few.
+    sides = np.minimum(np.full(2, material.opacity), 1.0 - 1.0 / SIDE_STEPS)
+    stopped, whole = _stopped(material, rays)
+    return float(_codes(stopped, np.ones(2) if whole else sides, mirrored, material.glass is not None))
+
+
+def _stopped(material: CompiledMaterial, rays: int) -> tuple[int, bool]:
+    """Which rays a transparent material's triangles stop, and whether they stop those wherever they meet them."""
+    if material.casts_by_lot or material.glass:
+        return rays, False
+    return (WHOLE_SHADOW if rays == ALL_RAYS else rays), rays == SHADOW_ALONE
+
+
+def _codes(stopped: int, sides: np.ndarray, mirrored: bool, glass: bool, tile=0) -> np.ndarray:
+    """What decides whether rays pass triangles, as shaders/trace/hierarchy.glsl reads it: coverage (..., 2) of front
+    and back by which they pass at random, or, where it is not 0, the `tile` (...) that tells it for each place, and
+    which rays that is about; negative where rays may also be bent. `mirrored`: corners run the other way round."""
+    steps = np.rint(np.clip(sides[..., ::-1] if mirrored else sides, 0.0, 1.0) * SIDE_STEPS)
+    even = (stopped * (SIDE_STEPS + 1) + steps[..., 0]) * (SIDE_STEPS + 1) + steps[..., 1]
+    # Twice a whole number: beyond 2^24 every second one is a float.
+    tiled = (MAPPED + stopped) * (SIDE_STEPS + 1) ** 2 + 2 * (2 * np.asarray(tile) + mirrored)
+    codes = np.where(np.asarray(tile) > 0, tiled, even).astype(float)
+    return -np.maximum(codes, 1.0) if glass else codes
+
+
+def _refine(look, of_triangle, materials: list[CompiledMaterial], known, rays: int, mirrored: bool) -> None:
+    """Put what OpacityMaps found of an instance's triangles, `known`, into their rows of `look`."""
+    if known is None:
+        return
+    for number in np.unique(of_triangle[known.measured]):
+        material = materials[number]
+        stopped, whole = _stopped(material, rays)
+        if not whole:
+            own = np.flatnonzero(known.measured & (of_triangle == number))
+            glass = material.glass is not None
+            look[own, 0] = _codes(stopped, known.sides[own], mirrored, glass, known.tile[own])
 
 
 def _emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple[float, float, float], float]:
@@ -130,10 +166,19 @@ def _emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple
     return (front if any(front) else behind), -side if mirrored else side
 
 
-def coverage(codes: np.ndarray) -> np.ndarray:
+def coverage(codes: np.ndarray, maps: OpacityMaps) -> np.ndarray:
     """(N,) mean of the two sides' opacity, of what world_triangles says of (N,) triangles."""
     sides = np.abs(codes) % (SIDE_STEPS + 1) ** 2
-    return (sides // (SIDE_STEPS + 1) + sides % (SIDE_STEPS + 1)) / (2 * SIDE_STEPS)
+    mean = (sides // (SIDE_STEPS + 1) + sides % (SIDE_STEPS + 1)) / (2 * SIDE_STEPS)
+    tiled = np.abs(codes) >= MAPPED * (SIDE_STEPS + 1) ** 2
+    if tiled.any():
+        mean[tiled] = maps.means[(sides[tiled] / 4).astype(int)]
+    return mean
+
+
+def _empty(codes: np.ndarray) -> np.ndarray:
+    """(N,) triangles that no ray can meet."""
+    return (codes >= 0) & (codes % (SIDE_STEPS + 1) ** 2 == 0) & (codes < WHOLE_SHADOW * (SIDE_STEPS + 1) ** 2)
 
 
 def _cofactors(matrices: np.ndarray) -> np.ndarray:
@@ -167,28 +212,36 @@ class Tree:
     leaves: np.ndarray | None  # (L, LEAF_TEXELS, LEAF)
     low: np.ndarray | None  # (slots, 3) of the triangle in each
     high: np.ndarray | None
+    tiles: np.ndarray  # (N, 4) texels of OpacityMaps, before the leaves: a whole number of leaves
     refitted: bool = False
 
 
-def build(corners: np.ndarray, look: np.ndarray) -> Tree:
-    """The hierarchy of `corners` (T, 3, 3) with opacity, emission, material and normals `look` (T, 8)."""
-    shown = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
+def build(corners: np.ndarray, look: np.ndarray, tiles: np.ndarray = NO_TILES) -> Tree:
+    """The hierarchy of `corners` (T, 3, 3) with opacity, emission, material and normals `look` (T, 8); `tiles` are the
+    texels of OpacityMaps that opacity codes tell of."""
+    shown = np.flatnonzero(_shown(corners, look))
     boxes = box_tree.build(corners[shown].min(axis=1), corners[shown].max(axis=1))
     place = np.full(len(corners), -1)
     place[shown] = boxes.place
     leaves = np.zeros((max(boxes.leaf_count, 1), LEAF_TEXELS, LEAF), np.float32)  # zero edges: never hit
     low = np.full((boxes.leaf_count * LEAF, 3), EMPTY, np.float32)
     hierarchy = Hierarchy(None, None, len(shown))
-    return _written(Tree(hierarchy, boxes, place, leaves, low, -low), boxes.place, corners[shown], look[shown])
+    tiles = np.pad(tiles, ((0, -len(tiles) % LEAF_TEXELS), (0, 0)))
+    return _written(Tree(hierarchy, boxes, place, leaves, low, -low, tiles), boxes.place, corners[shown], look[shown])
 
 
 def refit(tree: Tree, numbers: np.ndarray, corners: np.ndarray, look: np.ndarray) -> Tree | None:
     """The tree with triangles `numbers` (N,) elsewhere, at the cost of larger boxes; `tree` itself is used up. None
-    where a triangle is not finite."""
-    place = tree.place[numbers]
-    if (place < 0).any() or not np.isfinite(corners).all():
+    where other triangles than before can be met."""
+    shown = _shown(corners, look)
+    if ((tree.place[numbers] >= 0) != shown).any():
         return None
-    return _written(replace(tree, refitted=True), place, corners, look)
+    return _written(replace(tree, refitted=True), tree.place[numbers][shown], corners[shown], look[shown])
+
+
+def _shown(corners: np.ndarray, look: np.ndarray) -> np.ndarray:
+    """(T,) which triangles some ray can meet."""
+    return np.isfinite(corners).all(axis=(1, 2)) & ~_empty(look[:, 0])
 
 
 def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarray) -> Tree:
@@ -207,8 +260,10 @@ def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarra
     )
     rows = np.zeros((len(low), NODE_TEXELS, 4), np.float32)
     _pack_boxes(rows, low, high, max(1e-6 * float(reach), 1e-30))
-    rows[:, 3, 0], rows[:, 3, 1], rows[:, 3, 2] = tree.boxes.first_node, tree.boxes.first_leaf, tree.boxes.nodes
-    nodes, leaves = (images.upload_list(texels.reshape(-1, 4)) for texels in (rows, tree.leaves))
+    rows[:, 3, 0], rows[:, 3, 2] = tree.boxes.first_node, tree.boxes.nodes
+    rows[:, 3, 1] = tree.boxes.first_leaf + len(tree.tiles) // LEAF_TEXELS
+    leaves = np.concatenate([tree.tiles, tree.leaves.reshape(-1, 4)]) if len(tree.tiles) else tree.leaves
+    nodes, leaves = (images.upload_list(texels.reshape(-1, 4)) for texels in (rows, leaves))
     return replace(tree, hierarchy=Hierarchy(nodes, leaves, tree.hierarchy.triangles))
 
 
@@ -244,7 +299,13 @@ class HierarchyCache:
         self._kept: dict[object, Tree] = {}
 
     def get(
-        self, snapshot, materials: list[CompiledMaterial], origin: np.ndarray, path: str, draft: bool = False
+        self,
+        snapshot,
+        materials: list[CompiledMaterial],
+        maps: OpacityMaps,
+        origin: np.ndarray,
+        path: str,
+        draft: bool = False,
     ) -> Hierarchy | None:
         """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`).
 
@@ -258,21 +319,22 @@ class HierarchyCache:
         key = shown, (
             None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            tuple((_opacity_code(m), _emission(m)) for m in materials), tuple(origin),
+            tuple((_mean_code(m), _emission(m)) for m in materials), maps.changes, tuple(origin),
         )  # fmt: skip
         tree = self._kept.get(key)
         if tree is None and draft:
-            tree = self._moved(key, snapshot, materials, origin, path)
+            tree = self._moved(key, snapshot, materials, maps, origin, path)
         if tree is None or (tree.refitted and not draft):
-            tree = build(*world_triangles(list(shown), snapshot.meshes, materials, origin, path))
+            triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps)
+            tree = build(*triangles, maps.texels)
             if tree.hierarchy.triangles > MOST_REFITTED:
-                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = None
+                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = None
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
         return tree.hierarchy
 
-    def _moved(self, key, snapshot, materials: list[CompiledMaterial], origin: np.ndarray, path: str) -> Tree | None:
+    def _moved(self, key, snapshot, materials, maps: OpacityMaps, origin: np.ndarray, path: str) -> Tree | None:
         """The tree of the same instances, of which a few have moved since; None if there is none."""
         shown, rest = key
         for other in self._kept:
@@ -287,7 +349,7 @@ class HierarchyCache:
                 continue
             starts = np.cumsum(counts) - counts
             numbers = [np.arange(starts[k], starts[k] + counts[k]) for k in moved]
-            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path)
+            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path, maps)
             del self._kept[other]
             return refit(tree, np.concatenate(numbers), *triangles)
         return None

@@ -76,6 +76,8 @@ class SceneGeometry:
         self.instances: images.Image | None = None
         self.draws: list[Draw] = []  # by material, corner attributes: surfaces, and casters with alpha
         self.opaque_casters: list[Draw] = []  # positions only, materials ignored
+        # Instances with triangles, by their rows in `instances`; meshes; materials.
+        self.placed: tuple[list[Instance], dict[str, Mesh], list[CompiledMaterial]] = ([], {}, [])
         self.changes = 0  # updates that changed anything: what was drawn of the same number still stands
         self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
         self._draw_key = None
@@ -108,7 +110,7 @@ class SceneGeometry:
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
             tuple((m.attributes, m.casts_by_lot) for m in materials),
         )
-        self._placed = (instances, snapshot.meshes, materials)
+        self.placed = (instances, snapshot.meshes, materials)
         self.changes += changed or key != self._draw_key
         if key == self._draw_key:
             if changed:
@@ -124,7 +126,7 @@ class SceneGeometry:
         if self._clusters[0] != self.changes:
             if not make:
                 return None
-            self._clusters = (self.changes, casters.clusters(*self._placed, self.origin))
+            self._clusters = (self.changes, casters.clusters(*self.placed, self.origin))
         return self._clusters[1]
 
     def is_closed(self, mesh: Mesh) -> bool:

@@ -128,7 +128,7 @@ class MaterialSet:
         return _caster_program(self.compiled[index])
 
     def opacity_program(self, index: int) -> Program:
-        """Adds up how much material `index` covers, by the side that is seen."""
+        """Adds up how much of their tiles triangles of material `index` cover, for both sides."""
         return _opacity_program(self.compiled[index])
 
     def emission_program(self, index: int) -> Program:
@@ -266,19 +266,27 @@ EVERY_DEFINES = tuple((name, "-1" if name == "VISIBILITY_FLAG" else value) for n
 
 
 def _emission_program(compiled: CompiledMaterial) -> Program:
-    return _sum_program(compiled, "emission")
+    return replace(
+        _caster_program(compiled),
+        name=f"emission {compiled.program_key[:8]}",
+        fragment="surface/emission.frag.glsl",
+        outputs=(("VEC4", "out_emission"),),
+        defines=EVERY_DEFINES,
+    )
 
 
 def _opacity_program(compiled: CompiledMaterial) -> Program:
-    return _sum_program(compiled, "opacity")
-
-
-def _sum_program(compiled: CompiledMaterial, what: str) -> Program:
+    """See opacity_maps.py."""
+    like = _caster_program(compiled)
     return replace(
-        _caster_program(compiled),
-        name=f"{what} {compiled.program_key[:8]}",
-        fragment=f"surface/{what}.frag.glsl",
-        outputs=(("VEC4", f"out_{what}"),),
+        like,
+        name=f"opacity {compiled.program_key[:8]}",
+        vertex="surface/opacity_map.vert.glsl",
+        fragment="surface/opacity_map.frag.glsl",
+        inputs=(*(one for one in like.inputs if one[1] != "local_instance"), ("VEC2", "cell")),
+        varyings=(*like.varyings, ("flat", "INT", "sample_flat")),
+        outputs=(("VEC4", "out_opacity"),),
+        constants=(("INT", "first_instance"), ("VEC2", "tile_scale")),
         defines=EVERY_DEFINES,
     )
 

@@ -24,6 +24,7 @@ from .ledger import RAN, REUSED, Ledger, Row
 from .lens import point_of
 from .lights import Emitter, emitters
 from .materials import MaterialSet, compile_programs
+from .opacity_maps import OpacityMaps
 from .plan import Plan, make_plan
 from .rates import Rate
 from .sequence import FILM, LENS, point, third
@@ -51,6 +52,7 @@ class Frame:
     view_block: Block
     hierarchies: HierarchyCache
     surface_means: SurfaceMeans
+    measured_opacity: OpacityMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -111,12 +113,23 @@ class Frame:
         """The scene's materials, with the means that they have on the surfaces that show them."""
         return self.surface_means.of(self.materials, self.geometry)
 
+    @cached_property
+    def opacity_maps(self) -> OpacityMaps:
+        """How opaque triangles are, place by place."""
+        self.measured_opacity.update(self.materials, self.geometry)
+        return self.measured_opacity
+
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
         if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
             self._hierarchies[path] = self.hierarchies.get(
-                self.snapshot, self.measured_materials, self.geometry.origin, path, self.settings.draft
+                self.snapshot,
+                self.measured_materials,
+                self.opacity_maps,
+                self.geometry.origin,
+                path,
+                self.settings.draft,
             )
         return self._hierarchies[path]
 
@@ -156,7 +169,7 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
-        self._hierarchies, self._surface_means = HierarchyCache(), SurfaceMeans()
+        self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._frame_key: object = None
@@ -202,7 +215,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means,
+            self._surface_means, self._opacity,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)

@@ -1,25 +1,20 @@
-"""Means of materials over the surfaces that show them, for what runs no shader: opacity that rays meet, and emission.
+"""Means over surfaces of what their materials emit, for what runs no shader: the choice of light sources, and rays.
 
-The mean of an image says little about that: a wall that shows the opaque corner of a sheet of sprites blocks all light,
-and of a colour ramp over noise nothing is known at all. A node tree is only known as a program, so the surfaces of each
-material that varies are drawn over one another from the directions of overview.py, with what they cover and what they
-emit added up, for the two sides apart: walls that are seen through from outside close the room that they surround, and
-a panel may shine to one side only.
+The mean of an image says little about that: a wall shows a part of a sheet of sprites, and of a colour ramp over noise
+nothing is known at all. A node tree is only known as a program, so the surfaces of each material that varies are drawn
+over one another from the directions of overview.py, with what they emit added up, for the two sides apart: a panel may
+shine to one side only.
 
 | cost | once per set of materials and geometry |
 |---|---|
-| draws | of each such material's meshes (not of all of their instances), 4 for opacity, 8 for emission |
-| readback | 4 x SIDE x SIDE pixels of each |
+| draws | 8 of each such material's meshes (not of all of their instances) |
+| readback | 8 x SIDE x SIDE pixels of each |
 
-Against Cycles: a room textured from a sheet of which some is transparent had .28 of its indirect light, now .98.
-
-Fails: a material has one mean a side wherever it is; a leaf of which much is cut away blocks as much as one that is
-whole.
+Fails: a material emits the same a side wherever it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +30,6 @@ from .overview import DIRECTIONS, overview, some
 SIDE = 32  # pixels of one view
 VIEWS = np.concatenate([DIRECTIONS, -DIRECTIONS])  # of both sides
 ALIKE = 0.1  # relative difference of the sides' emission that the views alone may make
-Measure = Callable[[MaterialSet, SceneGeometry, int, list[int]], dict[str, object]]
 
 
 class SurfaceMeans:
@@ -45,10 +39,10 @@ class SurfaceMeans:
         self._known: dict[object, dict[str, object]] = {}
 
     def of(self, materials: MaterialSet, geometry: SceneGeometry) -> list[CompiledMaterial]:
-        """The scene's materials, with opacity and emission of those that vary as their surfaces have them."""
+        """The scene's materials, with the emission of those that vary as their surfaces have it."""
         shown: dict[int, list[int]] = {}
         for number, draw in enumerate(geometry.draws):
-            if _measures(materials.compiled[draw.material]):
+            if materials.compiled[draw.material].uneven_emission:
                 shown.setdefault(draw.material, []).append(number)
         if not shown:
             return materials.compiled
@@ -57,31 +51,11 @@ class SurfaceMeans:
             places = tuple(
                 (draw.batch.number, draw.first, draw.count) for draw in map(geometry.draws.__getitem__, numbers)
             )
-            for measure in _measures(found[material]):
-                key = measure, prints[material], prints[count:], places
-                known[key] = self._known.get(key) or measure(materials, geometry, material, numbers)
-                found[material] = replace(found[material], **known[key])
+            key = prints[material], prints[count:], places
+            known[key] = self._known.get(key) or _emission(materials, geometry, material, numbers)
+            found[material] = replace(found[material], **known[key])
         self._known = known
         return found
-
-
-def _measures(material: CompiledMaterial) -> list[Measure]:
-    return [
-        measure for measure, needed in ((_opacity, material.uneven), (_emission, material.uneven_emission)) if needed
-    ]
-
-
-def _opacity(materials: MaterialSet, geometry: SceneGeometry, material: int, numbers: list[int]) -> dict[str, object]:
-    bindings = materials.bindings(material, geometry.instances)
-    covered, drawn, covered_behind, drawn_behind = _sum(
-        geometry, numbers, materials.opacity_program(material), bindings
-    )
-    if not (drawn + drawn_behind > 0 and np.isfinite(covered + covered_behind)):
-        return {}
-    # A side that none of the views shows is taken for the other one.
-    front = covered / drawn if drawn > 0 else covered_behind / drawn_behind
-    behind = covered_behind / drawn_behind if drawn_behind > 0 else front
-    return {"opacity": float(front), "opacity_behind": float(behind)}
 
 
 def _emission(materials: MaterialSet, geometry: SceneGeometry, material: int, numbers: list[int]) -> dict[str, object]:
@@ -96,7 +70,7 @@ def _emission(materials: MaterialSet, geometry: SceneGeometry, material: int, nu
     return {"emission": front, "emission_behind": behind}
 
 
-def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings: dict, side: int = 0) -> np.ndarray:
+def _sum(geometry: SceneGeometry, numbers: list[int], program: Program, bindings: dict, side: int) -> np.ndarray:
     """(4,) what a program draws in all pixels of all views together; `side` as emission.frag.glsl reads it."""
     own = some(numbers, geometry.draws)
     draws = [geometry.draws[k] for k in own]

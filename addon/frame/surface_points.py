@@ -59,19 +59,20 @@ class SurfacePoints:
         eye = frame.snapshot.camera.matrix[:3, 3] - frame.geometry.origin
         eye = np.round(eye / reach) * reach if np.isfinite(eye).all() else np.zeros(3)
         snapshot, materials, origin = frame.snapshot, frame.measured_materials, frame.geometry.origin
+        maps = frame.opacity_maps
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.matrix.tobytes(), i.materials, i.visibility.diffuse)
                   for i in snapshot.instances),
-            tuple((m.opacity, m.opacity_behind) if m.transparent else 1.0 for m in materials),
+            tuple(m.opacity if m.transparent else 1.0 for m in materials), maps.changes,
             tuple(origin), tuple(eye), reach, points,
         )  # fmt: skip
         if key == self._key:
             return False
         shown = [i for i in snapshot.instances if i.visibility.diffuse and snapshot.meshes[i.mesh].triangle_count]
-        corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse")
+        corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse", maps)
         meshes = [snapshot.meshes[i.mesh] for i in shown]
         surfaces = Surfaces(
-            corners, acceleration.coverage(look[:, 0]),
+            corners, acceleration.coverage(look[:, 0], maps),
             np.repeat(np.arange(len(shown)), [mesh.triangle_count for mesh in meshes]),
             np.array([np.sign(np.linalg.det(i.matrix[:3, :3])) * frame.geometry.is_closed(m)
                       for i, m in zip(shown, meshes)]),

@@ -39,10 +39,8 @@ class CompiledMaterial:
     # Mean radiance of the side that faces the viewer and of the other one, for choosing and sampling emissive geometry.
     emission: tuple[float, float, float]
     emission_behind: tuple[float, float, float]
-    # Mean coverage 0..1 of sides that face the ray and of those turned away, where a shader cannot be run per point.
-    opacity: float
-    opacity_behind: float
-    # Opacity, emission vary: what they are on average depends on the surfaces (frame/surface_means.py).
+    opacity: float  # mean coverage 0..1
+    # Opacity, emission vary: what they are depends on the surfaces (frame/opacity_maps.py, frame/surface_means.py).
     uneven: bool
     uneven_emission: bool
     diffuse: bool  # has a diffuse closure

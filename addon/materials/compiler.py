@@ -83,7 +83,6 @@ class _Compilation:
             emission=shining,
             emission_behind=shining,
             opacity=opacity,
-            opacity_behind=opacity,
             uneven=transparent and not passes.constant,
             uneven_emission=not emission.constant,
             diffuse=summary.diffuse,

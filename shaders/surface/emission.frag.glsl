@@ -5,7 +5,7 @@
 void main()
 {
   bool behind;
-  Closures c = closures_seen(RAY_LIGHT, behind);
+  Closures c = closures_seen(light_point.xyz, RAY_LIGHT, behind);
   bool counts = behind == (sample_index != 0) && is_finite(max_component(abs(c.emission)));
   out_emission = counts ? vec4(c.emission, 1.0) : vec4(0.0);
 }

@@ -6,9 +6,9 @@
 #include "generated/material"
 #include "surface/point.glsl"
 
-Closures closures_seen(int ray, out bool behind)
+Closures closures_seen(vec3 incoming, int ray, out bool behind)
 {
-  SurfacePoint point = surface_point(light_point.xyz, instance_read(instance_flat.x));
+  SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
   point.ray = ray;
   behind = point.backfacing;
   Closures c = closures_begin(point.normal, 0.5);

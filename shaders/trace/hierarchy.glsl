@@ -9,6 +9,7 @@
 #define LEAF_TEXELS 17
 #define OPACITY_TEXEL 9  // opacity_of_four
 #define SIDES 2048.0     // one more than what an opaque side has
+#define MAPPED 4.0       // from here on a code tells of a tile
 #define MATERIAL_TEXEL 13  // its number; .25 more or less: the triangle emits to its front or to its back alone
 #define NORMAL_TEXEL 14
 
@@ -22,9 +23,9 @@ vec4 leaf_texel(int index)
   return trace_leaves_fetch(ivec2(index & 2047, index >> 11));
 }
 
-// Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed. `facing`: above 0 where the corners
-// run anticlockwise, seen from the origin.
-vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
+// Distances to four triangles at once (Moeller & Trumbore 1997), and where they are met; 1e30 where missed. `facing`:
+// above 0 where the corners run anticlockwise, seen from the origin.
+vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 u, out vec4 v, out vec4 facing)
 {
   int base = leaf * LEAF_TEXELS;
   vec4 e1x = leaf_texel(base + 3);
@@ -41,11 +42,11 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
   vec4 tx = origin.x - leaf_texel(base);
   vec4 ty = origin.y - leaf_texel(base + 1);
   vec4 tz = origin.z - leaf_texel(base + 2);
-  vec4 u = (tx * px + ty * py + tz * pz) * inverse;
+  u = (tx * px + ty * py + tz * pz) * inverse;
   vec4 qx = ty * e1z - tz * e1y;
   vec4 qy = tz * e1x - tx * e1z;
   vec4 qz = tx * e1y - ty * e1x;
-  vec4 v = (direction.x * qx + direction.y * qy + direction.z * qz) * inverse;
+  v = (direction.x * qx + direction.y * qy + direction.z * qz) * inverse;
   vec4 t = (e2x * qx + e2y * qy + e2z * qz) * inverse;
   bvec4 inside = lessThanEqual(max(max(-u, -v), max(u + v - vec4(1.0), -t)), vec4(0.0));
   t = mix(vec4(1e30), t, inside);
@@ -53,10 +54,23 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
 }
 
-// The share of rays that four triangles stop. Codes are negative where the triangle may also bend what meets it; they hold
-// which rays it is about, 0: all, 1: not those that look for a light, 2: those alone, 3: all, and those for certain; and
-// the coverage of either side.
-vec4 opacity_of_four(int leaf, vec4 facing, bool bent, bool shadow)
+// Coverage of a triangle at (u, v), from the tile that its code names (addon/frame/opacity_maps.py).
+float tile_opacity(float code, bool front, float u, float v)
+{
+  int number = int(code) >> 1;  // of tile and side: corners of an odd one run the other way round
+  vec4 tile = leaf_texel(number >> 1);
+  float cells = 2.0 * tile.y;
+  int x = int(clamp(u * cells, 0.0, cells - 1.0));
+  int y = int(clamp(v * cells, 0.0, cells - 1.0 - float(x)));
+  float both = leaf_texel(int(tile.x) + (y >> 1) * int(tile.y) + (x >> 1))[2 * (y & 1) + (x & 1)];
+  float level = floor(both / 256.0);
+  return ((front == ((number & 1) == 0)) ? level : both - 256.0 * level) / 255.0;
+}
+
+// The share of rays that four triangles stop, of those that `met` says. Codes are negative where the triangle may also bend
+// what meets it; they hold which rays it is about, 0: all, 1: not those that look for a light, 2: those alone, 3: all, and
+// those for certain; and the coverage of either side, or, if MAPPED, of which tile.
+vec4 opacity_of_four(int leaf, vec4 u, vec4 v, vec4 facing, bvec4 met, bool bent, bool shadow)
 {
   vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
   vec4 stopped = floor(abs(code) / (SIDES * SIDES));
@@ -64,6 +78,14 @@ vec4 opacity_of_four(int leaf, vec4 facing, bool bent, bool shadow)
   vec4 front = floor(sides / SIDES);
   vec4 covered = mix(sides - SIDES * front, front, greaterThan(facing, vec4(0.0)));
   vec4 opacity = min(covered * (1.0001 / (SIDES - 1.0)), vec4(1.0));
+  if (max_component(max(stopped.xyz, stopped.w)) >= MAPPED) {
+    for (int k = 0; k < 4; k++) {
+      if (stopped[k] >= MAPPED && met[k]) {
+        opacity[k] = tile_opacity(sides[k], facing[k] > 0.0, u[k], v[k]);
+      }
+    }
+    stopped -= mix(vec4(0.0), vec4(MAPPED), greaterThanEqual(stopped, vec4(MAPPED)));
+  }
   if (bent) {
     opacity = mix(opacity, vec4(1.0), lessThan(code, vec4(0.0)));
   }
@@ -173,11 +195,13 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     if (!more) {
       break;
     }
+    vec4 u;
+    vec4 v;
     vec4 facing;
-    vec4 t = intersect_four(place.index, origin, direction, facing);
+    vec4 t = intersect_four(place.index, origin, direction, u, v, facing);
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
-      vec4 opacity = opacity_of_four(place.index, facing, bent, shadow);
+      vec4 opacity = opacity_of_four(place.index, u, v, facing, lessThan(t, vec4(nearest)), bent, shadow);
 #ifdef OPAQUE_ONLY
       opacity = floor(opacity);
 #endif

@@ -55,6 +55,14 @@ class Stage:
         corners = [(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]
         return self.mesh(corners, [(0, 1, 2, 3)], material=material, **placement)
 
+    def card(self, material, left, right, **placement):
+        """A square of two metres that shows an image between u = `left` and `right`."""
+        made = self.rectangle((-1, -1), (1, 1), material=material, **placement)
+        layer = made.data.uv_layers.new(name="UVMap")
+        for corner, place in enumerate([(left, 0), (right, 0), (right, 1), (left, 1)]):
+            layer.uv[corner].vector = place
+        return made
+
     def remove(self, placed):
         """Take an object out of the file, with its mesh and materials."""
         data = placed.data
