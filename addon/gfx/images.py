@@ -38,12 +38,14 @@ _CHANNELS = {
 
 @dataclass(eq=False)
 class Image:
-    """A two-dimensional GPU image. Row 0 is the bottom row."""
+    """A two-dimensional GPU image. Row 0 is the bottom row. Passes that read it are compiled with its `defines`, so
+    that what only some content needs costs others nothing."""
 
     width: int
     height: int
     format: str
     texture: gpu.types.GPUTexture
+    defines: tuple[tuple[str, str], ...] = ()
 
     @property
     def size(self) -> tuple[int, int]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
 
 import gpu
 import numpy as np
@@ -45,7 +47,7 @@ def fullscreen(
     depth image, in which the program stands at 0.5: a driver leaves out whole blocks of pixels that fail it, which
     branches in the program cannot save where they are masked. A program that writes depth marks such pixels.
     """
-    shader = get(program)
+    shader = _for_images(program, bindings)
     if program.writes_depth:
         where = "ALWAYS"
     with _state(target, viewport, blend=blend, depth_test=where, depth_write=program.writes_depth, rows=rows):
@@ -81,13 +83,24 @@ def draw_points(shader: Shader, batch: gpu.types.GPUBatch, instances: int = 1) -
 
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
-    shader = get(program)
+    shader = _for_images(program, bindings)
     if overtakes_draws():
         finish()
     shader.bind(**bindings)
     groups = [-(-extent // group) for extent, group in zip((*size, 1), program.group)]
     gpu.compute.dispatch(shader.handle, *groups)
     gpu.shader.unbind()
+
+
+def _for_images(program: Program, bindings: dict) -> Shader:
+    """The shader of a program, with what the images that it reads define."""
+    read = bindings.get("textures") or {}
+    return get(_with_defines(program, tuple(one for image in read.values() for one in image.defines)))
+
+
+@cache
+def _with_defines(program: Program, defines: tuple[tuple[str, str], ...]) -> Program:
+    return replace(program, defines=(*program.defines, *defines)) if defines else program
 
 
 @contextmanager

@@ -1,5 +1,7 @@
 // Nearest hit of a ray in the bounding volume hierarchy of addon/frame/acceleration.py.
 //
+// Where some triangles are opaque place by place, OPACITY_TILES is defined (the image of the leaves sees to it).
+//
 // The tree is four-wide. A stack holds nodes of which some children are still to visit, and those children as four bits.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
@@ -23,9 +25,9 @@ vec4 leaf_texel(int index)
   return trace_leaves_fetch(ivec2(index & 2047, index >> 11));
 }
 
-// Distances to four triangles at once (Moeller & Trumbore 1997), and where they are met; 1e30 where missed. `facing`:
-// above 0 where the corners run anticlockwise, seen from the origin.
-vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 u, out vec4 v, out vec4 facing)
+// Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed. `facing`: above 0 where the corners
+// run anticlockwise, seen from the origin.
+vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
 {
   int base = leaf * LEAF_TEXELS;
   vec4 e1x = leaf_texel(base + 3);
@@ -42,11 +44,11 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 u, out vec4 
   vec4 tx = origin.x - leaf_texel(base);
   vec4 ty = origin.y - leaf_texel(base + 1);
   vec4 tz = origin.z - leaf_texel(base + 2);
-  u = (tx * px + ty * py + tz * pz) * inverse;
+  vec4 u = (tx * px + ty * py + tz * pz) * inverse;
   vec4 qx = ty * e1z - tz * e1y;
   vec4 qy = tz * e1x - tx * e1z;
   vec4 qz = tx * e1y - ty * e1x;
-  v = (direction.x * qx + direction.y * qy + direction.z * qz) * inverse;
+  vec4 v = (direction.x * qx + direction.y * qy + direction.z * qz) * inverse;
   vec4 t = (e2x * qx + e2y * qy + e2z * qz) * inverse;
   bvec4 inside = lessThanEqual(max(max(-u, -v), max(u + v - vec4(1.0), -t)), vec4(0.0));
   t = mix(vec4(1e30), t, inside);
@@ -54,23 +56,39 @@ vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 u, out vec4 
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
 }
 
-// Coverage of a triangle at (u, v), from the tile that its code names (addon/frame/opacity_maps.py).
-float tile_opacity(float code, bool front, float u, float v)
+// How far a place on a triangle is along its two edges.
+vec2 triangle_place(ivec2 hit, vec3 position)
+{
+  int base = hit.x * LEAF_TEXELS;
+  int k = hit.y;
+  vec3 corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
+  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
+  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  vec3 across = cross(e1, e2);
+  vec3 offset = position - corner;
+  return vec2(dot(cross(offset, e2), across), dot(cross(e1, offset), across)) / max(dot(across, across), 1e-37);
+}
+
+#ifdef OPACITY_TILES
+// Coverage of a triangle where a ray meets it, from the tile that its code names (addon/frame/opacity_maps.py).
+float tile_opacity(ivec2 hit, float code, bool front, vec3 position)
 {
   int number = int(code) >> 1;  // of tile and side: corners of an odd one run the other way round
   vec4 tile = leaf_texel(number >> 1);
   float cells = 2.0 * tile.y;
-  int x = int(clamp(u * cells, 0.0, cells - 1.0));
-  int y = int(clamp(v * cells, 0.0, cells - 1.0 - float(x)));
+  vec2 place = triangle_place(hit, position) * cells;
+  int x = int(clamp(place.x, 0.0, cells - 1.0));
+  int y = int(clamp(place.y, 0.0, cells - 1.0 - float(x)));
   float both = leaf_texel(int(tile.x) + (y >> 1) * int(tile.y) + (x >> 1))[2 * (y & 1) + (x & 1)];
   float level = floor(both / 256.0);
   return ((front == ((number & 1) == 0)) ? level : both - 256.0 * level) / 255.0;
 }
+#endif
 
-// The share of rays that four triangles stop, of those that `met` says. Codes are negative where the triangle may also bend
-// what meets it; they hold which rays it is about, 0: all, 1: not those that look for a light, 2: those alone, 3: all, and
-// those for certain; and the coverage of either side, or, if MAPPED, of which tile.
-vec4 opacity_of_four(int leaf, vec4 u, vec4 v, vec4 facing, bvec4 met, bool bent, bool shadow)
+// The share of rays that four triangles stop, met at the distances `t`, of those before `limit`. Codes are negative where the
+// triangle may also bend what meets it; they hold which rays it is about, 0: all, 1: not those that look for a light, 2:
+// those alone, 3: all, and those for certain; and the coverage of either side, or, if MAPPED, of which tile.
+vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction, vec4 facing, bool bent, bool shadow)
 {
   vec4 code = leaf_texel(leaf * LEAF_TEXELS + OPACITY_TEXEL);
   vec4 stopped = floor(abs(code) / (SIDES * SIDES));
@@ -78,14 +96,16 @@ vec4 opacity_of_four(int leaf, vec4 u, vec4 v, vec4 facing, bvec4 met, bool bent
   vec4 front = floor(sides / SIDES);
   vec4 covered = mix(sides - SIDES * front, front, greaterThan(facing, vec4(0.0)));
   vec4 opacity = min(covered * (1.0001 / (SIDES - 1.0)), vec4(1.0));
-  if (max_component(max(stopped.xyz, stopped.w)) >= MAPPED) {
+#ifdef OPACITY_TILES
+  if (max(max(stopped.x, stopped.y), max(stopped.z, stopped.w)) >= MAPPED) {
     for (int k = 0; k < 4; k++) {
-      if (stopped[k] >= MAPPED && met[k]) {
-        opacity[k] = tile_opacity(sides[k], facing[k] > 0.0, u[k], v[k]);
+      if (stopped[k] >= MAPPED && t[k] < limit) {
+        opacity[k] = tile_opacity(ivec2(leaf, k), sides[k], facing[k] > 0.0, origin + t[k] * direction);
       }
     }
     stopped -= mix(vec4(0.0), vec4(MAPPED), greaterThanEqual(stopped, vec4(MAPPED)));
   }
+#endif
   if (bent) {
     opacity = mix(opacity, vec4(1.0), lessThan(code, vec4(0.0)));
   }
@@ -195,13 +215,11 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     if (!more) {
       break;
     }
-    vec4 u;
-    vec4 v;
     vec4 facing;
-    vec4 t = intersect_four(place.index, origin, direction, u, v, facing);
+    vec4 t = intersect_four(place.index, origin, direction, facing);
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
-      vec4 opacity = opacity_of_four(place.index, u, v, facing, lessThan(t, vec4(nearest)), bent, shadow);
+      vec4 opacity = opacity_of_four(place.index, t, nearest, origin, direction, facing, bent, shadow);
 #ifdef OPAQUE_ONLY
       opacity = floor(opacity);
 #endif
@@ -266,18 +284,10 @@ vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)
 // Unit shading normal of a triangle where a ray meets it, interpolated between its corners.
 vec3 triangle_shading_normal(ivec2 hit, vec3 position)
 {
-  int base = hit.x * LEAF_TEXELS;
+  int base = hit.x * LEAF_TEXELS + NORMAL_TEXEL;
   int k = hit.y;
-  vec3 corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
-  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
-  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
-  vec3 across = cross(e1, e2);
-  float area = max(dot(across, across), 1e-37);
-  vec3 offset = position - corner;
-  float u = dot(cross(offset, e2), across) / area;
-  float v = dot(cross(e1, offset), across) / area;
-  vec3 normal = (1.0 - u - v) * unpack_normal(leaf_texel(base + NORMAL_TEXEL)[k])
-                + u * unpack_normal(leaf_texel(base + NORMAL_TEXEL + 1)[k])
-                + v * unpack_normal(leaf_texel(base + NORMAL_TEXEL + 2)[k]);
+  vec2 place = triangle_place(hit, position);
+  vec3 normal = (1.0 - place.x - place.y) * unpack_normal(leaf_texel(base)[k])
+                + place.x * unpack_normal(leaf_texel(base + 1)[k]) + place.y * unpack_normal(leaf_texel(base + 2)[k]);
   return safe_normalize(normal);
 }
