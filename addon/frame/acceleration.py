@@ -301,21 +301,15 @@ class HierarchyCache:
     def __init__(self):
         self._kept: dict[object, Tree] = {}
 
-    def get(
-        self,
-        snapshot,
-        materials: list[CompiledMaterial],
-        maps: OpacityMaps,
-        origin: np.ndarray,
-        path: str,
-        draft: bool = False,
-    ) -> Hierarchy | None:
+    def get(self, frame, path: str) -> Hierarchy | None:
         """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`).
 
         For a draft, of which the next may follow at once, triangles that moved keep their places in the tree.
         """
+        snapshot, origin, draft = frame.snapshot, frame.geometry.origin, frame.settings.draft
         if too_many(snapshot):
             return None
+        materials, maps = frame.measured_materials, frame.opacity_maps
         kinds = {id(i.visibility): i for i in snapshot.instances}
         alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in kinds.values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))

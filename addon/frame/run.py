@@ -123,14 +123,7 @@ class Frame:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
         if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
-            self._hierarchies[path] = self.hierarchies.get(
-                self.snapshot,
-                self.measured_materials,
-                self.opacity_maps,
-                self.geometry.origin,
-                path,
-                self.settings.draft,
-            )
+            self._hierarchies[path] = self.hierarchies.get(self, path)
         return self._hierarchies[path]
 
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:

@@ -19,8 +19,7 @@ V comes from a bounding volume hierarchy (addon/frame/acceleration.py): no depth
 Why rays: screen-space marching misses what is off screen or behind; prefiltered maps have no occlusion. Both are
 faster on small GPUs and will fill the reflection slot beside this one.
 
-Fails: above 4 million triangles (instances counted) nothing is traced and narrow lobes show dots. Alpha is taken as
-the material's mean opacity instead of its texture.
+Fails: above 4 million triangles (instances counted) nothing is traced and narrow lobes show dots.
 """
 
 from __future__ import annotations

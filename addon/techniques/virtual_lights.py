@@ -47,7 +47,6 @@ Bias, in diffuse and glossy indirect light:
   falls on varnished boards, the mean of the pass is 1.007 of Cycles' (1.041 while gloss counted as diffuse, since most
   of that light goes to walls behind the camera; 0.97 with a layer's losses as the camera's view has them).
 - Normals are those of the triangles: a coarse smooth lamp shade about a lamp sends 3 % too much.
-- Alpha is taken as the material's mean opacity.
 """
 
 from __future__ import annotations
