@@ -18,7 +18,7 @@ from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
 from . import box_tree
 from .box_tree import LEAF
-from .opacity_maps import OpacityMaps
+from .opacity_maps import OpacityMaps, TriangleOpacity
 
 LARGEST = 4_000_000  # triangles
 AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
@@ -38,7 +38,7 @@ FRONT_ALONE = 0.25  # added to the material's number
 SIDE_STEPS = 2047  # of the opacity of a side: those of two, and the above, are exact in one float
 NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
 EMPTY = 1e30
-# For programs that trace rays among triangles with tiles; others are an eighth faster without.
+# For programs that trace rays among triangles with tiles; others are a tenth faster without.
 TILED = (("OPACITY_TILES", "1"),)
 NO_TILES = np.zeros((0, 4), np.float32)
 
@@ -62,8 +62,8 @@ def world_triangles(
     meshes: dict[str, Mesh],
     materials: list[CompiledMaterial],
     origin: np.ndarray,
-    path: str = "glossy",
-    maps: OpacityMaps | None = None,
+    path: str,
+    maps: OpacityMaps,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_codes), mean emitted radiance, number of the material
@@ -71,7 +71,7 @@ def world_triangles(
     corners, looks = [], []
     look = {
         (rays, mirrored): np.array([
-            (_mean_code(m, rays, mirrored), *radiance, k + side)
+            (_mean_code(m, rays), *radiance, k + side)
             for k, m in enumerate(materials)
             for radiance, side in [_emission(m, mirrored)]
         ])
@@ -83,12 +83,13 @@ def world_triangles(
     turns = np.linalg.det([one.matrix[:3, :3] for one in shown]) if shown else ()
     kinds = zip(shown, ((one.mesh, one.materials, _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)))
     for (key, slots, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
-        mesh, slots = meshes[key], np.asarray(slots)
-        of_triangle = slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]
+        mesh = meshes[key]
+        of_triangle = mesh.triangle_materials(slots)
         look_of_triangle = look[rays, bool(mirrored)][of_triangle]
         copies, at_once = [one for one, _ in group], max(AT_ONCE // mesh.triangle_count, 1)
-        if maps is not None:
-            _refine(look_of_triangle, of_triangle, materials, maps.of(copies[0]), rays, bool(mirrored))
+        known = maps.of(copies[0])
+        if known is not None:
+            _refine(look_of_triangle, of_triangle, materials, known, rays, bool(mirrored))
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
             matrices = np.stack([one.matrix[:3] for one in some])
@@ -114,14 +115,13 @@ def _rays(instance: Instance, path: str) -> int:
     return ALL_RAYS if instance.visibility.shadow else OPEN_TO_SHADOW
 
 
-def _mean_code(material: CompiledMaterial, rays: int = ALL_RAYS, mirrored: bool = False) -> float:
+def _mean_code(material: CompiledMaterial, rays: int = ALL_RAYS) -> float:
     """The code of triangles of a material of which no more is known than its mean opacity."""
     if not material.transparent:
         return float(_codes(rays, np.ones(2), False, False))
-    # Some ray may pass, however few.
-    sides = np.minimum(np.full(2, material.opacity), 1.0 - 1.0 / SIDE_STEPS)
     stopped, whole = _stopped(material, rays)
-    return float(_codes(stopped, np.ones(2) if whole else sides, mirrored, material.glass is not None))
+    opacity = 1.0 if whole else min(material.opacity, 1.0 - 1.0 / SIDE_STEPS)  # some ray may pass, however few
+    return float(_codes(stopped, np.full(2, opacity), False, material.glass is not None))
 
 
 def _stopped(material: CompiledMaterial, rays: int) -> tuple[int, bool]:
@@ -143,10 +143,15 @@ def _codes(stopped: int, sides: np.ndarray, mirrored: bool, glass: bool, tile=0)
     return -np.maximum(codes, 1.0) if glass else codes
 
 
-def _refine(look, of_triangle, materials: list[CompiledMaterial], known, rays: int, mirrored: bool) -> None:
+def _refine(
+    look: np.ndarray,
+    of_triangle: np.ndarray,
+    materials: list[CompiledMaterial],
+    known: TriangleOpacity,
+    rays: int,
+    mirrored: bool,
+) -> None:
     """Put what OpacityMaps found of an instance's triangles, `known`, into their rows of `look`."""
-    if known is None:
-        return
     for number in np.unique(of_triangle[known.measured]):
         material = materials[number]
         stopped, whole = _stopped(material, rays)

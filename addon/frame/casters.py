@@ -71,8 +71,7 @@ def clusters(
         mesh = meshes[instance.mesh]
         if not instance.visibility.shadow or not mesh.triangle_count or not np.isfinite(instance.matrix).all():
             continue
-        slots = np.asarray(instance.materials)
-        blocks = opaque[slots[np.minimum(mesh.triangle_slots, len(slots) - 1)]]
+        blocks = opaque[mesh.triangle_materials(instance.materials)]
         if not blocks.any():
             continue
         if mesh.key not in known:

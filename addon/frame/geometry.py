@@ -322,9 +322,7 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
     """GPU batches of meshes in one buffer: [(material, batch)], and position-only batches of what is opaque."""
     corner_start = np.cumsum([0] + [len(mesh.corner_vertices) for _, mesh, _ in parts])
     vertex_start = np.cumsum([0] + [len(mesh.positions) for _, mesh, _ in parts])
-    triangle_material = np.concatenate(
-        [np.asarray(slots, np.int64)[np.minimum(mesh.triangle_slots, len(slots) - 1)] for _, mesh, slots in parts]
-    )
+    triangle_material = np.concatenate([mesh.triangle_materials(slots) for _, mesh, slots in parts])
     corners = np.concatenate([mesh.triangle_corners + start for (_, mesh, _), start in zip(parts, corner_start)])
     surface_vertices = gfx_geometry.vertex_buffer(
         position=np.concatenate([mesh.positions[mesh.corner_vertices] for _, mesh, _ in parts]),

@@ -76,7 +76,7 @@ class OpacityMaps:
         instances, meshes, _ = geometry.placed
         varied = {k for k, material in enumerate(materials.compiled) if material.uneven}
         kinds: dict[tuple[str, tuple[int, ...]], list[int]] = {}
-        for number, instance in enumerate(instances):
+        for number, instance in enumerate(instances) if varied else ():
             if varied.intersection(instance.materials):
                 kinds.setdefault((instance.mesh, instance.materials), []).append(number)
         prints, count = materials.fingerprint() if kinds else (), len(materials.compiled)
@@ -94,13 +94,16 @@ class OpacityMaps:
 
     def _measure(self, materials: MaterialSet, geometry: SceneGeometry, kinds: dict, varied: set[int]) -> None:
         instances, meshes, _ = geometry.placed
-        parts = []
+        parts: list[_Part] = []
+        count = 0
         for (key, slots), numbers in kinds.items():
-            mesh = meshes[key]
-            material = np.asarray(slots)[np.minimum(mesh.triangle_slots, len(slots) - 1)]
-            own = [(k, np.flatnonzero(material == k)) for k in dict.fromkeys(slots) if k in varied]
-            parts += [_Part(mesh, (key, slots), k, found, numbers) for k, found in own if len(found)]
-        if not 0 < sum(len(part.triangles) for part in parts) <= MOST_MEASURED:
+            material = meshes[key].triangle_materials(slots)
+            for k in sorted(varied.intersection(np.unique(material).tolist())):
+                triangles = np.flatnonzero(material == k)
+                own = slice(count, count + len(triangles))
+                parts.append(_Part(meshes[key], (key, slots), k, triangles, own, numbers))
+                count = own.stop
+        if not 0 < count <= MOST_MEASURED:
             return
         area = np.concatenate([_areas(part, instances[part.numbers[0]]) for part in parts])
         sides = _tile_sides(area)
@@ -110,41 +113,39 @@ class OpacityMaps:
 
     def _drawn(self, materials, geometry, parts, sides, corners, height) -> tuple[np.ndarray, np.ndarray]:
         """(height, WIDTH, 2) how much of each cell is covered, of how many samples, for front and back."""
-        first = 0
-        with images.borrowed(WIDTH, height, "RGBA16F") as target:
-            target.clear()
-            state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
-            for part in parts:
-                own = slice(first, first + len(part.triangles))
-                first += len(part.triangles)
-                batch = _flat_batch(part, materials.compiled[part.material].attributes, sides[own], corners[own])
-                shader = passes.get(materials.opacity_program(part.material))
-                bindings = materials.bindings(part.material, geometry.instances)
-                with passes.drawing(target, **state):
-                    for number in part.numbers[:: -(-len(part.numbers) // INSTANCES)]:
-                        constants = {"first_instance": number, "tile_scale": (2 / WIDTH, 2 / height)}
-                        shader.bind(**bindings, constants=constants)
-                        passes.draw(shader, batch, 2 * SAMPLES)
-            found = images.read(target.colors[0])
+        image = images.create(WIDTH, height, "RGBA16F")  # not of the pool: its height is that of this scene alone
+        target = images.Target((image,))
+        target.clear()
+        state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
+        for part in parts:
+            attributes = materials.compiled[part.material].attributes
+            batch = _flat_batch(part, attributes, sides[part.own], corners[part.own])
+            shader = passes.get(materials.opacity_program(part.material))
+            bindings = materials.bindings(part.material, geometry.instances)
+            with passes.drawing(target, **state):
+                for number in part.numbers[:: -(-len(part.numbers) // INSTANCES)]:
+                    constants = {"first_instance": number, "tile_scale": (2 / WIDTH, 2 / height)}
+                    shader.bind(**bindings, constants=constants)
+                    passes.draw(shader, batch, 2 * SAMPLES)
+        found = images.read(image)
         return found[..., 0::2], found[..., 1::2]
 
     def _keep(self, parts, sides, corners, covered, drawn) -> None:
+        """Put what was drawn into tiles, the largest first, and say of each triangle where its own is."""
         count = len(sides)
-        mean, even = np.zeros((count, 2)), np.zeros(count, bool)
-        order, start, cells = np.zeros(count, np.int64), np.zeros(count, np.int64), []
+        mean, order, start, cells = np.zeros((count, 2)), np.zeros(count, np.int64), np.zeros(count, np.int64), []
         texels, tiles = 0, 0
-        for side in np.unique(sides):
+        for side in np.unique(sides)[::-1]:
             own = np.flatnonzero(sides == side)
             place = corners[own][:, None, None] + np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1)
             total, asked = covered[place[..., 1], place[..., 0]], drawn[place[..., 1], place[..., 0]]
             # What is not drawn lies beyond the diagonal, or is not finite.
             opacity = np.where(asked > 0, total / np.maximum(asked, 1), np.nan)
-            weight = np.maximum(asked.sum(axis=(1, 2)), 1)
-            mean[own] = np.where(asked.sum(axis=(1, 2)) > 0, total.sum(axis=(1, 2)) / weight, 1.0)
+            weight = asked.sum(axis=(1, 2))
+            mean[own] = np.where(weight > 0, total.sum(axis=(1, 2)) / np.maximum(weight, 1), 1.0)
             away = np.nanmax(np.abs(opacity - mean[own][:, None, None]), axis=(1, 2, 3), initial=0.0)
-            even[own] = ~(away > ALIKE)
-            kept = ~even[own]
-            kept &= np.arange(len(own)) < MOST_TILES - 1 - tiles
+            kept = away > ALIKE
+            kept &= np.cumsum(kept) < MOST_TILES - tiles
             if kept.any():
                 order[own[kept]] = tiles + 1 + np.arange(kept.sum())
                 levels = np.rint(np.nan_to_num(opacity[kept], nan=1.0) * STEPS)
@@ -161,18 +162,12 @@ class OpacityMaps:
         table[order[mapped], 1] = sides[mapped] // 2
         self.means[order[mapped]] = mean[mapped].mean(axis=1)
         self.texels = np.concatenate([table, *cells])
-        first = 0
         for part in parts:
-            own = slice(first, first + len(part.triangles))
-            first += len(part.triangles)
             count = part.mesh.triangle_count
-            if part.kind not in self._of:
-                self._of[part.kind] = TriangleOpacity(
-                    np.zeros(count, bool), np.ones((count, 2)), np.zeros(count, np.int64)
-                )
-            known = self._of[part.kind]
-            known.measured[part.triangles], known.sides[part.triangles] = True, mean[own]
-            known.tile[part.triangles] = order[own]
+            nothing = TriangleOpacity(np.zeros(count, bool), np.ones((count, 2)), np.zeros(count, np.int64))
+            known = self._of.setdefault(part.kind, nothing)
+            known.measured[part.triangles], known.sides[part.triangles] = True, mean[part.own]
+            known.tile[part.triangles] = order[part.own]
 
 
 @dataclass(frozen=True)
@@ -183,6 +178,7 @@ class _Part:
     kind: tuple[str, tuple[int, ...]]  # mesh and slots
     material: int
     triangles: np.ndarray
+    own: slice  # which they are among all that are measured
     numbers: list[int]  # of the instances that show it
 
 

@@ -7,6 +7,7 @@ Arrays are C-contiguous and read-only by agreement: whoever wants a change makes
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -57,6 +58,10 @@ class Mesh:
     @property
     def triangle_count(self) -> int:
         return len(self.triangle_corners)
+
+    def triangle_materials(self, slots: Sequence[int]) -> np.ndarray:
+        """(T,) the material of each triangle where `slots` holds those of an instance; the last one stands for more."""
+        return np.asarray(slots, np.int64)[np.minimum(self.triangle_slots, len(slots) - 1)]
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:
     wanted = frame.settings.get(AccumulatedMaps, SHADOWS_BY.name)
     if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
         return False
-    if drawn_by_lot(frame):  # rays know the mean alone
+    if drawn_by_lot(frame):  # maps ask the material itself; rays know it by cells
         return False
     asked = views()
     if not asked or wanted == BY_RAYS:

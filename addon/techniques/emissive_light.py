@@ -51,7 +51,7 @@ class EmissiveTriangles:
             mesh = frame.snapshot.meshes[instance.mesh]
             if emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
                 continue
-            slots = np.array(instance.materials)[np.minimum(mesh.triangle_slots, len(instance.materials) - 1)]
+            slots = mesh.triangle_materials(instance.materials)
             for side, sign in SIDES:
                 emission = of_side[side][slots]
                 shining = np.abs(emission).max(axis=1) > 0

@@ -258,7 +258,7 @@ class EnvironmentLight(Technique):
         useful = frame.services.get("world_seen")
         asked = frame.settings.values.get((self.name, "directions"), 0)
         denoised = any(technique.name == "denoise" for technique in frame.plan.techniques)
-        # Rays know only the mean opacity of a layer.
+        # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
         if useful is None or asked or layered or not denoised or not frame.settings.whole:
             return None

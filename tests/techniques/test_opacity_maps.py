@@ -5,24 +5,28 @@ import numpy as np
 import pytest
 
 UPRIGHT = {"location": (-1.0, 0.0, 1.0), "turn": (0, np.pi / 2, 0)}
-SHEET = 64  # pixels a side: the left half lets all light pass, the right half none
 
 
-@pytest.fixture
-def sheet(stage):
-    """A diffuse material whose alpha is an image."""
-    image = bpy.data.images.new("Sheet", SHEET, SHEET, alpha=True)
-    pixels = np.ones((SHEET, SHEET, 4), np.float32)
-    pixels[:, : SHEET // 2, 3] = 0.0
+def with_alpha(stage, alpha, interpolation):
+    """A diffuse material whose alpha is an image of (N, N) `alpha`."""
+    image = bpy.data.images.new("Alpha", *alpha.shape, alpha=True)
+    pixels = np.ones((*alpha.shape, 4), np.float32)
+    pixels[..., 3] = alpha
     image.pixels.foreach_set(pixels.ravel())
     image.pack()
     material = stage.principled(Base_Color=(0.8, 0.8, 0.8, 1), Specular_IOR_Level=0.0)
     tree = material.node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.interpolation = image, "Closest"
+    texture.image, texture.interpolation = image, interpolation
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     tree.links.new(texture.outputs["Alpha"], shader.inputs["Alpha"])
     return material
+
+
+@pytest.fixture
+def sheet(stage):
+    """The left half lets all light pass, the right half none."""
+    return with_alpha(stage, np.arange(64)[None] * np.ones((64, 1)) >= 32, "Closest")
 
 
 def sides(stage):
@@ -149,20 +153,8 @@ def test_a_room_whose_walls_are_seen_through_from_outside_keeps_its_light(stage,
 @pytest.fixture
 def spots(stage):
     """A material that is there inside of discs, three to an edge of the image."""
-    side = 96
-    image = bpy.data.images.new("Spots", side, side, alpha=True)
-    y, x = np.mgrid[:side, :side] % (side // 3) - side / 6 + 0.5
-    pixels = np.ones((side, side, 4), np.float32)
-    pixels[..., 3] = np.hypot(x, y) < 0.4 * side / 3
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    material = stage.principled(Base_Color=(0.8, 0.8, 0.8, 1), Specular_IOR_Level=0.0)
-    tree = material.node_tree
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image
-    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    tree.links.new(texture.outputs["Alpha"], shader.inputs["Alpha"])
-    return material
+    y, x = np.mgrid[:96, :96] % 32 - 15.5
+    return with_alpha(stage, np.hypot(x, y) < 12.8, "Linear")
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (1, 0.5, 1)], ids=["plain", "mirrored", "flat"])
