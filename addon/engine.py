@@ -8,6 +8,7 @@ viewport.py. All of it is freed in `free_sessions`.
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -20,11 +21,11 @@ from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, take
-from .snapshot.scene import Snapshot
+from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree, resolve
 from .ui import ENGINE
-from .ui.passes import RenderPass, wanted_passes
+from .ui.passes import RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
@@ -106,6 +107,8 @@ class CandelaEngine(bpy.types.RenderEngine):
             )
         except UnsupportedScene as error:
             self._fail(str(error))
+        except Exception as error:  # Blender would print it and go on with a black picture
+            self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
 
     def render(self, depsgraph):
@@ -125,6 +128,10 @@ class CandelaEngine(bpy.types.RenderEngine):
             with context.turn:
                 frame = shared.renderer.begin(snapshot, settings, self._compiling)
             frame.ledger.times["sync"] = self._sync_seconds
+            missing = missing_passes(layer)
+            if missing and not self.is_preview:
+                text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
+                frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name)
             for _ in self._drawn(shared.renderer, frame):
@@ -143,6 +150,9 @@ class CandelaEngine(bpy.types.RenderEngine):
             self.end_result(result)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))
+            return
+        except Exception as error:
+            self._fail_unforeseen(error)
             return
         ledger = ledgers.latest()
         ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
@@ -182,6 +192,10 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _fail(self, sentence: str) -> None:
         self.error_set(sentence)
         self.report({"ERROR"}, sentence)
+
+    def _fail_unforeseen(self, error: Exception) -> None:
+        traceback.print_exc()
+        self._fail(f"{type(error).__name__}: {error}. This is an error in Candela; please report it.")
 
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:

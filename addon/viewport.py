@@ -104,9 +104,10 @@ class Viewport:
         self._pauses = (0.0, 0.0)  # between the last redraws
         self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
         self._compiled = -1  # programs made so far, when the sample was begun
-        self.local_view = False
+        self.hidden: tuple = ()  # what the region's own settings hide, see _hidden
         self.news = False  # a ledger that the panels do not show yet
         self.reported = ""  # the error that was reported last
+        self.failed_at: tuple | None = None  # the region's size and kind of view when the error came
 
     @property
     def picture(self) -> images.Image | None:
@@ -154,6 +155,8 @@ class Viewport:
         called = clock()
         self._prepare(source, camera, size, border or (0, 0, *size), settings, clock)
         frame, started = self.frame, clock()
+        if self._target is None and self._sample is None and frame.samples_done:
+            self._resolve(frame)  # the frame outlived an error that took its picture
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
         while frame.samples_done < settings.samples:
             spent = self._work(frame, clock, budget)
@@ -304,7 +307,11 @@ def draw(engine, context, depsgraph) -> None:
     viewport = _viewport_of(engine, context, depsgraph)
     region, scene = context.region, depsgraph.scene
     size = (max(region.width, 1), max(region.height, 1))
+    place = (size, context.region_data.view_perspective)
+    if viewport.error and viewport.failed_at != place:  # it may have been this view's, or this size's
+        viewport.error = ""
     if not viewport.error:
+        viewport.failed_at = place
         if turn.acquire(timeout=TURN_WAIT_S):
             try:
                 _refine(viewport, engine, context, depsgraph, size)
@@ -331,11 +338,11 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         looks_through = space.camera if space.use_local_camera else depsgraph.scene.camera
         if looks_through is not None and looks_through.type != "CAMERA":
             looks_through = None
-    shown = None
-    if space.local_view is not None:
+    hidden, shown = _hidden(space), None
+    if hidden:
         shown = lambda shown_object: shown_object.visible_in_viewport_get(space)  # noqa: E731
-    if viewport.local_view != (shown is not None):
-        viewport.local_view = shown is not None
+    if viewport.hidden != hidden:
+        viewport.hidden = hidden
         viewport.dirty = True
 
     def source(camera: Camera, width: int, height: int) -> Snapshot:
@@ -356,6 +363,16 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
         gpu.state.blend_set(blend)
         gpu.state.depth_test_set(depth_test)
         gpu.state.depth_mask_set(depth_mask)
+
+
+_KINDS = [p.identifier for p in bpy.types.SpaceView3D.bl_rna.properties if p.identifier.startswith("show_object_view")]
+
+
+def _hidden(space) -> tuple[str, ...]:
+    """Names of what the region's own settings hide: other than in local view or in its collections, and kinds."""
+    own = [name for name in ("local_view", "use_local_collections") if getattr(space, name, None)]
+    kinds = [name for name in _KINDS if not getattr(space, name, True)]
+    return (*own, *kinds)
 
 
 def render_border(depsgraph, space, view: Camera, looks_through, size: tuple[int, int]):

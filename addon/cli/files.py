@@ -33,7 +33,11 @@ def output(path: Path, folder: bool) -> Path:
         path = path.resolve()
         if path.exists() and path.is_dir() != folder:
             raise Refused(f"{path} is a {'file' if folder else 'folder'}, and cannot be written as output.")
-        place = next(parent for parent in (path, *path.parents) if _stands(parent) and (folder or parent != path))
+        place = next(
+            (parent for parent in (path, *path.parents) if _stands(parent) and (folder or parent != path)), None
+        )
+        if place is None:  # a drive that is not there
+            raise Refused(f"{path} cannot be written: there is no {path.anchor or 'such folder'}.")
         for thing in (path, place, *([path / "index.html"] if folder else [])):
             if _stands(thing) and not thing.stat().st_mode & 0o222:  # meant to stay, also when the user is root
                 raise Refused(f"{path} cannot be written: {thing} is write-protected.")

@@ -17,7 +17,7 @@ from ..ui.tuning import SEED, choices, properties
 from .files import output
 from .refused import USAGE, Refused, reason
 from .terminal import progress, quiet
-from .verbs import Job
+from .verbs import Job, open_mainfile
 
 
 def tune_scene(job: Job) -> None:
@@ -88,7 +88,9 @@ def save(file: Path, scene: str, candidate: tune.Candidate, path: Path) -> None:
     """Open the file anew, change nothing but Candela's settings of the scene, and write it. Raises Refused."""
     try:
         with quiet():
-            bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
+            problem = open_mainfile(file)
+            if problem:
+                raise Refused(f"{file} could not be opened: {problem}.")
             for name, value in properties(candidate):
                 setattr(bpy.data.scenes[scene].candela, name, value)
             bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)

@@ -53,7 +53,7 @@ def open_job(options: argparse.Namespace) -> Job:
     """Check the file, open it and apply the options. Raises Refused."""
     refuse_blend(options.file)
     with quiet(options.verbose):
-        why = _open_mainfile(options.file)
+        why = open_mainfile(options.file)
     if why:
         raise Refused(f"{options.file} could not be opened: {why}.")
     scene = _named("scene", options.scene, bpy.data.scenes) or bpy.context.scene
@@ -75,7 +75,7 @@ def open_job(options: argparse.Namespace) -> Job:
     return Job(options, scene, layer)
 
 
-def _open_mainfile(path: Path) -> str:
+def open_mainfile(path: Path) -> str:
     """Open the file in Blender; why it could not be opened, or an empty string."""
     full = str(path.resolve())
     try:

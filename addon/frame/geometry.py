@@ -23,6 +23,7 @@ from .culling import closed
 from .morton import morton_codes
 
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
+TRANSMISSION_FLAG = 32  # no shader asks for it, but the frame begins anew when it changes
 TEXELS_PER_INSTANCE = 8  # layout in shaders/lib/instance.glsl
 MOST_MOVED = 32  # instances; for more the whole list is uploaded, sorted anew
 JOINED_TRIANGLES = 2000  # about so many triangles of joined meshes make one draw: enough to fill a GPU, few to cull
@@ -116,8 +117,9 @@ class SceneGeometry:
             if changed:
                 self._set_bounds()
             return changed
-        self._draw_key = key
+        self._draw_key = None  # until they are there
         self._make_draws(instances, snapshot.meshes, materials)
+        self._draw_key = key
         return True
 
     def resting_casters(self, make: bool = True) -> list[casters.Clusters] | None:
@@ -145,6 +147,16 @@ class SceneGeometry:
             self._kinds, self._matrices = kinds, matrices
         return [instances[k] for k in self._order]
 
+    def _where_seen(self, camera) -> np.ndarray:
+        """The camera's place; of an orthographic one, which may stand anywhere, before the middle of the scene."""
+        middle = (self.bounds_min + self.bounds_max) / 2
+        if camera is None:
+            return middle
+        place, forward = camera.matrix[:3, 3], -camera.matrix[:3, 2]
+        if camera.kind != "ORTHOGRAPHIC" or not np.isfinite(middle).all():
+            return place
+        return place + forward * np.clip((middle - place) @ forward, camera.clip_start, camera.clip_end)
+
     def _update_transforms(self, instances: list[Instance], snapshot: Snapshot) -> bool:
         if not instances:
             self.bounds_min = self.bounds_max = np.zeros(3)
@@ -161,7 +173,7 @@ class SceneGeometry:
             reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
             self._low, self._high = world - reach, world + reach  # per instance
             self.bounds_min, self.bounds_max = self._low.min(axis=0), self._high.max(axis=0)
-        camera = snapshot.camera.matrix[:3, 3] if snapshot.camera else (self.bounds_min + self.bounds_max) / 2
+        camera = self._where_seen(snapshot.camera)
         # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
         grid = 2.0 ** np.ceil(np.log2(self.size)) if instances else 1.0
         self.origin = np.round(camera / grid) * grid
@@ -177,6 +189,7 @@ class SceneGeometry:
             flags = (
                 CAMERA_FLAG * seen.camera + SHADOW_FLAG * seen.shadow + DIFFUSE_FLAG * seen.diffuse
                 + GLOSSY_FLAG * seen.glossy + HOLDOUT_FLAG * instance.holdout
+                + TRANSMISSION_FLAG * seen.transmission
             )  # fmt: skip
             rows[k, 3] = (instance.random, instance.pass_index, flags, 0.0)
             rows[k, 4] = instance.color

@@ -56,6 +56,12 @@ class Emitter:
         return self.kind in (RECTANGLE, ELLIPSE)
 
     @property
+    def concentration(self) -> float:
+        """How much brighter it is along its axis than without a spread (spread_attenuation in light/sources.glsl)."""
+        half = np.arctan(self.spread)
+        return float(self.spread / (self.spread - half if half > 0.05 else half**3 / 3.0)) if half > 0 else 1.0
+
+    @property
     def power(self) -> float:
         """For choosing among many lights: total strength, W (suns: W/m2)."""
         return float(np.abs(self.light.strength).sum())

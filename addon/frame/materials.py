@@ -113,7 +113,9 @@ class MaterialSet:
 
     def fingerprint(self) -> tuple:
         """Equal in two frames if all materials shade alike."""
-        return tuple((c.program_key, c.values.tobytes(), c.images) for c in self.compiled) + tuple(self._images)
+        return tuple(
+            (c.program_key, c.values.tobytes(), c.images, c.medium and c.medium.key) for c in self.compiled
+        ) + tuple(self._images)
 
     def surface_program(self, index: int) -> Program:
         """Draws material `index` into the surface images."""

@@ -27,12 +27,14 @@ from .materials import MaterialSet, compile_programs
 from .opacity_maps import OpacityMaps
 from .plan import Plan, make_plan
 from .rates import Rate
-from .sequence import FILM, LENS, point, third
+from .sequence import FILM, LENS, lot, point, third
 from .settings import Settings
 from .surface_means import SurfaceMeans
 from .technique import Technique
 from .view import VIEW, View, blackman_harris_offset
 from .world_tree import WorldTree
+
+ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
 
 
 @dataclass
@@ -81,6 +83,10 @@ class Frame:
         """Point `index` of the sequence for `use`, for uses that take more or fewer points than samples."""
         return point(index, use, self.settings.seed)
 
+    def lot(self, use: str) -> float:
+        """A number of this sample that chooses among things, of which the chosen one then draws a point."""
+        return lot(self.sample, use, self.settings.seed)
+
     def random_volume_at(self, index: int, use: str) -> tuple[float, float, float]:
         """The same with a third number."""
         return *self.random_at(index, use), third(index, use, self.settings.seed)
@@ -107,6 +113,16 @@ class Frame:
         """Where point `number` of the film lies, in pixels from a pixel's middle."""
         x, y = (blackman_harris_offset(u, self.snapshot.film.filter_width) for u in self.random_at(number, FILM))
         return x, y
+
+    @property
+    def typical_distance(self) -> float:
+        """Of what is seen, m; of an orthographic camera that from which a common lens would see as much, since its own
+        place says nothing. Asked where there are receivers."""
+        camera = self.snapshot.camera
+        if camera.kind == "ORTHOGRAPHIC":
+            left, right, bottom, top = camera.frame
+            return ORTHOGRAPHIC_DISTANCE * max(right - left, top - bottom)
+        return float(np.median(self.receivers.distance))
 
     @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:
@@ -172,8 +188,16 @@ class Renderer:
     def begin(self, snapshot: Snapshot, settings: Settings, progress=None) -> Frame:
         """Make everything ready for samples of this snapshot. Raises ValueError if there is no camera.
 
-        If nothing differs from the frame before, that frame comes back with the samples it already has.
+        If nothing differs from the frame before, that frame comes back with the samples it already has. Where something
+        is raised, the next frame begins anew.
         """
+        try:
+            return self._begin(snapshot, settings, progress)
+        except BaseException:
+            self._frame_key = None  # what is half made, or made of half of a change, is not to be taken for it
+            raise
+
+    def _begin(self, snapshot: Snapshot, settings: Settings, progress) -> Frame:
         if snapshot.camera is None:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
         started = time.perf_counter()

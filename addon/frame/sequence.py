@@ -1,6 +1,8 @@
 """The one low-discrepancy sequence that all techniques draw from, indexed by sample number.
 
-Sobol' points, Owen-scrambled by hashing. Every use but the film takes dimensions 1 to 3 with a scramble of its own. The
+Sobol' points, Owen-scrambled by hashing. Two scrambles of one dimension are functions of each other: what is integrated
+together needs dimensions of its own. Every use but these three takes dimensions 1 to 3 with a scramble of its own: the
+lens takes 4 and 5, since each point of it sees all lights, and lots that choose one of many things (`lot`) take 8. The
 first two are the perfect pair: every prefix of 2^k points has one in each cell of any shape. The film takes this pair,
 too, but with its index turned by a matrix over the bits (FILM_ORDER): each prefix of 2^k points is then the same set,
 perfect at edges, in another order, chosen so that the film and any one use form a net together as well. At an edge,
@@ -48,9 +50,9 @@ def _owen(x: np.ndarray, seed: int) -> np.ndarray:
     return _reverse_bits(_laine_karras(_reverse_bits(x), seed))
 
 
-# Primitive polynomials and initial numbers of dimensions 2 to 7 (Joe & Kuo 2008, new-joe-kuo-6): degree, a, m.
+# Primitive polynomials and initial numbers of dimensions 2 to 8 (Joe & Kuo 2008, new-joe-kuo-6): degree, a, m.
 _JOE_KUO = ((1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)), (3, 2, (1, 1, 1)), (4, 1, (1, 1, 3, 3)),
-            (4, 4, (1, 3, 5, 13)))  # fmt: skip
+            (4, 4, (1, 3, 5, 13)), (5, 2, (1, 1, 5, 5, 17)))  # fmt: skip
 DIMENSIONS = 1 + len(_JOE_KUO)
 
 
@@ -104,7 +106,7 @@ def points(first: int, count: int, use: str, seed: int = 0) -> np.ndarray:
     """Points `first` ... `first + count - 1` of the sequence for `use`, (count, 2) float64 in [0, 1)."""
     salt = zlib.crc32(f"{use}/{seed}".encode())
     index = np.arange(first, first + count, dtype=np.uint64)
-    pair = _FILM_DIRECTIONS if use == FILM else _DIRECTIONS[:2]
+    pair = {FILM: _FILM_DIRECTIONS, LENS: _DIRECTIONS[3:5]}.get(use, _DIRECTIONS[:2])
     numbers = [salt * 2654435761 + 1, salt * 2246822519 + 2]
     scrambled = np.stack([_owen(_bits(index, axis), number) for axis, number in zip(pair, numbers)], axis=-1)
     if use in _FIRST:
@@ -122,9 +124,9 @@ def _block(number: int, use: str, seed: int) -> list[tuple[float, float]]:
 
 
 @lru_cache(maxsize=1024)
-def _thirds(number: int, use: str, seed: int) -> list[float]:
+def _axis(number: int, dimension: int, use: str, seed: int) -> list[float]:
     salt = zlib.crc32(f"{use}/{seed}".encode())
-    scrambled = _owen(bits(_indices(number), 2), salt * 3266489917 + 3)
+    scrambled = _owen(bits(_indices(number), dimension), salt * 3266489917 + 3)
     return (scrambled.astype(np.float64) / 4294967296.0).tolist()
 
 
@@ -145,7 +147,12 @@ def point(index: int, use: str, seed: int = 0) -> tuple[float, float]:
 
 def third(index: int, use: str, seed: int = 0) -> float:
     """A third number that goes with `point`, for uses that fill a volume."""
-    return _thirds(index // BLOCK, use, seed)[index % BLOCK]
+    return _axis(index // BLOCK, 2, use, seed)[index % BLOCK]
+
+
+def lot(index: int, use: str, seed: int = 0) -> float:
+    """A number that chooses among things, of which the chosen one then takes a `point`."""
+    return _axis(index // BLOCK, 7, use, seed)[index % BLOCK]
 
 
 def pixel_bits(index: int) -> tuple[int, int, int, int]:

@@ -172,8 +172,8 @@ _image_estimates: dict[tuple[int, str, bool, str], tuple[weakref.ref, Estimate]]
 def image_estimate(image, clipped: bool, output: str) -> Estimate:
     """Bounds and mean of what an image gives at its output "Color" (while alpha is not used) or "Alpha".
 
-    `clipped`: the lookup gives 0 outside of the image. Means are over at most 256 x 256 pixels; bounds of alpha are
-    exact, those of colour cover the pixels that were looked at. Remembered as long as the pixels exist.
+    `clipped`: the lookup gives 0 outside of the image. Means are over at most 256 x 256 pixels, bounds over all.
+    Remembered as long as the pixels exist.
     """
     key = (id(image.pixels), image.encoding + image.alpha_mode, clipped, output)
     alive, estimate = _image_estimates.get(key, (None, None))
@@ -199,12 +199,13 @@ def _alpha_estimate(image, clipped: bool) -> Estimate:
 
 
 def _color_estimate(image, clipped: bool) -> Estimate:
-    pixels = _some_pixels(image)
-    color = pixels[..., :3]
-    if image.alpha_mode == "STRAIGHT":
-        color = color * pixels[..., 3:]
+    def channels(pixels: np.ndarray) -> list[np.ndarray]:
+        alpha = pixels[..., 3] if image.alpha_mode == "STRAIGHT" else 1.0
+        return [pixels[..., k] * alpha for k in range(3)]
+
+    all_pixels = channels(image.pixels)  # holes of a grille may lie between those that the mean looks at
+    low, high = (np.array([float(end(channel)) for channel in all_pixels]) for end in (np.min, np.max))
+    mean = np.stack(channels(_some_pixels(image)), axis=-1).reshape(-1, 3)
     if image.encoding == "SRGB":
-        color = srgb_decode(color)
-    flat = color.reshape(-1, 3)
-    low = flat.min(axis=0)
-    return Estimate(np.minimum(low, 0.0) if clipped else low, flat.mean(axis=0), flat.max(axis=0))
+        low, high, mean = srgb_decode(low), srgb_decode(high), srgb_decode(mean)
+    return Estimate(np.minimum(low, 0.0) if clipped else low, mean.mean(axis=0), high)

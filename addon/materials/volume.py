@@ -15,7 +15,7 @@ stands for it and `even` is false.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -34,6 +34,11 @@ class Medium:
     temperature: float  # kelvin, of the part that glows as a black body
     glow: float  # strength of that glow
     even: bool  # the same everywhere
+
+    @property
+    def key(self) -> tuple:
+        """Equal for media that are alike."""
+        return tuple(np.ravel(getattr(self, part.name)).tobytes() for part in fields(self))
 
     def __mul__(self, share: float) -> Medium:
         return Medium(

@@ -65,7 +65,9 @@ class ImageTable:
         state = _state(original)
         encoding, space_notes = _encoding(original)
         alpha = original.alpha_mode
-        if alpha in ("STRAIGHT", "PREMUL"):
+        if alpha in ("STRAIGHT", "PREMUL") and original.colorspace_settings.is_data:
+            alpha = "CHANNEL_PACKED"  # what is no colour is not covered by alpha
+        elif alpha in ("STRAIGHT", "PREMUL"):
             alpha = "PREMUL" if original.is_float else "STRAIGHT"
         same = (
             old is not None

@@ -291,6 +291,7 @@ class AccumulatedMaps(Technique):
                 largest.append(np.full(len(centre), np.inf))
                 continue
             strength *= emitter.area if emitter.area > 0 else 1.0
+            strength *= emitter.concentration
             nearest = np.clip(emitter.centre, receivers.low, receivers.high)
             reach = float(np.linalg.norm(emitter.u[:3]) + np.linalg.norm(emitter.v[:3])) if emitter.has_span else 0
             gap = np.maximum(np.linalg.norm(nearest - emitter.centre, axis=1) - reach, 1e-6 * frame.geometry.size)

@@ -177,6 +177,7 @@ class DirectLight(Technique):
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
             rate = self._rate(frame, emitter, weight, shadow)
+            frame.services.setdefault("light rates", {})[emitter.light.key] = rate.per_sample
             points = rate.per_sample * frame.settings.samples / weight
             if shadow and self._has_rays(frame, emitter, shadow):
                 for number in rate.points(frame.sample):
@@ -246,7 +247,7 @@ class DirectLight(Technique):
         share = 0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)
         chance = np.minimum(share * most, 1.0)
         edges = np.concatenate([[0.0], np.cumsum(chance)])
-        marks = np.arange(int(np.ceil(edges[-1]))) + frame.random("choose lights")[0]
+        marks = np.arange(int(np.ceil(edges[-1]))) + frame.lot("choose lights")
         picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
         return [(self._emitters[k], 1.0 / chance[k]) for k in picked]
 

@@ -19,7 +19,7 @@ need many samples.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,16 +40,21 @@ SIDES = ((BOTH, 1.0), (FRONT, 1.0), (BEHIND, -1.0))  # with the sign of the norm
 FEWEST_POINTS, MOST_POINTS = 32, 16  # in a whole picture, and in one of its samples
 
 
-class EmissiveTriangles:
-    """World-space triangles that emit, ready to draw points from."""
+PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
 
-    def __init__(self, frame: Frame):
-        corners, radiance, normals, sided = [], [], [], []
+
+class EmissiveTriangles:
+    """World-space triangles that emit, ready to draw points from; of objects that any of these paths (names of
+    Visibility) may see. As in Cycles, an object lights what its ray visibility says."""
+
+    def __init__(self, frame: Frame, paths: Sequence[str]):
+        corners, radiance, normals, sided, flags = [], [], [], [], []
         of_side = {side: np.array([_emission(m, side) for m in frame.measured_materials]) for side, _ in SIDES}
         emissive = {k for emission in of_side.values() for k in np.flatnonzero(emission.any(axis=1))}
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
-            if emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
+            seen = sum(PATHS[path] * getattr(instance.visibility, path) for path in paths)
+            if not seen or emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
                 continue
             slots = mesh.triangle_materials(instance.materials)
             for side, sign in SIDES:
@@ -65,9 +70,11 @@ class EmissiveTriangles:
                 # A mirrored triangle's corners run the other way round.
                 normals.append(np.full(len(world), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
                 sided.append(np.full(len(world), side != BOTH))
+                flags.append(np.full(len(world), seen))
         self.corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
         self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
         self.sided = np.concatenate(sided) if sided else np.zeros(0, bool)
+        self.flags = np.concatenate(flags) if flags else np.zeros(0, int)  # of lights.py, for `paths`
         normal = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         double_area = np.linalg.norm(normal, axis=1)
         self.normal = normal / np.maximum(double_area, 1e-30)[:, None]
@@ -81,20 +88,20 @@ class EmissiveTriangles:
     def row(
         self, numbers: tuple[float, float, float], share: float, flags: int, views: int = 1, samples: float = np.inf
     ) -> np.ndarray:
-        """Of a point drawn by three uniform numbers, one of `share` in each of `samples` samples; see lights.py."""
-        point, normal, radiance, density, sided = self.draw(*numbers)
-        flags += lights.SIDED_FLAG * sided
+        """Of a point drawn by three uniform numbers, one of `share` in each of `samples` samples; see lights.py. Flags
+        of the paths that see it are added."""
+        k, point, density = self.draw(*numbers)
+        flags += int(self.flags[k]) + lights.SIDED_FLAG * bool(self.sided[k])
+        normal, radiance = self.normal[k], self.radiance[k]
         return lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
 
-    def draw(self, x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, bool]:
-        """From three uniform numbers: point, normal, radiance, density per m2, and whether it shines to the normal's
-        side only."""
+    def draw(self, x: float, y: float, z: float) -> tuple[int, np.ndarray, float]:
+        """From three uniform numbers: a triangle, a point on it, and the density per m2."""
         k = int(np.clip(np.searchsorted(self._edges, x * self.power, side="right") - 1, 0, len(self.radiance) - 1))
         root = np.sqrt(y)
         a, b, c = self.corners[k]
         point = (1 - root) * a + root * (1 - z) * b + root * z * c
-        density = float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
-        return point, self.normal[k], self.radiance[k], density, bool(self.sided[k])
+        return k, point, float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
 
 
 def _emission(material: CompiledMaterial, side: str) -> tuple[float, float, float]:
@@ -131,18 +138,18 @@ class EmissiveLight(Technique):
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         if frame.sample == 0:
-            self._triangles = EmissiveTriangles(frame)
+            self._triangles = EmissiveTriangles(frame, ("diffuse", "glossy"))
         count = self._count(frame.settings)
         frame.services["emissive"] = (self._triangles.power, float(count))
         if not self._triangles.power > 0:
             return
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
-        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.GLOSSY_FLAG + lights.TRACED_FLAG
+        flags = lights.SHADOW_FLAG + lights.TRACED_FLAG
         items = []
         for k in range(count):
             number = frame.sample * count + k
             numbers = frame.random_volume_at(number, "emissive")
-            point = self._triangles.draw(*numbers)[0]
+            point = self._triangles.draw(*numbers)[1]
             if number == 0:
                 self._traced = by_rays(frame, lambda place=point: _views(frame, place, 0, resolution), resolution)
             views = [] if self._traced else _views(frame, point, number, resolution)

@@ -137,7 +137,7 @@ class VirtualMaps:
 
     def draw(self, frame: Frame, technique: Technique, lights: VirtualLightSet, points: int, side: int) -> BoundGather:
         """Maps of `side` texels from runs of `points` points, both powers of two. Counts in the technique's row."""
-        unit = float(np.median(frame.receivers.distance))
+        unit = frame.typical_distance
         if frame.sample == 0:
             made = self._points.update(frame, points, unit)
             count = self._points.triangles + self._points.points

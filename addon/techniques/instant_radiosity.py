@@ -236,7 +236,7 @@ class InstantRadiosity(Technique):
         grain, which a mean over neighbours takes out; what virtual lights leave is not."""
         near = near_radius(frame, count)
         several = frame.settings.samples >= SEVERAL and not frame.settings.draft
-        far = FARTHER * float(np.median(frame.receivers.distance))
+        far = FARTHER * frame.typical_distance
         return {"near_radius": far if several else near, "glossy_radius": near}
 
     def release(self) -> None:

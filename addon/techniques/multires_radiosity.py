@@ -56,8 +56,6 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from functools import cache
 
-import numpy as np
-
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
@@ -214,7 +212,7 @@ class MultiresRadiosity(InstantRadiosity):
             return
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
-        scale = float(np.median(frame.receivers.distance))
+        scale = frame.typical_distance
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
         if not frame.settings.get(self, "near_bounces"):

@@ -58,8 +58,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from ..frame import acceleration
 from ..frame.run import Frame
 from ..frame.settings import Settings
@@ -211,7 +209,7 @@ class ScreenSpaceBounce(Technique):
 
 def fan_bindings(frame: Frame, technique: Technique) -> dict:
     """What shaders/ssdo/fan.glsl needs, by the parameters that `fan_params` declares."""
-    distance = float(np.median(frame.receivers.distance))
+    distance = frame.typical_distance
     return {
         "textures": {**surface_bindings(frame), "energy_table": frame.materials.energy_table},
         "blocks": {"film_view": frame.view_block},

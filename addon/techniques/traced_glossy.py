@@ -103,7 +103,8 @@ class TracedGlossy(Technique):
         if frame.sample == 0:
             found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
             shown = lights.traceable([emitter for emitter in found if emitter is not None])
-            rates = [rate_of(frame, emitter.light.key).per_sample for emitter in shown]
+            drawn = frame.services.get("light rates", {})  # whole lights have one point, whatever their rate
+            rates = [drawn.get(e.light.key, rate_of(frame, e.light.key).per_sample) for e in shown]
             rows = [emitter.row(emitter.centre, 0, 0, rate, rate) for emitter, rate in zip(shown, rates)]
             self._rows = rows
             sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)

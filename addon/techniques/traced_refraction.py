@@ -201,7 +201,7 @@ class TracedRefraction(Technique):
         used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
         self._triangles = None
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
-            triangles = EmissiveTriangles(frame)
+            triangles = EmissiveTriangles(frame, ("diffuse", "transmission"))
             self._triangles = triangles if triangles.power > 0 else None
         seen = frame.snapshot.world.visibility
         self._world_flags = lights.TRANSMISSION_FLAG * seen.transmission + lights.DIFFUSE_FLAG * seen.diffuse
@@ -215,19 +215,18 @@ class TracedRefraction(Technique):
         count = len(self._emitters)
         chosen = np.arange(count)
         if count > MOST_LAMPS:
-            chosen = (np.arange(MOST_LAMPS) + frame.random("refraction/choose")[0]) * count / MOST_LAMPS
+            chosen = (np.arange(MOST_LAMPS) + frame.lot("refraction/choose")) * count / MOST_LAMPS
             chosen = chosen.astype(int)
         for number in chosen:
             emitter = self._emitters[number]
             sample = emitter.sample(*frame.random_volume("refraction/light"))
             row = emitter.row(sample, 0, int(emitter.light.cast_shadow), max(count / MOST_LAMPS, 1.0))
             rows.append(row)
-        seen = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.TRANSMISSION_FLAG
         if self._triangles is not None:
             for k in range(EMISSIVE_POINTS):
                 index = frame.sample * EMISSIVE_POINTS + k
                 drawn = frame.random_volume_at(index, "refraction/emissive")
-                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, seen))
+                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG))
         if self._world_flags:
             seen = lights.SHADOW_FLAG + self._world_flags
             for k in range(WORLD_DIRECTIONS):

@@ -239,7 +239,7 @@ class VirtualLights:
         self._emissive = None
         used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
-            triangles = EmissiveTriangles(frame)
+            triangles = EmissiveTriangles(frame, ("diffuse",))
             self._emissive = triangles if triangles.power > 0 else None
         self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.diffuse
         others = (self._emissive is not None) << lights.SURFACE | bool(self._world) << lights.DIRECTION
@@ -255,7 +255,7 @@ class VirtualLights:
         if self._emissive is not None:
             for index in numbers:
                 drawn = frame.random_volume_at(index, "virtual lights/emissive")
-                rows.append(self._emissive.row(drawn, share, seen, samples=total / share))
+                rows.append(self._emissive.row(drawn, share, lights.SHADOW_FLAG, samples=total / share))
         if self._world:
             chosen = np.array([frame.random_at(index, "virtual lights/world") for index in numbers])
             for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
@@ -269,7 +269,7 @@ class VirtualLights:
             power = np.array([emitter.power for emitter in self._emitters])
             chance = np.minimum(share * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
             edges = np.concatenate([[0.0], np.cumsum(chance)])
-            marks = np.arange(share) + frame.random("virtual lights/choose")[0]
+            marks = np.arange(share) + frame.lot("virtual lights/choose")
             picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
             chosen = [(self._emitters[k], 1.0 / chance[k]) for k in picked]
         each = max(share // max(len(chosen), 1), 1)
@@ -380,7 +380,7 @@ class Grid:
 
 def near_radius(frame: Frame, count: int) -> float:
     """Distance below which `count` virtual lights leave light to short rays, m: in proportion to their spacing."""
-    return NEAR * float(np.sqrt(128 / max(count, 1)) * np.median(frame.receivers.distance))
+    return NEAR * float(np.sqrt(128 / max(count, 1)) * frame.typical_distance)
 
 
 def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:

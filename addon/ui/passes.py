@@ -74,6 +74,34 @@ def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     return [render_pass for render_pass in PASSES if getattr(layer, render_pass.switch)]
 
 
+# Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.
+_OTHERS = (
+    ("use_pass_mist", "Mist"), ("use_pass_position", "Position"), ("use_pass_vector", "Vector"), ("use_pass_uv", "UV"),
+    ("use_pass_object_index", "Object Index"), ("use_pass_material_index", "Material Index"),
+    ("use_pass_shadow", "Shadow"), ("use_pass_ambient_occlusion", "Ambient Occlusion"),
+    ("use_pass_subsurface_direct", "Subsurface Direct"), ("use_pass_subsurface_indirect", "Subsurface Indirect"),
+    ("use_pass_subsurface_color", "Subsurface Color"),
+    ("use_pass_cryptomatte_object", "Cryptomatte Object"), ("use_pass_cryptomatte_material", "Cryptomatte Material"),
+    ("use_pass_cryptomatte_asset", "Cryptomatte Asset"),
+    ("cycles.denoising_store_passes", "Denoising Data"),
+    ("cycles.use_pass_shadow_catcher", "Shadow Catcher"),
+)  # fmt: skip
+
+
+def missing_passes(layer: bpy.types.ViewLayer) -> list[str]:
+    """Names of the passes that a view layer asks for in vain, so that what reads them will find nothing."""
+    names = [name for switch, name in _OTHERS if _ticked(layer, switch)]
+    names += [f"AOV '{aov.name}'" for aov in layer.aovs]
+    return names + [f"light group '{group.name}'" for group in layer.lightgroups]
+
+
+def _ticked(layer: bpy.types.ViewLayer, switch: str) -> bool:
+    thing = layer
+    for name in switch.split("."):
+        thing = getattr(thing, name, False)
+    return bool(thing)
+
+
 def divide_by_color(light: np.ndarray, color: np.ndarray) -> np.ndarray:
     """Light over colour per channel, as Cycles writes its passes: a channel without colour takes the mean of others."""
     has = color != 0.0

@@ -81,7 +81,8 @@ void main()
       float density;
       vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
       if (hit_distance < limit) {
-        out_emission.rgb += radiance;
+        // Where there is no surface, its emission is what coloured layers let through.
+        out_emission.rgb += s.hit ? radiance : radiance * s.emission;
       }
     }
   }

@@ -19,7 +19,7 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
-  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7)));
+  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7) + uint(film_view.seed) * 0x9E3779B1u));
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   if (max_component(s.diffuse) > 0.0) {
 #ifdef SHARED
@@ -41,7 +41,8 @@ void main()
     Lobe lobe = lobe_begin(s, to_viewer);
     // Where the lobe is most of what is seen, on metal, it has the noise that is seen.
     int count = (luminance(s.glossy_weight * s.glossy_tint) > luminance(s.diffuse)) ? lobe_rays : 1;
-    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), scrambled(film_view.bits_w, salt.x));
+    // bits_w chose which lobe is kept: of each pixel it would draw a part of the lobe only.
+    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), shuffled(film_view.sample_index, salt.xz));
     for (int k = 0; k < count; k++) {
       float part = float(k) / float(count);
       vec3 weight;
@@ -60,7 +61,7 @@ void main()
     // viewer's side, do not serve them. One ray does, of the cosine's density.
     float side = (soft.kind == LOBE_TRANSLUCENT) ? -1.0 : 1.0;
     roll = hash3(roll);
-    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), scrambled(film_view.bits_w, salt.x));
+    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), shuffled(film_view.sample_index, salt.xz));
     vec3 direction = cosine_direction(side * soft.normal, u);
     if (side * dot(direction, s.geometric_normal) > 0.0) {
       vec3 weight = soft_reflection(soft, direction) * PI / max(side * dot(direction, soft.normal), 1e-6);

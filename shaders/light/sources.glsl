@@ -262,7 +262,8 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
   float distance_squared = max(dot(to_centre, to_centre), 1e-30);
   float along = dot(to_centre, direction);
   if (LIGHT_IS(light, LIGHT_SPHERE)) {
-    float miss_squared = max(distance_squared - along * along, 0.0);
+    vec3 missed = to_centre - along * direction;  // of squares the difference would cancel for a small lamp far away
+    float miss_squared = dot(missed, missed);
     float r_squared = light.radius * light.radius;
     bool within = distance_squared < r_squared;
     if (miss_squared > r_squared || (along <= 0.0 && !within)) {

@@ -47,13 +47,13 @@ void vector_displacement_object(SurfacePoint point, vec3 vector, float midlevel,
   displacement = world_from_object(point, (vector - vec3(midlevel)) * scale);
 }
 
-// Of the vector in tangent space, y is along the normal. `tangent` is in world space, the bitangent's sign in w.
+// Of the vector in tangent space, y is along the normal. `tangent` is in object space, the bitangent's sign in w.
 void vector_displacement_tangent(SurfacePoint point, vec4 tangent, vec3 vector, float midlevel, float scale,
                                  out vec3 displacement)
 {
   vec3 offset = (vector - vec3(midlevel)) * scale;
   vec3 normal = object_from_world_normal(point, point.normal);
-  vec3 along = object_from_world_normal(point, tangent.xyz);
+  vec3 along = tangent.xyz;
   vec3 bitangent = tangent.w * safe_normalize(cross(normal, along));
   displacement = world_from_object(point, along * offset.x + normal * offset.y + bitangent * offset.z);
 }

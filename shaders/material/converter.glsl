@@ -45,9 +45,14 @@ void combine_rgb(float first, float second, float third, out vec3 color)
   color = vec3(first, second, third);
 }
 
+// Hues are not wrapped here: as in Cycles all that lie outside have the colours of the last sixth.
 void combine_hsv(float first, float second, float third, out vec3 color)
 {
   color = hsv_to_rgb(vec3(first, second, third));
+  if (first >= 1.0 || first < 0.0) {
+    float part = first * 6.0 - floor(first * 6.0);
+    color = third * vec3(1.0, 1.0 - second, 1.0 - second * part);
+  }
 }
 
 void combine_hsl(float first, float second, float third, out vec3 color)

@@ -356,7 +356,7 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
                        mirror_normal);
     }
     else {
-      add_glass(closures, point, w * through, vec3(1.0), sqrt(base), max(specular_tint, vec3(0.0)),
+      add_glass(closures, point, w * through, vec3(1.0), sqrt(min(base, vec3(1.0))), max(specular_tint, vec3(0.0)),
                 clamp(ior, 1e-5, MOST_IOR), r, mirror_normal, distribution);
     }
     w *= 1.0 - through;

@@ -99,3 +99,16 @@ def test_the_film_offsets_are_distributed_as_the_filter():
     assert abs(offsets.mean()) < 1e-4
     assert np.abs(offsets).max() <= 1.5
     assert offsets.var() == pytest.approx((density * t**2).sum() / density.sum(), rel=2e-3)
+
+
+def test_lens_and_lots_cover_the_plane_together_with_what_they_choose():
+    """Two scrambles of one dimension are functions of each other: a point of the lens, or a lot, would see the same
+    part of a light for ever."""
+    count = 1024
+    light = points(0, count, "light")
+    lots = np.array([sequence.lot(k, "choose lights") for k in range(count)])
+    lens = points(0, count, sequence.LENS)
+    for other in (lots, lens[:, 0], lens[:, 1]):
+        for axis in (0, 1):
+            cells = occupancy(np.stack([other, light[:, axis]], axis=1), (4, 4))
+            assert cells.min() > 0 and cells.max() <= 16  # 4 on average; of one dimension 240 of 256 are empty

@@ -1,5 +1,6 @@
 """Size, border and filter of the picture."""
 
+import numpy as np
 import pytest
 
 
@@ -13,16 +14,17 @@ def test_film_takes_the_scenes_settings(stage):
     assert film.exposure == 1.0
 
 
-@pytest.mark.parametrize("size", [(64, 48), (65, 49), (101, 7)])
-def test_the_border_is_rounded_down_as_blender_rounds_it(stage, size):
+@pytest.mark.parametrize("low", [(0.25, 0.1), (0.7, 0.3)])  # in double precision .7 of 100 pixels are 69
+@pytest.mark.parametrize("size", [(64, 48), (65, 49), (101, 7), (100, 100)])
+def test_the_border_is_rounded_down_as_blender_rounds_it(stage, size, low):
     """The size of a bordered result is what Blender saves when it crops: asked by rendering one."""
     import bpy
 
     width, height = size
     render = stage.scene.render
     render.use_border = render.use_crop_to_border = True
-    render.border_min_x, render.border_max_x = 0.25, 0.8
-    render.border_min_y, render.border_max_y = 0.1, 0.55
+    render.border_min_x, render.border_max_x = low[0], 0.8
+    render.border_min_y, render.border_max_y = low[1], 0.55
     render.resolution_x, render.resolution_y = size
     stage.camera()
     sizes = []
@@ -44,7 +46,7 @@ def test_the_border_is_rounded_down_as_blender_rounds_it(stage, size):
         bpy.utils.unregister_class(Engine)
     film = stage.take(width=width, height=height).film
     assert film.border_size == sizes[0]
-    assert film.border[:2] == (int(0.25 * width), int(0.1 * height))
+    assert film.border[:2] == tuple(int(np.float32(share) * np.float32(n)) for share, n in zip(low, size))
 
 
 def test_a_border_of_the_caller_wins(stage):

@@ -53,6 +53,9 @@ def test_linear_and_data_bytes_need_no_decoding(stage, space):
     shown(stage, image)
     taken = only_image(stage.take())
     assert taken.encoding == "LINEAR"
+    assert taken.alpha_mode == (
+        "CHANNEL_PACKED" if space == "Non-Color" else "STRAIGHT"
+    )  # data is not covered by alpha
     assert np.allclose(taken.pixels, values, atol=1e-6)
 
 

@@ -7,6 +7,7 @@ bound is 0.004, since at half the resolution twice as large a share of the pixel
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 from addon.compare.metrics import compare_radiance
@@ -54,3 +55,13 @@ def test_a_direct_path_is_cycles_path(errors, path, request):
     assert error.not_finite == error.negative == 0
     assert error.relmse <= max(RELMSE, error.floor), error
     assert error.bias == pytest.approx(1.0, abs=BIAS + error.bias_floor), error
+
+
+def test_highlight_of_a_whole_lamp_in_one_sample(stage):
+    """Rays and points share a highlight; the points of a lamp that is drawn whole count as they are drawn."""
+    stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.25))
+    stage.light("POINT", (0.0, 0.0, 2.0), shadow_soft_size=0.1)
+    stage.camera_above(3.0)
+    truth = stage.render(256, (48, 48))["glossy_direct"].mean()
+    one = np.mean([stage.render(1, (48, 48), seed=seed)["glossy_direct"].mean() for seed in range(4)])
+    np.testing.assert_allclose(one, truth, rtol=0.1)

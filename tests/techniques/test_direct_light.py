@@ -326,3 +326,17 @@ def test_of_many_lights_a_few_per_sample_give_the_sum_of_all(floor):
     found = irradiance(floor, samples=256).ravel()
     assert found.mean() == pytest.approx(expected.mean(), rel=TOLERANCE)
     assert np.sqrt(np.mean((found / expected - 1) ** 2)) < 0.02
+
+
+def test_a_small_lamp_far_away_is_seen_as_round_as_a_near_one(stage):
+    """Its share of the picture is the cone's that it fills; at this distance the difference of squares cancels."""
+    radius, away = 0.05, 300.0
+    lamp = stage.light("POINT", (0, 0, -away), shadow_soft_size=radius, use_soft_falloff=False)
+    lamp.visible_camera = True
+    camera = stage.camera((0, 0, 0), (0, 0, 0), angle=8 * radius / away)
+    camera.data.clip_end = 1e4
+    seen = stage.render(64, (32, 32))["emission"][..., 0]
+    lamp.location.z, camera.data.angle = -away / 100, 8 * radius / (away / 100)
+    lamp.data.energy, lamp.data.shadow_soft_size = lamp.data.energy, radius
+    near = stage.render(64, (32, 32))["emission"][..., 0]
+    np.testing.assert_allclose(seen.sum(), near.sum(), rtol=0.02)

@@ -106,3 +106,20 @@ def test_without_emission_the_technique_says_so(stage):
     stage.camera_above(SPAN)
     stage.render(1)
     assert stage.ledger.row("emissive_light").reason == "no material emits light"
+
+
+@pytest.mark.parametrize(("path", "other"), [("diffuse", "glossy"), ("glossy", "diffuse")])
+def test_ray_visibility_says_what_an_emitter_lights(floor, path, other):
+    """As in Cycles: hidden from diffuse rays it lights no diffuse surface, yet still the glossy ones."""
+    floor.clear()
+    glow = floor.material("ShaderNodeEmission", Strength=RADIANCE, Color=(1, 1, 1, 1))
+    floor.floor(material=floor.principled(Roughness=0.7))
+    floor.camera_above(SPAN)
+    corners = [(-0.5, -0.5, 2), (0.5, -0.5, 2), (0.5, 0.5, 2), (-0.5, 0.5, 2)]
+    shade = floor.mesh(corners, [(0, 1, 2, 3)], material=glow)
+    shade.visible_camera = False
+    both = floor.render(16, SIZE)
+    setattr(shade, f"visible_{path}", False)
+    one = floor.render(16, SIZE)
+    assert both[f"{path}_direct"].max() > 0 and not one[f"{path}_direct"].any()
+    np.testing.assert_allclose(one[f"{other}_direct"].mean(), both[f"{other}_direct"].mean(), rtol=0.02)

@@ -309,3 +309,17 @@ def test_pictures_of_few_samples_trace_more_of_the_virtual_lights():
 
     assert [rays(samples) for samples in (1, 2, 3, 4, 64)] == [8, 4, 3, 2, 2]
     assert rays(1, draft=True) == 2 and rays(16, asked=5) == 5
+
+
+def test_where_an_orthographic_camera_stands_changes_nothing(stage):
+    """Blender's orthographic viewport looks from half a kilometre away."""
+    stage.floor(half=1.0, material=stage.diffuse(0.8))
+    stage.rectangle((-0.5, -0.5), (0.5, 0.5), material=stage.diffuse(0.8), turn=(0.0, 1.2, 0.0), location=(0.6, 0, 0.4))
+    stage.light("AREA", (-0.5, 0.2, 1.5), size=0.5)
+    camera = stage.camera_above(2.0, height=3.0)
+    near = stage.render(8, (32, 32), bounces=2)["diffuse_indirect"]
+    camera.location.z, camera.data.clip_end = 500.0, 1000.0
+    far = stage.render(8, (32, 32), bounces=2)["diffuse_indirect"]
+    assert near.mean() > 0.0
+    np.testing.assert_allclose(far.mean(), near.mean(), rtol=0.01)
+    assert np.sqrt(((far - near) ** 2).mean()) < 0.05 * near.mean()

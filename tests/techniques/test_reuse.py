@@ -214,3 +214,53 @@ def test_fifty_renders_with_changes_leave_memory_flat(room):
     engine.free_sessions()
     assert images.pool.allocated_bytes == 0
     assert pool <= max(bytes_ for _, bytes_ in used[:10])
+
+
+def test_error_leaves_no_half_made_frame(room, monkeypatch):
+    """What fails before the first sample is said, and the next picture is whole."""
+    whole = room.render(1)["combined"]
+    room.lamp.data.energy *= 2.0
+
+    def broken(self, frame):
+        raise KeyError("half made")
+
+    monkeypatch.setattr(AccumulatedMaps, "prepare", broken, raising=False)
+    monkeypatch.setattr(AccumulatedMaps, "key", lambda *_: object())
+    with pytest.raises(RuntimeError, match="half made"):
+        room.render(1)
+    monkeypatch.undo()
+    np.testing.assert_allclose(room.render(1)["combined"][..., :3], 2.0 * whole[..., :3], rtol=1e-4, atol=1e-6)
+
+
+def test_what_an_object_does_to_refracted_rays_begins_a_new_picture(room):
+    room.boxes[0].visible_transmission = True
+    room.render(1)
+    room.render(1)
+    assert states(room)["surfaces"] == REUSED
+    room.boxes[0].visible_transmission = False
+    room.render(1)
+    assert states(room)["surfaces"] == RAN
+
+
+def test_absorption_begins_a_new_picture(room):
+    glass = room.material("ShaderNodeBsdfGlass")
+    tree = glass.node_tree
+    absorbs = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    tree.links.new(absorbs.outputs[0], output.inputs["Volume"])
+    room.boxes[0].data.materials[0] = glass
+    room.render(1)
+    absorbs.inputs["Density"].default_value = 5.0
+    room.render(1)
+    assert states(room)["surfaces"] == RAN
+
+
+def test_passes_that_are_not_written_are_named(room):
+    layer = room.scene.view_layers[0]
+    layer.use_pass_mist = layer.use_pass_object_index = True
+    try:
+        room.render(1)
+    finally:
+        layer.use_pass_mist = layer.use_pass_object_index = False
+    (note,) = (note for note in room.ledger.notes if note.subject == f"View layer '{layer.name}'")
+    assert "Mist, Object Index" in note.text

@@ -142,3 +142,27 @@ def test_region_shows_its_picture_while_another_renders(window):
         pixels = window.draw(made)
     assert made.redraws > before
     assert pixels[..., :3].std() > 0.01
+
+
+def test_error_of_one_view_ends_with_another(window, monkeypatch):
+    made = Engine()
+    window.update(made)
+    monkeypatch.setattr(viewport, "take", lambda *_, **__: 1 / 0)
+    window.draw(made)
+    assert "division by zero" in made.stats
+    monkeypatch.undo()
+    window.region_data.view_perspective, window.space_data.use_render_border = "PERSP", False
+    window.space_data.clip_start, window.space_data.clip_end = 0.1, 100.0
+    window.draw(made)
+    assert made.stats.startswith("Sample")
+
+
+def test_what_the_region_hides_is_asked_for_and_starts_anew(window, monkeypatch):
+    asked = []
+    monkeypatch.setattr(viewport, "take", lambda *_, shown, **__: asked.append(shown) or 1 / 0)
+    made = Engine()
+    for hide in (False, True):
+        window.space_data.show_object_viewport_light = not hide
+        window.update(made)
+        window.draw(made)
+    assert asked[0] is None and asked[1] is not None

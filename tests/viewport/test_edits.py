@@ -123,3 +123,11 @@ def test_released_viewport_holds_no_image(scene):
     made.viewport.release()
     images.pool.trim()
     assert images.pool.allocated_bytes == before
+
+
+def test_picture_comes_back_after_an_error_that_changed_nothing(region):
+    region.viewport.pace.cost = {1: 1e-3}  # fast: the frame is begun at full resolution, as the one before
+    before = region.rest()
+    region.viewport.drop()
+    assert region.viewport.picture is None
+    np.testing.assert_array_equal(region.rest(), before)
