@@ -22,6 +22,7 @@ from . import casters
 from .culling import closed
 from .morton import morton_codes
 
+LARGE, STEPS = 256.0, 16  # m: scenes beyond it are cut into so many places for the origin
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
 TRANSMISSION_FLAG = 32  # no shader asks for it, but the frame begins anew when it changes
 TEXELS_PER_INSTANCE = 8  # layout in shaders/lib/instance.glsl
@@ -175,7 +176,9 @@ class SceneGeometry:
             self.bounds_min, self.bounds_max = self._low.min(axis=0), self._high.max(axis=0)
         camera = self._where_seen(snapshot.camera)
         # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
-        grid = 2.0 ** np.ceil(np.log2(self.size)) if instances else 1.0
+        # In a landscape the steps are smaller: at its rim float32 knows a place to .2 mm only.
+        step = np.clip(self.size / STEPS, min(self.size, LARGE), self.size)
+        grid = 2.0 ** np.ceil(np.log2(step)) if instances else 1.0
         self.origin = np.round(camera / grid) * grid
         rows = np.zeros((max(len(instances), 1), TEXELS_PER_INSTANCE, 4), np.float32)
         if len(self._written) == len(instances) and len(self.instance_rows) == len(rows):

@@ -34,6 +34,7 @@ from .technique import Technique
 from .view import VIEW, View, blackman_harris_offset
 from .world_tree import WorldTree
 
+FAR_BEYOND = 300.0  # by the typical distance of what is seen
 ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
 
 
@@ -123,6 +124,14 @@ class Frame:
             left, right, bottom, top = camera.frame
             return ORTHOGRAPHIC_DISTANCE * max(right - left, top - bottom)
         return float(np.median(self.receivers.distance))
+
+    @property
+    def offset_size(self) -> float:
+        """How far beside a surface rays begin at least, m: what float32 may be wrong about a position. Of a scene that
+        reaches far beyond what is seen (a sky of some kilometres), only what is seen counts."""
+        seen = self.receivers is not None and len(self.receivers.distance)
+        reach = FAR_BEYOND * self.typical_distance if seen else np.inf
+        return 1e-6 * min(self.geometry.size, reach)
 
     @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:

@@ -144,13 +144,21 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
             if attribute.domain == "CURVE":
                 values = np.repeat(values, np.diff(offsets), axis=0)
             colors[name] = np.ascontiguousarray(_finite(values[source[corners]]))
+    uv_maps = {}
+    if hair:  # as in Cycles, the first of them is where a strand grows, however it is called
+        curve = np.searchsorted(offsets, source, side="right") - 1
+        count = len(data.curves)
+        for layer in data.attributes:
+            if layer.data_type == "FLOAT2" and layer.domain == "CURVE" and count:
+                places = _finite(_attribute(data, layer.name, "vector", count, np.float32, 2))
+                uv_maps[layer.name] = np.ascontiguousarray(places[curve[corners]])
     generated = None
     if wanted.generated and len(positions):
         low, high = positions.min(axis=0), positions.max(axis=0)
         generated = ((positions - low) / np.maximum(high - low, 1e-30)).astype(np.float32)
     return RawMesh(
         positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
-        colors=colors, generated=generated,
+        uv_maps=uv_maps, active_uv=next(iter(uv_maps), ""), colors=colors, generated=generated,
     )  # fmt: skip
 
 

@@ -143,7 +143,7 @@ def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, objec
     """Textures and RAY_CONSTANTS: what casts shadows, for rays."""
     hierarchy = frame.hierarchy("shadow")
     textures = hierarchy.textures
-    return textures, {"offset_size": 1e-6 * frame.geometry.size}
+    return textures, {"offset_size": frame.offset_size}
 
 
 def drawn_by_lot(frame: Frame) -> list[Draw]:
@@ -172,7 +172,7 @@ def _far_off(frame: Frame) -> bool:
     in a way that the picture shows: in pixels with little of a huge scene."""
     receivers = frame.receivers
     sides = (receivers.high - receivers.low).max(axis=1)
-    return bool(len(sides)) and 1e-6 * frame.geometry.size > PIXEL_SHARE * float(np.percentile(sides, 10)) / TILE
+    return bool(len(sides)) and frame.offset_size > PIXEL_SHARE * float(np.percentile(sides, 10)) / TILE
 
 
 NO_VIEWS = np.zeros((0, lights.VIEW_TEXELS, 4))

@@ -122,7 +122,7 @@ class DirectionalOcclusion(Technique):
         if traced:
             bindings["textures"] |= hierarchy.textures
             bindings["constants"] |= {
-                "offset_size": 1e-6 * frame.geometry.size,
+                "offset_size": frame.offset_size,
             }  # fmt: skip
             frame.count(self, "rays", frame.size[0] * frame.size[1] * frame.settings.get(self, "fans"))
         with images.borrowed(*frame.size, "RGBA32F") as arriving:

@@ -111,7 +111,7 @@ class LightProbes(Technique):
             "textures": {
                 **surface_bindings(frame), **hierarchy.textures,
             },
-            "constants": {"offset_size": 1e-6 * frame.geometry.size},
+            "constants": {"offset_size": frame.offset_size},
         }  # fmt: skip
 
     def _guide(self, frame: Frame) -> None:

@@ -122,7 +122,7 @@ class TracedGlossy(Technique):
             "blocks": {"world_light": frame.environment.block},
             "constants": {
                 "light_count": len(self._rows), "traced_roughness": roughness,
-                "offset_size": 1e-6 * frame.geometry.size,
+                "offset_size": frame.offset_size,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive_power, "emissive_points": emissive_points,

@@ -154,7 +154,7 @@ class TracedRefraction(Technique):
                 "sources": self._sources.set(rows),
             },
             constants={
-                "light_count": len(rows), "offset_size": 1e-6 * frame.geometry.size,
+                "light_count": len(rows), "offset_size": frame.offset_size,
                 "interfaces": frame.settings.get(self, "interfaces"),
                 "world_transmission": int(bool(self._world_flags & lights.TRANSMISSION_FLAG)),
                 "world_samples": float(WORLD_DIRECTIONS),

@@ -228,7 +228,7 @@ class VirtualLights:
             },
             "blocks": {"film_view": frame.view_block, "sources": self._source_block},
             "constants": {
-                "light_count": self._source_count, "offset_size": 1e-6 * frame.geometry.size,
+                "light_count": self._source_count, "offset_size": frame.offset_size,
                 "bounces": frame.settings.bounces,
             },
         }  # fmt: skip

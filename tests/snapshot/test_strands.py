@@ -87,3 +87,17 @@ def test_hair_and_points_are_meshes_of_the_snapshot(stage):
     assert snapshot.instances[0].object_name == "Hair"
     again = stage.take(cache)
     assert next(iter(again.meshes.values())).version == mesh.version
+
+
+def test_strands_know_where_they_grow(stage):
+    """As in Cycles the first pair of numbers per curve is the UV map, and the others go by their names."""
+    data = hair(stage, [[(x, 0, 0), (x, 0, 1)] for x in (0.0, 1.0, 2.0)], 0.02)
+    places = np.float32([[0.1, 0.2], [0.5, 0.6], [0.9, 0.3]])
+    for name, scale in (("surface_uv_coordinate", 1.0), ("other", 2.0)):
+        layer = data.attributes.new(name, "FLOAT2", "CURVE")
+        layer.data.foreach_set("vector", (scale * places).ravel())
+    (mesh,) = stage.take().meshes.values()
+    strand = np.rint(mesh.positions[mesh.corner_vertices][:, 0]).astype(int)
+    assert mesh.active_uv == "surface_uv_coordinate"
+    np.testing.assert_allclose(mesh.uv_maps["surface_uv_coordinate"], places[strand])
+    np.testing.assert_allclose(mesh.uv_maps["other"], 2.0 * places[strand])

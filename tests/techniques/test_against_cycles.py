@@ -60,7 +60,8 @@ def test_a_direct_path_is_cycles_path(errors, path, request):
 def test_highlight_of_a_whole_lamp_in_one_sample(stage):
     """Rays and points share a highlight; the points of a lamp that is drawn whole count as they are drawn."""
     stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.25))
-    stage.light("POINT", (0.0, 0.0, 2.0), shadow_soft_size=0.1)
+    stage.rectangle((0.3, 0.3), (0.6, 0.6), 0.4, material=stage.diffuse())
+    stage.light("POINT", (0.0, 0.0, 2.0), shadow_soft_size=0.3)
     stage.camera_above(3.0)
     truth = stage.render(256, (48, 48))["glossy_direct"].mean()
     one = np.mean([stage.render(1, (48, 48), seed=seed)["glossy_direct"].mean() for seed in range(4)])

@@ -365,3 +365,24 @@ def test_settings_toggled_objects_deleted_and_sizes_changed_in_a_row_give_what_e
         pictures.append(room.stage.render(2, SIZE)["combined"])
     engine.free_sessions()
     np.testing.assert_array_equal(room.stage.render(2, SIZE)["combined"], pictures[-1])
+
+
+@pytest.mark.parametrize("by", ["MAPS", "RAYS"])
+def test_a_sky_of_ten_kilometres_leaves_small_things_as_they_are(stage, by):
+    """Contact shadows, indirect light below a small card, and what stands close to the camera."""
+    stage.scene.candela.accumulated_maps_by = by
+    stage.floor(half=2.0, material=stage.diffuse(0.8))
+    stage.rectangle((-0.05, -0.05), (0.05, 0.05), 0.01, material=stage.diffuse(0.8))
+    stage.rectangle((0.1, -0.1), (0.1001, 0.1), 1.3, material=stage.diffuse(0.8))
+    stage.rectangle((-0.2, -0.2), (0.2, 0.2), material=stage.diffuse(0.8), turn=(0, 1.2, 0), location=(-0.2, 0, 0.2))
+    stage.light("AREA", (0.4, 0.3, 1.0), size=0.2)
+    stage.camera((0, 0, 1.5), (0, 0, 0), angle=0.4)
+    before = stage.render(16, (32, 32), bounces=1)
+    corners = [(x, y, z) for x in (-1e4, 1e4) for y in (-1e4, 1e4) for z in (-1e4, 1e4)]
+    faces = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    dome = stage.mesh(corners, faces, material=stage.diffuse(0.0))
+    dome.visible_camera = dome.visible_shadow = False
+    after = stage.render(16, (32, 32), bounces=1)
+    for name in ("diffuse_direct", "diffuse_indirect", "depth"):
+        scale = np.abs(before[name]).mean()
+        assert scale > 0.0 and np.abs(after[name] - before[name]).mean() < 0.02 * scale, name
