@@ -280,16 +280,17 @@ class Expressions:
                 )
         if not asked_for(node, socket):
             return glsl_number(0.0, socket.kind)
-        if socket.implicit == "@RADIAL":
+        implicit = "" if given is not None and given.given else socket.implicit
+        if implicit == "@RADIAL":
             self.includes["material/input.glsl"] = None
             generated = self._attribute(node, "GENERATED", "")
             return f"surface_tangent(point, vec3(0.5 - {generated}.y, {generated}.x - 0.5, 0.0))"
-        if socket.implicit == "@UV":
+        if implicit == "@UV":
             return f"vec3({self._attribute(node, 'UV', '')}.xy, 0.0)"
-        if socket.implicit == "@GENERATED":
+        if implicit == "@GENERATED":
             return f"{self._attribute(node, 'GENERATED', '')}.xyz"
-        if socket.implicit:
-            return socket.implicit
+        if implicit:
+            return implicit
         value, kind = (socket.default, socket.kind) if given is None else (given.value, given.kind)
         constant = to_kind(socket.default if value is None else value, kind, socket.kind)
         if self.lean and socket.layer and constant == 0.0:

@@ -12,6 +12,7 @@ class Input:
     kind: str  # FLOAT, VECTOR, COLOR, SHADER, INT, BOOLEAN, OTHER
     value: tuple[float, ...] | float | None = None
     link: tuple[str, str] | None = None
+    given: bool = False  # the value stands where an unlinked socket would take the surface's own vector
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,9 @@ _settings_of_type: dict[str, tuple] = {}
 WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
 
 
+INLINES = bpy.app.version >= (5, 0, 0)  # Blender dissolves groups itself before Cycles sees the tree
+
+
 @dataclass(frozen=True)
 class _Place:
     """Where a node stands: its tree and the chain of group nodes that lead there."""
@@ -72,7 +75,7 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     links = {}
     for name in ("Surface", "Volume", "Displacement"):
         socket = output.inputs.get(name)
-        links[name.lower()] = None if socket is None else reading.source(place, output, socket)[0]
+        links[name.lower()] = None if socket is None else reading.source(place, output, socket).link
     if links["displacement"] is not None and getattr(owner, "displacement_method", "BUMP") != "BUMP":
         reading.notes.append((owner.name, "Displacement bends the surface's normal only; its shape stays."))
     reading.read_pending()
@@ -141,52 +144,67 @@ class _Reading:
             self._links[tree.as_pointer()] = links
         return links.get(socket.as_pointer())
 
-    def source(self, place: _Place, node, socket) -> tuple[tuple[str, str] | None, object, str]:
-        """What an input socket reads: (link, constant, kind of the constant). Follows groups, reroutes, muted nodes.
+    def source(self, place: _Place, node, socket) -> Input:
+        """What an input socket reads. Follows groups, reroutes, muted nodes.
 
-        Where a group's socket has another kind than what is plugged in, the value is converted on the way, so a
-        `Convert` node is put in between.
+        Where a chain ends at nothing, the value stands of the last group's socket on the way, or the socket's own.
+        Where a group's socket has another kind than what is plugged in, the value is converted on the way; before
+        Blender 5.0 links are, too, so a `Convert` node is put in between.
         """
-        constant, constant_kind = _default(socket), _kind(socket)
-        conversions: list[str] = []
+        asked, conversions, held = socket, [], (socket, 0)
         passed: set[tuple] = set()
         while True:
             step = (place.path, socket.as_pointer())
             if step in passed:
                 self.notes.append((node.name, "The links run in a circle and were cut."))
-                return None, constant, constant_kind
+                return self._held(asked, *held, conversions)
             passed.add(step)
             link = self._link_into(place.tree, socket)
             if link is None:
-                value, kind = _default(socket), _kind(socket)
-                for wanted in conversions[::-1]:
-                    value, kind = _converted(value, kind, wanted), wanted
-                return (None, constant, constant_kind) if value is None else (None, value, kind)
+                if socket.node.bl_idname != "NodeReroute" or not INLINES:
+                    held = (socket, len(conversions))
+                return self._held(asked, *held, conversions)
             node, output = link.from_node, link.from_socket
+            socket = None
             if node.mute:
                 socket = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
-                if socket is None:
-                    return None, constant, constant_kind
             elif node.bl_idname == "NodeReroute":
                 socket = node.inputs[0]
             elif node.bl_idname == "NodeGroupInput":
-                if place.parent is None:
-                    return None, constant, constant_kind
-                node, place = place.group, place.parent
-                socket = _by_identifier(node.inputs, output.identifier)
-                if socket is None:
-                    return None, constant, constant_kind
-                _pass_through(conversions, _kind(socket))
+                if place.parent is not None:
+                    node, place = place.group, place.parent
+                    socket = _by_identifier(node.inputs, output.identifier)
+                    if socket is not None:
+                        _pass_through(conversions, _kind(socket))
+                        held = (socket, len(conversions))
             elif isinstance(node, bpy.types.ShaderNodeGroup) or node.bl_idname == "ShaderNodeGroup":
                 inside = self._inside(place, node)
                 end = None if inside is None else _group_output(inside.tree)
                 socket = None if end is None else _by_identifier(end.inputs, output.identifier)
-                if socket is None:
-                    return None, constant, constant_kind
-                place = inside
-                _pass_through(conversions, _kind(socket))
+                if socket is not None:
+                    place = inside
+                    _pass_through(conversions, _kind(socket))
             else:
-                return self._plain_link(place, node, output, conversions), constant, constant_kind
+                linked = self._plain_link(place, node, output, [] if INLINES else conversions)
+                return Input(_kind(asked), _default(asked), linked)
+            if socket is None:
+                return self._held(asked, *held, conversions)
+
+    def _held(self, asked, socket, count: int, conversions: list[str]) -> Input:
+        """The value of a socket on the way, after the first `count` of the conversions backwards.
+
+        Blender 5.0 takes what a group's socket shows for a value, also where the socket that asks would take the
+        surface's own vector; what it hides it does not, except for the vectors of textures.
+        """
+        value, kind, wanted = _default(socket), _kind(socket), _kind(asked)
+        if value is None:
+            value, kind = _default(asked), wanted
+        else:
+            for passed in conversions[:count][::-1]:
+                value, kind = _converted(value, kind, passed), passed
+        texture = asked.node.bl_idname.startswith("ShaderNodeTex")
+        given = INLINES and socket != asked and socket.node.bl_idname == "ShaderNodeGroup"
+        return Input(wanted, _converted(value, kind, wanted), given=given and (texture or not socket.hide_value))
 
     def _inside(self, place: _Place, group) -> _Place | None:
         """The tree of a group node; None, with a sentence, for a missing tree or one that contains itself."""
@@ -227,9 +245,7 @@ class _Reading:
         for socket in node.inputs:
             if not socket.enabled:
                 continue
-            link, value, kind = self.source(place, node, socket)
-            wanted = _kind(socket)
-            inputs[socket.identifier] = Input(wanted, _converted(value, kind, wanted), link)
+            inputs[socket.identifier] = self.source(place, node, socket)
         if node.bl_idname in CONSTANT_NODES:
             for socket in node.outputs:
                 # The Normal node has an input of the same name beside the direction in its output.

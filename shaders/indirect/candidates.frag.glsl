@@ -45,7 +45,9 @@ void main()
     vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
     vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
     if (bounce == 2) {
+      // What neighbours share is the part below albedo: rough surfaces reflect less than that to most directions.
       lobe = max(reflected - met.reflection.diffuse, vec3(0.0));
+      out_albedo.rgb = min(reflected, met.reflection.diffuse);
     }
     else {
       // From here on paths end by lot: what they bring is a mean over many, shared by many.

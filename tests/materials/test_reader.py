@@ -211,6 +211,9 @@ def test_a_group_socket_of_another_kind_converts(material):
     color = tree.add("ShaderNodeRGB", "Paint")
     tree.link(color, 0, use, 0)
     graph, _ = read(material)
+    if bpy.app.version >= (5, 0, 0):  # links go past the socket, see test_groups_against_cycles.py
+        assert follow(graph, "Color").key == "Paint"
+        return
     assert follow(graph, "Color").properties["kind"] == "FLOAT"
     assert follow(graph, "Color", "Value").key == "Paint"
     assert "color_luminance" in compile_material("Test", graph).glsl

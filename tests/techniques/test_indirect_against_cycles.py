@@ -58,3 +58,16 @@ def test_walls_seen_edge_on_do_not_outshine_themselves(registered, monkeypatch):
     sequence._block.cache_clear()
     light = light_paths(images)["diffuse_indirect"]
     assert light.max() < 100 * light.mean()
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1.0])
+def test_light_goes_round_a_closed_room_as_in_cycles(stage, roughness):
+    """Rough surfaces reflect less than their albedo to most directions, at every bounce."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    stage.mesh(corners, faces, material=stage.diffuse(0.6, roughness))
+    stage.light("AREA", (0, 0, 1.9), size=0.5, energy=20)
+    stage.camera((0.9, 0.9, 1.0), (np.pi / 2, 0, 3 * np.pi / 4), angle=1.5)
+    pictures = (stage.render(n, (32, 32), engine=e, bounces=4) for n, e in ((64, "CANDELA"), (512, "CYCLES")))
+    ours, theirs = (picture["diffuse_indirect"].mean() for picture in pictures)
+    assert ours == pytest.approx(theirs, rel=0.02)
