@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ from .frame import ledger as ledgers
 from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
-from .snapshot import SnapshotCache, UnsupportedScene, take
+from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree, resolve
@@ -29,6 +29,8 @@ from .ui.passes import RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
+
+STEREO = ("left", "right")
 
 
 @dataclass
@@ -116,24 +118,42 @@ class CandelaEngine(bpy.types.RenderEngine):
         snapshot = getattr(self, "_snapshot", None)
         if snapshot is not None:
             with images.passing_context():
-                self._render(depsgraph, snapshot)
+                for eye in eyes(depsgraph.scene):
+                    self._render(depsgraph, self._seen(depsgraph, snapshot, eye), eye)
+                    if self.test_break():
+                        break
 
-    def _render(self, depsgraph, snapshot: Snapshot) -> None:
+    def _seen(self, depsgraph, snapshot: Snapshot, eye: str) -> Snapshot:
+        """The same scene through the camera of a view, where there are several."""
+        if not eye:
+            return snapshot
+        self.active_view_set(eye)
+        scene, film = depsgraph.scene_eval, snapshot.film
+        camera = self.camera_override or scene.camera
+        placed = np.array(self.camera_model_matrix(camera), np.float64).reshape(4, 4)
+        shift = self.camera_shift_x(camera)
+        view = camera_of_scene(scene, depsgraph, film.width, film.height, camera, placed, shift)
+        return replace(snapshot, camera=view)
+
+    def _render(self, depsgraph, snapshot: Snapshot, eye: str) -> None:
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
         shared = session(scene, "preview" if self.is_preview else "final")
         settings = settings_of(scene, viewport=False, preview=self.is_preview)
         try:
             check_tree(settings.passes)
+            before = shared.renderer.frame
             with context.turn:
                 frame = shared.renderer.begin(snapshot, settings, self._compiling)
+                if before is not None and before.size != frame.size:
+                    images.pool.trim()  # nobody asks for images of the old size again
             frame.ledger.times["sync"] = self._sync_seconds
             missing = missing_passes(layer)
             if missing and not self.is_preview:
                 text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
                 frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
             width, height = frame.size
-            result = self.begin_result(0, 0, width, height, layer=layer.name)
+            result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
             for _ in self._drawn(shared.renderer, frame):
                 if self.test_break():
                     self.end_result(result, cancel=True)
@@ -144,7 +164,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             with context.turn:
                 pixels = _finished(shared.renderer, frame, wanted)
             for name, array in pixels.items():
-                render_pass = result.layers[0].passes.find_by_name(name, "")
+                render_pass = result.layers[0].passes.find_by_name(name, eye)
                 if render_pass is not None:
                     render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())
             self.end_result(result)
@@ -196,6 +216,15 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _fail_unforeseen(self, error: Exception) -> None:
         traceback.print_exc()
         self._fail(f"{type(error).__name__}: {error}. This is an error in Candela; please report it.")
+
+
+def eyes(scene) -> list[str]:
+    """Names of the views that are rendered; one without a name where there is but one."""
+    render = scene.render
+    if not render.use_multiview:
+        return [""]
+    used = [view.name for view in render.views if view.use]
+    return [name for name in used if name in STEREO] if render.views_format == "STEREO_3D" else used
 
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:

@@ -12,9 +12,12 @@ from .errors import UnsupportedScene
 from .scene import Aperture, Camera, Note
 
 
-def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> Camera:
+def camera_of_scene(
+    scene, depsgraph, width: int, height: int, camera=None, placed: np.ndarray | None = None, shift: float | None = None
+) -> Camera:
     """The view of `camera`, or of the scene's active camera, on a picture of `width` x `height` pixels.
 
+    `placed`, `shift`: matrix and horizontal shift other than its own, of an eye of a stereoscopic pair.
     Raises UnsupportedScene when there is no camera, or when it is neither perspective nor orthographic.
     """
     camera = camera or scene.camera
@@ -29,7 +32,8 @@ def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> C
             f"Camera '{camera.name}': lens type {data.type.title()} is not supported; choose Perspective or"
             " Orthographic in the camera's Lens panel."
         )
-    placed = np.array(camera.matrix_world, np.float64)
+    if placed is None:
+        placed = np.array(camera.matrix_world, np.float64)
     if not np.isfinite(placed).all():
         text = "has a position that is not a finite number; check its drivers and constraints."
         raise UnsupportedScene(f"Camera '{camera.name}' {text}")
@@ -37,7 +41,7 @@ def camera_of_scene(scene, depsgraph, width: int, height: int, camera=None) -> C
     return Camera(
         matrix=_rigid(placed),
         kind="PERSPECTIVE" if data.type == "PERSP" else "ORTHOGRAPHIC",
-        frame=_frame(data, width, height, aspect),
+        frame=_frame(data, width, height, aspect, data.shift_x if shift is None else shift),
         clip_start=data.clip_start,
         clip_end=data.clip_end,
         name=camera.name,
@@ -88,7 +92,9 @@ def camera_of_view(region_data, space=None, camera=None) -> Camera:
     return Camera(matrix, "ORTHOGRAPHIC", frame, float(near), float(far), name="")
 
 
-def _frame(data, width: int, height: int, aspect: tuple[float, float]) -> tuple[float, float, float, float]:
+def _frame(
+    data, width: int, height: int, aspect: tuple[float, float], shift: float
+) -> tuple[float, float, float, float]:
     """(left, right, bottom, top) as in scene.Camera, by Blender's rules of sensor fit and lens shift.
 
     One side of the picture is fitted: it spans sensor/lens (or ortho_scale), and shifts count in its length.
@@ -102,7 +108,7 @@ def _frame(data, width: int, height: int, aspect: tuple[float, float]) -> tuple[
     sensor = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
     span = data.ortho_scale if data.type == "ORTHO" else sensor / data.lens
     per_pixel = span / fitted
-    middle_x, middle_y = data.shift_x * span, data.shift_y * span
+    middle_x, middle_y = shift * span, data.shift_y * span
     half_x, half_y = 0.5 * width * per_pixel, 0.5 * height * pixel_height * per_pixel
     return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
 

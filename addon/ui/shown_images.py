@@ -5,13 +5,16 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+OWN = "made_by_candela"  # a packed image no longer says that it was generated
+
 
 def write(name: str, picture: np.ndarray):
     """The image of this name with the content of `picture`, (H, W, 1 to 4) scene-linear; made if it is not there."""
     height, width = picture.shape[:2]
     image = bpy.data.images.get(name)
-    if image is None or image.source != "GENERATED" or not image.is_float:
+    if image is None or not image.is_float or not (image.source == "GENERATED" or image.get(OWN)):
         image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
+        image[OWN] = True
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
     pixels = np.ones((height, width, 4), np.float32)

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.frame.run import ORTHOGRAPHIC_DISTANCE
 from addon.techniques.directional_occlusion import blurred
 from tests.techniques.conftest import places
 from tests.techniques.test_environment_light import sky
@@ -67,7 +68,7 @@ def test_points_miss_a_wall_with_the_chance_that_the_thesis_gives_them(stage, re
     stage.mesh([(0, -20, 0), (0, 20, 0), (0, 20, 20), (0, -20, 20)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
     camera = stage.camera((14, 0, 14), (np.pi / 4, 0, np.pi / 2))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0
-    light = render(visibility="POINTS", radius=0.6 / 19)[:, 16:32].mean(axis=(1, 2))
+    light = render(visibility="POINTS", radius=0.6 / (ORTHOGRAPHIC_DISTANCE * 4.0))[:, 16:32].mean(axis=(1, 2))
     distance = -((np.arange(SIZE[1]) + 0.5) / SIZE[1] - 0.5) * 4 / np.sin(np.pi / 4) / 0.6
     share, left = [0.02, 0.1, 0.25, 0.5, 0.75], [0.559, 0.691, 0.832, 0.948, 0.992]
     floor = (distance > 0.02) & (distance < 0.75)

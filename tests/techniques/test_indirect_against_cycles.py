@@ -10,6 +10,7 @@ than at 256x192.
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 from addon.compare.metrics import compare_radiance

@@ -162,6 +162,11 @@ def test_bake_keeps_the_picture_in_the_file(tree):
     assert bpy.ops.candela.passes_bake(tree="Passes", node=name) == {"FINISHED"}
     image = bpy.data.images[f"Passes {name}"]
     assert image.packed_file and image.is_float and tuple(image.size) == (64, 48)
+    kept = np.array(image.pixels[:], np.float32)
+    image.pixels.foreach_set(np.zeros_like(kept))
+    assert bpy.ops.candela.passes_bake(tree="Passes", node=name) == {"FINISHED"}  # into the same image
+    assert f"Passes {name}.001" not in bpy.data.images and image.packed_file
+    np.testing.assert_allclose(np.array(image.pixels[:]), kept, atol=1e-6)
     with pytest.raises(RuntimeError, match="has no picture yet"):
         bpy.ops.candela.passes_bake(tree="Passes", node="nobody")
 
