@@ -119,7 +119,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         if snapshot is not None:
             with images.passing_context():
                 for eye in eyes(depsgraph.scene):
-                    self._render(depsgraph, self._seen(depsgraph, snapshot, eye), eye)
+                    self._render(depsgraph, snapshot, eye)
                     if self.test_break():
                         break
 
@@ -142,6 +142,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         settings = settings_of(scene, viewport=False, preview=self.is_preview)
         try:
             check_tree(settings.passes)
+            snapshot = self._seen(depsgraph, snapshot, eye)
             before = shared.renderer.frame
             with context.turn:
                 frame = shared.renderer.begin(snapshot, settings, self._compiling)
