@@ -21,6 +21,7 @@ from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
+from .snapshot.errors import unforeseen
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree, resolve
@@ -216,7 +217,7 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     def _fail_unforeseen(self, error: Exception) -> None:
         traceback.print_exc()
-        self._fail(f"{type(error).__name__}: {error}. This is an error in Candela; please report it.")
+        self._fail(unforeseen(error))
 
 
 def eyes(scene) -> list[str]:

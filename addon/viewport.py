@@ -33,6 +33,7 @@ from .gfx import context as gpu_context
 from .gfx import images, library
 from .gfx.context import turn
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, camera_of_view, take
+from .snapshot.errors import unforeseen
 from .snapshot.scene import Camera, Snapshot
 from .techniques.film import check_tree, resolve
 from .ui.properties import settings_of
@@ -358,7 +359,7 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
     except Exception as error:
         # An error of Candela's own. Raised further it would come again with every redraw.
         traceback.print_exc()
-        _fail(viewport, engine, f"{type(error).__name__}: {error}. The console holds the details; please report this.")
+        _fail(viewport, engine, unforeseen(error))
     finally:
         gpu.state.blend_set(blend)
         gpu.state.depth_test_set(depth_test)

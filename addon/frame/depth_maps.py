@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,6 +31,11 @@ class Receivers:
     low: np.ndarray  # (T, 3)
     high: np.ndarray  # (T, 3)
     distance: np.ndarray  # (T,) from the camera, metres
+
+    @cached_property
+    def typical_distance(self) -> float:
+        """The median, m; asked where there are any."""
+        return float(np.median(self.distance))
 
     @property
     def corners(self) -> np.ndarray:

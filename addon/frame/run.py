@@ -123,7 +123,7 @@ class Frame:
         if camera.kind == "ORTHOGRAPHIC":
             left, right, bottom, top = camera.frame
             return ORTHOGRAPHIC_DISTANCE * max(right - left, top - bottom)
-        return float(np.median(self.receivers.distance))
+        return self.receivers.typical_distance
 
     @property
     def offset_size(self) -> float:

@@ -200,8 +200,9 @@ def _alpha_estimate(image, clipped: bool) -> Estimate:
 
 def _color_estimate(image, clipped: bool) -> Estimate:
     def channels(pixels: np.ndarray) -> list[np.ndarray]:
-        alpha = pixels[..., 3] if image.alpha_mode == "STRAIGHT" else 1.0
-        return [pixels[..., k] * alpha for k in range(3)]
+        if image.alpha_mode == "STRAIGHT":
+            return [pixels[..., k] * pixels[..., 3] for k in range(3)]
+        return [pixels[..., k] for k in range(3)]
 
     all_pixels = channels(image.pixels)  # holes of a grille may lie between those that the mean looks at
     low, high = (np.array([float(end(channel)) for channel in all_pixels]) for end in (np.min, np.max))

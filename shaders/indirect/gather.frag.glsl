@@ -19,7 +19,7 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
-  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7) + uint(film_view.seed) * 0x9E3779B1u));
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 7);
   vec3 origin = ray_origin(s.position, s.geometric_normal);
   if (max_component(s.diffuse) > 0.0) {
 #ifdef SHARED

@@ -11,7 +11,7 @@ void gather(ivec2 region, int level_of_region)
   Surface s = SURFACE_READ(pixel);
   if (s.hit) {
     uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
-    uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 7) + uint(film_view.seed) * 0x9E3779B1u));
+    uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 7);
     vec3 origin = ray_origin(s.position, s.geometric_normal);
     float choice = scrambled(film_view.bits_w, salt.z);
     irradiance = vec4(virtual_gather(s, vec3(0.0), false, origin, choice, salt.x + roll.x), 1.0);

@@ -45,7 +45,7 @@ float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 norm
   }
   vec3 origin = ray_origin(position, normal);
   // The same lots for all lights, so that two half lights are one.
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index)) + uvec3(0, 0, uint(film_view.seed) << 16));
+  uvec3 salt = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 19);
   float open = 0.0;
   float all = 0.0;
   for (int k = 0; k < contact_side * contact_side; k++) {

@@ -52,6 +52,13 @@ float shuffled(int index, uvec2 salt)
   return to_unit(owen_scramble(reverse_bits(owen_scramble(uint(index), salt.y)), salt.x));
 }
 
+// Bits of a pixel, a sample and a seed, to draw from by hashing again; those of another `purpose` (below 1,024) are
+// independent.
+uvec3 roll_of(ivec2 pixel, int sample_number, int seed, int purpose)
+{
+  return hash3(uvec3(uvec2(pixel), uint(sample_number * 1024 + purpose) + uint(seed) * 0x9E3779B1u));
+}
+
 // Draws one of many in proportion to their weights, as they come: whether this one replaces the one kept so far. What
 // is left of the uniform number `choice` decides on the next (weighted reservoir sampling, Chao 1982).
 bool reservoir_takes(float weight, inout float total, inout float choice)

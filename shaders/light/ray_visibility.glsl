@@ -10,6 +10,6 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   float density;
   light_sample(light, origin, direction, density);
   float reach = 0.9999 * light_distance(light, origin, direction);
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index) + (uint(film_view.seed) << 16u)));
+  uvec3 salt = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 17);
   return clear_to_light(origin, direction, reach, salt.x);
 }

@@ -110,7 +110,7 @@ void main()
   }
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 53u));
-  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 13) + uint(film_view.seed) * 0x9E3779B1u));
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 13);
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   float choice = shuffled(film_view.sample_index, salt.zx);
   Interface surface = interface_begin(s.glossy_normal, to_viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,

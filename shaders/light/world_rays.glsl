@@ -49,6 +49,6 @@ Light own_point(Light light, int number)
 
 float light_visibility(Light light, vec3 position, vec3 normal)
 {
-  uvec3 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index) + (uint(film_view.seed) << 16u)));
+  uvec3 salt = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 17);
   return clear_path(ray_origin(position, normal), light.centre, 1e29, salt.x);
 }

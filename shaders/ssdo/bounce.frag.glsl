@@ -56,7 +56,7 @@ void main()
   }
   vec2 turn = tile_numbers(pixel, film_view.bits_x, film_view.bits_y);
   vec2 within = tile_numbers(pixel, film_view.bits_z, film_view.bits_w);
-  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 13) + uint(film_view.seed) * 0x9E3779B1u));
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 13);
 #ifdef RAYS
   float open_sectors = 0.0;
   vec3 chosen = s.normal;

@@ -13,7 +13,7 @@ void main()
     return;
   }
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 57u));
-  uvec3 roll = hash3(uvec3(uvec2(pixel), uint(film_view.sample_index * 1024 + 29) + uint(film_view.seed) * 0x9E3779B1u));
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 29);
   Lobe lobe = lobe_begin(s, viewer_direction(s.position));
   vec3 weight;
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));

@@ -1,10 +1,13 @@
 """What group sockets, muted nodes and reroutes hand on: colours beside Cycles'."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 
 SIZE = (8, 8)
+ESSENTIALS = Path(bpy.utils.system_resource("DATAFILES")) / "assets" / "nodes" / "shading_nodes_essentials.blend"
 
 
 @pytest.fixture
@@ -77,4 +80,24 @@ def test_a_reroute_that_nothing_reaches(tree):
 def test_a_vector_of_a_group_that_nothing_feeds(tree, inner, socket, output, hidden):
     """Blender 5.0 takes a value that the artist can see for one, and a hidden one for the usual vector."""
     group(tree, "NodeSocketVector", inner, socket, output, hide_value=hidden, default_value=(0.2, 0.3, 0.4))
+    check(tree)
+
+
+@pytest.mark.skipif(not ESSENTIALS.exists(), reason="Blender has had this library of node groups since 5.1")
+@pytest.mark.parametrize(("coordinates", "output"), [("Cylindrical", "R"), ("Cylindrical", "Phi"), ("Spherical", "R"),
+                                                     ("Spherical", "Theta")])  # fmt: skip
+def test_node_groups_that_come_with_blender(tree, coordinates, output):
+    """The place on the sphere, taken apart, a part of it shifted, and put together again."""
+    with bpy.data.libraries.load(str(ESSENTIALS)) as (_, loaded):
+        loaded.node_groups = [f"Separate {coordinates}", f"Combine {coordinates}"]
+    apart, together = (tree.tree.nodes.new("ShaderNodeGroup") for _ in range(2))
+    apart.node_tree, together.node_tree = loaded.node_groups
+    geometry, shift = (tree.tree.nodes.new(f"ShaderNode{name}") for name in ("NewGeometry", "Math"))
+    tree.tree.links.new(geometry.outputs["Position"], apart.inputs["Vector"])
+    for socket in apart.outputs:
+        tree.tree.links.new(socket, together.inputs[socket.name])
+    tree.tree.links.new(apart.outputs[output], shift.inputs[0])
+    shift.inputs[1].default_value = 0.3
+    tree.tree.links.new(shift.outputs[0], together.inputs[output])
+    tree.tree.links.new(together.outputs["Vector"], tree.emission.inputs["Color"])
     check(tree)
