@@ -6,7 +6,7 @@
 #include "cssm/filter.glsl"
 #include "cssm/range.glsl"
 
-void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec3 normal, vec2 half_size, ivec2 first, ivec2 last)
+void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 beside, vec2 half_size, ivec2 first, ivec2 last)
 {
   bool search = found.extent.x > 0.0;
   vec2 low = max(r.texel - half_size, vec2(first));

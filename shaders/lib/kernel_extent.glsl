@@ -14,7 +14,7 @@ vec2 kernel_extent(Light light, ShadowReceiver r, float share)
   vec3 across = sources.view[r.view * VIEW_TEXELS].xyz - r.ndc.x * row_w;
   vec3 along = sources.view[r.view * VIEW_TEXELS + 1].xyz - r.ndc.y * row_w;
   vec2 extent;
-  if (light.kind == LIGHT_RECTANGLE || light.kind == LIGHT_ELLIPSE) {
+  if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     vec3 u = sources.light[light.base + 5].xyz;
     vec3 v = sources.light[light.base + 6].xyz;
     // A light that reaches towards the receiver as far as half its distance, as faces beside its axis see it, has no
@@ -25,7 +25,7 @@ vec2 kernel_extent(Light light, ShadowReceiver r, float share)
   }
   else {
     float radius = light.radius;
-    if (light.kind == LIGHT_SUN) {
+    if (LIGHT_IS(light, LIGHT_SUN)) {
       radius = tan(min(light.radius, 1.5)) / length(sources.view[r.view * VIEW_TEXELS + 3].xyz);
     }
     extent = radius * vec2(length(across), length(along));

@@ -106,21 +106,31 @@ vec2 shadow_outward(ShadowReceiver r, vec3 normal)
   return outward * inversesqrt(max(dot(outward, outward), 1e-30));
 }
 
+// Whether only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
+// convex edge, or it overhangs a steep receiver.
+bool shadow_unsure(ShadowReceiver r, vec4 caster, vec2 behind)
+{
+  float turn = length(caster.yz - r.gradient);
+  return behind.x > 0.0 && behind.y <= 0.0 && turn > 0.6 * (length(caster.yz) + length(r.gradient));
+}
+
+// What then decides, by shadow_behind: one texel down the receiver's slope (out along its normal, where that faces the
+// light) the edge is gone, the overhang is not.
+vec2 shadow_beside(ShadowReceiver r, vec3 normal)
+{
+  vec2 down = shadow_outward(r, normal);
+  down = (dot(r.gradient, down) > 0.0) ? -down : down;
+  vec2 beside = clamp(floor(r.texel + down), vec2(0.0), vec2(r.rectangle.z - 1.0));
+  return shadow_behind(r, depth_maps_fetch(ivec2(r.rectangle.xy + beside)), r.texel - beside - 0.5);
+}
+
 // Whether the caster in a texel of the view (from its corner) stands between light and receiver.
 bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
 {
   vec4 caster = depth_maps_fetch(ivec2(r.rectangle.xy + cell));
   vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
-  float turn = length(caster.yz - r.gradient);
-  if (behind.x > 0.0 && behind.y <= 0.0 && turn > 0.6 * (length(caster.yz) + length(r.gradient))) {
-    // Only the caster's own plane says "behind", and it stands at an angle: the caster is either the other side of a
-    // convex edge, or it overhangs a steep receiver. One texel down the receiver's slope (out along its normal, where
-    // that faces the light) the edge is gone, the overhang is not.
-    vec2 down = shadow_outward(r, normal);
-    down = (dot(r.gradient, down) > 0.0) ? -down : down;
-    vec2 beside = clamp(floor(r.texel + down), vec2(0.0), vec2(r.rectangle.z - 1.0));
-    caster = depth_maps_fetch(ivec2(r.rectangle.xy + beside));
-    behind = shadow_behind(r, caster, r.texel - beside - 0.5);
+  if (shadow_unsure(r, caster, behind)) {
+    behind = shadow_beside(r, normal);
   }
   return min(behind.x, behind.y) > 0.0;
 }

@@ -4,7 +4,7 @@
 // Share of a cell of the kernel that belongs to the light's shape. `place`: of the cell's centre, in half extents.
 float kernel_weight(Light light, vec2 place, float cell)
 {
-  return (light.kind == LIGHT_RECTANGLE) ? 1.0 : clamp((1.0 - length(place)) / cell + 0.5, 0.0, 1.0);
+  return LIGHT_IS(light, LIGHT_RECTANGLE) ? 1.0 : clamp((1.0 - length(place)) / cell + 0.5, 0.0, 1.0);
 }
 
 // Least and largest q of a pyramid entry; level 0 is the map itself. Where nothing was drawn: 0, behind everything.
@@ -45,7 +45,7 @@ void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
 {
   first = vec2(0.0);
   last = vec2(r.rectangle.z - 1.0);
-  if (light.kind != LIGHT_RECTANGLE && light.kind != LIGHT_ELLIPSE) {
+  if (!LIGHT_IS(light, LIGHT_RECTANGLE) && !LIGHT_IS(light, LIGHT_ELLIPSE)) {
     return;
   }
   vec3 forward = sources.view[r.view * VIEW_TEXELS + 2].xyz;
@@ -142,13 +142,24 @@ void kernel_add(inout Blockers found, vec2 offset, vec2 half_cell, float height,
   found.height += weight * height;
 }
 
+// Whether the caster in a texel of the view hides the map's point, as shadow_blocked, and its height above the receiver's
+// point. `beside`: by shadow_beside, which is the same for all texels.
+bool kernel_blocked(ShadowReceiver r, vec2 beside, ivec2 texel, out float height)
+{
+  vec4 caster = depth_maps_fetch(ivec2(r.rectangle.xy) + texel);
+  vec2 behind = shadow_behind(r, caster, r.texel - vec2(texel) - 0.5);
+  behind = shadow_unsure(r, caster, behind) ? beside : behind;
+  height = caster.x - r.q;
+  return min(behind.x, behind.y) > 0.0;
+}
+
 // `least`: height that a blocker has at least; a kernel of few texels sees tilted casters beside their texels' centres.
-void kernel_texel(inout Blockers found, ShadowReceiver r, vec3 normal, ivec2 texel, float least, float weight)
+void kernel_texel(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 texel, float least, float weight)
 {
   found.whole += weight;
-  if (shadow_blocked(r, vec2(texel), normal)) {
-    float q = depth_maps_fetch(ivec2(r.rectangle.xy) + texel).x;
-    kernel_add(found, vec2(texel) + 0.5 - r.texel, vec2(0.5), max(q - r.q, least), weight);
+  float height;
+  if (kernel_blocked(r, beside, texel, height)) {
+    kernel_add(found, vec2(texel) + 0.5 - r.texel, vec2(0.5), max(height, least), weight);
   }
 }
 

@@ -15,7 +15,7 @@
 
 // Blockers in the box r.texel -+ half_size. `extent` above 0: only those that stand within the kernel of their own
 // height; else texels that the box's edge cuts count in part. `horizon`: see Blockers.
-Blockers kernel_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, vec2 extent, vec2 horizon)
+Blockers kernel_box(Light light, ShadowReceiver r, vec2 beside, vec2 half_size, vec2 extent, vec2 horizon)
 {
   Blockers found = blockers_none(extent, horizon);
   ivec2 first;
@@ -23,7 +23,7 @@ Blockers kernel_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, 
   kernel_texels(light, r, half_size, first, last);
   ivec2 count = last - first + 1;
   if (max(count.x, count.y) > FEW_TEXELS) {
-    kernel_cells(found, light, r, normal, half_size, first, last);
+    kernel_cells(found, light, r, beside, half_size, first, last);
     return found;
   }
   vec2 low = max(r.texel - half_size, vec2(first));
@@ -34,7 +34,7 @@ Blockers kernel_box(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, 
       vec2 place = (vec2(x, y) + 0.5 - r.texel) / half_size;
       float weight = covered.x * covered.y * kernel_weight(light, place, 1.0 / min(half_size.x, half_size.y));
       weight *= kernel_cosine(found, place * half_size, vec2(0.5));
-      kernel_texel(found, r, normal, ivec2(x, y), r.slack, max(weight, 1e-6));
+      kernel_texel(found, r, beside, ivec2(x, y), r.slack, max(weight, 1e-6));
     }
   }
   return found;
@@ -75,10 +75,10 @@ Blockers kernel_back(Light light, ShadowReceiver r, vec2 half_size, Blockers fou
 // Where the map was drawn from, as the receiver sees it.
 vec3 kernel_towards(Light light, vec3 position)
 {
-  if (light.kind == LIGHT_SUN) {
+  if (LIGHT_IS(light, LIGHT_SUN)) {
     return light.point;
   }
-  bool offset = light.kind == LIGHT_POINT || light.kind == LIGHT_SPHERE;
+  bool offset = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
   return light.point + (offset ? light.centre : vec3(0.0)) - position;
 }
 
@@ -97,7 +97,7 @@ float kernel_lit(Blockers hiding)
 
 // Blockers in the box r.texel -+ half_size. One that stands higher than `most_height` hides, with a texel of this box, a
 // smaller part of the light.
-Blockers kernel_near(Light light, ShadowReceiver r, vec3 normal, vec2 half_size, float most_height, vec2 horizon)
+Blockers kernel_near(Light light, ShadowReceiver r, vec2 beside, vec2 half_size, float most_height, vec2 horizon)
 {
   Blockers found = blockers_none(vec2(0.0), horizon);
   ivec2 first;
@@ -114,8 +114,9 @@ Blockers kernel_near(Light light, ShadowReceiver r, vec3 normal, vec2 half_size,
       float weight = kernel_weight(light, offset / half_size, 2.0 / float(NEAR_TEXELS));
       weight *= kernel_cosine(found, offset, 0.5 * step_size);
       found.whole += weight;
-      if (shadow_blocked(r, vec2(texel), normal)) {
-        float height = max(kernel_entry(ivec2(r.rectangle.xy) + texel, 0).y - r.q, r.slack);
+      float height;
+      if (kernel_blocked(r, beside, texel, height)) {
+        height = max(height, r.slack);
         float part = min(most_height / height, 1.0);
         kernel_add(found, offset, vec2(0.0), height, weight * part * part);
       }
@@ -125,7 +126,7 @@ Blockers kernel_near(Light light, ShadowReceiver r, vec3 normal, vec2 half_size,
 }
 
 // Visibility past blockers that stand lower than `height`.
-float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, float most, float height)
+float near_visibility(Light light, ShadowReceiver r, vec2 beside, vec2 extent, float most, float height)
 {
   height *= NEAR_RATIO;
   vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
@@ -136,14 +137,14 @@ float near_visibility(Light light, ShadowReceiver r, vec3 normal, vec2 extent, f
   if (kernel_bounds(r, first, last, deepest).y <= deepest) {
     return 1.0;  // nothing stands above the receiver here
   }
-  Blockers search = kernel_near(light, r, normal, window, height, vec2(0.0));
+  Blockers search = kernel_near(light, r, beside, window, height, vec2(0.0));
   if (search.blocked <= 0.0) {
     return 1.0;
   }
   float blocker = min(search.height / search.blocked, height);
   vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
   // Heights scatter around their mean, hence twice: else a slanted blocker would count in part.
-  return kernel_lit(kernel_near(light, r, normal, size, 2.0 * blocker, r.gradient / blocker));
+  return kernel_lit(kernel_near(light, r, beside, size, 2.0 * blocker, r.gradient / blocker));
 }
 #endif
 
@@ -156,6 +157,7 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
   if (abs(facing) < EDGE_ON) {
     r.gradient = shadow_outward(r, normal) * (-1e3 * height);  // a wall that bounds the kernel
   }
+  vec2 beside = shadow_beside(r, normal);
   blocker = 0.0;
   if (back && dot(abs(r.gradient), extent) <= LEAST_ABOVE) {
     // Hardly any of the light stands above the horizon; shading normals may show it all the same.
@@ -168,7 +170,7 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
     search = kernel_back(light, r, window, blockers_none(within, vec2(0.0)));
   }
   else {
-    search = kernel_box(light, r, normal, window, within, vec2(0.0));
+    search = kernel_box(light, r, beside, window, within, vec2(0.0));
   }
   float lit = 1.0;
   if (search.blocked > 0.0) {
@@ -180,13 +182,13 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
       hiding = kernel_back(light, r, size, blockers_none(vec2(0.0), horizon));
     }
     else {
-      hiding = kernel_box(light, r, normal, size, vec2(0.0), horizon);
+      hiding = kernel_box(light, r, beside, size, vec2(0.0), horizon);
     }
     lit = kernel_lit(hiding);
   }
 #ifndef CONTACT_RAYS
   if (!back) {
-    lit = min(lit, near_visibility(light, r, normal, extent, most, (blocker > 0.0) ? blocker : height));
+    lit = min(lit, near_visibility(light, r, beside, extent, most, (blocker > 0.0) ? blocker : height));
   }
 #endif
   return lit;

@@ -65,9 +65,13 @@ void main()
     light = own_point(light, i);
 #endif
     bool whole = LIGHTS_HAVE(LIGHTS_AS_A_WHOLE) && (light.flags & LIGHT_WHOLE) != 0;
-    int parts = whole ? WHOLE_PARTS : 1;
     bool on_diffuse = has_diffuse && (light.flags & LIGHT_DIFFUSE) != 0;
     bool on_glossy = has_glossy && (light.flags & LIGHT_GLOSSY) != 0;
+    bool by_points = !whole || on_glossy;
+#ifdef SOFT_LOBES
+    by_points = by_points || soft.exists;
+#endif
+    int parts = by_points ? (whole ? WHOLE_PARTS : 1) : 0;
     vec3 from_diffuse = vec3(0.0);
     vec3 from_glossy = vec3(0.0);
     vec3 facing = s.geometric_normal;
@@ -75,7 +79,7 @@ void main()
     vec3 falling = vec3(0.0);
 #endif
     if (whole && on_diffuse) {
-      vec3 to_middle = (light.kind == LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
+      vec3 to_middle = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
       from_diffuse = whole_diffuse(light, s, to_viewer, to_middle);
     }
     for (int part = 0; part < parts; part++) {
@@ -100,7 +104,7 @@ void main()
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
         if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
-          float rays = (light.kind == LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
+          float rays = LIGHT_IS(light, LIGHT_SURFACE) ? 1.0 : float(CANDIDATES);
           float ratio = rays * lobe_density / (light.rate * density);
           reflected /= 1.0 + ratio * ratio;
         }

@@ -19,7 +19,7 @@ uvec4 vssm_sum(ivec2 texel)
 }
 
 // Texels first..last of the view, whose sum in the table is `sum`.
-void vssm_cell(inout Blockers found, ShadowReceiver r, vec3 normal, ivec2 first, ivec2 last, uvec4 sum, float range, float weight)
+void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first, ivec2 last, uvec4 sum, float range, float weight)
 {
   vec2 size = vec2(last - first + 1);
   vec2 centre = vec2(first) + 0.5 * size;
@@ -70,17 +70,21 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec3 normal, ivec2 first,
     kernel_add(found, offset, 0.5 * size, square / mean + base, weight * share);
   }
   else {
-    // Something lies far behind the receiver and no bound holds: ask texels.
-    for (int k = 0; k < 9; k++) {
-      vec2 place = (vec2(float(k % 3), float(k / 3)) + 0.5) / 3.0;
-      kernel_texel(found, r, normal, first + ivec2(place * size), 0.0, weight / 9.0);
+    // Something lies far behind the receiver and no bound holds: ask texels, all of a small cell.
+    ivec2 asked = min(last - first + 1, ivec2((found.extent.x > 0.0) ? 2 : 3));
+    vec2 apart = size / vec2(asked);
+    float share = weight / float(asked.x * asked.y);
+    for (int y = 0; y < asked.y; y++) {
+      for (int x = 0; x < asked.x; x++) {
+        kernel_texel(found, r, beside, first + ivec2((vec2(x, y) + 0.5) * apart), 0.0, share);
+      }
     }
   }
 }
 
 // Adds the box r.texel -+ half_size, texels first..last of the view. When blockers are looked for the cells are even; else
 // the outermost are one texel wide and count by the part of them that the box covers.
-void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec3 normal, vec2 half_size, ivec2 first, ivec2 last)
+void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 beside, vec2 half_size, ivec2 first, ivec2 last)
 {
   bool smooth_edges = found.extent.x <= 0.0;
   vec2 low = max(r.texel - half_size, vec2(first));
@@ -89,7 +93,7 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec3 norm
   // Lines of the grid: with smooth edges, the first and the last cell are one texel wide.
   // The outline of a round light takes more of them, and so do sums that have to fit into 32 bits.
   int border = smooth_edges ? 1 : 0;
-  int wished = smooth_edges ? ((light.kind == LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
+  int wished = smooth_edges ? (LIGHT_IS(light, LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
   int longest = max(count.x, count.y) - 2 * border;
   int cells = max(wished, (longest + CELL_TEXELS - 1) / CELL_TEXELS + 2 * border);
   ivec2 inner_low = first + border;
@@ -117,7 +121,7 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec3 norm
         weight *= kernel_cosine(found, place * half_size, 0.5 * (b - a));
         if (weight > 0.0) {
           uvec4 sum = corner - corner_before - below + below_before;
-          vssm_cell(found, r, normal, ivec2(left, bottom), ivec2(line_x, line_y) - 1, sum, range, weight);
+          vssm_cell(found, r, beside, ivec2(left, bottom), ivec2(line_x, line_y) - 1, sum, range, weight);
         }
       }
       row_below[i] = corner;
