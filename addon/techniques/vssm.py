@@ -104,7 +104,7 @@ class VarianceSoftShadows(SoftMaps):
     )  # fmt: skip
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
-        table = self.kept("table", size, "RGBA32UI")
+        table = self.kept("table", (size[0] // 2, size[1] // 2), "RGBA32UI")
         if drawn:
             bound = {"depth_maps": maps.atlas, **maps.textures}
             tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)

@@ -39,8 +39,8 @@ vec2 kernel_bounds(ShadowReceiver r, ivec2 first, ivec2 last, out float deepest)
   return bounds;
 }
 
-// Texels of the view (first..last) that can hold blockers: in front of an area light's plane. Views beside its axis
-// have that plane's horizon along a row or a column (turn_along in addon/frame/depth_maps.py).
+// Texels of the view (first..last) that can hold blockers: in front of an area light's plane, in whole blocks of two, as
+// tables know them. Views beside its axis have that plane's horizon along a row or a column (turn_along in addon/frame/depth_maps.py).
 void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
 {
   first = vec2(0.0);
@@ -59,10 +59,10 @@ void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
   int k = (abs(rise.x) > abs(rise.y)) ? 0 : 1;
   float here = clamp(horizon[k], 0.0, r.rectangle.z - 1.0);
   if (rise[k] > 0.0) {
-    first[k] = ceil(here);
+    first[k] = min(2.0 * ceil(0.5 * here), r.rectangle.z - 2.0);
   }
   else {
-    last[k] = max(floor(here) - 1.0, 0.0);
+    last[k] = max(2.0 * floor(0.5 * here) - 1.0, 1.0);
   }
 }
 

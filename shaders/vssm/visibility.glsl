@@ -10,12 +10,12 @@
 #include "vssm/range.glsl"
 
 #define CELL_LINES 11  // of a grid of up to 10 x 10 cells: a kernel of 2 MOST_HALF_SIZE texels
-#define CELL_TEXELS 64  // widest cell whose sums fit into 32 bits
+#define CELL_BLOCKS 32  // widest cell whose sums fit into 32 bits
 
-uvec4 vssm_sum(ivec2 texel)
+uvec4 vssm_sum(ivec2 block)
 {
-  // A prefix: sums up to, not including, the texel. The table begins at the atlas' corner.
-  return (min(texel.x, texel.y) <= 0) ? uvec4(0u) : depth_table_fetch(texel - 1);
+  // A prefix: sums up to, not including, the block. The table begins at the atlas' corner.
+  return (min(block.x, block.y) <= 0) ? uvec4(0u) : depth_table_fetch(block - 1);
 }
 
 // Texels first..last of the view, whose sum in the table is `sum`.
@@ -70,66 +70,67 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
     kernel_add(found, offset, 0.5 * size, square / mean + base, weight * share);
   }
   else {
-    // Something lies far behind the receiver and no bound holds: ask texels, all of a small cell.
+    // Something lies far behind the receiver and no bound holds: ask texels, all of a small cell. Each row and column is
+    // shifted by another part of their distance, so that an edge along them is told as finely.
     ivec2 asked = min(last - first + 1, ivec2((found.extent.x > 0.0) ? 2 : 3));
     vec2 apart = size / vec2(asked);
     float share = weight / float(asked.x * asked.y);
     for (int y = 0; y < asked.y; y++) {
       for (int x = 0; x < asked.x; x++) {
-        kernel_texel(found, r, beside, first + ivec2((vec2(x, y) + 0.5) * apart), 0.0, share);
+        vec2 shift = (vec2(y, x) + 0.5) / vec2(asked.yx) - 0.5;
+        kernel_texel(found, r, beside, first + ivec2((vec2(x, y) + 0.5 + shift) * apart), 0.0, share);
       }
     }
   }
 }
 
-// Adds the box r.texel -+ half_size, texels first..last of the view. When blockers are looked for the cells are even; else
-// the outermost are one texel wide and count by the part of them that the box covers.
+// Adds the box r.texel -+ half_size, texels first..last of the view, by the blocks of 2x2 texels that it touches. When
+// blockers are looked for the cells are even; else the outermost are one block wide. What the box cuts counts in part.
 void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 beside, vec2 half_size, ivec2 first, ivec2 last)
 {
   bool smooth_edges = found.extent.x <= 0.0;
   vec2 low = max(r.texel - half_size, vec2(first));
   vec2 high = min(r.texel + half_size, vec2(last + 1));
-  ivec2 count = last - first + 1;
-  // Lines of the grid: with smooth edges, the first and the last cell are one texel wide.
-  // The outline of a round light takes more of them, and so do sums that have to fit into 32 bits.
+  ivec2 block = first / 2;
+  ivec2 end = last / 2 + 1;
+  // Lines of the grid: the outline of a round light takes more of them, and so do sums that have to fit into 32 bits.
   int border = smooth_edges ? 1 : 0;
   int wished = smooth_edges ? (LIGHT_IS(light, LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
-  int longest = max(count.x, count.y) - 2 * border;
-  int cells = max(wished, (longest + CELL_TEXELS - 1) / CELL_TEXELS + 2 * border);
-  ivec2 inner_low = first + border;
-  ivec2 inner = count - 2 * border;
+  ivec2 inner = end - block - 2 * border;
+  int cells = max(wished, (max(inner.x, inner.y) + CELL_BLOCKS - 1) / CELL_BLOCKS + 2 * border);
   int inner_cells = cells - 2 * border;
   ivec2 origin = ivec2(r.rectangle.xy);
   float range = vssm_range(origin);
   uvec4 row_below[CELL_LINES];
-  int bottom = first.y;
+  ivec2 before = block;
   for (int j = 0; j <= cells; j++) {
-    int line_y = (j == 0) ? first.y : ((j == cells) ? last.y + 1 : inner_low.y + inner.y * (j - border) / inner_cells);
+    ivec2 line = block;
+    line.y = (j == 0) ? block.y : ((j == cells) ? end.y : block.y + border + inner.y * (j - border) / inner_cells);
     uvec4 corner_before = uvec4(0u);
     uvec4 below_before = uvec4(0u);
-    int left = first.x;
+    before.x = block.x;
     for (int i = 0; i <= cells; i++) {
-      int line_x = (i == 0) ? first.x : ((i == cells) ? last.x + 1 : inner_low.x + inner.x * (i - border) / inner_cells);
-      uvec4 corner = vssm_sum(origin + ivec2(line_x, line_y));
+      line.x = (i == 0) ? block.x : ((i == cells) ? end.x : block.x + border + inner.x * (i - border) / inner_cells);
+      uvec4 corner = vssm_sum(origin / 2 + line);
       uvec4 below = row_below[i];
-      if (j > 0 && i > 0 && line_x > left && line_y > bottom) {
-        vec2 a = vec2(left, bottom);
-        vec2 b = vec2(line_x, line_y);
+      if (j > 0 && i > 0 && all(greaterThan(line, before))) {
+        vec2 a = 2.0 * vec2(before);
+        vec2 b = 2.0 * vec2(line);
         vec2 covered = min(b, high) - max(a, low);
         vec2 place = (0.5 * (a + b) - r.texel) / half_size;
         float weight = covered.x * covered.y * kernel_weight(light, place, 2.0 / float(inner_cells));
         weight *= kernel_cosine(found, place * half_size, 0.5 * (b - a));
         if (weight > 0.0) {
           uvec4 sum = corner - corner_before - below + below_before;
-          vssm_cell(found, r, beside, ivec2(left, bottom), ivec2(line_x, line_y) - 1, sum, range, weight);
+          vssm_cell(found, r, beside, 2 * before, 2 * line - 1, sum, range, weight);
         }
       }
       row_below[i] = corner;
       corner_before = corner;
       below_before = below;
-      left = line_x;
+      before.x = line.x;
     }
-    bottom = line_y;
+    before.y = line.y;
   }
 }
 
