@@ -56,6 +56,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from functools import cache
 
+from ..frame import lists
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
@@ -107,19 +108,17 @@ BOUNDS = passes.fullscreen_program(
 )
 
 
-RUN = 64  # entries of the list of regions that lie side by side
 REGION_BITS = 14  # of each axis, in an entry
-RUNS = (("RUN", str(RUN)), ("REGION_BITS", str(REGION_BITS)))
+RUNS = (*lists.DEFINES, ("REGION_BITS", str(REGION_BITS)))
 GRID = (("IVEC2", "grid_offset"), ("IVEC2", "atlas_size"))  # of what includes shaders/indirect/regions.glsl
 LIST = Program(
     name="list of regions",
     compute="indirect/region_list.comp.glsl",
     textures=(("RGBA32F", "surface_position"), ("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags")),
-    images=(("entries", "R32UI", "UINT_2D", "WRITE"), ("entry_count", "R32UI", "UINT_2D_ATOMIC", "READ_WRITE")),
+    images=lists.FILLED,
     constants=(*GRID, ("INT", "level"), ("INT", "levels")),
     defines=RUNS,
 )
-LISTED = (("entries", "R32UI", "UINT_2D", "READ"), ("entry_count", "R32UI", "UINT_2D", "READ"))
 
 
 def _fill(name: str, textures: tuple[str, ...], defines=()) -> Program:
@@ -145,7 +144,7 @@ FILL = _fill("regions from coarser ones", ("coarser_flags", "coarser_irradiance"
 def regions(gather: Gather, listed: bool = True) -> Program:
     """The gather of regions, those of the list or those of one level, with what tells which lights are hidden."""
     if listed:
-        textures, bound, constants = (), LISTED, (("INT", "columns"),)
+        textures, bound, constants = (), lists.READ, (("INT", "columns"),)
     else:
         textures, bound = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags")), ()
         constants = (("INT", "level"), ("INT", "levels"))
@@ -158,7 +157,7 @@ def regions(gather: Gather, listed: bool = True) -> Program:
         constants=(*GATHER_CONSTANTS, *GRID, ("INT", "first_row"), *constants, *gather.constants),
         snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
         defines=(*RUNS, *gather.defines, *(() if listed else (("BY_LEVEL", ""),))),
-        group=(RUN, 1, 1),
+        group=(lists.RUN, 1, 1),
     )
 
 
@@ -293,17 +292,15 @@ class MultiresRadiosity(InstantRadiosity):
 
     def _listed(self, frame: Frame, flags: list[images.Image], grid: dict) -> dict[str, images.Image]:
         """The list of the regions that gather, and how many they are."""
-        entries, count = images.pool.take(*_list_size(frame.size), "R32UI"), images.pool.take(1, 1, "R32UI")
-        count.texture.clear(format="UINT", value=(0,))
+        listed = lists.take(frame.size)
         position = surface_bindings(frame)["surface_position"]
         for level, (own, coarser) in enumerate(zip(flags, (*flags[1:], flags[-1])), 1):
             passes.compute(
                 LIST, own.size,
                 textures={"surface_position": position, "region_flags": own, "coarser_flags": coarser},
-                images={"entries": entries, "entry_count": count},
-                constants={**grid, "level": level, "levels": len(flags)},
+                images=listed, constants={**grid, "level": level, "levels": len(flags)},
             )  # fmt: skip
-        return {"entries": entries, "entry_count": count}
+        return listed
 
     def _fill(self, frame: Frame, atlas: images.Image, flags: list[images.Image], constants: dict) -> images.Image:
         """Irradiance at every pixel from that of the regions that have gathered."""
@@ -341,7 +338,7 @@ class MultiresRadiosity(InstantRadiosity):
     def _gather_listed(
         self, frame: Frame, bindings, bound: BoundGather, grid: dict, bound_images: dict
     ) -> Iterator[None]:
-        columns = _list_size((max(frame.size[0] // 8, 1), 1))[0]
+        columns = lists.columns(frame.size, 8)
         program = regions(bound.gather)
         textures = bindings["textures"] | bound.textures
         constants = bindings["constants"] | bound.constants | grid | {"columns": columns}
@@ -384,11 +381,6 @@ def _level_size(size: tuple[int, int], level: int, levels: int) -> tuple[int, in
     """Regions of a level: whole ones of the coarsest level, wherever the grid is shifted to."""
     side = 1 << levels
     return tuple((-(-(extent + side - 1) // side) * side) >> level for extent in size)
-
-
-def _list_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Room for as many regions as there are pixels, see shaders/indirect/regions.glsl."""
-    return -(-size[0] // RUN) * RUN, size[1]
 
 
 def _atlas_size(size: tuple[int, int], levels: int) -> tuple[int, int]:

@@ -71,20 +71,15 @@ class Lit:
 
 
 def add(
-    frame: Frame, technique: Technique, sources: lights.Sources, lit: Lit, marks: images.Image | None = None
-) -> Iterator[None]:
-    """Add this light to the sample's radiance, in parts, and keep it for other points of the film. `marks`: a depth
-    image of this pass alone, that lit.where is about instead of the MARKS of surfaces; such light is not kept."""
-    names = tuple(f"radiance.{path}" for path in PATHS)
-    if marks is None:
-        target = frame.target(*names, depth=MARKS)
-    else:
-        target = images.Target(tuple(frame.images[name] for name in names), marks)
+    frame: Frame, technique: Technique, sources: lights.Sources, lit: Lit, keeps: bool = True
+) -> Iterator[None]:  # fmt: skip
+    """Add this light to the sample's radiance, in parts, and keep it for other points of the film."""
+    target = frame.target(*(f"radiance.{path}" for path in PATHS), depth=MARKS)
     bindings = lit.bound(frame, sources, surface_bindings(frame))
     for band in frame.bands(technique):
         passes.fullscreen(lit.program, target, blend="ADDITIVE_PREMULT", where=lit.where, rows=band, **bindings)
         yield
-    if marks is None:
+    if keeps:
         keep(frame, lit)
 
 

@@ -40,11 +40,11 @@ from functools import cache
 
 import numpy as np
 
-from ..frame import lights
+from ..frame import lights, lists
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..frame.view import VIEW
-from ..gfx import images, passes
+from ..gfx import context, images, passes
 from ..gfx.library import Program
 from . import repeated_light
 from .accumulated_maps import Lookup, Maps
@@ -54,14 +54,13 @@ RATE = 4  # pixels between lookups, along both axes
 ALIKE = 0.1  # difference of visibility between a cell's corners up to which pixels within it interpolate
 MANY_PIXELS = 100_000
 LIGHTS = 4  # whose visibility one image holds
-KNOWN, UNKNOWN = "GREATER", "LESS"  # `where` of passes.fullscreen: the marks are 0, and 1
 CORNERS = ("first", "second", "third", "fourth")  # light: what its cells know
 DEFINES = (("RATE", str(RATE)), ("ALIKE", str(ALIKE)), ("FACING", "0.9"), ("OFF_PLANE", "2.0"))
 SEEN = tuple(texture for texture in SURFACE_TEXTURES if texture[1] in ("surface_position", "surface_normal"))
 BETWEEN = Lookup(
     "shared visibility",
     "light/shared_visibility.glsl",
-    textures=tuple(("RGBA32F", name) for name in CORNERS),
+    textures=(*(("RGBA32F", name) for name in CORNERS), ("RGBA16F", "apart")),
     defines=DEFINES,
     maps=False,
 )
@@ -73,61 +72,117 @@ CELLS = passes.fullscreen_program(
     defines=DEFINES,
     outputs=tuple(("VEC4", f"out_{name}") for name in ("plane", *CORNERS)),
 )
-MARKS = passes.fullscreen_program(
-    "marks of shared visibility",
-    "light/visibility_marks.frag.glsl",
+LIST = Program(
+    name="pixels that look for themselves",
+    compute="light/visibility_list.comp.glsl",
     textures=(*SEEN, ("RGBA32F", "cell_plane")),
+    images=lists.FILLED,
     blocks=((VIEW, "film_view"),),
-    defines=DEFINES,
-    writes_depth=True,
+    defines=(*DEFINES, *lists.DEFINES),
 )
+SHARE = 8  # of a list's room: entries that a thread may take
+
+
+def _looking(lookup: Lookup, kinds: int) -> dict:
+    """What all programs that look up the visibility of lights of these kinds declare."""
+    return {
+        "textures": (*lookup.textures, ("RGBA32F", "depth_maps"), *SEEN),
+        "blocks": ((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
+        "constants": (("INT", "light_count"), *lookup.constants),
+        "defines": (*DEFINES, *lookup.defines, ("LIGHT_KINDS", str(kinds))),
+        "snippets": (("generated/visibility", f'#include "{lookup.file}"\n'),),
+    }
 
 
 @cache
 def looking(lookup: Lookup, kinds: int = -1) -> Program:
-    """The pass that looks up the visibility of lights of these kinds (bits as in lights.LAMPS; -1: any light)."""
+    """The pass that looks up the visibility of lights of these kinds (bits as in lights.LAMPS; -1: any light) at every
+    RATE-th pixel."""
     return passes.fullscreen_program(
-        f"visibility at some pixels, {lookup.name}",
-        "light/visibility.frag.glsl",
-        textures=(*lookup.textures, ("RGBA32F", "depth_maps"), *SEEN),
-        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
-        constants=(("INT", "light_count"), *lookup.constants),
-        defines=(*DEFINES, *lookup.defines, ("LIGHT_KINDS", str(kinds))),
-        snippets=(("generated/visibility", f'#include "{lookup.file}"\n'),),
-        outputs=(("VEC4", "out_visibility"),),
-    )
+        f"visibility at some pixels, {lookup.name}", "light/visibility.frag.glsl",
+        **_looking(lookup, kinds), outputs=(("VEC4", "out_visibility"),),
+    )  # fmt: skip
+
+
+@cache
+def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Program:
+    """The same at pixels that look for themselves: those of a list, or all that are found to."""
+    declared = _looking(lookup, kinds)
+    constants, images_read, defines = (("INT", "first_row"),), (), ()
+    if listed:
+        constants, images_read = (*constants, ("INT", "columns")), lists.READ
+        defines = (*lists.DEFINES, ("LISTED", ""))
+    else:
+        declared["textures"] = (*declared["textures"], ("RGBA32F", "cell_plane"))
+    return Program(
+        name=f"visibility at {'listed' if listed else 'found'} pixels, {lookup.name}",
+        compute="light/visibility_apart.comp.glsl",
+        images=(("apart", "RGBA16F", "FLOAT_2D", "WRITE"), *images_read),
+        group=(lists.RUN, 1, 1),
+        **declared | {
+            "constants": (*declared["constants"], *constants),
+            "defines": (*declared["defines"], *defines),
+        },
+    )  # fmt: skip
 
 
 @dataclass
-class _Cells:
-    """What cells know of up to LIGHTS lights, and the marks of the pixels."""
+class _Found:
+    """What is known of the visibility of up to LIGHTS lights: at the corners of cells, and at pixels apart."""
 
     corners: list[images.Image] = field(default_factory=list)
-    marks: images.Image | None = None
+    apart: images.Image | None = None
 
-    def find(self, frame: Frame, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps) -> None:
+    def find(
+        self, frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps
+    ) -> Iterator[None]:  # fmt: skip
+        """Look the visibility up, in parts."""
         points = tuple(-(-(extent - 1) // RATE) + 1 for extent in frame.size)
         size = tuple(max(count - 1, 1) for count in points)
         bindings = surface_bindings(frame)
         seen = {name: bindings[name] for _, name in SEEN}
         view = {"film_view": frame.view_block}
-        visibility = images.pool.take(*points, "RGBA32F")
         plane, *self.corners = (images.pool.take(*size, "RGBA32F") for _ in range(1 + LIGHTS))
-        self.marks = images.pool.take(*frame.size, "DEPTH_COMPONENT32F")
-        passes.fullscreen(
-            looking(maps.lookup, kinds), images.Target((visibility,)),
-            textures={**seen, "depth_maps": maps.atlas, **maps.textures},
-            blocks={**view, "sources": sources.set(rows, maps.views), **maps.blocks},
-            constants={"light_count": len(rows), **maps.constants},
-        )  # fmt: skip
-        cells = images.Target((plane, *self.corners))
-        passes.fullscreen(CELLS, cells, textures={**seen, "visibility": visibility}, blocks=view)
-        passes.fullscreen(MARKS, images.Target((), self.marks), textures={**seen, "cell_plane": plane}, blocks=view)
-        images.pool.give(visibility)
-        images.pool.give(plane)
+        self.apart = images.pool.take(*frame.size, "RGBA16F")
+        held = [plane]
+
+        def bound() -> dict:
+            return {
+                "textures": {**seen, "depth_maps": maps.atlas, **maps.textures},
+                "blocks": {**view, "sources": sources.set(rows, maps.views), **maps.blocks},
+                "constants": {"light_count": len(rows), **maps.constants},
+            }
+
+        try:
+            with images.borrowed(*points, "RGBA32F") as visibility:
+                passes.fullscreen(looking(maps.lookup, kinds), visibility, **bound())
+                known = {**seen, "visibility": visibility.colors[0]}
+                passes.fullscreen(CELLS, images.Target((plane, *self.corners)), textures=known, blocks=view)
+            yield
+            self.apart.texture.clear(format="FLOAT", value=(-1.0,) * 4)
+            listed = context.counts_in_images()
+            to_bind, extra, width = {"apart": self.apart}, {}, frame.size[0]
+            if listed:
+                entries = lists.take(frame.size)
+                held += entries.values()
+                cells = {**seen, "cell_plane": plane}
+                passes.compute(LIST, frame.size, textures=cells, blocks=view, images=entries)
+                to_bind |= entries
+                width = lists.columns(frame.size, SHARE)
+                extra = {"columns": width}
+            program = looking_apart(maps.lookup, kinds, listed)
+            for first, last in frame.bands(technique, "visibility"):
+                given = bound()
+                given["constants"] |= {"first_row": first, **extra}
+                given["textures"] |= {} if listed else {"cell_plane": plane}
+                passes.compute(program, (width, last - first), images=to_bind, **given)
+                yield
+        finally:
+            for image in held:
+                images.pool.give(image)
 
     def give(self) -> None:
-        for image in (*self.corners, *([self.marks] if self.marks else [])):
+        for image in (*self.corners, *([self.apart] if self.apart else [])):
             images.pool.give(image)
 
 
@@ -135,27 +190,27 @@ def add(
     frame: Frame, technique: Technique, sources: lights.Sources, lit: repeated_light.Lit, kinds: int, maps: Maps,
     between: Program,
 ) -> Iterator[None]:  # fmt: skip
-    """Add this light to the sample's radiance, in parts, and keep it for other points of the film: as it is where
-    pixels ask `maps` themselves, and by the program `between`, with the lookup BETWEEN, elsewhere."""
-    bindings = lit.bindings
+    """Add this light to the sample's radiance, in parts, by the program `between`, with the lookup BETWEEN, and keep it
+    for other points of the film, which ask `maps` themselves."""
     for first in range(0, len(lit.rows), LIGHTS):
         some = lit.rows[first : first + LIGHTS]
-        constants = {**bindings["constants"], "light_count": len(some)}
-        cells = _Cells()
+        found = _Found()
         try:
-            cells.find(frame, some, kinds, sources, maps)
-            yield
+            yield from found.find(frame, technique, some, kinds, sources, maps)
             known = {
-                "textures": {"energy_table": frame.materials.energy_table, **dict(zip(CORNERS, cells.corners))},
+                "textures": {
+                    "energy_table": frame.materials.energy_table, "apart": found.apart,
+                    **dict(zip(CORNERS, found.corners)),
+                },
                 "blocks": {},
-                "constants": {name: constants[name] for name in ("light_count", "traced_roughness")},
-            }
-            asked = {**bindings, "constants": constants}
-            for program, where, bound in ((between, KNOWN, known), (lit.program, UNKNOWN, asked)):
-                part = repeated_light.Lit(program, where, bound, some, lit.views)
-                yield from repeated_light.add(frame, technique, sources, part, cells.marks)
+                "constants": {
+                    "light_count": len(some), "traced_roughness": lit.bindings["constants"]["traced_roughness"]
+                },
+            }  # fmt: skip
+            part = repeated_light.Lit(between, lit.where, known, some, lit.views)
+            yield from repeated_light.add(frame, technique, sources, part, keeps=False)
         finally:
-            cells.give()
+            found.give()
         frame.count(technique, "passes", 5)
         frame.count(technique, "shared lookups", len(some))
     repeated_light.keep(frame, lit)

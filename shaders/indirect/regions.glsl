@@ -1,19 +1,7 @@
 // Regions of pixels and where what is gathered for them lies: the programs of addon/techniques/multires_radiosity.py.
-// RUN entries of the list of regions lie side by side; each has REGION_BITS for each axis.
+// An entry of the list of regions has REGION_BITS for each axis.
 #include "lib/math.glsl"
-
-// Where an entry of the list lies: runs one above the other, so that some rows of the list hold their share of it.
-ivec2 entry_place(int index)
-{
-  int rows = surface_position_size().y;
-  int run = index / RUN;
-  return ivec2((run / rows) * RUN + index % RUN, run % rows);
-}
-
-int entry_index(ivec2 place)
-{
-  return ((place.x / RUN) * surface_position_size().y + place.y) * RUN + place.x % RUN;
-}
+#include "lib/entry_list.glsl"
 
 // The pixel that stands for a region.
 ivec2 region_pixel(ivec2 region, int level_of_region)

@@ -7,6 +7,10 @@
 #define OPAQUE_ONLY
 #include "trace/rays.glsl"
 
+#ifndef SEEN_PIXEL
+#define SEEN_PIXEL ivec2(gl_FragCoord.xy)
+#endif
+
 #define CONTACT_SHARE 0.06  // length of the rays beside what the map spans at the receiver
 
 // A point of what the map stands for: all of the light or a part around the map's point. `place` in [0, 1)^2.
@@ -45,12 +49,14 @@ float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 norm
   }
   vec3 origin = ray_origin(position, normal);
   // The same lots for all lights, so that two half lights are one.
-  uvec3 salt = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 19);
+  uvec3 salt = roll_of(SEEN_PIXEL, film_view.sample_index, film_view.seed, 19);
   float open = 0.0;
   float all = 0.0;
-  for (int k = 0; k < contact_side * contact_side; k++) {
-    uvec3 lot = hash3(salt + uvec3(k, 0, 0));
-    vec2 place = (vec2(k % contact_side, k / contact_side) + vec2(to_unit(lot.x), to_unit(lot.y))) / float(contact_side);
+  int count = contact_side * contact_side;
+  uint stratum = 0xFFFFFFFFu / uint(count) + 1u;
+  for (int k = 0; k < count; k++) {
+    // One in each row, column and square of the grid: Hammersley's points, scrambled.
+    vec2 place = vec2(scrambled(int(uint(k) * stratum), salt.x), scrambled(int(reverse_bits(uint(k))), salt.y));
     Light source = contact_point(light, place, r.rectangle.w, position);
     vec3 direction;
     float density;

@@ -1,4 +1,5 @@
-// Visibility between the corners of a cell (light/visibility_cells.frag.glsl).
+// Visibility that a pixel looked for itself (`apart`), else between the corners of a cell
+// (light/visibility_cells.frag.glsl).
 #include "light/sources.glsl"
 
 float light_visibility(Light light, vec3 position, vec3 normal)
@@ -6,6 +7,10 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 cell = pixel / RATE;
   int index = light.base / LIGHT_TEXELS;
+  vec4 own = apart_fetch(pixel);
+  if (own.x >= 0.0) {
+    return own[index];
+  }
   vec4 known = (index < 2) ? ((index == 0) ? first_fetch(cell) : second_fetch(cell))
                            : ((index == 2) ? third_fetch(cell) : fourth_fetch(cell));
   vec2 span = vec2(max(min(ivec2(RATE), surface_position_size() - 1 - cell * RATE), ivec2(1)));

@@ -1,4 +1,4 @@
-// Cells between four pixels at which visibility is known: the plane on which three of them lie, if each light is
+// Cells between four pixels at which visibility is known: the plane on which most of them lie, if each light is
 // seen alike from those (else 0), and, light by light, what is known at the corners, -1 beside the plane.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
@@ -18,7 +18,7 @@ void main()
   }
   vec4 plane = vec4(0.0);
   bvec4 on_plane = bvec4(false);
-  int most = 2;
+  int most = 1;
   for (int k = 0; k < 4; k++) {
     if (positions[k].w == 0.0) {
       continue;

@@ -1,0 +1,27 @@
+"""Lists of the places of a picture that one compute pass finds and another works on, in no order.
+
+A pass that has work at a tenth of the pixels leaves most of a GPU's lanes idle; over a list of them all are busy. Entries
+are packed into integers by who fills the list; shaders/lib/entry_list.glsl says where they lie. Not on backends whose
+shaders cannot count in images (context.counts_in_images).
+"""
+
+from __future__ import annotations
+
+from ..gfx import images
+
+RUN = 64  # entries that lie side by side
+DEFINES = (("RUN", str(RUN)),)
+FILLED = (("entries", "R32UI", "UINT_2D", "WRITE"), ("entry_count", "R32UI", "UINT_2D_ATOMIC", "READ_WRITE"))
+READ = (("entries", "R32UI", "UINT_2D", "READ"), ("entry_count", "R32UI", "UINT_2D", "READ"))
+
+
+def take(size: tuple[int, int]) -> dict[str, images.Image]:
+    """An empty list with room for as many entries as a picture has pixels: images of the pool."""
+    entries, count = images.pool.take(-(-size[0] // RUN) * RUN, size[1], "R32UI"), images.pool.take(1, 1, "R32UI")
+    count.texture.clear(format="UINT", value=(0,))
+    return {"entries": entries, "entry_count": count}
+
+
+def columns(size: tuple[int, int], share: int) -> int:
+    """Threads side by side for a list of a picture's `size`, each of which takes up to `share` entries."""
+    return -(-max(size[0] // share, 1) // RUN) * RUN

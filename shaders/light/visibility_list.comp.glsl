@@ -1,0 +1,12 @@
+// The list of the pixels that look for the visibility of lights themselves (addon/frame/lists.py).
+#include "light/visibility_cell.glsl"
+#include "lib/entry_list.glsl"
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  if (all(lessThan(pixel, surface_position_size())) && stands_apart(pixel)) {
+    int index = int(imageAtomicAdd(entry_count, ivec2(0), 1u));
+    imageStore(entries, entry_place(index), uvec4(uint(pixel.x) | (uint(pixel.y) << 16)));
+  }
+}
