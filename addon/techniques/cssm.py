@@ -44,7 +44,7 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .shared_visibility import looking
+from .shared_visibility import programs_of
 from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SPARSE, SoftMaps, soft_lookup, with_contacts
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
@@ -84,12 +84,8 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
 
 
 DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, _, _ in PREFILTERS)
-LOOKUPS = tuple(
-    program
-    for lookup in DEFAULTS
-    for one in (lookup, with_contacts(lookup))
-    for program in (lighting(one, False), looking(one))
-)
+LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
+SHARED = tuple(program for lookup in DEFAULTS for program in programs_of(with_contacts(lookup)))
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
 BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
 

@@ -51,16 +51,21 @@ from .accumulated_maps import Lookup, Maps
 from .surfaces import SURFACE_TEXTURES, surface_bindings
 
 RATE = 4  # pixels between lookups, along both axes
-ALIKE = 0.1  # difference of visibility between a cell's corners up to which pixels within it interpolate
+# Differences of visibility between a cell's corners up to which pixels within it interpolate: whatever lies around, and
+# where second differences there are at most BEND.
+ALIKE, LINEAR, BEND = 0.1, 0.3, 0.05
 MANY_PIXELS = 100_000
 LIGHTS = 4  # whose visibility one image holds
 CORNERS = ("first", "second", "third", "fourth")  # light: what its cells know
-DEFINES = (("RATE", str(RATE)), ("ALIKE", str(ALIKE)), ("FACING", "0.9"), ("OFF_PLANE", "2.0"))
+DEFINES = (
+    ("RATE", str(RATE)), ("ALIKE", str(ALIKE)), ("LINEAR", str(LINEAR)), ("BEND", str(BEND)), ("FACING", "0.9"),
+    ("OFF_PLANE", "2.0"),
+)  # fmt: skip
 SEEN = tuple(texture for texture in SURFACE_TEXTURES if texture[1] in ("surface_position", "surface_normal"))
 BETWEEN = Lookup(
     "shared visibility",
     "light/shared_visibility.glsl",
-    textures=(*(("RGBA32F", name) for name in CORNERS), ("RGBA16F", "apart")),
+    textures=(*(("RGBA32F", name) for name in CORNERS), ("RGBA16F", "own_visibility")),
     defines=DEFINES,
     maps=False,
 )
@@ -117,13 +122,18 @@ def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Progr
     return Program(
         name=f"visibility at {'listed' if listed else 'found'} pixels, {lookup.name}",
         compute="light/visibility_apart.comp.glsl",
-        images=(("apart", "RGBA16F", "FLOAT_2D", "WRITE"), *images_read),
+        images=(("own_visibility", "RGBA16F", "FLOAT_2D", "WRITE"), *images_read),
         group=(lists.RUN, 1, 1),
         **declared | {
             "constants": (*declared["constants"], *constants),
             "defines": (*declared["defines"], *defines),
         },
     )  # fmt: skip
+
+
+def programs_of(lookup: Lookup) -> tuple[Program, ...]:
+    """All that may look shadows up in this way."""
+    return looking(lookup), looking_apart(lookup), looking_apart(lookup, listed=False)
 
 
 @dataclass
@@ -134,7 +144,8 @@ class _Found:
     apart: images.Image | None = None
 
     def find(
-        self, frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps
+        self, frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources,
+        maps: Maps,
     ) -> Iterator[None]:  # fmt: skip
         """Look the visibility up, in parts."""
         points = tuple(-(-(extent - 1) // RATE) + 1 for extent in frame.size)
@@ -161,7 +172,7 @@ class _Found:
             yield
             self.apart.texture.clear(format="FLOAT", value=(-1.0,) * 4)
             listed = context.counts_in_images()
-            to_bind, extra, width = {"apart": self.apart}, {}, frame.size[0]
+            to_bind, extra, width = {"own_visibility": self.apart}, {}, frame.size[0]
             if listed:
                 entries = lists.take(frame.size)
                 held += entries.values()
@@ -199,7 +210,7 @@ def add(
             yield from found.find(frame, technique, some, kinds, sources, maps)
             known = {
                 "textures": {
-                    "energy_table": frame.materials.energy_table, "apart": found.apart,
+                    "energy_table": frame.materials.energy_table, "own_visibility": found.apart,
                     **dict(zip(CORNERS, found.corners)),
                 },
                 "blocks": {},

@@ -87,6 +87,11 @@ def with_contacts(lookup: Lookup) -> Lookup:
     )
 
 
+def few_samples(frame: Frame) -> bool:
+    """Whether each sample shows all of a light, and stands for much of the picture."""
+    return frame.settings.samples < FEWEST_POINTS
+
+
 class SoftMaps(AccumulatedMaps):
     """Base of the techniques; `filtered` is theirs."""
 
@@ -141,7 +146,7 @@ class SoftMaps(AccumulatedMaps):
         return self.atlas_texels if frame.shared_out is None else min(self.atlas_texels, PART_TEXELS)
 
     def draw(self, frame: Frame, views: list) -> Maps:
-        seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self))
+        seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self), few_samples(frame))
         key = (*seen, *((view.rows.tobytes(), view.cell) for view in views))
         if not drawn_by_lot(frame) and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
@@ -161,7 +166,7 @@ class SoftMaps(AccumulatedMaps):
         if not contacts or acceleration.too_many(frame.snapshot):
             return maps
         textures, constants = ray_bindings(frame)
-        constants["contact_side"] = self.contact_side if frame.settings.samples < FEWEST_POINTS else 1
+        constants["contact_side"] = self.contact_side if few_samples(frame) else 1
         return replace(
             maps, lookup=with_contacts(lookup), textures=maps.textures | textures,
             constants=maps.constants | constants,
@@ -170,9 +175,9 @@ class SoftMaps(AccumulatedMaps):
     def _sparse(self, frame: Frame) -> bool:
         """Whether shadows are looked up at some pixels, and between where that does not suffice."""
         width, height = frame.size
-        few, many = frame.settings.samples < FEWEST_POINTS, width * height >= shared_visibility.MANY_PIXELS
+        many = width * height >= shared_visibility.MANY_PIXELS
         # Of layers that are lit from both sides a pixel shows light of either.
-        return few and many and not frame.materials.soft and frame.settings.get(self, "sparse")
+        return few_samples(frame) and many and not frame.materials.soft and frame.settings.get(self, "sparse")
 
     def _with_bounds(self, frame: Frame, views: list, maps: Maps) -> Maps:
         """Pyramid, limits and filtered maps of the part of the atlas that holds views."""

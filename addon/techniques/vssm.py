@@ -55,36 +55,49 @@ from ..frame.run import Frame
 from ..frame.technique import Param
 from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
 from .direct_light import lighting
-from .shared_visibility import looking
-from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SPARSE, SoftMaps, soft_lookup, with_contacts
+from .shared_visibility import programs_of
+from .soft_maps import (
+    CONTACTS,
+    LIMIT_CONSTANTS,
+    LIMIT_TEXTURES,
+    REFINE,
+    SPARSE,
+    SoftMaps,
+    few_samples,
+    soft_lookup,
+    with_contacts,
+)
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
-MOMENTS = tables.TableSource(
-    "depth moments",
-    '#include "vssm/moments.glsl"\n',
-    textures=(("RGBA32F", "depth_maps"), *LIMIT_TEXTURES),
-    constants=LIMIT_CONSTANTS,
-    integer=True,
-)
+FINE, COARSE = 1, 2  # texels along each side of the blocks that a table has entries for
+MOMENTS = {
+    block: tables.TableSource(
+        f"depth moments of blocks of {block}",
+        '#include "vssm/moments.glsl"\n',
+        textures=(("RGBA32F", "depth_maps"), *LIMIT_TEXTURES),
+        constants=LIMIT_CONSTANTS,
+        defines=(("TABLE_BLOCK", str(block)),),
+        integer=True,
+    )
+    for block in (FINE, COARSE)
+}
 
 
-def _lookup(rule: str, cells: int) -> Lookup:
+def _lookup(rule: str, cells: int, block: int) -> Lookup:
     return soft_lookup(
-        f"variance soft shadows, {rule.lower()}, {cells} cells",
+        f"variance soft shadows, {rule.lower()}, {cells} cells, blocks of {block}",
         "vssm/visibility.glsl",
         ("RGBA32UI", "depth_table"),
-        defines=(("CELLS", str(cells)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ())),
-    )
+        defines=(
+            ("CELLS", str(cells)), ("TABLE_BLOCK", str(block)), *((("MEAN_RULE", "1"),) if rule == "MEAN" else ()),
+        ),
+    )  # fmt: skip
 
 
-DEFAULTS = tuple(_lookup(rule, 3) for rule, _, _ in RULES)
-LOOKUPS = tuple(
-    program
-    for lookup in DEFAULTS
-    for one in (lookup, with_contacts(lookup))
-    for program in (lighting(one, False), looking(one))
-)
-MOMENT_VALUES = tables.values_program(MOMENTS)
+DEFAULTS = tuple(_lookup(rule, 3, block) for rule, _, _ in RULES for block in MOMENTS)
+LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
+SHARED = programs_of(with_contacts(_lookup("BOUNDS", 3, COARSE)))
+MOMENT_VALUES = tuple(tables.values_program(source) for source in MOMENTS.values())
 
 
 class VarianceSoftShadows(SoftMaps):
@@ -104,11 +117,17 @@ class VarianceSoftShadows(SoftMaps):
     )  # fmt: skip
 
     def filtered(self, frame: Frame, maps: Maps, size: tuple[int, int], drawn: bool) -> Maps:
-        table = self.kept("table", (size[0] // 2, size[1] // 2), "RGBA32UI")
+        block = _block(frame)
+        table = self.kept("table", (size[0] // block, size[1] // block), "RGBA32UI")
         if drawn:
             bound = {"depth_maps": maps.atlas, **maps.textures}
-            tables.build_table(MOMENTS, table, textures=bound, constants=maps.constants)
+            tables.build_table(MOMENTS[block], table, textures=bound, constants=maps.constants)
         return replace(maps, textures={**maps.textures, "depth_table": table})
 
     def lookup(self, frame: Frame) -> Lookup:
-        return _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"))
+        return _lookup(frame.settings.get(self, "rule"), frame.settings.get(self, "cells"), _block(frame))
+
+
+def _block(frame: Frame) -> int:
+    """Pictures of few samples take a quarter of the table; kernels of many are small, and end within blocks."""
+    return COARSE if few_samples(frame) else FINE

@@ -1,6 +1,10 @@
 // The texels of a depth map that hide a light with extent from a receiver, and bounds of what they hold.
 #include "lib/kernel_extent.glsl"
 
+#ifndef TABLE_BLOCK
+#define TABLE_BLOCK 1  // texels along each side of what a table has one entry for
+#endif
+
 // Share of a cell of the kernel that belongs to the light's shape. `place`: of the cell's centre, in half extents.
 float kernel_weight(Light light, vec2 place, float cell)
 {
@@ -39,8 +43,8 @@ vec2 kernel_bounds(ShadowReceiver r, ivec2 first, ivec2 last, out float deepest)
   return bounds;
 }
 
-// Texels of the view (first..last) that can hold blockers: in front of an area light's plane, in whole blocks of two, as
-// tables know them. Views beside its axis have that plane's horizon along a row or a column (turn_along in addon/frame/depth_maps.py).
+// Texels of the view (first..last) that can hold blockers: in front of an area light's plane, in whole blocks of a
+// table. Views beside its axis have that plane's horizon along a row or a column (turn_along in addon/frame/depth_maps.py).
 void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
 {
   first = vec2(0.0);
@@ -57,12 +61,13 @@ void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
   vec2 rise = vec2(dot(across, light.axis), dot(along, light.axis));
   vec2 horizon = (vec2(dot(across, forward), dot(along, forward)) * 0.5 + 0.5) * r.rectangle.z;
   int k = (abs(rise.x) > abs(rise.y)) ? 0 : 1;
+  float block = float(TABLE_BLOCK);
   float here = clamp(horizon[k], 0.0, r.rectangle.z - 1.0);
   if (rise[k] > 0.0) {
-    first[k] = min(2.0 * ceil(0.5 * here), r.rectangle.z - 2.0);
+    first[k] = min(block * ceil(here / block), r.rectangle.z - block);
   }
   else {
-    last[k] = max(2.0 * floor(0.5 * here) - 1.0, 1.0);
+    last[k] = max(block * floor(here / block), block) - 1.0;
   }
 }
 

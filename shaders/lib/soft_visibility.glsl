@@ -13,11 +13,10 @@
 #define FEW_TEXELS 5  // up to this size of a kernel every texel is looked at
 #define EDGE_ON 1e-3  // cosine of the direction to the map's point
 
-// Blockers in the box r.texel -+ half_size. `extent` above 0: only those that stand within the kernel of their own
-// height; else texels that the box's edge cuts count in part. `horizon`: see Blockers.
-Blockers kernel_box(Light light, ShadowReceiver r, vec2 beside, vec2 half_size, vec2 extent, vec2 horizon)
+// Adds the blockers in the box r.texel -+ half_size. found.extent above 0: only those that stand within the kernel of
+// their own height; else texels that the box's edge cuts count in part.
+Blockers kernel_box(Light light, ShadowReceiver r, vec2 beside, vec2 half_size, Blockers found)
 {
-  Blockers found = blockers_none(extent, horizon);
   ivec2 first;
   ivec2 last;
   kernel_texels(light, r, half_size, first, last);
@@ -163,28 +162,27 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
     // Hardly any of the light stands above the horizon; shading normals may show it all the same.
     return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
   }
-  vec2 within = max(extent, vec2(1e-30));
   vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
-  Blockers search;
-  if (back) {
-    search = kernel_back(light, r, window, blockers_none(within, vec2(0.0)));
-  }
-  else {
-    search = kernel_box(light, r, beside, window, within, vec2(0.0));
-  }
   float lit = 1.0;
-  if (search.blocked > 0.0) {
-    blocker = min(search.height / search.blocked, height);
-    vec2 horizon = r.gradient / blocker;
-    vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
-    Blockers hiding;
+  Blockers found = blockers_none(max(extent, vec2(1e-30)), vec2(0.0));
+  for (int turn = 0; turn < 2; turn++) {  // twice the same code, which compilers would otherwise hold twice
     if (back) {
-      hiding = kernel_back(light, r, size, blockers_none(vec2(0.0), horizon));
+      found = kernel_back(light, r, window, found);
     }
     else {
-      hiding = kernel_box(light, r, beside, size, vec2(0.0), horizon);
+      found = kernel_box(light, r, beside, window, found);
     }
-    lit = kernel_lit(hiding);
+    if (turn == 1) {
+      lit = kernel_lit(found);
+    }
+    if (found.blocked <= 0.0) {
+      break;
+    }
+    if (turn == 0) {
+      blocker = min(found.height / found.blocked, height);
+      window = clamp(extent * blocker, vec2(0.5), vec2(most));
+      found = blockers_none(vec2(0.0), r.gradient / blocker);
+    }
   }
 #ifndef CONTACT_RAYS
   if (!back) {

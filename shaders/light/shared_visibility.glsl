@@ -1,4 +1,4 @@
-// Visibility that a pixel looked for itself (`apart`), else between the corners of a cell
+// Visibility that a pixel looked for itself (`own_visibility`), else between the corners of a cell
 // (light/visibility_cells.frag.glsl).
 #include "light/sources.glsl"
 
@@ -7,7 +7,7 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 cell = pixel / RATE;
   int index = light.base / LIGHT_TEXELS;
-  vec4 own = apart_fetch(pixel);
+  vec4 own = own_visibility_fetch(pixel);
   if (own.x >= 0.0) {
     return own[index];
   }

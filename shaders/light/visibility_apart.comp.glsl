@@ -11,16 +11,16 @@ void main()
 {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
 #ifdef LISTED
-  // What a loop without turns holds is not even masked: threads beyond the list end at once.
+  // Where branches are masked, a loop ends all the same: threads beyond the list take one turn.
   int count = int(imageLoad(entry_count, ivec2(0)).x);
   for (; entry_index(place) < count; place.x += columns) {
     uint entry = imageLoad(entries, place).x;
     ivec2 pixel = ivec2(int(entry & 0xFFFFu), int(entry >> 16));
-    imageStore(apart, pixel, visibility_at(pixel));
+    imageStore(own_visibility, pixel, visibility_at(pixel));
   }
 #else
   if (all(lessThan(place, surface_position_size())) && stands_apart(place)) {
-    imageStore(apart, place, visibility_at(place));
+    imageStore(own_visibility, place, visibility_at(place));
   }
 #endif
 }

@@ -1,7 +1,26 @@
-// Cells between four pixels at which visibility is known: the plane on which most of them lie, if each light is
-// seen alike from those (else 0), and, light by light, what is known at the corners, -1 beside the plane.
+// Cells between four pixels at which visibility is known: the plane on which most of them lie, if each light is seen alike
+// from those or varies in proportion (else 0), and, light by light, what is known at the corners, -1 beside the plane.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
+
+// Largest second difference along the edges of a cell, which reach one corner further on both sides.
+vec4 bend_at(ivec2 cell)
+{
+  ivec2 last = visibility_size() - 1;
+  vec4 bend = vec4(0.0);
+  for (int axis = 0; axis < 2; axis++) {
+    ivec2 along = (axis == 0) ? ivec2(1, 0) : ivec2(0, 1);
+    for (int side = 0; side < 2; side++) {
+      ivec2 corner = cell + side * along.yx;
+      vec4 a = visibility_fetch(clamp(corner - along, ivec2(0), last));
+      vec4 b = visibility_fetch(corner);
+      vec4 c = visibility_fetch(min(corner + along, last));
+      vec4 d = visibility_fetch(min(corner + 2 * along, last));
+      bend = max(bend, max(abs(a - 2.0 * b + c), abs(b - 2.0 * c + d)));
+    }
+  }
+  return bend;
+}
 
 void main()
 {
@@ -49,7 +68,8 @@ void main()
     }
   }
   vec4 range = highest - lowest;
-  out_plane = (max(max_component(range.rgb), range.a) <= ALIKE) ? plane : vec4(0.0);
+  bvec4 linear = lessThanEqual(range, mix(vec4(ALIKE), vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND))));
+  out_plane = all(linear) ? plane : vec4(0.0);
   out_first = vec4(known[0].x, known[1].x, known[2].x, known[3].x);
   out_second = vec4(known[0].y, known[1].y, known[2].y, known[3].y);
   out_third = vec4(known[0].z, known[1].z, known[2].z, known[3].z);

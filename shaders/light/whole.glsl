@@ -43,10 +43,10 @@ float whole_polygon(Light light, vec3 position, vec3 normal)
   int sides = LIGHT_IS(light, LIGHT_RECTANGLE) ? 4 : ELLIPSE_SIDES;
   float sum = 0.0;
   int above = 0;
-  vec3 first = safe_normalize(whole_corner(light, 0) - position);
-  vec3 a = first;
+  vec3 start = safe_normalize(whole_corner(light, 0) - position);
+  vec3 a = start;
   for (int k = 1; k <= sides; k++) {
-    vec3 b = (k == sides) ? first : safe_normalize(whole_corner(light, k) - position);
+    vec3 b = (k == sides) ? start : safe_normalize(whole_corner(light, k) - position);
     sum += edge_term(a, b, normal);
     above += (dot(b, normal) > 0.0) ? 1 : 0;
     a = b;
@@ -54,13 +54,13 @@ float whole_polygon(Light light, vec3 position, vec3 normal)
   if (above == 0) {
     return 0.0;
   }
-  // Few lights are cut by the horizon; a loop without turns costs nothing where branches are masked.
+  // Few lights are cut by the horizon; a loop without turns costs one where branches are masked.
   int cut_sides = (above < sides) ? sides : 0;
   sum = (above < sides) ? 0.0 : sum;
-  vec3 leaves = first;
-  vec3 enters = first;
+  vec3 leaves = start;
+  vec3 enters = start;
   for (int k = 1; k <= cut_sides; k++) {
-    vec3 next = (k == sides) ? first : safe_normalize(whole_corner(light, k) - position);
+    vec3 next = (k == sides) ? start : safe_normalize(whole_corner(light, k) - position);
     vec3 b = next;
     float height_a = dot(a, normal);
     float height_b = dot(b, normal);

@@ -10,7 +10,7 @@
 #include "vssm/range.glsl"
 
 #define CELL_LINES 11  // of a grid of up to 10 x 10 cells: a kernel of 2 MOST_HALF_SIZE texels
-#define CELL_BLOCKS 32  // widest cell whose sums fit into 32 bits
+#define CELL_BLOCKS (64 / TABLE_BLOCK)  // widest cell whose sums fit into 32 bits
 
 uvec4 vssm_sum(ivec2 block)
 {
@@ -54,20 +54,15 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
   one_sided = one_sided && !clear;
 #endif
   vec2 offset = centre - r.texel;
-  float base = dot(r.gradient, offset);
-  if (blocked) {
-    found.whole += weight;
-    kernel_add(found, offset, 0.5 * size, mean + base, weight);
-  }
-  else if (lit) {
-    found.whole += weight;
-  }
-  else if (one_sided) {
+  if (blocked || lit || one_sided) {
     // Rounding can leave a square below its least possible value, where all of the cell is blocked evenly.
     square = max(square, mean * mean);
-    float share = mean * mean / square;
+    float share = blocked ? 1.0 : (lit ? 0.0 : mean * mean / square);
+    float height = blocked ? mean : square / mean;
     found.whole += weight;
-    kernel_add(found, offset, 0.5 * size, square / mean + base, weight * share);
+    if (share > 0.0) {
+      kernel_add(found, offset, 0.5 * size, height + dot(r.gradient, offset), weight * share);
+    }
   }
   else {
     // Something lies far behind the receiver and no bound holds: ask texels, all of a small cell. Each row and column is
@@ -84,15 +79,15 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
   }
 }
 
-// Adds the box r.texel -+ half_size, texels first..last of the view, by the blocks of 2x2 texels that it touches. When
+// Adds the box r.texel -+ half_size, texels first..last of the view, by the table's blocks that it touches. When
 // blockers are looked for the cells are even; else the outermost are one block wide. What the box cuts counts in part.
 void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 beside, vec2 half_size, ivec2 first, ivec2 last)
 {
   bool smooth_edges = found.extent.x <= 0.0;
   vec2 low = max(r.texel - half_size, vec2(first));
   vec2 high = min(r.texel + half_size, vec2(last + 1));
-  ivec2 block = first / 2;
-  ivec2 end = last / 2 + 1;
+  ivec2 block = first / TABLE_BLOCK;
+  ivec2 end = last / TABLE_BLOCK + 1;
   // Lines of the grid: the outline of a round light takes more of them, and so do sums that have to fit into 32 bits.
   int border = smooth_edges ? 1 : 0;
   int wished = smooth_edges ? (LIGHT_IS(light, LIGHT_RECTANGLE) ? CELLS + 1 : max(CELLS + 1, 6)) : CELLS;
@@ -111,18 +106,18 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 besi
     before.x = block.x;
     for (int i = 0; i <= cells; i++) {
       line.x = (i == 0) ? block.x : ((i == cells) ? end.x : block.x + border + inner.x * (i - border) / inner_cells);
-      uvec4 corner = vssm_sum(origin / 2 + line);
+      uvec4 corner = vssm_sum(origin / TABLE_BLOCK + line);
       uvec4 below = row_below[i];
       if (j > 0 && i > 0 && all(greaterThan(line, before))) {
-        vec2 a = 2.0 * vec2(before);
-        vec2 b = 2.0 * vec2(line);
+        vec2 a = vec2(TABLE_BLOCK * before);
+        vec2 b = vec2(TABLE_BLOCK * line);
         vec2 covered = min(b, high) - max(a, low);
         vec2 place = (0.5 * (a + b) - r.texel) / half_size;
         float weight = covered.x * covered.y * kernel_weight(light, place, 2.0 / float(inner_cells));
         weight *= kernel_cosine(found, place * half_size, 0.5 * (b - a));
         if (weight > 0.0) {
           uvec4 sum = corner - corner_before - below + below_before;
-          vssm_cell(found, r, beside, 2 * before, 2 * line - 1, sum, range, weight);
+          vssm_cell(found, r, beside, TABLE_BLOCK * before, TABLE_BLOCK * line - 1, sum, range, weight);
         }
       }
       row_below[i] = corner;
