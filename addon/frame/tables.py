@@ -168,26 +168,34 @@ def pyramid_size(width: int, height: int) -> tuple[int, int]:
 
 
 def level_program(source: PyramidSource) -> Program:
-    """Level 1 from a source."""
-    return Program(
-        name=f"{source.name} pyramid",
-        compute=f"table/{'means' if source.means else 'bounds'}.comp.glsl",
+    """Level 1 from a source. It is drawn, as tables are; further levels read the image that they are written to."""
+    return passes.fullscreen_program(
+        f"{source.name} pyramid",
+        "table/first_level.frag.glsl",
         textures=source.textures,
-        images=(("pyramid", source.format, "FLOAT_2D", "READ_WRITE"),),
-        constants=(("IVEC2", "extent"), ("INT", "source_row"), ("INT", "row"), *source.constants),
-        defines=source.defines,
+        constants=source.constants,
+        defines=(*source.defines, *_REDUCED[source.means]),
         snippets=(("generated/source", source.glsl),),
+        outputs=(("VEC4", "out_entry"),),
     )
 
 
-_LEVELS = {
-    False: level_program(
-        PyramidSource("min-max", "vec2 bounds_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel).xy;\n}\n")
-    ),
-    True: level_program(
-        PyramidSource("mean", "vec4 means_source(ivec2 texel)\n{\n  return imageLoad(pyramid, texel);\n}\n", means=True)
-    ),
-}
+_REDUCED = {False: (), True: (("MEANS", ""),)}
+FURTHER_LEVELS = tuple(  # of bounds and of means
+    Program(
+        name=f"further levels of a pyramid of {'means' if means else 'bounds'}",
+        compute="table/level.comp.glsl",
+        images=(("pyramid", kind, "FLOAT_2D", "READ_WRITE"),),
+        constants=(("IVEC2", "extent"), ("INT", "source_row"), ("INT", "row")),
+        defines=_REDUCED[means],
+        snippets=(
+            ("generated/source", f"{value}_source(ivec2 texel)\n{{\n  return imageLoad(pyramid, texel){part};\n}}\n"),
+        ),
+    )
+    for means, kind, value, part in (
+        (False, "RG32F", "vec2 bounds", ".xy"), (True, "RGBA16F", "vec4 means", ""),
+    )
+)  # fmt: skip
 
 
 def build_pyramid(source: PyramidSource, pyramid: images.Image, levels: int, **bindings) -> None:
@@ -198,15 +206,13 @@ def build_pyramid(source: PyramidSource, pyramid: images.Image, levels: int, **b
     width, height = 2 * pyramid.width, pyramid.height
     if width % (1 << levels) or height % (1 << levels):
         raise ValueError(f"A pyramid of {levels} levels needs sides that 2^{levels} divides, not {width}x{height}.")
-    for level in range(1, levels + 1):
-        first = level == 1
-        program = level_program(source) if first else _LEVELS[source.means]
+    if levels:
+        viewport = (0, 0, width // 2, height // 2)
+        passes.fullscreen(level_program(source), images.Target((pyramid,)), viewport=viewport, **bindings)
+    for level in range(2, levels + 1):
         extent = (width >> level, height >> level)
+        rows = [height - (height >> (one - 1)) for one in (level - 1, level)]
         passes.compute(
-            program, extent, images={"pyramid": pyramid}, textures=bindings.get("textures", {}) if first else {},
-            constants={
-                "extent": extent, "row": height - (height >> (level - 1)),
-                "source_row": 0 if first else height - (height >> (level - 2)),
-                **(bindings.get("constants", {}) if first else {}),
-            },
+            FURTHER_LEVELS[source.means], extent, images={"pyramid": pyramid},
+            constants={"extent": extent, "source_row": rows[0], "row": rows[1]},
         )  # fmt: skip
