@@ -144,15 +144,15 @@ FILL = _fill("regions from coarser ones", ("coarser_flags", "coarser_irradiance"
 def regions(gather: Gather, listed: bool = True) -> Program:
     """The gather of regions, those of the list or those of one level, with what tells which lights are hidden."""
     if listed:
-        textures, bound, constants = (), lists.READ, (("INT", "columns"),)
+        textures, constants = lists.READ, (("INT", "columns"),)
     else:
-        textures, bound = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags")), ()
+        textures = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags"))
         constants = (("INT", "level"), ("INT", "levels"))
     return Program(
         name=f"regions{'' if listed else ' of a level'}, {gather.name}",
         compute="indirect/region_gather.comp.glsl",
         textures=(*GATHER_TEXTURES, *textures, *gather.textures),
-        images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), *bound),
+        images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"),),
         blocks=PATH_BLOCKS,
         constants=(*GATHER_CONSTANTS, *GRID, ("INT", "first_row"), *constants, *gather.constants),
         snippets=(("generated/gather", f'#include "{gather.file}"\n'),),
@@ -271,7 +271,7 @@ class MultiresRadiosity(InstantRadiosity):
             if levels and context.counts_in_images():
                 listed = self._listed(frame, flags, grid)
                 held += listed.values()
-                yield from self._gather_listed(frame, bindings, bound, grid, {"gathered": atlas, **listed})
+                yield from self._gather_listed(frame, bindings, bound, grid, atlas, listed)
                 if frame.sample == 0:
                     frame.count(self, "regions", int(images.read(listed["entry_count"])[0, 0, 0]))
             else:
@@ -336,16 +336,16 @@ class MultiresRadiosity(InstantRadiosity):
         return found
 
     def _gather_listed(
-        self, frame: Frame, bindings, bound: BoundGather, grid: dict, bound_images: dict
+        self, frame: Frame, bindings, bound: BoundGather, grid: dict, atlas: images.Image, listed: dict
     ) -> Iterator[None]:
         columns = lists.columns(frame.size, 8)
         program = regions(bound.gather)
-        textures = bindings["textures"] | bound.textures
+        textures = bindings["textures"] | bound.textures | listed
         constants = bindings["constants"] | bound.constants | grid | {"columns": columns}
         for first, last in frame.bands(self, "regions"):
             passes.compute(
-                program, (columns, last - first), textures=textures, images=bound_images, blocks=bindings["blocks"],
-                constants={**constants, "first_row": first},
+                program, (columns, last - first), textures=textures, images={"gathered": atlas},
+                blocks=bindings["blocks"], constants={**constants, "first_row": first},
             )  # fmt: skip
             yield
 

@@ -77,10 +77,11 @@ CELLS = passes.fullscreen_program(
     defines=DEFINES,
     outputs=tuple(("VEC4", f"out_{name}") for name in ("plane", *CORNERS)),
 )
+PLANE = (("RGBA32F", "cell_plane"),)
 LIST = Program(
     name="pixels that look for themselves",
     compute="light/visibility_list.comp.glsl",
-    textures=(*SEEN, ("RGBA32F", "cell_plane")),
+    textures=(*SEEN, *PLANE),
     images=lists.FILLED,
     blocks=((VIEW, "film_view"),),
     defines=(*DEFINES, *lists.DEFINES),
@@ -113,19 +114,17 @@ def looking(lookup: Lookup, kinds: int = -1) -> Program:
 def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Program:
     """The same at pixels that look for themselves: those of a list, or all that are found to."""
     declared = _looking(lookup, kinds)
-    constants, images_read, defines = (("INT", "first_row"),), (), ()
+    textures, constants, defines = PLANE, (), ()
     if listed:
-        constants, images_read = (*constants, ("INT", "columns")), lists.READ
-        defines = (*lists.DEFINES, ("LISTED", ""))
-    else:
-        declared["textures"] = (*declared["textures"], ("RGBA32F", "cell_plane"))
+        textures, constants, defines = lists.READ, (("INT", "columns"),), (*lists.DEFINES, ("LISTED", ""))
     return Program(
         name=f"visibility at {'listed' if listed else 'found'} pixels, {lookup.name}",
         compute="light/visibility_apart.comp.glsl",
-        images=(("own_visibility", "RGBA16F", "FLOAT_2D", "WRITE"), *images_read),
+        images=(("own_visibility", "RGBA16F", "FLOAT_2D", "WRITE"),),
         group=(lists.RUN, 1, 1),
         **declared | {
-            "constants": (*declared["constants"], *constants),
+            "textures": (*declared["textures"], *textures),
+            "constants": (*declared["constants"], ("INT", "first_row"), *constants),
             "defines": (*declared["defines"], *defines),
         },
     )  # fmt: skip
@@ -171,22 +170,20 @@ class _Found:
                 passes.fullscreen(CELLS, images.Target((plane, *self.corners)), textures=known, blocks=view)
             yield
             self.apart.texture.clear(format="FLOAT", value=(-1.0,) * 4)
+            where, width, extra = {"cell_plane": plane}, frame.size[0], {}
             listed = context.counts_in_images()
-            to_bind, extra, width = {"own_visibility": self.apart}, {}, frame.size[0]
             if listed:
                 entries = lists.take(frame.size)
                 held += entries.values()
-                cells = {**seen, "cell_plane": plane}
-                passes.compute(LIST, frame.size, textures=cells, blocks=view, images=entries)
-                to_bind |= entries
-                width = lists.columns(frame.size, SHARE)
+                passes.compute(LIST, frame.size, textures={**seen, **where}, blocks=view, images=entries)
+                where, width = entries, lists.columns(frame.size, SHARE)
                 extra = {"columns": width}
             program = looking_apart(maps.lookup, kinds, listed)
             for first, last in frame.bands(technique, "visibility"):
                 given = bound()
+                given["textures"] |= where
                 given["constants"] |= {"first_row": first, **extra}
-                given["textures"] |= {} if listed else {"cell_plane": plane}
-                passes.compute(program, (width, last - first), images=to_bind, **given)
+                passes.compute(program, (width, last - first), images={"own_visibility": self.apart}, **given)
                 yield
         finally:
             for image in held:

@@ -40,10 +40,10 @@ void main()
     return;
   }
   // Fewer threads than there is room for: the list is mostly short, and a thread without an entry is not free.
-  int count = int(imageLoad(entry_count, ivec2(0)).x);
+  int count = int(entry_count_fetch(ivec2(0)).x);
   uint axis = (1u << REGION_BITS) - 1u;
   for (; entry_index(place) < count; place.x += columns) {
-    uint entry = imageLoad(entries, place).x;
+    uint entry = entries_fetch(place).x;
     gather(ivec2(entry & axis, (entry >> REGION_BITS) & axis), int(entry >> (2 * REGION_BITS)));
   }
 }

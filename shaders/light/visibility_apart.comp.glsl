@@ -12,9 +12,9 @@ void main()
   ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
 #ifdef LISTED
   // Where branches are masked, a loop ends all the same: threads beyond the list take one turn.
-  int count = int(imageLoad(entry_count, ivec2(0)).x);
+  int count = int(entry_count_fetch(ivec2(0)).x);
   for (; entry_index(place) < count; place.x += columns) {
-    uint entry = imageLoad(entries, place).x;
+    uint entry = entries_fetch(place).x;
     ivec2 pixel = ivec2(int(entry & 0xFFFFu), int(entry >> 16));
     imageStore(own_visibility, pixel, visibility_at(pixel));
   }
