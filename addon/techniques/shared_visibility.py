@@ -56,7 +56,7 @@ RATE = 4  # pixels between lookups, along both axes
 ALIKE, LINEAR, BEND = 0.1, 0.3, 0.05
 MANY_PIXELS = 100_000
 LIGHTS = 4  # whose visibility one image holds
-CORNERS = ("first", "second", "third", "fourth")  # light: what its cells know
+CORNERS = tuple(f"corners_{k}" for k in range(LIGHTS))  # light: what its cells know
 DEFINES = (
     ("RATE", str(RATE)), ("ALIKE", str(ALIKE)), ("LINEAR", str(LINEAR)), ("BEND", str(BEND)), ("FACING", "0.9"),
     ("OFF_PLANE", "2.0"),
@@ -65,7 +65,7 @@ SEEN = tuple(texture for texture in SURFACE_TEXTURES if texture[1] in ("surface_
 BETWEEN = Lookup(
     "shared visibility",
     "light/shared_visibility.glsl",
-    textures=(*(("RGBA32F", name) for name in CORNERS), ("RGBA16F", "own_visibility")),
+    textures=(*(("RGBA32F", name) for name in CORNERS), ("R32F", "own_visibility")),
     defines=DEFINES,
     maps=False,
 )
@@ -77,14 +77,17 @@ CELLS = passes.fullscreen_program(
     defines=DEFINES,
     outputs=tuple(("VEC4", f"out_{name}") for name in ("plane", *CORNERS)),
 )
-PLANE = (("RGBA32F", "cell_plane"),)
+CELL = (("RGBA32F", "cell_plane"), *(("RGBA32F", name) for name in CORNERS))
+PIXEL_BITS = 14  # of each axis, in an entry of the list
+LISTED = (*lists.DEFINES, ("PIXEL_BITS", str(PIXEL_BITS)))
 LIST = Program(
     name="pixels that look for themselves",
     compute="light/visibility_list.comp.glsl",
-    textures=(*SEEN, *PLANE),
+    textures=(*SEEN, *CELL),
     images=lists.FILLED,
     blocks=((VIEW, "film_view"),),
-    defines=(*DEFINES, *lists.DEFINES),
+    constants=(("INT", "light_count"),),
+    defines=(*DEFINES, *LISTED),
 )
 SHARE = 8  # of a list's room: entries that a thread may take
 
@@ -114,13 +117,13 @@ def looking(lookup: Lookup, kinds: int = -1) -> Program:
 def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Program:
     """The same at pixels that look for themselves: those of a list, or all that are found to."""
     declared = _looking(lookup, kinds)
-    textures, constants, defines = PLANE, (), ()
+    textures, constants, defines = CELL, (), ()
     if listed:
-        textures, constants, defines = lists.READ, (("INT", "columns"),), (*lists.DEFINES, ("LISTED", ""))
+        textures, constants, defines = lists.READ, (("INT", "columns"),), (*LISTED, ("LISTED", ""))
     return Program(
         name=f"visibility at {'listed' if listed else 'found'} pixels, {lookup.name}",
         compute="light/visibility_apart.comp.glsl",
-        images=(("own_visibility", "RGBA16F", "FLOAT_2D", "WRITE"),),
+        images=(("own_visibility", "R32F", "FLOAT_2D", "WRITE"),),
         group=(lists.RUN, 1, 1),
         **declared | {
             "textures": (*declared["textures"], *textures),
@@ -153,7 +156,7 @@ class _Found:
         seen = {name: bindings[name] for _, name in SEEN}
         view = {"film_view": frame.view_block}
         plane, *self.corners = (images.pool.take(*size, "RGBA32F") for _ in range(1 + LIGHTS))
-        self.apart = images.pool.take(*frame.size, "RGBA16F")
+        self.apart = images.pool.take(frame.size[0], frame.size[1] * len(rows), "R32F")
         held = [plane]
 
         def bound() -> dict:
@@ -170,13 +173,18 @@ class _Found:
                 passes.fullscreen(CELLS, images.Target((plane, *self.corners)), textures=known, blocks=view)
             yield
             self.apart.texture.clear(format="FLOAT", value=(-1.0,) * 4)
-            where, width, extra = {"cell_plane": plane}, frame.size[0], {}
-            listed = context.counts_in_images()
+            where = {"cell_plane": plane, **dict(zip(CORNERS, self.corners))}
+            width, extra = frame.size[0], {}
+            listed = context.counts_in_images() and max(frame.size) <= 1 << PIXEL_BITS
             if listed:
-                entries = lists.take(frame.size)
+                room = (frame.size[0] * len(rows), frame.size[1])
+                entries = lists.take(room)
                 held += entries.values()
-                passes.compute(LIST, frame.size, textures={**seen, **where}, blocks=view, images=entries)
-                where, width = entries, lists.columns(frame.size, SHARE)
+                passes.compute(
+                    LIST, frame.size, textures={**seen, **where}, blocks=view, images=entries,
+                    constants={"light_count": len(rows)},
+                )  # fmt: skip
+                where, width = entries, lists.columns(room, SHARE)
                 extra = {"columns": width}
             program = looking_apart(maps.lookup, kinds, listed)
             for first, last in frame.bands(technique, "visibility"):

@@ -1,4 +1,4 @@
-// Visibility of up to four lights, one in each channel, at a pixel of the picture.
+// Visibility of a light at a pixel of the picture.
 #include "lib/gbuffer.glsl"
 
 ivec2 seen_pixel;
@@ -6,17 +6,13 @@ ivec2 seen_pixel;
 #include "light/whole.glsl"
 #include "generated/visibility"
 
-vec4 visibility_at(ivec2 pixel)
+float visibility_at(ivec2 pixel, int index)
 {
   seen_pixel = pixel;
-  vec4 visibility = vec4(1.0);
-  vec3 position = surface_position_fetch(pixel).xyz;
-  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-  for (int i = 0; i < light_count; i++) {
-    Light light = light_read(i);
-    if ((light.flags & LIGHT_SHADOW) != 0) {
-      visibility[i] = light_visibility(light, position, normal);
-    }
+  Light light = light_read(index);
+  if ((light.flags & LIGHT_SHADOW) == 0) {
+    return 1.0;
   }
-  return visibility;
+  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
+  return light_visibility(light, surface_position_fetch(pixel).xyz, normal);
 }

@@ -1,5 +1,5 @@
-// Cells between four pixels at which visibility is known: the plane on which most of them lie, if each light is seen alike
-// from those or varies in proportion (else 0), and, light by light, what is known at the corners, -1 beside the plane.
+// Cells between four pixels at which visibility was looked up: the plane on which two or more of them lie, and, light by
+// light, its visibility at the corners: -1 beside the plane, and at all where it neither is alike nor varies in proportion.
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
@@ -67,11 +67,14 @@ void main()
       known[k] = vec4(-1.0);
     }
   }
-  vec4 range = highest - lowest;
-  bvec4 linear = lessThanEqual(range, mix(vec4(ALIKE), vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND))));
-  out_plane = all(linear) ? plane : vec4(0.0);
-  out_first = vec4(known[0].x, known[1].x, known[2].x, known[3].x);
-  out_second = vec4(known[0].y, known[1].y, known[2].y, known[3].y);
-  out_third = vec4(known[0].z, known[1].z, known[2].z, known[3].z);
-  out_fourth = vec4(known[0].w, known[1].w, known[2].w, known[3].w);
+  vec4 most_range = mix(vec4(ALIKE), vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND)));
+  bvec4 tells = lessThanEqual(highest - lowest, most_range);
+  for (int k = 0; k < 4; k++) {
+    known[k] = mix(vec4(-1.0), known[k], tells);
+  }
+  out_plane = plane;
+  out_corners_0 = vec4(known[0].x, known[1].x, known[2].x, known[3].x);
+  out_corners_1 = vec4(known[0].y, known[1].y, known[2].y, known[3].y);
+  out_corners_2 = vec4(known[0].z, known[1].z, known[2].z, known[3].z);
+  out_corners_3 = vec4(known[0].w, known[1].w, known[2].w, known[3].w);
 }
