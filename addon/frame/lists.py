@@ -7,6 +7,9 @@ whose shaders cannot count in images (context.counts_in_images).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from ..gfx import images
 
 RUN = 64  # entries that lie side by side
@@ -25,3 +28,14 @@ def take(size: tuple[int, int]) -> dict[str, images.Image]:
 def columns(size: tuple[int, int], share: int) -> int:
     """Threads side by side for a list of a picture's `size`, each of which takes up to `share` entries."""
     return -(-max(size[0] // share, 1) // RUN) * RUN
+
+
+@contextmanager
+def borrowed(size: tuple[int, int]) -> Iterator[dict[str, images.Image]]:
+    """A list as `take` has it, whose images the pool gets back at the end."""
+    held = take(size)
+    try:
+        yield held
+    finally:
+        for image in held.values():
+            images.pool.give(image)

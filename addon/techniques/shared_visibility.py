@@ -2,31 +2,35 @@
 
 A soft shadow map asks some hundred texels for each pixel and light, for a visibility that mostly varies little from
 one pixel to the next. So up to four lights at a time are looked up at every RATE-th pixel along both axes, a sixteenth
-of the pixels. A cell between four such pixels knows the visibility within it if three or more of them lie on a plane
-(two pixels' width, normals within 25 degrees) and each light is seen alike from those. Pixels of the cell on that plane
-interpolate, all others look for themselves:
+of the pixels. A cell between four such pixels knows the visibility of a light within it if two or more of them lie on a
+plane (two pixels' width, normals within 25 degrees) and the light is seen alike from those, or varies in proportion.
+Pixels of the cell on that plane interpolate, all others look for themselves:
 
-    V(p) = bilinear of V at the corners on the plane,    max V - min V <= ALIKE there
+    V(p) = bilinear of V at the corners on the plane,
+    max V - min V <= ALIKE there, or <= LINEAR where second differences, one corner further too, are at most BEND
 
-What is lit, or in full shadow, is as exact as before; so are outlines, contacts and the steep part of penumbrae.
+What is lit, or in full shadow, is as exact as before; so are outlines, contacts and the bends of penumbrae. The pixels
+that look for themselves lie scattered, and lanes of a GPU beside them would idle: they are listed (frame/lists.py),
+light by light.
 
-Beside looking at every pixel, one variance map of 1024x1024, software GPU (time: `python -m bench.soft_lights`): the
-RMS error of the visibility at 640x360 is .0287 and .0289 (thin poles), .0507 and .0506 (chain fence), .0578 and .0580
-(foliage). Of `foliage`, whose ground lies in penumbra all over, lookups take 230 ms of processor time in place of 700:
-58 at every fourth pixel, 6 for cells and marks, 170 on leaves and at their outlines.
+Beside looking at every pixel, one variance map of 1024x1024, 640x360 pixels: RMS error of the visibility, and processor
+time of its shadow on a software GPU (as `python -m bench.soft_lights` takes it):
+
+| | thin poles | chain fence | foliage | grid | far background | stacked blockers |
+|---|---|---|---|---|---|---|
+| every pixel | .0270, 314 ms | .0454, 422 ms | .0574, 421 ms | .0417, 330 ms | .0191, 324 ms | .0164, 270 ms |
+| shared | .0271, 105 ms | .0456, 332 ms | .0574, 142 ms | .0420, 194 ms | .0181, 132 ms | .0168, 85 ms |
 
 | cost | per four lights, beside the lookups |
 |---|---|
-| passes | 3, and the pass of light twice, each over its own pixels |
-| fetches | 12 per cell; per pixel 3, and 1 per light |
-| bytes | 4 per pixel, 96 per cell |
+| passes | 2, and 2 dispatches per light |
+| fetches | 32 per cell; per pixel and light 4 to list, and 2 to light |
+| bytes | per pixel 4, and 4 per light; 96 per cell |
 
 Small pictures (MANY_PIXELS) are left alone: they cost little, and shadows narrower than four pixels are much of them.
-At 128x96 RMS grew from .0234 to .0257 (poles) and .0487 to .0514 (far background), elsewhere by up to .0007. One-sample
-pictures at 640x360 take .8 of the time (`soft_shadow_garden`, `window_interior`).
 
 Bias (direct light of soft maps in pictures of few samples): shadows narrower than four pixels, between corners that do
-not see them; else at most ALIKE. None with more samples, or with `sparse` off.
+not see them; else at most ALIKE, or an eighth of BEND. None with more samples, or with `sparse` off.
 
 Sources: Ward, Rubinstein, Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, for a quantity
 that is kept where it varies little; on a grid of the screen, with silhouettes told by planes, Nichols & Wyman 2009.
@@ -35,6 +39,7 @@ that is kept where it varies little; on a grid of the screen, with silhouettes t
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -78,16 +83,14 @@ CELLS = passes.fullscreen_program(
     outputs=tuple(("VEC4", f"out_{name}") for name in ("plane", *CORNERS)),
 )
 CELL = (("RGBA32F", "cell_plane"), *(("RGBA32F", name) for name in CORNERS))
-PIXEL_BITS = 14  # of each axis, in an entry of the list
-LISTED = (*lists.DEFINES, ("PIXEL_BITS", str(PIXEL_BITS)))
 LIST = Program(
     name="pixels that look for themselves",
     compute="light/visibility_list.comp.glsl",
     textures=(*SEEN, *CELL),
     images=lists.FILLED,
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "light_count"),),
-    defines=(*DEFINES, *LISTED),
+    constants=(("INT", "light_index"),),
+    defines=(*DEFINES, *lists.DEFINES),
 )
 SHARE = 8  # of a list's room: entries that a thread may take
 
@@ -97,7 +100,7 @@ def _looking(lookup: Lookup, kinds: int) -> dict:
     return {
         "textures": (*lookup.textures, ("RGBA32F", "depth_maps"), *SEEN),
         "blocks": ((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
-        "constants": (("INT", "light_count"), *lookup.constants),
+        "constants": lookup.constants,
         "defines": (*DEFINES, *lookup.defines, ("LIGHT_KINDS", str(kinds))),
         "snippets": (("generated/visibility", f'#include "{lookup.file}"\n'),),
     }
@@ -107,19 +110,22 @@ def _looking(lookup: Lookup, kinds: int) -> dict:
 def looking(lookup: Lookup, kinds: int = -1) -> Program:
     """The pass that looks up the visibility of lights of these kinds (bits as in lights.LAMPS; -1: any light) at every
     RATE-th pixel."""
+    declared = _looking(lookup, kinds)
     return passes.fullscreen_program(
         f"visibility at some pixels, {lookup.name}", "light/visibility.frag.glsl",
-        **_looking(lookup, kinds), outputs=(("VEC4", "out_visibility"),),
+        **declared | {"constants": (*declared["constants"], ("INT", "light_count"))},
+        outputs=(("VEC4", "out_visibility"),),
     )  # fmt: skip
 
 
 @cache
 def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Program:
-    """The same at pixels that look for themselves: those of a list, or all that are found to."""
+    """The dispatch that looks up that of one light at the pixels that look for themselves: those of a list, or all that
+    are found to."""
     declared = _looking(lookup, kinds)
     textures, constants, defines = CELL, (), ()
     if listed:
-        textures, constants, defines = lists.READ, (("INT", "columns"),), (*LISTED, ("LISTED", ""))
+        textures, constants, defines = lists.READ, (("INT", "columns"),), (*lists.DEFINES, ("LISTED", ""))
     return Program(
         name=f"visibility at {'listed' if listed else 'found'} pixels, {lookup.name}",
         compute="light/visibility_apart.comp.glsl",
@@ -127,7 +133,7 @@ def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Progr
         group=(lists.RUN, 1, 1),
         **declared | {
             "textures": (*declared["textures"], *textures),
-            "constants": (*declared["constants"], ("INT", "first_row"), *constants),
+            "constants": (*declared["constants"], ("INT", "light_index"), ("INT", "first_row"), *constants),
             "defines": (*declared["defines"], *defines),
         },
     )  # fmt: skip
@@ -142,8 +148,8 @@ def programs_of(lookup: Lookup) -> tuple[Program, ...]:
 class _Found:
     """What is known of the visibility of up to LIGHTS lights: at the corners of cells, and at pixels apart."""
 
-    corners: list[images.Image] = field(default_factory=list)
-    apart: images.Image | None = None
+    cells: dict[str, images.Image] = field(default_factory=dict)  # by binding, as CELL
+    apart: images.Image | None = None  # below 0 where cells tell it
 
     def find(
         self, frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources,
@@ -155,50 +161,43 @@ class _Found:
         bindings = surface_bindings(frame)
         seen = {name: bindings[name] for _, name in SEEN}
         view = {"film_view": frame.view_block}
-        plane, *self.corners = (images.pool.take(*size, "RGBA32F") for _ in range(1 + LIGHTS))
+        self.cells = {name: images.pool.take(*size, kind) for kind, name in CELL}
         self.apart = images.pool.take(frame.size[0], frame.size[1] * len(rows), "R32F")
-        held = [plane]
+        self.apart.texture.clear(format="FLOAT", value=(-1.0,))
 
-        def bound() -> dict:
+        def bound(constants: dict) -> dict:
             return {
                 "textures": {**seen, "depth_maps": maps.atlas, **maps.textures},
                 "blocks": {**view, "sources": sources.set(rows, maps.views), **maps.blocks},
-                "constants": {"light_count": len(rows), **maps.constants},
+                "constants": {**constants, **maps.constants},
             }
 
-        try:
-            with images.borrowed(*points, "RGBA32F") as visibility:
-                passes.fullscreen(looking(maps.lookup, kinds), visibility, **bound())
-                known = {**seen, "visibility": visibility.colors[0]}
-                passes.fullscreen(CELLS, images.Target((plane, *self.corners)), textures=known, blocks=view)
-            yield
-            self.apart.texture.clear(format="FLOAT", value=(-1.0,) * 4)
-            where = {"cell_plane": plane, **dict(zip(CORNERS, self.corners))}
-            width, extra = frame.size[0], {}
-            listed = context.counts_in_images() and max(frame.size) <= 1 << PIXEL_BITS
-            if listed:
-                room = (frame.size[0] * len(rows), frame.size[1])
-                entries = lists.take(room)
-                held += entries.values()
-                passes.compute(
-                    LIST, frame.size, textures={**seen, **where}, blocks=view, images=entries,
-                    constants={"light_count": len(rows)},
-                )  # fmt: skip
-                where, width = entries, lists.columns(room, SHARE)
-                extra = {"columns": width}
-            program = looking_apart(maps.lookup, kinds, listed)
-            for first, last in frame.bands(technique, "visibility"):
-                given = bound()
-                given["textures"] |= where
-                given["constants"] |= {"first_row": first, **extra}
-                passes.compute(program, (width, last - first), images={"own_visibility": self.apart}, **given)
-                yield
-        finally:
-            for image in held:
-                images.pool.give(image)
+        with images.borrowed(*points, "RGBA32F") as visibility:
+            passes.fullscreen(looking(maps.lookup, kinds), visibility, **bound({"light_count": len(rows)}))
+            known = {**seen, "visibility": visibility.colors[0]}
+            passes.fullscreen(CELLS, images.Target(tuple(self.cells.values())), textures=known, blocks=view)
+        yield
+        listed = context.counts_in_images()
+        program = looking_apart(maps.lookup, kinds, listed)
+        for index in range(len(rows)):
+            where, width, constants = self.cells, frame.size[0], {"light_index": index}
+            with ExitStack() as stack:
+                if listed:
+                    entries = stack.enter_context(lists.borrowed(frame.size))
+                    passes.compute(
+                        LIST, frame.size, textures={**seen, **self.cells}, blocks=view, images=entries,
+                        constants=constants,
+                    )  # fmt: skip
+                    where, width = entries, lists.columns(frame.size, SHARE)
+                    constants["columns"] = width
+                for first, last in frame.bands(technique, "visibility"):
+                    given = bound({**constants, "first_row": first})
+                    given["textures"] |= where
+                    passes.compute(program, (width, last - first), images={"own_visibility": self.apart}, **given)
+                    yield
 
     def give(self) -> None:
-        for image in (*self.corners, *([self.apart] if self.apart else [])):
+        for image in (*self.cells.values(), *([self.apart] if self.apart else [])):
             images.pool.give(image)
 
 
@@ -216,7 +215,7 @@ def add(
             known = {
                 "textures": {
                     "energy_table": frame.materials.energy_table, "own_visibility": found.apart,
-                    **dict(zip(CORNERS, found.corners)),
+                    **{name: found.cells[name] for name in CORNERS},
                 },
                 "blocks": {},
                 "constants": {

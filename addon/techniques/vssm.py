@@ -10,9 +10,10 @@ for a cell of the kernel that holds the receiver's plane and one height. Both me
 q, q^2, q x and q y: with the last two, heights above a tilted plane are as exact as above a parallel one.
 
 Cells are classified by a min-max pyramid (`rule` BOUNDS): all above the receiver, all lit, nothing far behind the
-receiver (the moments hold), else a few texels are looked at. The source's own rule (`rule` MEAN) takes the moments
-wherever the mean lies above the receiver, and leaks where a far background lies behind near blockers. Kernels of a
-few texels look at every texel and see the caster's plane too, so contacts stay closed.
+receiver (the moments hold), else a few texels are looked at, staggered so that edges along rows are told as finely. The
+source's own rule (`rule` MEAN) takes the moments wherever the mean lies above the receiver, and leaks where a far
+background lies behind near blockers. Kernels of a few texels look at every texel and see the caster's plane too, so
+contacts stay closed.
 
 With n samples of the light, the map of each stands for 1 / n of it: the kernel's extents shrink by sqrt(n), steps
 between the points are filled, and the error goes to that of accumulated maps and to zero. Rectangles are cut into 2^k
@@ -25,11 +26,12 @@ classification by bounds and the plane-relative moments are ours.
 
 | cost | per map of N x N texels |
 |---|---|
-| pyramid, table | log2 N dispatches, 4 log8 N - 1 passes (log8 N rounded up); 20 bytes per texel kept |
+| pyramid | a pass and log2 N - 1 dispatches; 4 bytes per texel |
+| table | 4 log8 N - 1 passes (log8 N rounded up) over blocks of 2 x 2 texels, from 16 samples on over texels |
 | lookup, lit or all blocked pixels | up to 27 loads |
-| lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 41 loads of 16 bytes, up to 225 of 8; 9 more per mixed cell |
+| lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 41 loads of 16 bytes, up to 225 of 8; up to 9 more per mixed cell |
 | contact rays | 4 per pixel that is not settled and map, from 16 samples on 1 |
-| bytes | 20 per texel and 16 borrowed, beside the map's 20 |
+| bytes | 8 per texel and 4 borrowed, beside the map's 20; from 16 samples on 20 and 16 |
 
 Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the light's
 middle does not see, beyond the reach of contact rays, blocks nothing; visibility multiplies the unblocked light, as if

@@ -1,5 +1,5 @@
-// Visibility of lights at the pixels that cells do not tell it: those of a list, or, where shaders cannot count, all that
-// are found. Of the lights one above the other.
+// Visibility of a light at the pixels that look for themselves: those of a list, or, where shaders cannot count, all that
+// are found to. Of the lights one above the other.
 #include "light/visibility_at.glsl"
 #ifdef LISTED
 #include "lib/entry_list.glsl"
@@ -7,9 +7,10 @@
 #include "light/visibility_cell.glsl"
 #endif
 
-void look(ivec2 pixel, int index)
+void look(ivec2 pixel)
 {
-  imageStore(own_visibility, pixel + ivec2(0, index * surface_position_size().y), vec4(visibility_at(pixel, index)));
+  ivec2 place = pixel + ivec2(0, light_index * surface_position_size().y);
+  imageStore(own_visibility, place, vec4(visibility_at(pixel, light_index)));
 }
 
 void main()
@@ -18,20 +19,13 @@ void main()
 #ifdef LISTED
   // Where branches are masked, a loop ends all the same: threads beyond the list take one turn.
   int count = int(entry_count_fetch(ivec2(0)).x);
-  int most = (1 << PIXEL_BITS) - 1;
   for (; entry_index(place) < count; place.x += columns) {
-    int entry = int(entries_fetch(place).x);
-    look(ivec2(entry & most, (entry >> PIXEL_BITS) & most), (entry >> (2 * PIXEL_BITS)) & 3);
+    uint entry = entries_fetch(place).x;
+    look(ivec2(int(entry & 0xFFFFu), int(entry >> 16)));
   }
 #else
-  if (any(greaterThanEqual(place, surface_position_size())) || surface_position_fetch(place).w == 0.0) {
-    return;
-  }
-  bool on_plane = lies_on_plane(place, surface_position_fetch(place).xyz);
-  for (int i = 0; i < light_count; i++) {
-    if (!on_plane || !cell_knows(place / RATE, i)) {
-      look(place, i);
-    }
+  if (all(lessThan(place, surface_position_size())) && looks_itself(place, light_index)) {
+    look(place);
   }
 #endif
 }
