@@ -26,7 +26,7 @@ def take(size: tuple[int, int]) -> dict[str, images.Image]:
 
 
 def columns(size: tuple[int, int], share: int) -> int:
-    """Threads side by side for a list of a picture's `size`, each of which takes up to `share` entries."""
+    """Threads side by side for a list of a picture's `size`; each takes about `share` entries of a full one."""
     return -(-max(size[0] // share, 1) // RUN) * RUN
 
 

@@ -94,8 +94,8 @@ def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
 
 @dataclass(frozen=True)
 class Lookup:
-    """GLSL file with `float light_visibility(Light, vec3 position, vec3 normal)` and what else it binds. `maps`: it
-    reads depth maps."""
+    """GLSL file with `float light_visibility(Light, ivec2 pixel, vec3 position, vec3 normal)` and what else it binds.
+    `maps`: it reads depth maps."""
 
     name: str
     file: str

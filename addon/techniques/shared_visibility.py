@@ -23,14 +23,16 @@ time of its shadow on a software GPU (as `python -m bench.soft_lights` takes it)
 
 | cost | per four lights, beside the lookups |
 |---|---|
-| passes | 2, and 2 dispatches per light |
-| fetches | 32 per cell; per pixel and light 4 to list, and 2 to light |
+| passes | 2, and 2 dispatches per light (1 where shaders cannot count) |
+| fetches | 28 per cell; per pixel and light 4 to list, and 2 to light |
 | bytes | per pixel 4, and 4 per light; 96 per cell |
 
 Small pictures (MANY_PIXELS) are left alone: they cost little, and shadows narrower than four pixels are much of them.
 
 Bias (direct light of soft maps in pictures of few samples): shadows narrower than four pixels, between corners that do
-not see them; else at most ALIKE, or an eighth of BEND. None with more samples, or with `sparse` off.
+not see them; else at most ALIKE between three corners, or an eighth of BEND between four. Beside two corners alone, at
+outlines, nothing tells how visibility goes on; RMS over the families is the same with three. None with more samples, or
+with `sparse` off.
 
 Sources: Ward, Rubinstein, Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, for a quantity
 that is kept where it varies little; on a grid of the screen, with silhouettes told by planes, Nichols & Wyman 2009.
@@ -156,8 +158,8 @@ class _Found:
         maps: Maps,
     ) -> Iterator[None]:  # fmt: skip
         """Look the visibility up, in parts."""
-        points = tuple(-(-(extent - 1) // RATE) + 1 for extent in frame.size)
-        size = tuple(max(count - 1, 1) for count in points)
+        size = tuple((extent - 1) // RATE + 1 for extent in frame.size)  # so that each pixel has a cell
+        points = tuple(count + 1 for count in size)
         bindings = surface_bindings(frame)
         seen = {name: bindings[name] for _, name in SEEN}
         view = {"film_view": frame.view_block}
@@ -190,7 +192,7 @@ class _Found:
                     )  # fmt: skip
                     where, width = entries, lists.columns(frame.size, SHARE)
                     constants["columns"] = width
-                for first, last in frame.bands(technique, "visibility"):
+                for first, last in frame.bands(technique, f"visibility {index}"):
                     given = bound({**constants, "first_row": first})
                     given["textures"] |= where
                     passes.compute(program, (width, last - first), images={"own_visibility": self.apart}, **given)
@@ -207,8 +209,9 @@ def add(
 ) -> Iterator[None]:  # fmt: skip
     """Add this light to the sample's radiance, in parts, by the program `between`, with the lookup BETWEEN, and keep it
     for other points of the film, which ask `maps` themselves."""
-    for first in range(0, len(lit.rows), LIGHTS):
-        some = lit.rows[first : first + LIGHTS]
+    many = min(LIGHTS, max(images.most_side() // frame.size[1], 1))  # one above the other in an image
+    for first in range(0, len(lit.rows), many):
+        some = lit.rows[first : first + many]
         found = _Found()
         try:
             yield from found.find(frame, technique, some, kinds, sources, maps)
@@ -226,6 +229,6 @@ def add(
             yield from repeated_light.add(frame, technique, sources, part, keeps=False)
         finally:
             found.give()
-        frame.count(technique, "passes", 5)
+        frame.count(technique, "passes", 3 + 2 * len(some))
         frame.count(technique, "shared lookups", len(some))
     repeated_light.keep(frame, lit)

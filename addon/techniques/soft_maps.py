@@ -88,7 +88,7 @@ def with_contacts(lookup: Lookup) -> Lookup:
 
 
 def few_samples(frame: Frame) -> bool:
-    """Whether each sample shows all of a light, and stands for much of the picture."""
+    """Whether each sample is so much of the picture that it pays to spend rays on it, and to save texels."""
     return frame.settings.samples < FEWEST_POINTS
 
 

@@ -131,5 +131,6 @@ class VarianceSoftShadows(SoftMaps):
 
 
 def _block(frame: Frame) -> int:
-    """Pictures of few samples take a quarter of the table; kernels of many are small, and end within blocks."""
+    """Pictures of few samples take a quarter of the table; those of many, which show parts of lights, have kernels of a
+    few texels, whose edges blocks would blur."""
     return COARSE if few_samples(frame) else FINE

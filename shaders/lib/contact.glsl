@@ -7,10 +7,6 @@
 #define OPAQUE_ONLY
 #include "trace/rays.glsl"
 
-#ifndef SEEN_PIXEL
-#define SEEN_PIXEL ivec2(gl_FragCoord.xy)
-#endif
-
 #define CONTACT_SHARE 0.06  // length of the rays beside what the map spans at the receiver
 
 // A point of what the map stands for: all of the light or a part around the map's point. `place` in [0, 1)^2.
@@ -42,14 +38,14 @@ float contact_reach(ShadowReceiver r)
 }
 
 // Share of the light that no caster nearer than `reach` hides, by contact_side^2 rays.
-float contact_visibility(Light light, ShadowReceiver r, vec3 position, vec3 normal, float reach)
+float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 position, vec3 normal, float reach)
 {
   if (ray_offset(position) > 0.1 * reach) {
     return 1.0;  // beside so large a scene rays would start beyond what they look for
   }
   vec3 origin = ray_origin(position, normal);
   // The same lots for all lights, so that two half lights are one.
-  uvec3 salt = roll_of(SEEN_PIXEL, film_view.sample_index, film_view.seed, 19);
+  uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 19);
   float open = 0.0;
   float all = 0.0;
   int count = contact_side * contact_side;

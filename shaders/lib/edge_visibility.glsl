@@ -14,7 +14,7 @@
 #define SHARP_TEXELS 2.0  // half width of a penumbra
 #define CLEARANCE 0.25  // most that the ray's start may be off the surface, beside the nearest caster's distance
 
-float light_visibility(Light light, vec3 position, vec3 normal)
+float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
   ShadowReceiver r;
   if (!shadow_find(light.first_view, light.view_count, position, normal, r)) {

@@ -62,7 +62,7 @@ void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
   vec2 horizon = (vec2(dot(across, forward), dot(along, forward)) * 0.5 + 0.5) * r.rectangle.z;
   int k = (abs(rise.x) > abs(rise.y)) ? 0 : 1;
   float block = float(TABLE_BLOCK);
-  float here = clamp(horizon[k], 0.0, r.rectangle.z - 1.0);
+  float here = clamp(horizon[k], 0.0, r.rectangle.z);
   if (rise[k] > 0.0) {
     first[k] = min(block * ceil(here / block), r.rectangle.z - block);
   }

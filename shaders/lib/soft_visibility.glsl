@@ -125,7 +125,7 @@ Blockers kernel_near(Light light, ShadowReceiver r, vec2 beside, vec2 half_size,
 }
 
 // Visibility past blockers that stand lower than `height`.
-float near_visibility(Light light, ShadowReceiver r, vec2 beside, vec2 extent, float most, float height)
+float near_visibility(Light light, ShadowReceiver r, vec2 beside, vec2 slope, vec2 extent, float most, float height)
 {
   height *= NEAR_RATIO;
   vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
@@ -143,7 +143,7 @@ float near_visibility(Light light, ShadowReceiver r, vec2 beside, vec2 extent, f
   float blocker = min(search.height / search.blocked, height);
   vec2 size = clamp(extent * blocker, vec2(0.5), vec2(most));
   // Heights scatter around their mean, hence twice: else a slanted blocker would count in part.
-  return kernel_lit(kernel_near(light, r, beside, size, 2.0 * blocker, r.gradient / blocker));
+  return kernel_lit(kernel_near(light, r, beside, size, 2.0 * blocker, slope / blocker));
 }
 #endif
 
@@ -153,9 +153,9 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
                         out float blocker)
 {
   bool back = facing <= -EDGE_ON;
-  if (abs(facing) < EDGE_ON) {
-    r.gradient = shadow_outward(r, normal) * (-1e3 * height);  // a wall that bounds the kernel
-  }
+  // Seen edge-on the receiver is a wall that bounds the kernel; what stands higher than its point blocks.
+  bool edge_on = abs(facing) < EDGE_ON;
+  vec2 slope = edge_on ? shadow_outward(r, normal) * (-1e3 * height) : r.gradient;
   vec2 beside = shadow_beside(r, normal);
   blocker = 0.0;
   if (back && dot(abs(r.gradient), extent) <= LEAST_ABOVE) {
@@ -164,7 +164,7 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
   }
   vec2 window = clamp(extent * height, vec2(0.5), vec2(most));
   float lit = 1.0;
-  Blockers found = blockers_none(max(extent, vec2(1e-30)), vec2(0.0));
+  Blockers found = blockers_none(max(extent, vec2(1e-30)), edge_on ? slope / height : vec2(0.0));
   for (int turn = 0; turn < 2; turn++) {  // twice the same code, which compilers would otherwise hold twice
     if (back) {
       found = kernel_back(light, r, window, found);
@@ -181,18 +181,18 @@ float kernel_visibility(Light light, ShadowReceiver r, float facing, vec3 normal
     if (turn == 0) {
       blocker = min(found.height / found.blocked, height);
       window = clamp(extent * blocker, vec2(0.5), vec2(most));
-      found = blockers_none(vec2(0.0), r.gradient / blocker);
+      found = blockers_none(vec2(0.0), slope / blocker);
     }
   }
 #ifndef CONTACT_RAYS
   if (!back) {
-    lit = min(lit, near_visibility(light, r, beside, extent, most, (blocker > 0.0) ? blocker : height));
+    lit = min(lit, near_visibility(light, r, beside, slope, extent, most, (blocker > 0.0) ? blocker : height));
   }
 #endif
   return lit;
 }
 
-float light_visibility(Light light, vec3 position, vec3 normal)
+float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
   ShadowReceiver r;
   if (!shadow_find(light.first_view, light.view_count, position, normal, r)) {
@@ -219,7 +219,7 @@ float light_visibility(Light light, vec3 position, vec3 normal)
 #ifdef CONTACT_RAYS
   if (lit > 0.0) {
     float reach = contact_reach(r);
-    float near = contact_visibility(light, r, position, normal, reach);
+    float near = contact_visibility(light, r, pixel, position, normal, reach);
     // Of blockers that both see the rays alone tell: the darker of a mean and of noise around it would be too dark.
     bool same = blocker > 0.0 && shadow_distance(r.view, position, towards, r.q + blocker) < 0.5 * reach;
     lit = same ? near : min(lit, near);

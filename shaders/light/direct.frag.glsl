@@ -124,7 +124,7 @@ void main()
     if (max_component(abs(from_diffuse) + abs(from_glossy)) > 0.0) {
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        visibility = light_visibility(light, s.position, facing);
+        visibility = light_visibility(light, pixel, s.position, facing);
       }
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;

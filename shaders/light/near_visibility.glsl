@@ -4,7 +4,7 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 
-float light_visibility(Light light, vec3 position, vec3 normal)
+float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
   if (light.radius <= near_share * length(light.centre - position)) {
     return shadow_visibility(light.first_view, light.view_count, position, normal);
@@ -14,6 +14,6 @@ float light_visibility(Light light, vec3 position, vec3 normal)
   light_sample(light, position, direction, density);
   vec3 origin = ray_origin(position, normal);
   float reach = 0.9999 * light_distance(light, origin, direction);
-  uvec3 salt = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 17);
+  uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 17);
   return clear_to_light(origin, direction, reach, salt.x);
 }

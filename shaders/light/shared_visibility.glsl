@@ -2,9 +2,8 @@
 #include "light/sources.glsl"
 #include "light/cell_corners.glsl"
 
-float light_visibility(Light light, vec3 position, vec3 normal)
+float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 cell = pixel / RATE;
   int index = light.base / LIGHT_TEXELS;
   float own = own_visibility_fetch(pixel + ivec2(0, index * surface_position_size().y)).x;

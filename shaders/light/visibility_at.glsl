@@ -1,18 +1,14 @@
 // Visibility of a light at a pixel of the picture.
 #include "lib/gbuffer.glsl"
-
-ivec2 seen_pixel;
-#define SEEN_PIXEL seen_pixel
 #include "light/whole.glsl"
 #include "generated/visibility"
 
 float visibility_at(ivec2 pixel, int index)
 {
-  seen_pixel = pixel;
   Light light = light_read(index);
   if ((light.flags & LIGHT_SHADOW) == 0) {
     return 1.0;
   }
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-  return light_visibility(light, surface_position_fetch(pixel).xyz, normal);
+  return light_visibility(light, pixel, surface_position_fetch(pixel).xyz, normal);
 }

@@ -67,7 +67,11 @@ void main()
       known[k] = vec4(-1.0);
     }
   }
-  vec4 most_range = mix(vec4(ALIKE), vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND)));
+  // From fewer corners the bilinear mean of what they have is no plane.
+  vec4 most_range = vec4(ALIKE);
+  if (all(on_plane)) {
+    most_range = mix(most_range, vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND)));
+  }
   bvec4 tells = lessThanEqual(highest - lowest, most_range);
   for (int k = 0; k < 4; k++) {
     known[k] = mix(vec4(-1.0), known[k], tells);

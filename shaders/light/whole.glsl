@@ -9,25 +9,29 @@
 #define ELLIPSE_SIDES 12
 #define WHOLE_PARTS 4
 
+// From the light's centre.
 vec3 whole_corner(Light light, int k)
 {
   vec3 u = sources.light[light.base + 5].xyz;
   vec3 v = sources.light[light.base + 6].xyz;
   if (LIGHT_IS(light, LIGHT_RECTANGLE)) {
-    return light.centre + ((k == 0 || k == 3) ? -u : u) + ((k < 2) ? -v : v);
+    return ((k == 0 || k == 3) ? -u : u) + ((k < 2) ? -v : v);
   }
   float turn = 2.0 * PI / float(ELLIPSE_SIDES);
   float radius = sqrt(turn / sin(turn));
-  return light.centre + radius * (cos(turn * float(k)) * u + sin(turn * float(k)) * v);
+  return radius * (cos(turn * float(k)) * u + sin(turn * float(k)) * v);
 }
 
-// Angle between unit vectors times the part along `normal` of the unit normal of their plane. The quotient of an acute
-// angle and its sine is a rational function of its cosine, by our own fit (relative error 6e-7). As it is smooth, terms of
-// a light far away, which nearly cancel, all err alike.
-float edge_term(vec3 a, vec3 b, vec3 normal)
+// Angle that an edge from `a` is seen under, times the part along `normal` of the unit normal of the plane through it and
+// the receiver. The quotient of an acute angle and its sine is a rational function of its cosine, by our own fit (relative
+// error 6e-7); for a light far away, where the terms nearly cancel, it is the same for all of them, and so that they cancel
+// to float32's relative precision the product is taken with the edge, not with the direction of its end.
+float edge_term(vec3 a, vec3 edge, vec3 normal)
 {
-  vec3 across = cross(a, b);
-  float cosine = dot(a, b);
+  vec3 b = a + edge;
+  float scale = inversesqrt(max(dot(a, a), 1e-30)) * inversesqrt(max(dot(b, b), 1e-30));
+  vec3 across = cross(a, edge) * scale;
+  float cosine = dot(a, b) * scale;
   float x = min(abs(cosine), 1.0);
   float acute = (1.57079545 + (0.90580899 + 0.02603178 * x) * x) / (1.0 + (1.21323599 + 0.28939883 * x) * x);
   float quotient = (cosine >= 0.0) ? acute : PI * inversesqrt(max(dot(across, across), 1e-24)) - acute;
@@ -41,14 +45,14 @@ float whole_polygon(Light light, vec3 position, vec3 normal)
     return 0.0;
   }
   int sides = LIGHT_IS(light, LIGHT_RECTANGLE) ? 4 : ELLIPSE_SIDES;
+  vec3 middle = light.centre - position;
   float sum = 0.0;
   int above = 0;
-  vec3 start = safe_normalize(whole_corner(light, 0) - position);
-  vec3 a = start;
+  vec3 a = whole_corner(light, 0);
   for (int k = 1; k <= sides; k++) {
-    vec3 b = (k == sides) ? start : safe_normalize(whole_corner(light, k) - position);
-    sum += edge_term(a, b, normal);
-    above += (dot(b, normal) > 0.0) ? 1 : 0;
+    vec3 b = whole_corner(light, (k == sides) ? 0 : k);
+    sum += edge_term(middle + a, b - a, normal);
+    above += (dot(middle + b, normal) > 0.0) ? 1 : 0;
     a = b;
   }
   if (above == 0) {
@@ -57,30 +61,33 @@ float whole_polygon(Light light, vec3 position, vec3 normal)
   // Few lights are cut by the horizon; a loop without turns costs one where branches are masked.
   int cut_sides = (above < sides) ? sides : 0;
   sum = (above < sides) ? 0.0 : sum;
-  vec3 leaves = start;
-  vec3 enters = start;
+  vec3 leaves = middle;
+  vec3 enters = middle;
   for (int k = 1; k <= cut_sides; k++) {
-    vec3 next = (k == sides) ? start : safe_normalize(whole_corner(light, k) - position);
-    vec3 b = next;
-    float height_a = dot(a, normal);
-    float height_b = dot(b, normal);
+    vec3 b = whole_corner(light, (k == sides) ? 0 : k);
+    vec3 from = middle + a;
+    vec3 edge = b - a;
+    float height_a = dot(from, normal);
+    float height_b = dot(middle + b, normal);
     if (height_a > 0.0 || height_b > 0.0) {
       if (height_a <= 0.0 || height_b <= 0.0) {
-        vec3 crossing = safe_normalize(mix(a, b, height_a / (height_a - height_b)));
+        float share = height_a / (height_a - height_b);
+        vec3 crossing = from + share * edge;
         if (height_a <= 0.0) {
           enters = crossing;
-          a = crossing;
+          from = crossing;
+          edge *= 1.0 - share;
         }
         else {
           leaves = crossing;
-          b = crossing;
+          edge *= share;
         }
       }
-      sum += edge_term(a, b, normal);
+      sum += edge_term(from, edge, normal);
     }
-    a = next;
+    a = b;
   }
-  return 0.5 * abs(sum + ((cut_sides > 0) ? edge_term(leaves, enters, normal) : 0.0));
+  return 0.5 * abs(sum + ((cut_sides > 0) ? edge_term(leaves, enters - leaves, normal) : 0.0));
 }
 
 // Projected solid angle of a cone of directions with the given sine around a unit axis.

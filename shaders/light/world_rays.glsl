@@ -47,8 +47,8 @@ Light own_point(Light light, int number)
   return light;
 }
 
-float light_visibility(Light light, vec3 position, vec3 normal)
+float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
-  uvec3 salt = roll_of(ivec2(gl_FragCoord.xy), film_view.sample_index, film_view.seed, 17);
+  uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 17);
   return clear_path(ray_origin(position, normal), light.centre, 1e29, salt.x);
 }

@@ -18,8 +18,9 @@ uvec4 vssm_sum(ivec2 block)
   return (min(block.x, block.y) <= 0) ? uvec4(0u) : depth_table_fetch(block - 1);
 }
 
-// Texels first..last of the view, whose sum in the table is `sum`.
-void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first, ivec2 last, uvec4 sum, float range, float weight)
+// Texels first..last of the view, whose sum in the table is `sum`. `cosine`: mean of kernel_cosine.
+void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first, ivec2 last, uvec4 sum, float range,
+               float weight, float cosine)
 {
   vec2 size = vec2(last - first + 1);
   vec2 centre = vec2(first) + 0.5 * size;
@@ -51,7 +52,9 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
   bool clear = bounds.x > plane + tilt + slack;  // of the receiver's plane
   bool blocked = clear && bounds.x > r.q + slack;
   lit = lit || (clear && bounds.y <= r.q + slack);
-  one_sided = one_sided && !clear;
+  // Where all stand above the plane's middle but not above its highest texel, what the plane rises by within the cell would
+  // pass for different heights.
+  one_sided = one_sided && bounds.x <= plane + slack;
 #endif
   vec2 offset = centre - r.texel;
   if (blocked || lit || one_sided) {
@@ -59,9 +62,9 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
     square = max(square, mean * mean);
     float share = blocked ? 1.0 : (lit ? 0.0 : mean * mean / square);
     float height = blocked ? mean : square / mean;
-    found.whole += weight;
+    found.whole += weight * cosine;
     if (share > 0.0) {
-      kernel_add(found, offset, 0.5 * size, height + dot(r.gradient, offset), weight * share);
+      kernel_add(found, offset, 0.5 * size, height + dot(r.gradient, offset), weight * cosine * share);
     }
   }
   else {
@@ -73,7 +76,9 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
     for (int y = 0; y < asked.y; y++) {
       for (int x = 0; x < asked.x; x++) {
         vec2 shift = (vec2(y, x) + 0.5) / vec2(asked.yx) - 0.5;
-        kernel_texel(found, r, beside, first + ivec2((vec2(x, y) + 0.5 + shift) * apart), 0.0, share);
+        ivec2 texel = first + ivec2((vec2(x, y) + 0.5 + shift) * apart);
+        float part = share * kernel_cosine(found, vec2(texel) + 0.5 - r.texel, vec2(0.5));
+        kernel_texel(found, r, beside, texel, 0.0, part);
       }
     }
   }
@@ -114,10 +119,10 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 besi
         vec2 covered = min(b, high) - max(a, low);
         vec2 place = (0.5 * (a + b) - r.texel) / half_size;
         float weight = covered.x * covered.y * kernel_weight(light, place, 2.0 / float(inner_cells));
-        weight *= kernel_cosine(found, place * half_size, 0.5 * (b - a));
-        if (weight > 0.0) {
+        float cosine = kernel_cosine(found, place * half_size, 0.5 * (b - a));
+        if (weight * cosine > 0.0) {
           uvec4 sum = corner - corner_before - below + below_before;
-          vssm_cell(found, r, beside, TABLE_BLOCK * before, TABLE_BLOCK * line - 1, sum, range, weight);
+          vssm_cell(found, r, beside, TABLE_BLOCK * before, TABLE_BLOCK * line - 1, sum, range, weight, cosine);
         }
       }
       row_below[i] = corner;
