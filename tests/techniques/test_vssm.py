@@ -46,6 +46,15 @@ def test_one_sample_without_blockers_is_the_whole_light(floor, name):
     assert visibility(floor, source) == pytest.approx(1.0, abs=2e-4)
 
 
+def test_a_small_lamp_far_away_shows_all_of_its_light(floor):
+    """The terms of its edges cancel to a hundred thousandth of each."""
+    side, height = 0.01, 1000.0
+    floor.light("AREA", (0, 0, height), size=side)
+    floor.blocker((30, 30), (31, 31), 0.5)  # casts no shadow here
+    source = model.area((0, 0, height), (side, 0, 0), (0, side, 0), 100)
+    assert visibility(floor, source) == pytest.approx(1.0, abs=5e-5)
+
+
 @pytest.mark.parametrize("name", LIGHTS)
 def test_one_map_shows_the_penumbra_of_an_edge(floor, name):
     kind, settings, source = LIGHTS[name]
