@@ -46,7 +46,7 @@ def test_short_rays_see_blockers_that_the_middle_of_the_light_does_not(registere
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "texels", "most"), [("far background", 4.0, 0.036), ("grid", 2.0, 0.055)])
 def test_what_points_are_asked_for_is_told_finely_along_their_rows(registered, family, texels, most):
-    """Texels of a map where moments do not hold, and rays to contacts: of square grids the errors were .048 and .060."""
+    """Texels where moments do not hold, and rays to contacts: of square grids the errors were .048 and .060."""
     from bench import soft_scenes
 
     scene = soft_scenes.build(family)
