@@ -40,6 +40,16 @@ def test_structs_are_filled_field_by_field_and_names_are_no_words_of_metal(file)
     assert "##" not in code
 
 
+@pytest.mark.parametrize("file", FILES)
+def test_there_are_no_mutable_globals(file):
+    """What stands outside of all braces is a function, a struct or a constant."""
+    code, depth, outside = code_of((SHADER_ROOT / file).read_text(encoding="utf-8")), 0, ""
+    for character in re.sub(r"^\s*#.*(?:\\\n.*)*$", "", code, flags=re.MULTILINE):
+        depth += {"{": 1, "}": -1}.get(character, 0)
+        outside += character if depth == 0 else ""
+    assert not re.findall(rf"(?m)^\s*(?:{TYPES}|{'|'.join(STRUCTS)})\s+\w+(?:\[[^;]*\])?\s*(?:=[^;]*)?;", outside)
+
+
 @pytest.mark.parametrize("program", programs(), ids=lambda program: program.name)
 def test_nothing_has_the_name_of_what_is_bound(program):
     """Blenders make those names macros: a parameter, local or member of that name would be replaced, too."""
