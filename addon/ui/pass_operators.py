@@ -17,7 +17,7 @@ from ..frame.ledger import RAN, SKIPPED
 from ..frame.plan import PlanError, make_plan
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
-from . import ENGINE, shown_images
+from . import ENGINE, shown_images, shown_otherwise
 from .jobs import Job, draw_progress, part
 from .pass_nodes import pictures_of
 from .pass_run import Rendered, reference_images, render_steps
@@ -107,6 +107,7 @@ class CANDELA_OT_passes_run(_OnTree, Job, bpy.types.Operator):
         rendered = yield from part(render_steps(scene, depsgraph, size, settings), 0.0, share)
         reference = None
         if self.compare:
+            shown_otherwise.warn(self, context.view_layer)
             steps = reference_steps(scene, tree.reference_samples, settings.bounces == 0, size, context.view_layer)
             reference = yield from part(steps, share, 1.0)
         truth = reference_images(reference) if reference is not None else {}

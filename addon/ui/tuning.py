@@ -17,7 +17,7 @@ from ..compare import metrics, tune
 from ..compare.beside import reference_steps
 from ..frame.ledger import RAN
 from ..techniques import REGISTRY
-from . import ENGINE
+from . import ENGINE, shown_otherwise
 from .jobs import Job, draw_progress, part
 from .pass_run import Rendered, render_steps
 from .properties import identifier, settings_of
@@ -116,6 +116,7 @@ class CANDELA_OT_tune(Job, bpy.types.Operator):
         share = scene.render.resolution_percentage * options.percentage / 10000
         size = tuple(max(int(side * share), 1) for side in (scene.render.resolution_x, scene.render.resolution_y))
         settings = settings_of(scene, viewport=False)
+        shown_otherwise.warn(self, context.view_layer)
         steps = reference_steps(scene, options.reference_samples, settings.bounces == 0, size, context.view_layer)
         truth = yield from part(steps, 0.0, REFERENCE_SHARE)
         trials: list[tune.Trial] = []
