@@ -70,10 +70,8 @@ class Lit:
         }
 
 
-def add(
-    frame: Frame, technique: Technique, sources: lights.Sources, lit: Lit, keeps: bool = True
-) -> Iterator[None]:  # fmt: skip
-    """Add this light to the sample's radiance, in parts, and keep it for other points of the film."""
+def add(frame: Frame, technique: Technique, sources: lights.Sources, lit: Lit, keeps: bool = True) -> Iterator[None]:
+    """Add this light to the sample's radiance, in parts, and, if it `keeps`, keep it for other points of the film."""
     target = frame.target(*(f"radiance.{path}" for path in PATHS), depth=MARKS)
     bindings = lit.bound(frame, sources, surface_bindings(frame))
     for band in frame.bands(technique):

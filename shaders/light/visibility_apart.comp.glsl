@@ -4,7 +4,7 @@
 #ifdef LISTED
 #include "lib/entry_list.glsl"
 #else
-#include "light/visibility_cell.glsl"
+#include "light/looks_itself.glsl"
 #endif
 
 void look(ivec2 pixel)

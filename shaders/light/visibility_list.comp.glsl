@@ -1,5 +1,5 @@
 // The list of the pixels that look a light's visibility up themselves (addon/frame/lists.py).
-#include "light/visibility_cell.glsl"
+#include "light/looks_itself.glsl"
 #include "lib/entry_list.glsl"
 
 void main()

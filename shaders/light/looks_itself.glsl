@@ -1,4 +1,4 @@
-// What a cell between looked-up pixels (light/visibility_cells.frag.glsl) leaves a pixel to look up.
+// Which pixels a cell between looked-up ones (light/visibility_cells.frag.glsl) leaves to look for themselves.
 #include "lib/gbuffer.glsl"
 #include "light/cell_corners.glsl"
 #include "neighbours/pixel_size.glsl"
