@@ -3,8 +3,9 @@
 
 A family of blockers (bench/soft_scenes.py) under 1, 4, 16 and 64 lights of 1 m on a ring, at 640x360 with variance maps
 of 1024x1024. Times are processor time of whole renders on a software GPU less that of the same render whose lights cast
-no shadow, the least of some that take turns: what is left are maps, tables and lookups. A further sample of accumulated
-maps is the difference between some samples and one. The number of samples with the same error is read off the errors
+no shadow, the least of some that take turns, each after another of its kind, so that none waits for memory that the one
+before had no use for: what is left are maps, tables and lookups. A further sample of accumulated maps is the difference
+between some samples and one. The number of samples with the same error is read off the errors
 under one light at 128x96 against 1,024 maps, between powers of four on logarithmic scales.
 
 `--levels` cuts every face of the blockers into four so many times, which changes no picture: what maps cost grows with
@@ -28,6 +29,7 @@ COMMAND = "python -m bench.soft_lights --page"
 LIGHTS = (1, 4, 16, 64)
 SAMPLES = (4, 16, 64)
 MORE = 4  # samples between which the cost of one is taken
+AFTER_ANOTHER = 1000  # between the seeds of a render and of the one before it, whose maps it must not take over
 RING = 0.5  # metres, radius of the ring of lights
 ERROR_SIZE = (128, 96)
 KINDS = (soft.Entrant("VSSM", soft.VSSM), soft.Entrant("CSSM", soft.CSSM))
@@ -89,6 +91,7 @@ def shadow_seconds(scene, size: tuple[int, int], runs: int) -> dict[str, float]:
     for seed in range(1, 2 + runs):  # the first run compiles
         for entrant, samples in cases:
             for shadows in (True, False):
+                seconds(scene, entrant, samples, size, seed + AFTER_ANOTHER, shadows)
                 spent = seconds(scene, entrant, samples, size, seed, shadows)
                 if seed > 1:
                     found.setdefault((entrant.label, samples, shadows), []).append(spent)

@@ -18,9 +18,11 @@ FILLED = (("entries", "R32UI", "UINT_2D", "WRITE"), ("entry_count", "R32UI", "UI
 READ = (("UINT_2D", "entries"), ("UINT_2D", "entry_count"))  # as textures: images are few
 
 
-def take(size: tuple[int, int]) -> dict[str, images.Image]:
-    """An empty list with room for as many entries as a picture has pixels: images of the pool."""
-    entries, count = images.pool.take(-(-size[0] // RUN) * RUN, size[1], "R32UI"), images.pool.take(1, 1, "R32UI")
+def take(size: tuple[int, int], lists: int = 1) -> dict[str, images.Image]:
+    """So many empty lists, one above the other, each with room for as many entries as a picture has pixels: images of
+    the pool."""
+    entries = images.pool.take(-(-size[0] // RUN) * RUN, size[1] * lists, "R32UI")
+    count = images.pool.take(lists, 1, "R32UI")
     count.texture.clear(format="UINT", value=(0,))
     return {"entries": entries, "entry_count": count}
 
@@ -31,9 +33,9 @@ def columns(size: tuple[int, int], share: int) -> int:
 
 
 @contextmanager
-def borrowed(size: tuple[int, int]) -> Iterator[dict[str, images.Image]]:
-    """A list as `take` has it, whose images the pool gets back at the end."""
-    held = take(size)
+def borrowed(size: tuple[int, int], lists: int = 1) -> Iterator[dict[str, images.Image]]:
+    """Lists as `take` has them, whose images the pool gets back at the end."""
+    held = take(size, lists)
     try:
         yield held
     finally:

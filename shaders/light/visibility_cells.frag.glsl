@@ -1,6 +1,7 @@
-// Cells between four pixels at which visibility was looked up: the plane on which two or more of them lie, and, light by
-// light, its visibility at the corners: -1 beside the plane, and at all where it neither is alike nor varies in proportion.
+// Cells between four points of the picture at which visibility was looked up: the plane on which two or more of them lie,
+// which of them do, and which lights are seen alike from those, or vary in proportion (light/cell.glsl).
 #include "lib/gbuffer.glsl"
+#include "light/cell.glsl"
 #include "neighbours/pixel_size.glsl"
 
 // Largest second difference along the edges of a cell, which reach one corner further on both sides.
@@ -27,15 +28,13 @@ void main()
   ivec2 cell = ivec2(gl_FragCoord.xy);
   vec3 normals[4];
   vec4 positions[4];
-  vec4 known[4];
   for (int k = 0; k < 4; k++) {
-    ivec2 corner = cell + ivec2(k & 1, k >> 1);
-    ivec2 pixel = min(corner * RATE, surface_position_size() - 1);
+    ivec2 pixel = min((cell + cell_corner(k)) << cell_bits, surface_position_size() - 1);
     positions[k] = surface_position_fetch(pixel);
     normals[k] = octahedral_decode(surface_normal_fetch(pixel).zw);
-    known[k] = visibility_fetch(corner);
   }
-  vec4 plane = vec4(0.0);
+  vec3 normal = vec3(0.0, 0.0, 1.0);
+  float height = 0.0;
   bvec4 on_plane = bvec4(false);
   int most = 1;
   for (int k = 0; k < 4; k++) {
@@ -43,42 +42,34 @@ void main()
       continue;
     }
     float reach = OFF_PLANE * pixel_size_at(positions[k].xyz);
-    bvec4 alike = bvec4(false);
+    bvec4 beside = bvec4(false);
     int count = 0;
     for (int j = 0; j < 4; j++) {
       float off = abs(dot(positions[j].xyz - positions[k].xyz, normals[k]));
-      alike[j] = positions[j].w != 0.0 && dot(normals[j], normals[k]) > FACING && off < reach;
-      count += alike[j] ? 1 : 0;
+      beside[j] = positions[j].w != 0.0 && dot(normals[j], normals[k]) > FACING && off < reach;
+      count += beside[j] ? 1 : 0;
     }
     if (count > most) {
       most = count;
-      on_plane = alike;
-      plane = vec4(normals[k], dot(normals[k], positions[k].xyz));
+      on_plane = beside;
+      normal = normals[k];
+      height = dot(normal, positions[k].xyz);
     }
   }
   vec4 lowest = vec4(1.0);
   vec4 highest = vec4(0.0);
   for (int k = 0; k < 4; k++) {
     if (on_plane[k]) {
-      lowest = min(lowest, known[k]);
-      highest = max(highest, known[k]);
-    }
-    else {
-      known[k] = vec4(-1.0);
+      vec4 seen = visibility_fetch(cell + cell_corner(k));
+      lowest = min(lowest, seen);
+      highest = max(highest, seen);
     }
   }
   // From fewer corners the bilinear mean of what they have is no plane.
-  vec4 most_range = vec4(ALIKE);
+  vec4 most_range = vec4(alike);
   if (all(on_plane)) {
     most_range = mix(most_range, vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND)));
   }
-  bvec4 tells = lessThanEqual(highest - lowest, most_range);
-  for (int k = 0; k < 4; k++) {
-    known[k] = mix(vec4(-1.0), known[k], tells);
-  }
-  out_plane = plane;
-  out_corners_0 = vec4(known[0].x, known[1].x, known[2].x, known[3].x);
-  out_corners_1 = vec4(known[0].y, known[1].y, known[2].y, known[3].y);
-  out_corners_2 = vec4(known[0].z, known[1].z, known[2].z, known[3].z);
-  out_corners_3 = vec4(known[0].w, known[1].w, known[2].w, known[3].w);
+  bvec4 known = lessThanEqual(highest - lowest, most_range);
+  out_cell = vec4(octahedral_encode(normal), height, cell_pack(on_plane, known));
 }

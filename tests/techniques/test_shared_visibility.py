@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from addon.gfx import images
+from addon.gfx import context, images
+from addon.techniques import shared_visibility
 from tests.techniques.test_shadows import HEIGHT, irradiance
 from tests.techniques.test_vssm import EDGE, floor  # noqa: F401 - a fixture
 
@@ -60,16 +61,46 @@ def test_five_lights_are_the_sum_of_each(large, most, monkeypatch):
     assert found.mean() == pytest.approx(expected.mean(), rel=2e-3)
 
 
-def test_outlines_and_what_stands_on_the_floor_look_for_themselves(large):
-    """A fence of posts, thinner than a cell, in front of the floor: each looks for its own light."""
-    large.light("AREA", (0, 0, HEIGHT), size=1.0)
+def fence(stage):
+    """Posts, thinner than a cell, in front of the floor."""
     for k in range(12):
         x = 0.32 * k - 1.9
-        large.rectangle((x, -2.0), (x + 0.02, 2.0), 0.3)
+        stage.rectangle((x, -2.0), (x + 0.02, 2.0), 0.3)
+
+
+def test_outlines_and_what_stands_on_the_floor_look_for_themselves(large):
+    """Each post looks for its own light."""
+    large.light("AREA", (0, 0, HEIGHT), size=1.0)
+    fence(large)
     found, expected, lights = both(large)
     assert lights == 1
     assert np.sqrt(((found - expected) ** 2).mean()) < 0.01 * expected.max()
     assert np.percentile(abs(found - expected), 99) < 0.05 * expected.max()
+
+
+def test_where_shaders_cannot_count_the_same_pixels_look_for_themselves(large, monkeypatch):
+    """Without lists each pixel is asked whether it does."""
+    for k in range(3):
+        large.light("AREA", (0.5 * k - 0.5, 0, HEIGHT), size=1.0)
+    fence(large)
+    listed, _, lights = both(large)
+    assert lights == 3
+    monkeypatch.setattr(context, "counts_in_images", lambda: False)
+    marked, _, lights = both(large)
+    assert lights == 3
+    assert np.array_equal(listed, marked)
+
+
+def test_closer_lookups_where_others_do_not_tell_change_little(large, monkeypatch):
+    """At every second pixel, and then there too, beside at every fourth and then everywhere."""
+    large.light("AREA", (0, 0, HEIGHT), size=1.0)
+    fence(large)
+    two, _, lights = both(large)
+    assert lights == 1
+    monkeypatch.setattr(shared_visibility, "RATES", shared_visibility.RATES[:1])
+    one, expected, lights = both(large)
+    assert lights == 1
+    assert 0.0 < np.sqrt(((two - one) ** 2).mean()) < 0.01 * expected.max()
 
 
 @pytest.mark.parametrize(("size", "samples"), [(SMALL, 1), (SIZE, 16)])
