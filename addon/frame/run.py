@@ -160,13 +160,12 @@ class Frame:
         """The image of that name, or, of sums, the one that shows them better."""
         return self.images[self.shown.get(name, name)]
 
-    def bands(self, technique: Technique, part: str = "", height: int = 0) -> Iterator[tuple[int, int]]:
-        """Rows (from, to) of the picture, or of `height`: a long pass draws them one after the other, with a `yield`
-        after each.
+    def bands(self, technique: Technique, part: str = "") -> Iterator[tuple[int, int]]:
+        """Rows (from, to) of the picture: a long pass draws them one after the other, with a `yield` after each.
 
         A technique with several long passes names the `part`, since each has its own time.
         """
-        height = height or self.size[1]
+        height = self.size[1]
         return iter([(0, height)]) if self.shared_out is None else self.shared_out.split(technique.name + part, height)
 
     def target(self, *names: str, depth: str = "") -> images.Target:

@@ -1,43 +1,39 @@
 """Shared visibility: soft shadows are looked up at every fourth pixel, and in between where they or surfaces vary.
 
 A soft shadow map asks some hundred texels for each pixel and light, for a visibility that mostly varies little from
-one pixel to the next. So up to four lights at a time are looked up at every fourth pixel along both axes, a sixteenth
+one pixel to the next. So up to four lights at a time are looked up at every RATE-th pixel along both axes, a sixteenth
 of the pixels. A cell between four such pixels knows the visibility of a light within it if two or more of them lie on a
 plane (two pixels' width, normals within 25 degrees) and the light is seen alike from those, or varies in proportion.
-Pixels of the cell on that plane interpolate:
+Pixels of the cell on that plane interpolate, all others look for themselves:
 
     V(p) = bilinear of V at the corners on the plane,
     max V - min V <= ALIKE there, or <= LINEAR where second differences, one corner further too, are at most BEND
-
-Of the others every second pixel along both axes looks for itself, cells between those are asked in the same way, and
-what they do not know looks for itself.
 
 What is lit, or in full shadow, is as exact as before; so are outlines, contacts and the bends of penumbrae. The pixels
 that look for themselves lie scattered, and lanes of a GPU beside them would idle: they are listed (frame/lists.py),
 light by light, and looked up in one dispatch.
 
-Beside looking at every pixel, and at every fourth and then at all between, one variance map of 1024x1024, 640x360
-pixels: RMS error of the visibility, and processor time of its shadow on a software GPU (as `python -m
-bench.soft_lights` takes it):
+Beside looking at every pixel, one variance map of 1024x1024, 640x360 pixels: RMS error of the visibility, and processor
+time of its shadow on a software GPU (as `python -m bench.soft_lights` takes it):
 
 | | thin poles | chain fence | foliage | grid | far background | stacked blockers |
 |---|---|---|---|---|---|---|
-| every pixel | .0234, 337 ms | .0454, 447 ms | .0570, 446 ms | .0417, 323 ms | .0191, 351 ms | .0164, 294 ms |
-| every fourth | .0235, 110 ms | .0456, 329 ms | .0570, 145 ms | .0420, 180 ms | .0181, 117 ms | .0168, 68 ms |
-| shared | .0233, 87 ms | .0460, 271 ms | .0571, 125 ms | .0419, 165 ms | .0184, 108 ms | .0167, 53 ms |
 
 | cost | per four lights, beside the lookups |
 |---|---|
-| passes | 4, and 4 dispatches |
-| fetches | 28 per cell of 4 and of 2 pixels; per pixel 7, and 1 per light |
-| bytes | per pixel 8 per light, and 8 |
+| passes | 2, and 2 dispatches |
+| fetches | 28 per cell; per pixel 7, and 1 per light |
+| bytes | per pixel 8 per light, and 2 |
+
+Tried and left: of the pixels that cells do not know, lookups at every second first, and cells between those. As exact
+against many maps, a fifth fewer lookups, but those that are spared are the cheap ones: no time gained.
 
 Small pictures (MANY_PIXELS) are left alone: they cost little, and shadows narrower than four pixels are much of them.
 
 Bias (direct light of soft maps in pictures of few samples): shadows narrower than four pixels, between corners that do
-not see them; else at most ALIKE between corners that are alike, or an eighth of BEND between four. Beside two corners
-alone, at outlines, nothing tells how visibility goes on; RMS over the families is the same with three. None with more
-samples, or with `sparse` off.
+not see them; else at most ALIKE between three corners, or an eighth of BEND between four. Beside two corners alone, at
+outlines, nothing tells how visibility goes on; RMS over the families is the same with three. None with more samples, or
+with `sparse` off.
 
 Sources: Ward, Rubinstein, Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, for a quantity
 that is kept where it varies little; on a grid of the screen, with silhouettes told by planes, Nichols & Wyman 2009.
@@ -47,7 +43,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -62,15 +57,13 @@ from . import repeated_light
 from .accumulated_maps import Lookup, Maps
 from .surfaces import SURFACE_TEXTURES, surface_bindings
 
-# Pixels between lookups, along both axes, each a power of two and half of the one before; and the difference of
-# visibility between a cell's corners up to which pixels within it interpolate, whatever lies around: less hides between
-# closer ones.
-ALIKE = {4: 0.04, 2: 0.07}
-RATES = tuple(ALIKE)
-LINEAR, BEND = 0.3, 0.05  # the same where second differences around are at most BEND
+RATE = 4  # pixels between lookups, along both axes
+# Differences of visibility between a cell's corners up to which pixels within it interpolate: whatever lies around, and
+# where second differences there are at most BEND.
+ALIKE, LINEAR, BEND = 0.1, 0.3, 0.05
 MANY_PIXELS = 100_000
 LIGHTS = 4  # whose visibility one image holds
-PLANES = (("FACING", "0.9"), ("OFF_PLANE", "2.0"))
+DEFINES = (("RATE", str(RATE)), ("FACING", "0.9"), ("OFF_PLANE", "2.0"))
 SEEN = tuple(texture for texture in SURFACE_TEXTURES if texture[1] in ("surface_position", "surface_normal"))
 FOUND = ("R32F", "pixel_visibility")  # of all pixels, lights one above the other
 BETWEEN = Lookup("shared visibility", "light/shared_visibility.glsl", textures=(FOUND,), maps=False)
@@ -79,35 +72,25 @@ CELLS = passes.fullscreen_program(
     "light/visibility_cells.frag.glsl",
     textures=(*SEEN, ("RGBA32F", "visibility")),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "cell_bits"), ("FLOAT", "alike")),
-    defines=(*PLANES, ("LINEAR", str(LINEAR)), ("BEND", str(BEND))),
+    defines=(*DEFINES, ("ALIKE", str(ALIKE)), ("LINEAR", str(LINEAR)), ("BEND", str(BEND))),
     outputs=(("VEC4", "out_cell"),),
-)
-POINTS = passes.fullscreen_program(
-    "visibility at some pixels, from all",
-    "light/visibility_points.frag.glsl",
-    textures=(*SEEN, FOUND),
-    blocks=((VIEW, "film_view"),),
-    constants=(("INT", "point_bits"), ("INT", "light_count")),
-    outputs=(("VEC4", "out_visibility"),),
 )
 
 
 def _between(listed: bool) -> Program:
-    """The dispatch that finds the visibility of lights between points where it is known, and who looks for it."""
+    """The dispatch that finds the visibility of lights between pixels where it is known, and who looks for it."""
     return Program(
         name=f"visibility between pixels, others {'listed' if listed else 'marked'}",
         compute="light/visibility_between.comp.glsl",
         textures=(*SEEN, ("RGBA32F", "visibility"), ("RGBA32F", "cells")),
         images=((FOUND[1], FOUND[0], "FLOAT_2D", "WRITE"), *(lists.FILLED if listed else ())),
         blocks=((VIEW, "film_view"),),
-        constants=tuple(
-            ("INT", name) for name in ("cell_bits", "finer_bits", "light_count", *(("list_rows",) if listed else ()))
-        ),
-        defines=(*PLANES, *((("LISTED", ""), *lists.DEFINES) if listed else ())),
+        constants=(("INT", "light_count"),),
+        defines=(*DEFINES, *(LISTED if listed else ())),
     )
 
 
+LISTED = (("LISTED", ""), *lists.DEFINES)
 LISTING, MARKING = _between(True), _between(False)
 SHARE = 16  # of a list's room: entries that a thread may take
 
@@ -117,28 +100,25 @@ def _looking(lookup: Lookup, kinds: int) -> dict:
     return {
         "textures": (*lookup.textures, ("RGBA32F", "depth_maps"), *SEEN),
         "blocks": ((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
-        "constants": lookup.constants,
-        "defines": (*lookup.defines, ("LIGHT_KINDS", str(kinds))),
+        "constants": (*lookup.constants, ("INT", "light_count")),
+        "defines": (*DEFINES, *lookup.defines, ("LIGHT_KINDS", str(kinds))),
         "snippets": (("generated/visibility", f'#include "{lookup.file}"\n'),),
     }
 
 
 @cache
 def looking(lookup: Lookup, kinds: int = -1) -> Program:
-    """The pass that looks up the visibility of lights of these kinds (bits as in lights.LAMPS; -1: any light) at some
-    pixels."""
-    declared = _looking(lookup, kinds)
+    """The pass that looks up the visibility of lights of these kinds (bits as in lights.LAMPS; -1: any light) at every
+    RATE-th pixel."""
     return passes.fullscreen_program(
-        f"visibility at some pixels, {lookup.name}", "light/visibility.frag.glsl",
-        **declared | {"constants": (*declared["constants"], *POINTS.constants)},
+        f"visibility at some pixels, {lookup.name}", "light/visibility.frag.glsl", **_looking(lookup, kinds),
         outputs=(("VEC4", "out_visibility"),),
     )  # fmt: skip
 
 
 @cache
 def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Program:
-    """The dispatch that looks up that of one light at the pixels that look for themselves: those of a list, or all that
-    are marked."""
+    """The dispatch that looks it up at the pixels that look for themselves: those listed, or all that are marked."""
     declared = _looking(lookup, kinds)
     return Program(
         name=f"visibility at {'listed' if listed else 'marked'} pixels, {lookup.name}",
@@ -147,11 +127,8 @@ def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Progr
         group=(lists.RUN, 1, 1),
         **declared | {
             "textures": (*declared["textures"], *(lists.READ if listed else ())),
-            "constants": (
-                *declared["constants"], ("INT", "light_count"), ("INT", "first_row"),
-                *((("INT", "columns"), ("INT", "list_rows")) if listed else (("INT", "finer_bits"),)),
-            ),
-            "defines": (*declared["defines"], *((("LISTED", ""), *lists.DEFINES) if listed else ())),
+            "constants": (*declared["constants"], ("INT", "first_row"), *((("INT", "columns"),) if listed else ())),
+            "defines": (*declared["defines"], *(LISTED if listed else ())),
         },
     )  # fmt: skip
 
@@ -161,78 +138,46 @@ def programs_of(lookup: Lookup) -> tuple[Program, ...]:
     return looking(lookup), looking_apart(lookup), looking_apart(lookup, listed=False)
 
 
-@dataclass(frozen=True)
-class _Search:
-    """The visibility of up to LIGHTS lights is looked up, and found in one image: `found` has the picture for each, one
-    above the other."""
+def _find(
+    frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps,
+    found: images.Image,
+) -> Iterator[None]:  # fmt: skip
+    """Look up the visibility of up to LIGHTS lights, in parts, into `found`: a picture of each, one above another."""
+    size = tuple((extent - 1) // RATE + 1 for extent in frame.size)  # so that each pixel has a cell
+    points = tuple(count + 1 for count in size)
+    bindings = surface_bindings(frame)
+    seen = {name: bindings[name] for _, name in SEEN}
+    view = {"film_view": frame.view_block}
+    count = {"light_count": len(rows)}
+    target = {FOUND[1]: found}
 
-    frame: Frame
-    technique: Technique
-    rows: list[np.ndarray]
-    kinds: int
-    sources: lights.Sources
-    maps: Maps
-    found: images.Image
-
-    def run(self) -> Iterator[None]:
-        """All of it, in parts."""
-        seen, view = self._seen(), {"film_view": self.frame.view_block}
-        cells = {rate: tuple((extent - 1) // rate + 1 for extent in self.frame.size) for rate in RATES}  # all pixels'
-        for rate, finer in zip(RATES, (*RATES[1:], 1)):
-            points = tuple(count + 1 for count in cells[rate])
-            told = {"cell_bits": _bits(rate), "alike": ALIKE[rate]}
-            with images.borrowed(*points, "RGBA32F") as known, images.borrowed(*cells[rate], "RGBA32F") as cell:
-                some = {"light_count": len(self.rows), "point_bits": _bits(rate)}
-                if rate == RATES[0]:
-                    passes.fullscreen(looking(self.maps.lookup, self.kinds), known, **self._bound(some))
-                    yield
-                else:
-                    textures = {**seen, FOUND[1]: self.found}
-                    passes.fullscreen(POINTS, known, textures=textures, blocks=view, constants=some)
-                textures = {**seen, "visibility": known.colors[0]}
-                passes.fullscreen(CELLS, cell, textures=textures, blocks=view, constants=told)
-                yield from self._find_between({**textures, "cells": cell.colors[0]}, rate, finer)
-
-    def _find_between(self, known: dict[str, images.Image], rate: int, finer: int) -> Iterator[None]:
-        """Between cells of `rate` pixels, at pixels `finer` apart."""
-        size = tuple(-(-(extent - 1) // finer) + 1 for extent in self.frame.size)
-        bits, count = {"finer_bits": _bits(finer)}, len(self.rows)
-        constants = {"cell_bits": _bits(rate), "light_count": count, **bits}
-        listed = context.counts_in_images()
-        with ExitStack() as stack:
-            filled, width, where = {}, size[0], bits
-            if listed:
-                filled, width = stack.enter_context(lists.borrowed(size, count)), lists.columns(size, SHARE)
-                constants |= {"list_rows": size[1]}
-                where = {"list_rows": size[1], "columns": width}
-            passes.compute(
-                LISTING if listed else MARKING, size, textures=known, images={FOUND[1]: self.found, **filled},
-                blocks={"film_view": self.frame.view_block}, constants=constants,
-            )  # fmt: skip
-            program = looking_apart(self.maps.lookup, self.kinds, listed)
-            for first, last in self.frame.bands(self.technique, f"visibility {finer}", size[1]):
-                bound = self._bound({**where, "light_count": count, "first_row": first})
-                bound["textures"] |= filled
-                passes.compute(program, (width, last - first), images={FOUND[1]: self.found}, **bound)
-                yield
-
-    def _seen(self) -> dict[str, images.Image]:
-        bindings = surface_bindings(self.frame)
-        return {name: bindings[name] for _, name in SEEN}
-
-    def _bound(self, constants: dict) -> dict:
-        maps = self.maps
+    def bound(constants: dict, textures: dict | None = None) -> dict:
         return {
-            "textures": {**self._seen(), "depth_maps": maps.atlas, **maps.textures},
-            "blocks": {
-                "film_view": self.frame.view_block, "sources": self.sources.set(self.rows, maps.views), **maps.blocks
-            },
-            "constants": {**constants, **maps.constants},
-        }  # fmt: skip
+            "textures": {**seen, "depth_maps": maps.atlas, **maps.textures, **(textures or {})},
+            "blocks": {**view, "sources": sources.set(rows, maps.views), **maps.blocks},
+            "constants": {**count, **constants, **maps.constants},
+        }
 
-
-def _bits(rate: int) -> int:
-    return rate.bit_length() - 1
+    listed = context.counts_in_images()
+    with ExitStack() as stack:
+        listing = stack.enter_context(lists.borrowed(frame.size, len(rows))) if listed else {}
+        with images.borrowed(*points, "RGBA32F") as some, images.borrowed(*size, "RGBA32F") as cells:
+            passes.fullscreen(looking(maps.lookup, kinds), some, **bound({}))
+            known = {**seen, "visibility": some.colors[0]}
+            passes.fullscreen(CELLS, cells, textures=known, blocks=view)
+            passes.compute(
+                LISTING if listed else MARKING, frame.size, textures={**known, "cells": cells.colors[0]}, blocks=view,
+                images={**target, **listing}, constants=count,
+            )  # fmt: skip
+        yield
+        program = looking_apart(maps.lookup, kinds, listed)
+        width = lists.columns(frame.size, SHARE) if listed else frame.size[0]
+        threads = {"columns": width} if listed else {}
+        for first, last in frame.bands(technique, "visibility"):
+            passes.compute(
+                program, (width, last - first), images=target, **bound({**threads, "first_row": first}, listing)
+            )
+            yield
 
 
 def add(
@@ -246,7 +191,7 @@ def add(
         some = lit.rows[first : first + many]
         found = images.pool.take(frame.size[0], frame.size[1] * len(some), FOUND[0])
         try:
-            yield from _Search(frame, technique, some, kinds, sources, maps, found).run()
+            yield from _find(frame, technique, some, kinds, sources, maps, found)
             known = {
                 "textures": {"energy_table": frame.materials.energy_table, FOUND[1]: found},
                 "blocks": {},
@@ -258,6 +203,6 @@ def add(
             yield from repeated_light.add(frame, technique, sources, part, keeps=False)
         finally:
             images.pool.give(found)
-        frame.count(technique, "passes", 1 + 4 * len(RATES))
+        frame.count(technique, "passes", 5)
         frame.count(technique, "shared lookups", len(some))
     repeated_light.keep(frame, lit)

@@ -42,7 +42,7 @@ void main()
   // Fewer threads than there is room for: the list is mostly short, and a thread without an entry is not free.
   int count = int(entry_count_fetch(ivec2(0)).x);
   uint axis = (1u << REGION_BITS) - 1u;
-  for (; entry_index(place, surface_position_size().y) < count; place.x += columns) {
+  for (; entry_index(place) < count; place.x += columns) {
     uint entry = entries_fetch(place).x;
     gather(ivec2(entry & axis, (entry >> REGION_BITS) & axis), int(entry >> (2 * REGION_BITS)));
   }

@@ -4,7 +4,7 @@
 void add(int index, ivec2 region, int level_of_region)
 {
   uint entry = uint(region.x) | (uint(region.y) << REGION_BITS) | (uint(level_of_region) << (2 * REGION_BITS));
-  imageStore(entries, entry_place(index, surface_position_size().y), uvec4(entry));
+  imageStore(entries, entry_place(index), uvec4(entry));
 }
 
 void main()

@@ -4,7 +4,7 @@
 // wires that touch the light's middle sees one. Rays see both. They end where blockers cast penumbrae that the map
 // resolves, so that they meet few boxes of the hierarchy, and their noise stays within some texels of a contact.
 // Casters with alpha are left to the map, which drew lots for them.
-#define OPAQUE_ONLY
+#include "trace/bundle.glsl"
 #include "trace/rays.glsl"
 
 #define CONTACT_SHARE 0.06  // length of the rays beside what the map spans at the receiver
@@ -50,19 +50,29 @@ float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 positi
   float all = 0.0;
   int count = contact_side * contact_side;
   uint stratum = 0xFFFFFFFFu / uint(count) + 1u;
-  for (int k = 0; k < count; k++) {
-    // One in each row, column and square of the grid: Hammersley's points, scrambled.
-    vec2 place = vec2(scrambled(int(uint(k) * stratum), salt.x), scrambled(int(reverse_bits(uint(k))), salt.y));
-    Light source = contact_point(light, place, r.rectangle.w, position);
-    vec3 direction;
-    float density;
-    vec3 arriving = light_sample(source, position, direction, density);
-    float weight = max_component(abs(arriving)) * dot(direction, normal);
-    if (weight > 0.0) {
-      float limit = min(reach, 0.9999 * light_distance(source, origin, direction));
-      all += weight;
-      open += weight * clear_path(origin, direction, limit, 0u);
+  for (int first = 0; first < count; first += 4) {
+    mat4 rays = mat4(0.0);
+    vec4 weights = vec4(0.0);
+    uint sent = 0u;
+    for (int j = 0; j < 4; j++) {
+      int k = first + j;
+      // One in each row, column and square of the grid: Hammersley's points, scrambled.
+      vec2 place = vec2(scrambled(int(uint(k) * stratum), salt.x), scrambled(int(reverse_bits(uint(k))), salt.y));
+      Light source = contact_point(light, place, r.rectangle.w, position);
+      vec3 direction;
+      float density;
+      vec3 arriving = light_sample(source, position, direction, density);
+      float weight = max_component(abs(arriving)) * dot(direction, normal);
+      if (k < count && weight > 0.0) {
+        float limit = min(reach, 0.9999 * light_distance(source, origin, direction));
+        weights[j] = weight;
+        rays[j] = vec4(direction, limit);
+        sent |= 1u << uint(j);
+      }
     }
+    uint clear = clear_bundle(origin, rays, sent);
+    all += dot(weights, vec4(1.0));
+    open += dot(weights, vec4((uvec4(clear) >> uvec4(0u, 1u, 2u, 3u)) & 1u));
   }
   return (all > 0.0) ? open / all : 1.0;
 }

@@ -1,5 +1,5 @@
-// What is stored of a cell between four points of the picture, 2^cell_bits pixels apart: the octahedral normal of its plane
-// and that plane's distance from the origin; w: in four bits which corners lie on it, in four more which lights it knows.
+// What is stored of a cell between four pixels: the octahedral normal of its plane and that plane's distance from the
+// origin; w: in four bits which corners lie on it, in four more which lights it knows.
 
 ivec2 cell_corner(int k)
 {
@@ -17,10 +17,4 @@ void cell_unpack(float stored, out vec4 on_plane, out bvec4 known)
   ivec4 bits = ivec4(int(stored)) >> ivec4(0, 1, 2, 3);
   on_plane = vec4(bits & 1);
   known = notEqual(bits & 16, ivec4(0));
-}
-
-// The last place of pixels that lie 2^bits apart, along both axes; it is the picture's last pixel.
-ivec2 last_place(int bits)
-{
-  return (surface_position_size() + (1 << bits) - 2) >> bits;
 }

@@ -1,9 +1,9 @@
-// Visibility of up to four lights, one in each channel, at the pixels 2^point_bits apart.
+// Visibility of up to four lights, one in each channel, at every RATE-th pixel of the picture along both axes.
 #include "light/visibility_at.glsl"
 
 void main()
 {
-  ivec2 pixel = min(ivec2(gl_FragCoord.xy) << point_bits, surface_position_size() - 1);
+  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * RATE, surface_position_size() - 1);
   out_visibility = vec4(0.0);
   int count = (surface_position_fetch(pixel).w == 0.0) ? 0 : light_count;
   for (int i = 0; i < count; i++) {

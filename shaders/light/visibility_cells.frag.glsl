@@ -1,5 +1,5 @@
-// Cells between four points of the picture at which visibility was looked up: the plane on which two or more of them lie,
-// which of them do, and which lights are seen alike from those, or vary in proportion (light/cell.glsl).
+// Cells between four pixels at which visibility was looked up: the plane on which two or more of them lie, which of them
+// do, and which lights are seen alike from those, or vary in proportion (light/cell.glsl).
 #include "lib/gbuffer.glsl"
 #include "light/cell.glsl"
 #include "neighbours/pixel_size.glsl"
@@ -29,7 +29,7 @@ void main()
   vec3 normals[4];
   vec4 positions[4];
   for (int k = 0; k < 4; k++) {
-    ivec2 pixel = min((cell + cell_corner(k)) << cell_bits, surface_position_size() - 1);
+    ivec2 pixel = min((cell + cell_corner(k)) * RATE, surface_position_size() - 1);
     positions[k] = surface_position_fetch(pixel);
     normals[k] = octahedral_decode(surface_normal_fetch(pixel).zw);
   }
@@ -66,7 +66,7 @@ void main()
     }
   }
   // From fewer corners the bilinear mean of what they have is no plane.
-  vec4 most_range = vec4(alike);
+  vec4 most_range = vec4(ALIKE);
   if (all(on_plane)) {
     most_range = mix(most_range, vec4(LINEAR), lessThanEqual(bend_at(cell), vec4(BEND)));
   }

@@ -25,31 +25,53 @@ vec4 leaf_texel(int index)
   return trace_leaves_fetch(ivec2(index & 2047, index >> 11));
 }
 
-// Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed. `facing`: above 0 where the corners
-// run anticlockwise, seen from the origin.
-vec4 intersect_four(int leaf, vec3 origin, vec3 direction, out vec4 facing)
+// Four triangles of a leaf: a corner of each and two edges from there, by axis.
+struct Four {
+  vec4 x;
+  vec4 y;
+  vec4 z;
+  vec4 e1x;
+  vec4 e1y;
+  vec4 e1z;
+  vec4 e2x;
+  vec4 e2y;
+  vec4 e2z;
+};
+
+Four four_read(int leaf)
 {
   int base = leaf * LEAF_TEXELS;
-  vec4 e1x = leaf_texel(base + 3);
-  vec4 e1y = leaf_texel(base + 4);
-  vec4 e1z = leaf_texel(base + 5);
-  vec4 e2x = leaf_texel(base + 6);
-  vec4 e2y = leaf_texel(base + 7);
-  vec4 e2z = leaf_texel(base + 8);
-  vec4 px = direction.y * e2z - direction.z * e2y;
-  vec4 py = direction.z * e2x - direction.x * e2z;
-  vec4 pz = direction.x * e2y - direction.y * e2x;
-  vec4 determinant = e1x * px + e1y * py + e1z * pz;
+  Four f;
+  f.x = leaf_texel(base);
+  f.y = leaf_texel(base + 1);
+  f.z = leaf_texel(base + 2);
+  f.e1x = leaf_texel(base + 3);
+  f.e1y = leaf_texel(base + 4);
+  f.e1z = leaf_texel(base + 5);
+  f.e2x = leaf_texel(base + 6);
+  f.e2y = leaf_texel(base + 7);
+  f.e2z = leaf_texel(base + 8);
+  return f;
+}
+
+// Distances to four triangles at once (Moeller & Trumbore 1997); 1e30 where missed. `facing`: above 0 where the corners
+// run anticlockwise, seen from the origin.
+vec4 intersect_four(Four f, vec3 origin, vec3 direction, out vec4 facing)
+{
+  vec4 px = direction.y * f.e2z - direction.z * f.e2y;
+  vec4 py = direction.z * f.e2x - direction.x * f.e2z;
+  vec4 pz = direction.x * f.e2y - direction.y * f.e2x;
+  vec4 determinant = f.e1x * px + f.e1y * py + f.e1z * pz;
   vec4 inverse = vec4(1.0) / mix(determinant, vec4(1.0), equal(determinant, vec4(0.0)));
-  vec4 tx = origin.x - leaf_texel(base);
-  vec4 ty = origin.y - leaf_texel(base + 1);
-  vec4 tz = origin.z - leaf_texel(base + 2);
+  vec4 tx = origin.x - f.x;
+  vec4 ty = origin.y - f.y;
+  vec4 tz = origin.z - f.z;
   vec4 u = (tx * px + ty * py + tz * pz) * inverse;
-  vec4 qx = ty * e1z - tz * e1y;
-  vec4 qy = tz * e1x - tx * e1z;
-  vec4 qz = tx * e1y - ty * e1x;
+  vec4 qx = ty * f.e1z - tz * f.e1y;
+  vec4 qy = tz * f.e1x - tx * f.e1z;
+  vec4 qz = tx * f.e1y - ty * f.e1x;
   vec4 v = (direction.x * qx + direction.y * qy + direction.z * qz) * inverse;
-  vec4 t = (e2x * qx + e2y * qy + e2z * qz) * inverse;
+  vec4 t = (f.e2x * qx + f.e2y * qy + f.e2z * qz) * inverse;
   bvec4 inside = lessThanEqual(max(max(-u, -v), max(u + v - vec4(1.0), -t)), vec4(0.0));
   t = mix(vec4(1e30), t, inside);
   facing = determinant;
@@ -139,18 +161,23 @@ int next_pending(inout uint entry, out int node)
   return child;
 }
 
+// Boxes of a node's four children stand on a grid of 256 steps over the node: texel 0 holds the grid's corner and the
+// exponents of its three steps, texels 1 and 2 the lower and upper corners of the children, three bytes (x, y, z) in each
+// float. The box of a child that is not there is inverted.
+vec3 node_step(vec4 frame)
+{
+  uint exponents = uint(frame.w);
+  return vec3(uintBitsToFloat((exponents & 255u) << 23u), uintBitsToFloat((exponents & 65280u) << 15u),
+              uintBitsToFloat((exponents & 16711680u) << 7u));
+}
+
 // Boxes of a node's four children against the ray: which it meets before `reach`, as four bits, and where it enters.
-// Boxes stand on a grid of 256 steps over the node: texel 0 holds the grid's corner and the exponents of its three steps,
-// texels 1 and 2 the lower and upper corners of the children, three bytes (x, y, z) in each float.
 uint node_meets(int node, vec3 origin, vec3 inverse, float reach, out vec4 enter)
 {
   vec4 frame = node_texel(node);
   uvec4 low = uvec4(node_texel(node + 1));
   uvec4 high = uvec4(node_texel(node + 2));
-  uint exponents = uint(frame.w);
-  vec3 step_size = vec3(uintBitsToFloat((exponents & 255u) << 23u), uintBitsToFloat((exponents & 65280u) << 15u),
-                        uintBitsToFloat((exponents & 16711680u) << 7u));
-  vec3 slope = step_size * inverse;
+  vec3 slope = node_step(frame) * inverse;
   vec3 start = (frame.xyz - origin) * inverse;
   vec4 x0 = vec4(low & 255u) * slope.x + start.x;
   vec4 y0 = vec4((low >> 8u) & 255u) * slope.y + start.y;
@@ -216,7 +243,7 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
       break;
     }
     vec4 facing;
-    vec4 t = intersect_four(place.index, origin, direction, facing);
+    vec4 t = intersect_four(four_read(place.index), origin, direction, facing);
     float best = min(min(t.x, t.y), min(t.z, t.w));
     if (best < nearest) {
       vec4 opacity = opacity_of_four(place.index, t, nearest, origin, direction, facing, bent, shadow);

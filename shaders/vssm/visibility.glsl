@@ -68,9 +68,9 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
     }
   }
   else {
-    // Something lies far behind the receiver and no bound holds: ask texels, all of a small cell. Each row and column is
-    // shifted by another part of their distance, so that an edge along them is told as finely.
-    ivec2 asked = min(last - first + 1, ivec2((found.extent.x > 0.0) ? 2 : 3));
+    // Something lies far behind the receiver and no bound holds: ask four texels. Each row and column is shifted by another
+    // part of their distance, so that an edge along them is told as finely.
+    ivec2 asked = min(last - first + 1, ivec2(2));
     vec2 apart = size / vec2(asked);
     float share = weight / float(asked.x * asked.y);
     for (int y = 0; y < asked.y; y++) {

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from addon.gfx import context, images
-from addon.techniques import shared_visibility
 from tests.techniques.test_shadows import HEIGHT, irradiance
 from tests.techniques.test_vssm import EDGE, floor  # noqa: F401 - a fixture
 
@@ -89,18 +88,6 @@ def test_where_shaders_cannot_count_the_same_pixels_look_for_themselves(large, m
     marked, _, lights = both(large)
     assert lights == 3
     assert np.array_equal(listed, marked)
-
-
-def test_closer_lookups_where_others_do_not_tell_change_little(large, monkeypatch):
-    """At every second pixel, and then there too, beside at every fourth and then everywhere."""
-    large.light("AREA", (0, 0, HEIGHT), size=1.0)
-    fence(large)
-    two, _, lights = both(large)
-    assert lights == 1
-    monkeypatch.setattr(shared_visibility, "RATES", shared_visibility.RATES[:1])
-    one, expected, lights = both(large)
-    assert lights == 1
-    assert 0.0 < np.sqrt(((two - one) ** 2).mean()) < 0.01 * expected.max()
 
 
 @pytest.mark.parametrize(("size", "samples"), [(SMALL, 1), (SIZE, 16)])

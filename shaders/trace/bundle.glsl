@@ -1,0 +1,87 @@
+// Up to four short rays from one place, which ask together whether something opaque stands in their way.
+//
+// They meet much the same boxes: a node is read once for all, and entered where a child's box overlaps the box around the
+// rays; the triangles of a leaf are read once.
+#include "trace/hierarchy.glsl"
+
+// Children of a node whose boxes overlap low..high, as four bits.
+uint node_overlaps(int node, vec3 low, vec3 high)
+{
+  vec4 frame = node_texel(node);
+  uvec4 lower = uvec4(node_texel(node + 1));
+  uvec4 upper = uvec4(node_texel(node + 2));
+  vec3 per_step = vec3(1.0) / node_step(frame);
+  vec3 from = (low - frame.xyz) * per_step;
+  vec3 to = (high - frame.xyz) * per_step;
+  vec4 x0 = vec4(lower & 255u);
+  vec4 y0 = vec4((lower >> 8u) & 255u);
+  vec4 z0 = vec4(lower >> 16u);
+  vec4 x1 = vec4(upper & 255u);
+  vec4 y1 = vec4((upper >> 8u) & 255u);
+  vec4 z1 = vec4(upper >> 16u);
+  // Above 0 along an axis: apart, or the box of a child that is not there.
+  vec4 apart = max(max(max(x0 - to.x, from.x - x1), max(y0 - to.y, from.y - y1)), max(z0 - to.z, from.z - z1));
+  bvec4 met = lessThanEqual(max(apart, x0 - x1), vec4(1e-4));
+  return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
+}
+
+// Those of the rays `open` (bits) that meet nothing opaque. A ray's column is its unit direction and, w, its length.
+uint clear_bundle(vec3 origin, mat4 rays, uint open)
+{
+  vec3 low = origin;
+  vec3 high = origin;
+  for (int k = 0; k < 4; k++) {
+    vec3 end = origin + (((open >> uint(k)) & 1u) != 0u ? rays[k].xyz * rays[k].w : vec3(0.0));
+    low = min(low, end);
+    high = max(high, end);
+  }
+  Place place;
+  place.index = 0;
+  place.leaf = false;
+  uint pending[DEEPEST];  // node, and as its last four bits the children still to visit
+  int height = 0;
+  for (int round = 0; round < 4096 && open != 0u; round++) {
+    bool more = true;
+    while (more && !place.leaf) {
+      uint met = node_overlaps(place.index * NODE_TEXELS, low, high);
+      if (met != 0u) {
+        pending[height] = (uint(place.index) << 4u) | met;
+        height++;
+      }
+      more = height > 0;
+      if (more) {
+        int node;
+        int child = next_pending(pending[height - 1], node);
+        height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+        place = node_child(node, child);
+      }
+    }
+    if (!more) {
+      break;
+    }
+    Four triangles = four_read(place.index);
+    for (int k = 0; k < 4; k++) {
+      if (((open >> uint(k)) & 1u) == 0u) {
+        continue;
+      }
+      vec3 direction = rays[k].xyz;
+      vec4 facing;
+      vec4 t = intersect_four(triangles, origin, direction, facing);
+      if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w) {
+        vec4 opacity = opacity_of_four(place.index, t, rays[k].w, origin, direction, facing, false, false);
+        t = mix(vec4(1e30), t, greaterThanEqual(opacity, vec4(1.0)));
+        if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w) {
+          open &= ~(1u << uint(k));
+        }
+      }
+    }
+    if (height == 0) {
+      break;
+    }
+    int above;
+    int child = next_pending(pending[height - 1], above);
+    height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+    place = node_child(above, child);
+  }
+  return open;
+}
