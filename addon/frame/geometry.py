@@ -196,7 +196,8 @@ class SceneGeometry:
             )  # fmt: skip
             rows[k, 3] = (instance.random, instance.pass_index, flags, 0.0)
             rows[k, 4] = instance.color
-            rows[k, 5], rows[k, 6, 0] = (*instance.generated, instance.uv[0]), instance.uv[1]
+            rows[k, 5] = (*instance.generated, instance.uv[0])
+            rows[k, 6, :2] = instance.uv[1], instance.terminator
         self._written = instances
         if len(instances):
             relative = matrices[:, :3, :].copy()

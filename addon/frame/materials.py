@@ -198,7 +198,7 @@ def _shared(compiled: CompiledMaterial) -> dict:
         ),
         "varyings": (
             ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"),
-            ("flat", "IVEC2", "instance_flat"),
+            ("smooth", "FLOAT", "normal_height"), ("flat", "IVEC2", "instance_flat"),
             *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
         ),
         "textures": (

@@ -68,6 +68,7 @@ class ObjectFacts:
     pass_index: int
     random: float
     color: tuple[float, float, float, float]
+    terminator: float
     notes: tuple[Note, ...]
 
 
@@ -126,6 +127,7 @@ def walk(
                         pass_index=owner.pass_index,
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
+                        terminator=owner.shadow_terminator_geometry_offset,
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:

@@ -95,6 +95,7 @@ class Instance:
     generated: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where on its instancer an instance stands
     uv: tuple[float, float] = (0.0, 0.0)
     key: str = ""  # stable identity across frames (object and persistent id)
+    terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
 
 
 @dataclass(frozen=True)

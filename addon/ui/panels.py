@@ -218,6 +218,19 @@ class CANDELA_OBJECT_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
             column.prop(context.object, f"visible_{name}", text=name.title())
 
 
+class CANDELA_OBJECT_PT_shadow_terminator(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Shadow Terminator"
+    bl_context = "object"
+    bl_parent_id = "OBJECT_PT_shading"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.object and context.object.type != "LIGHT"
+
+    def draw(self, context):
+        _columns(self).prop(context.object, "shadow_terminator_geometry_offset", text="Geometry Offset")
+
+
 class CANDELA_OT_select_culprit(bpy.types.Operator):
     """Select what the warning is about, and show it in the Properties editor"""
 
@@ -311,6 +324,7 @@ _CLASSES = (
     CANDELA_LIGHT_PT_beam_shape,
     CANDELA_LIGHT_PT_shadow,
     CANDELA_OBJECT_PT_ray_visibility,
+    CANDELA_OBJECT_PT_shadow_terminator,
 )
 
 

@@ -1,7 +1,7 @@
 // How a surface's closures are laid out in the images of the surface pass (surface.*), written and read here.
 //
 //   position  xyz relative to the render origin; w: 0 nothing hit, 1 surface, up to 2 held out
-//   normal    octahedral shading normal of the diffuse closure (xy) and of the triangle (zw)
+//   normal    octahedral shading normal of the diffuse closure (xy) and of the triangle (zw; in the last bits smooth_lift)
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
 //   tint      weight of the lobe; w: square root of its reflectance at normal incidence, 8 bits each
 //   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each); w: ior, below 0
@@ -20,6 +20,7 @@ struct Surface {
   vec3 position;          // relative to the render origin
   vec3 geometric_normal;  // on the viewer's side
   vec3 normal;            // of the diffuse closure
+  float lift;             // how high above its triangle a smooth surface runs, see smooth_lift
   float diffuse_roughness;
   vec3 diffuse;
   vec3 emission;
@@ -64,6 +65,28 @@ float bump_encode(float holdout, vec3 normal, vec3 bumped, bool displaced)
     stored = BUMP_STEPS + 1.0 + few + (BASE_BUMP_STEPS + 1.0) * (cell.x + BASE_STEPS * cell.y);
   }
   return 1.0 + holdout + 2.0 * stored;
+}
+
+// A length beside an octahedral normal: the normal stands on a grid of 2^-16, beneath whose steps 7 bits of either
+// coordinate hold the length's logarithm. Whoever reads the normal alone is 1e-5 off.
+#define LIFT_GRID 65536.0
+#define LIFT_BITS 128.0
+#define LIFT_OCTAVES 64.0  // from 2^-40 on
+
+vec2 lift_encode(vec2 octahedral, float lift)
+{
+  float steps = LIFT_BITS * LIFT_BITS - 1.0;
+  float code = (lift > 0.0) ? clamp(floor((log2(lift) + 40.0) * (steps / LIFT_OCTAVES) + 0.5), 1.0, steps) : 0.0;
+  float high = floor(code / LIFT_BITS);
+  return (floor(octahedral * LIFT_GRID + 0.5) + vec2(high, code - high * LIFT_BITS) / LIFT_BITS) / LIFT_GRID;
+}
+
+float lift_decode(vec2 stored)
+{
+  vec2 bits = floor(fract(stored * LIFT_GRID) * LIFT_BITS + 0.5);
+  float code = bits.x * LIFT_BITS + bits.y;
+  float steps = LIFT_BITS * LIFT_BITS - 1.0;
+  return (code > 0.0) ? exp2(code * (LIFT_OCTAVES / steps) - 40.0) : 0.0;
 }
 
 // Three numbers in 0..1 in one float, `steps` + 1 levels each; and back.
@@ -126,6 +149,7 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.normal = octahedral_decode(normal.xy);
   s.geometric_normal = octahedral_decode(normal.zw);
   s.bump = stored / BUMP_STEPS;
+  s.lift = lift_decode(normal.zw);
   s.base_normal = s.geometric_normal;
   if (stored > BUMP_STEPS) {
     float code = floor((stored - BUMP_STEPS - 1.0) / (BASE_BUMP_STEPS + 1.0));

@@ -1,5 +1,6 @@
 // Instances from the instance image, eight texels each: three rows of the matrix; random number, pass index, flags,
-// orientation; the object's colour; place on the instancer (generated, first of UV), second of UV; two are free.
+// orientation; the object's colour; place on the instancer (generated, first of UV), second of UV, and the object's offset
+// against the shadow terminator; one is free.
 
 #define FLAG_CAMERA 1
 #define FLAG_SHADOW 2
@@ -42,6 +43,11 @@ vec3 instance_position(Instance instance, vec3 local)
   return vec3(dot(instance.row0, p), dot(instance.row1, p), dot(instance.row2, p));
 }
 
+vec3 instance_origin(Instance instance)
+{
+  return vec3(instance.row0.w, instance.row1.w, instance.row2.w);
+}
+
 // Inverse transpose by cofactors: right for any scale, and finite for a flattened one.
 vec3 instance_normal(Instance instance, vec3 local)
 {
@@ -60,6 +66,11 @@ void instance_extras(int id, out vec4 color, out vec3 generated, out vec2 uv)
   vec4 first = instances_fetch(place + ivec2(5, 0));
   generated = first.xyz;
   uv = vec2(first.w, instances_fetch(place + ivec2(6, 0)).x);
+}
+
+float instance_terminator(int id)
+{
+  return instances_fetch(instance_place(id) + ivec2(6, 0)).y;
 }
 
 bool instance_seen(Instance instance)

@@ -13,6 +13,7 @@
 #ifdef SOFT_LOBES
 #include "lib/soft_lobe.glsl"
 #endif
+#include "light/terminator.glsl"
 #include "light/whole.glsl"
 #include "generated/visibility"
 #ifdef KNOWN_IRRADIANCE
@@ -75,12 +76,15 @@ void main()
     vec3 from_diffuse = vec3(0.0);
     vec3 from_glossy = vec3(0.0);
     vec3 facing = s.geometric_normal;
+    vec3 towards = vec3(0.0);
 #ifdef KNOWN_IRRADIANCE
     vec3 falling = vec3(0.0);
 #endif
+    if (whole) {
+      towards = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
+    }
     if (whole && on_diffuse) {
-      vec3 to_middle = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
-      from_diffuse = whole_diffuse(light, s, to_viewer, to_middle);
+      from_diffuse = whole_diffuse(light, s, to_viewer, towards);
     }
     for (int part = 0; part < parts; part++) {
       Light source = light;
@@ -100,7 +104,8 @@ void main()
                         surface_diffuse_reflection(s, to_viewer, direction);
       }
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
-      if (on_glossy && dot(direction, s.geometric_normal) > 0.0) {
+      towards = whole ? towards : direction;
+      if (on_glossy && (s.lift > 0.0 || dot(direction, s.geometric_normal) > 0.0)) {
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
         if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
@@ -124,7 +129,8 @@ void main()
     if (max_component(abs(from_diffuse) + abs(from_glossy)) > 0.0) {
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        visibility = light_visibility(light, pixel, s.position, facing);
+        vec3 start = light_start(s.position, s.normal, s.geometric_normal, s.lift, towards, facing);
+        visibility = light_visibility(light, pixel, start, facing);
       }
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;

@@ -1,5 +1,6 @@
 // Visibility of a light at a pixel of the picture.
 #include "lib/gbuffer.glsl"
+#include "light/terminator.glsl"
 #include "light/whole.glsl"
 #include "generated/visibility"
 
@@ -9,6 +10,10 @@ float visibility_at(ivec2 pixel, int index)
   if ((light.flags & LIGHT_SHADOW) == 0) {
     return 1.0;
   }
-  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
-  return light_visibility(light, pixel, surface_position_fetch(pixel).xyz, normal);
+  vec4 normals = surface_normal_fetch(pixel);
+  vec3 position = surface_position_fetch(pixel).xyz;
+  vec3 facing = octahedral_decode(normals.zw);
+  vec3 towards = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - position);
+  vec3 start = light_start(position, octahedral_decode(normals.xy), facing, lift_decode(normals.zw), towards, facing);
+  return light_visibility(light, pixel, start, facing);
 }

@@ -48,7 +48,8 @@ void main()
 
   bool displaced = dot(c.base_normal, point.mesh_normal) < 0.9999;
   out_position = vec4(world_position, bump_encode(holdout, c.base_normal, c.diffuse_normal, displaced));
-  out_normal = vec4(octahedral_encode(c.diffuse_normal), octahedral_encode(point.geometric_normal));
+  float lift = (instance_terminator(instance_flat.x) > 0.0) ? smooth_lift(instance, point.backfacing) : 0.0;
+  out_normal = vec4(octahedral_encode(c.diffuse_normal), lift_encode(octahedral_encode(point.geometric_normal), lift));
   out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, half_turns), 255.0));
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
   out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),

@@ -9,6 +9,7 @@ void main()
   Instance instance = instance_read(id);
   world_position = instance_position(instance, position);
   world_normal = instance_normal(instance, normal);
+  normal_height = dot(world_position - instance_origin(instance), world_normal);
   instance_flat = ivec2(id, instance.mirrored ? 1 : 0);
   copy_attributes();
   gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
