@@ -54,19 +54,18 @@ float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 positi
     mat4 rays = mat4(0.0);
     vec4 weights = vec4(0.0);
     uint sent = 0u;
-    for (int j = 0; j < 4; j++) {
-      int k = first + j;
+    for (int j = 0; j < min(count - first, 4); j++) {
+      uint k = uint(first + j);
       // One in each row, column and square of the grid: Hammersley's points, scrambled.
-      vec2 place = vec2(scrambled(int(uint(k) * stratum), salt.x), scrambled(int(reverse_bits(uint(k))), salt.y));
+      vec2 place = vec2(scrambled(int(k * stratum), salt.x), scrambled(int(reverse_bits(k)), salt.y));
       Light source = contact_point(light, place, r.rectangle.w, position);
       vec3 direction;
       float density;
       vec3 arriving = light_sample(source, position, direction, density);
       float weight = max_component(abs(arriving)) * dot(direction, normal);
-      if (k < count && weight > 0.0) {
-        float limit = min(reach, 0.9999 * light_distance(source, origin, direction));
+      if (weight > 0.0) {
         weights[j] = weight;
-        rays[j] = vec4(direction, limit);
+        rays[j] = vec4(direction, min(reach, 0.9999 * light_distance(source, origin, direction)));
         sent |= 1u << uint(j);
       }
     }

@@ -59,15 +59,32 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
     if (!more) {
       break;
     }
-    Four triangles = four_read(place.index);
+    // As intersect_four, with all that does not depend on the direction once.
+    Four f = four_read(place.index);
+    vec4 tx = origin.x - f.x;
+    vec4 ty = origin.y - f.y;
+    vec4 tz = origin.z - f.z;
+    vec4 nx = f.e2y * f.e1z - f.e2z * f.e1y;
+    vec4 ny = f.e2z * f.e1x - f.e2x * f.e1z;
+    vec4 nz = f.e2x * f.e1y - f.e2y * f.e1x;
+    vec4 px = f.e2y * tz - f.e2z * ty;
+    vec4 py = f.e2z * tx - f.e2x * tz;
+    vec4 pz = f.e2x * ty - f.e2y * tx;
+    vec4 qx = ty * f.e1z - tz * f.e1y;
+    vec4 qy = tz * f.e1x - tx * f.e1z;
+    vec4 qz = tx * f.e1y - ty * f.e1x;
+    vec4 volume = f.e2x * qx + f.e2y * qy + f.e2z * qz;
     for (int k = 0; k < 4; k++) {
-      if (((open >> uint(k)) & 1u) == 0u) {
-        continue;
-      }
       vec3 direction = rays[k].xyz;
-      vec4 facing;
-      vec4 t = intersect_four(triangles, origin, direction, facing);
-      if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w) {
+      vec4 facing = direction.x * nx + direction.y * ny + direction.z * nz;
+      bvec4 edge_on = equal(facing, vec4(0.0));
+      vec4 inverse = vec4(1.0) / mix(facing, vec4(1.0), edge_on);
+      vec4 u = (direction.x * px + direction.y * py + direction.z * pz) * inverse;
+      vec4 v = (direction.x * qx + direction.y * qy + direction.z * qz) * inverse;
+      vec4 t = volume * inverse;
+      bvec4 inside = lessThanEqual(max(max(-u, -v), max(u + v - vec4(1.0), -t)), vec4(0.0));
+      t = mix(mix(vec4(1e30), t, inside), vec4(1e30), edge_on);
+      if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w && ((open >> uint(k)) & 1u) != 0u) {
         vec4 opacity = opacity_of_four(place.index, t, rays[k].w, origin, direction, facing, false, false);
         t = mix(vec4(1e30), t, greaterThanEqual(opacity, vec4(1.0)));
         if (min(min(t.x, t.y), min(t.z, t.w)) < rays[k].w) {
