@@ -1,39 +1,45 @@
-// Up to four short rays from one place, which ask together whether something opaque stands in their way.
+// Up to four rays from one place, which ask together whether something opaque stands in their way.
 //
-// They meet much the same boxes: a node is read once for all, and entered where a child's box overlaps the box around the
-// rays; the triangles of a leaf are read once.
+// Short rays to one light meet much the same boxes: a node is read once for all, and entered where one of them does, and
+// so are the triangles of a leaf.
 #include "trace/hierarchy.glsl"
 
-// Children of a node whose boxes overlap low..high, as four bits.
-uint node_overlaps(int node, vec3 low, vec3 high)
+// Children of a node that one of the rays `open` meets, as four bits. `inverse`: of the rays' directions; see node_meets.
+uint node_meets_any(int node, vec3 origin, mat4 rays, mat4 inverse, uint open)
 {
   vec4 frame = node_texel(node);
-  uvec4 lower = uvec4(node_texel(node + 1));
-  uvec4 upper = uvec4(node_texel(node + 2));
-  vec3 per_step = vec3(1.0) / node_step(frame);
-  vec3 from = (low - frame.xyz) * per_step;
-  vec3 to = (high - frame.xyz) * per_step;
-  vec4 x0 = vec4(lower & 255u);
-  vec4 y0 = vec4((lower >> 8u) & 255u);
-  vec4 z0 = vec4(lower >> 16u);
-  vec4 x1 = vec4(upper & 255u);
-  vec4 y1 = vec4((upper >> 8u) & 255u);
-  vec4 z1 = vec4(upper >> 16u);
-  // Above 0 along an axis: apart, or the box of a child that is not there.
-  vec4 apart = max(max(max(x0 - to.x, from.x - x1), max(y0 - to.y, from.y - y1)), max(z0 - to.z, from.z - z1));
-  bvec4 met = lessThanEqual(max(apart, x0 - x1), vec4(1e-4));
+  uvec4 low = uvec4(node_texel(node + 1));
+  uvec4 high = uvec4(node_texel(node + 2));
+  vec3 step_size = node_step(frame);
+  vec3 start = frame.xyz - origin;
+  vec4 x0 = vec4(low & 255u) * step_size.x + start.x;
+  vec4 y0 = vec4((low >> 8u) & 255u) * step_size.y + start.y;
+  vec4 z0 = vec4(low >> 16u) * step_size.z + start.z;
+  vec4 x1 = vec4(high & 255u) * step_size.x + start.x;
+  vec4 y1 = vec4((high >> 8u) & 255u) * step_size.y + start.y;
+  vec4 z1 = vec4(high >> 16u) * step_size.z + start.z;
+  bvec4 met = bvec4(false);
+  for (int k = 0; k < 4; k++) {
+    vec3 slope = inverse[k].xyz;
+    bool right = slope.x > 0.0;
+    bool on = slope.y > 0.0;
+    bool up = slope.z > 0.0;
+    vec4 enter = max(max((right ? x0 : x1) * slope.x, (on ? y0 : y1) * slope.y), max((up ? z0 : z1) * slope.z, vec4(0.0)));
+    vec4 leave = min(min((right ? x1 : x0) * slope.x, (on ? y1 : y0) * slope.y),
+                     min((up ? z1 : z0) * slope.z, vec4(rays[k].w)));
+    bvec4 meets = lessThanEqual(enter, leave * 1.000001);
+    bool asks = ((open >> uint(k)) & 1u) != 0u;
+    met = asks ? bvec4(met.x || meets.x, met.y || meets.y, met.z || meets.z, met.w || meets.w) : met;
+  }
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }
 
 // Those of the rays `open` (bits) that meet nothing opaque. A ray's column is its unit direction and, w, its length.
 uint clear_bundle(vec3 origin, mat4 rays, uint open)
 {
-  vec3 low = origin;
-  vec3 high = origin;
+  mat4 inverse;
   for (int k = 0; k < 4; k++) {
-    vec3 end = origin + (((open >> uint(k)) & 1u) != 0u ? rays[k].xyz * rays[k].w : vec3(0.0));
-    low = min(low, end);
-    high = max(high, end);
+    inverse[k] = vec4(1.0) / mix(rays[k], vec4(1e-20), equal(rays[k], vec4(0.0)));
   }
   Place place;
   place.index = 0;
@@ -43,7 +49,7 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
   for (int round = 0; round < 4096 && open != 0u; round++) {
     bool more = true;
     while (more && !place.leaf) {
-      uint met = node_overlaps(place.index * NODE_TEXELS, low, high);
+      uint met = node_meets_any(place.index * NODE_TEXELS, origin, rays, inverse, open);
       if (met != 0u) {
         pending[height] = (uint(place.index) << 4u) | met;
         height++;
