@@ -68,18 +68,16 @@ void vssm_cell(inout Blockers found, ShadowReceiver r, vec2 beside, ivec2 first,
     }
   }
   else {
-    // Something lies far behind the receiver and no bound holds: ask four texels. Each row and column is shifted by another
-    // part of their distance, so that an edge along them is told as finely.
-    ivec2 asked = min(last - first + 1, ivec2(2));
-    vec2 apart = size / vec2(asked);
-    float share = weight / float(asked.x * asked.y);
-    for (int y = 0; y < asked.y; y++) {
-      for (int x = 0; x < asked.x; x++) {
-        vec2 shift = (vec2(y, x) + 0.5) / vec2(asked.yx) - 0.5;
-        ivec2 texel = first + ivec2((vec2(x, y) + 0.5 + shift) * apart);
-        float part = share * kernel_cosine(found, vec2(texel) + 0.5 - r.texel, vec2(0.5));
-        kernel_texel(found, r, beside, texel, 0.0, part);
-      }
+    // Something lies far behind the receiver and no bound holds: ask some texels, all of a small cell. Each stands in a
+    // column of its own, and by the golden ratio in a row of its own, so that edges along either are told as finely.
+    ivec2 extent = last - first + 1;
+    int asked = min(extent.x * extent.y, (found.extent.x > 0.0) ? 4 : 8);
+    float share = weight / float(asked);
+    for (int k = 0; k < asked; k++) {
+      vec2 place = vec2((float(k) + 0.5) / float(asked), fract((float(k) + 0.5) * 0.6180339887));
+      ivec2 texel = first + ivec2(place * size);
+      float part = share * kernel_cosine(found, vec2(texel) + 0.5 - r.texel, vec2(0.5));
+      kernel_texel(found, r, beside, texel, 0.0, part);
     }
   }
 }
