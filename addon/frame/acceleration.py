@@ -276,7 +276,7 @@ def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarra
 
 
 def _pack_boxes(rows: np.ndarray, low: np.ndarray, high: np.ndarray, least: float) -> None:
-    """Put boxes of four children per node, (N, 4, 3), into `rows` (N, NODE_TEXELS, 4); see node_meets in shaders/trace.
+    """Put boxes of four children per node, (N, 4, 3), into `rows` (N, NODE_TEXELS, 4); see boxes_met in shaders/trace.
 
     A step of the grid is a power of two, so that the shader's arithmetic is exact but for the last addition; the grid
     starts a little below the node's corner and boxes are rounded outwards. Extents below `least` metres count as that.

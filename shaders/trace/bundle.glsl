@@ -4,42 +4,12 @@
 // so are the triangles of a leaf.
 #include "trace/hierarchy.glsl"
 
-// Children of a node that one of the rays `open` meets, as four bits. `inverse`: of the rays' directions; see node_meets.
-uint node_meets_any(int node, vec3 origin, mat4 rays, mat4 inverse, uint open)
-{
-  vec4 frame = node_texel(node);
-  uvec4 low = uvec4(node_texel(node + 1));
-  uvec4 high = uvec4(node_texel(node + 2));
-  vec3 step_size = node_step(frame);
-  vec3 start = frame.xyz - origin;
-  vec4 x0 = vec4(low & 255u) * step_size.x + start.x;
-  vec4 y0 = vec4((low >> 8u) & 255u) * step_size.y + start.y;
-  vec4 z0 = vec4(low >> 16u) * step_size.z + start.z;
-  vec4 x1 = vec4(high & 255u) * step_size.x + start.x;
-  vec4 y1 = vec4((high >> 8u) & 255u) * step_size.y + start.y;
-  vec4 z1 = vec4(high >> 16u) * step_size.z + start.z;
-  bvec4 met = bvec4(false);
-  for (int k = 0; k < 4; k++) {
-    vec3 slope = inverse[k].xyz;
-    bool right = slope.x > 0.0;
-    bool on = slope.y > 0.0;
-    bool up = slope.z > 0.0;
-    vec4 enter = max(max((right ? x0 : x1) * slope.x, (on ? y0 : y1) * slope.y), max((up ? z0 : z1) * slope.z, vec4(0.0)));
-    vec4 leave = min(min((right ? x1 : x0) * slope.x, (on ? y1 : y0) * slope.y),
-                     min((up ? z1 : z0) * slope.z, vec4(rays[k].w)));
-    bvec4 meets = lessThanEqual(enter, leave * 1.000001);
-    bool asks = ((open >> uint(k)) & 1u) != 0u;
-    met = asks ? bvec4(met.x || meets.x, met.y || meets.y, met.z || meets.z, met.w || meets.w) : met;
-  }
-  return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
-}
-
 // Those of the rays `open` (bits) that meet nothing opaque. A ray's column is its unit direction and, w, its length.
 uint clear_bundle(vec3 origin, mat4 rays, uint open)
 {
-  mat4 inverse;
+  mat4 inverses;
   for (int k = 0; k < 4; k++) {
-    inverse[k] = vec4(1.0) / mix(rays[k], vec4(1e-20), equal(rays[k], vec4(0.0)));
+    inverses[k] = vec4(1.0) / mix(rays[k], vec4(1e-20), equal(rays[k], vec4(0.0)));
   }
   Place place;
   place.index = 0;
@@ -49,7 +19,13 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
   for (int round = 0; round < 4096 && open != 0u; round++) {
     bool more = true;
     while (more && !place.leaf) {
-      uint met = node_meets_any(place.index * NODE_TEXELS, origin, rays, inverse, open);
+      Boxes boxes = boxes_read(place.index * NODE_TEXELS);
+      uint met = 0u;
+      for (int k = 0; k < 4; k++) {
+        vec4 enter;
+        uint meets = boxes_met(boxes, origin, inverses[k].xyz, rays[k].w, enter);
+        met |= (((open >> uint(k)) & 1u) != 0u) ? meets : 0u;
+      }
       if (met != 0u) {
         pending[height] = (uint(place.index) << 4u) | met;
         height++;

@@ -161,30 +161,40 @@ int next_pending(inout uint entry, out int node)
   return child;
 }
 
-// Boxes of a node's four children stand on a grid of 256 steps over the node: texel 0 holds the grid's corner and the
-// exponents of its three steps, texels 1 and 2 the lower and upper corners of the children, three bytes (x, y, z) in each
-// float. The box of a child that is not there is inverted.
-vec3 node_step(vec4 frame)
-{
-  uint exponents = uint(frame.w);
-  return vec3(uintBitsToFloat((exponents & 255u) << 23u), uintBitsToFloat((exponents & 65280u) << 15u),
-              uintBitsToFloat((exponents & 16711680u) << 7u));
-}
+// Boxes of a node's four children, on a grid of 256 steps over the node: texel 0 holds the grid's corner and the exponents
+// of its three steps, texels 1 and 2 the lower and upper corners of the children, three bytes (x, y, z) in each float. The
+// box of a child that is not there is inverted.
+struct Boxes {
+  vec3 corner;
+  vec3 step_size;
+  uvec4 low;
+  uvec4 high;
+};
 
-// Boxes of a node's four children against the ray: which it meets before `reach`, as four bits, and where it enters.
-uint node_meets(int node, vec3 origin, vec3 inverse, float reach, out vec4 enter)
+Boxes boxes_read(int node)
 {
   vec4 frame = node_texel(node);
-  uvec4 low = uvec4(node_texel(node + 1));
-  uvec4 high = uvec4(node_texel(node + 2));
-  vec3 slope = node_step(frame) * inverse;
-  vec3 start = (frame.xyz - origin) * inverse;
-  vec4 x0 = vec4(low & 255u) * slope.x + start.x;
-  vec4 y0 = vec4((low >> 8u) & 255u) * slope.y + start.y;
-  vec4 z0 = vec4(low >> 16u) * slope.z + start.z;
-  vec4 x1 = vec4(high & 255u) * slope.x + start.x;
-  vec4 y1 = vec4((high >> 8u) & 255u) * slope.y + start.y;
-  vec4 z1 = vec4(high >> 16u) * slope.z + start.z;
+  uint exponents = uint(frame.w);
+  Boxes b;
+  b.corner = frame.xyz;
+  b.step_size = vec3(uintBitsToFloat((exponents & 255u) << 23u), uintBitsToFloat((exponents & 65280u) << 15u),
+                     uintBitsToFloat((exponents & 16711680u) << 7u));
+  b.low = uvec4(node_texel(node + 1));
+  b.high = uvec4(node_texel(node + 2));
+  return b;
+}
+
+// Which of them the ray meets before `reach`, as four bits, and where it enters.
+uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
+{
+  vec3 slope = b.step_size * inverse;
+  vec3 start = (b.corner - origin) * inverse;
+  vec4 x0 = vec4(b.low & 255u) * slope.x + start.x;
+  vec4 y0 = vec4((b.low >> 8u) & 255u) * slope.y + start.y;
+  vec4 z0 = vec4(b.low >> 16u) * slope.z + start.z;
+  vec4 x1 = vec4(b.high & 255u) * slope.x + start.x;
+  vec4 y1 = vec4((b.high >> 8u) & 255u) * slope.y + start.y;
+  vec4 z1 = vec4(b.high >> 16u) * slope.z + start.z;
   // By the ray's sign, not by min and max: the inverted box of an empty child is then never met.
   enter = max(max(inverse.x > 0.0 ? x0 : x1, inverse.y > 0.0 ? y0 : y1), max(inverse.z > 0.0 ? z0 : z1, vec4(0.0)));
   vec4 leave = min(min(inverse.x > 0.0 ? x1 : x0, inverse.y > 0.0 ? y1 : y0),
@@ -214,7 +224,7 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     bool more = true;
     while (more && !place.leaf) {
       vec4 enter;
-      uint met = node_meets(place.index * NODE_TEXELS, origin, inverse, nearest, enter);
+      uint met = boxes_met(boxes_read(place.index * NODE_TEXELS), origin, inverse, nearest, enter);
       int node = place.index;
       int child = 0;
       if (met != 0u) {
