@@ -138,7 +138,7 @@ def _with_resolution_of(owner: Technique, kind: type[SoftMaps]) -> SoftMaps:
     """Maps with the settings of their own technique, apart from the resolution; so many lights look for no contacts."""
 
     class Owned(kind):
-        contact_side = 0
+        contact_rays = 0
 
         def resolution(self, frame: Frame) -> int:
             return 1 << round(np.log2(map_resolution(frame, frame.settings.get(owner, "texels_per_pixel"))))

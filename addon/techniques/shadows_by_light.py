@@ -50,7 +50,7 @@ LEAST_SIDE, FEW_LIGHTS = 512, 4
 class FewBoxes(ConvolutionSoftShadows):
     """Convolution maps for lights that matter little each."""
 
-    contact_side = 1
+    contact_rays = 1
 
     def cells(self, frame: Frame) -> int:
         return min(super().cells(frame), 2)

@@ -82,7 +82,7 @@ def with_contacts(lookup: Lookup) -> Lookup:
         lookup,
         name=f"{lookup.name}, contact rays",
         textures=lookup.textures + acceleration.HIERARCHY_TEXTURES,
-        constants=(*lookup.constants, *RAY_CONSTANTS, ("INT", "contact_side")),
+        constants=(*lookup.constants, *RAY_CONSTANTS, ("INT", "contact_rays")),
         defines=(*lookup.defines, ("CONTACT_RAYS", "1")),
     )
 
@@ -97,7 +97,7 @@ class SoftMaps(AccumulatedMaps):
 
     atlas_texels = 2**22  # filtered maps take several times the bytes of plain ones
     least_side = 32  # of a map, texels
-    contact_side = 2  # squared: rays by which a picture of few samples looks for contacts of a map; with more, one
+    contact_rays = 8  # at most, by which a picture of few samples looks for contacts of a map; with more samples, one
 
     def __init__(self):
         super().__init__()
@@ -162,11 +162,11 @@ class SoftMaps(AccumulatedMaps):
         """`maps` with the lookup, and with what its rays bind where short rays look for near blockers."""
         lookup = self.lookup(frame)
         maps = replace(maps, lookup=lookup, sparse=len(maps.views) > 0 and self._sparse(frame))
-        contacts = self.contact_side > 0 and frame.settings.get(self, "contacts") and len(maps.views) > 0
+        contacts = self.contact_rays > 0 and frame.settings.get(self, "contacts") and len(maps.views) > 0
         if not contacts or acceleration.too_many(frame.snapshot):
             return maps
         textures, constants = ray_bindings(frame)
-        constants["contact_side"] = self.contact_side if few_samples(frame) else 1
+        constants["contact_rays"] = self.contact_rays if few_samples(frame) else 1
         return replace(
             maps, lookup=with_contacts(lookup), textures=maps.textures | textures,
             constants=maps.constants | constants,

@@ -37,27 +37,42 @@ float contact_reach(ShadowReceiver r)
   return CONTACT_SHARE * 2.0 * r.w / max(min(across, along), 1e-30);
 }
 
-// Share of the light that no caster nearer than `reach` hides, by contact_side^2 rays.
-float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 position, vec3 normal, float reach)
+// Visibility past what the map sees (`lit`) and what `rays` rays see (`near`); `same`: both see the same blockers. Of few
+// rays the share that passes is noise around the truth, which the map's answer moderates; where none passes, the map
+// missed what hides the light. Single rays are as many as the samples: their mean has no noise to speak of.
+#define CONTACT_PULL 2.0  // rays that the map's answer stands for
+#define CONTACT_APART 0.4  // share of near blockers beside the light that farther ones hide, not within it
+
+float contact_combined(float lit, float near, float rays, bool same)
 {
+  float told = (contact_rays > 1) ? mix(lit, near, rays / (rays + CONTACT_PULL)) : near;
+  if (same) {
+    return told;
+  }
+  // Different blockers hide min(lit, near) of the light where one lies within the other, and lit * near by chance.
+  return mix(min(lit, (near > 0.0) ? told : 0.0), lit * near, CONTACT_APART);
+}
+
+// What passes of the share `lit` that reaches the receiver past blockers at the mean height `blocker` (in q, 0 = none were
+// found): up to contact_rays rays look for casters near it. More than four are sent only where those disagree.
+float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 position, vec3 normal, float lit, float blocker)
+{
+  float reach = contact_reach(r);
   if (ray_offset(position) > 0.1 * reach) {
-    return 1.0;  // beside so large a scene rays would start beyond what they look for
+    return lit;  // beside so large a scene rays would start beyond what they look for
   }
   vec3 origin = ray_origin(position, normal);
   // The same lots for all lights, so that two half lights are one.
   uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 19);
   float open = 0.0;
   float all = 0.0;
-  int count = contact_side * contact_side;
-  uint stratum = 0xFFFFFFFFu / uint(count) + 1u;
-  for (int first = 0; first < count; first += 4) {
+  int sent = 0;
+  while (sent < contact_rays) {
     mat4 rays = mat4(0.0);
     vec4 weights = vec4(0.0);
-    uint sent = 0u;
-    for (int j = 0; j < min(count - first, 4); j++) {
-      uint k = uint(first + j);
-      // One in each row, column and square of the grid: Hammersley's points, scrambled.
-      vec2 place = vec2(scrambled(int(k * stratum), salt.x), scrambled(int(reverse_bits(k)), salt.y));
+    uint asked = 0u;
+    for (int j = 0; j < min(contact_rays - sent, 4); j++) {
+      vec2 place = vec2(scrambled(int(reverse_bits(uint(sent))), salt.x), scrambled(int(second_bits(uint(sent))), salt.y));
       Light source = contact_point(light, place, r.rectangle.w, position);
       vec3 direction;
       float density;
@@ -66,12 +81,21 @@ float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 positi
       if (weight > 0.0) {
         weights[j] = weight;
         rays[j] = vec4(direction, min(reach, 0.9999 * light_distance(source, origin, direction)));
-        sent |= 1u << uint(j);
+        asked |= 1u << uint(j);
       }
+      sent++;
     }
-    uint clear = clear_bundle(origin, rays, sent);
+    uint clear = clear_bundle(origin, rays, asked);
     all += dot(weights, vec4(1.0));
     open += dot(weights, vec4((uvec4(clear) >> uvec4(0u, 1u, 2u, 3u)) & 1u));
+    if (open <= 0.0 || open >= all) {
+      break;
+    }
   }
-  return (all > 0.0) ? open / all : 1.0;
+  if (all <= 0.0) {
+    return lit;
+  }
+  vec3 towards = safe_normalize(kernel_towards(light, position));
+  bool same = blocker > 0.0 && shadow_distance(r.view, position, towards, r.q + blocker) < reach;
+  return contact_combined(lit, open / all, float(sent), same);
 }

@@ -28,6 +28,17 @@ uint reverse_bits(uint x)
   return (x >> 16u) | (x << 16u);
 }
 
+// Second dimension of Sobol': Pascal's triangle modulo 2 times the bits, in halves of halves.
+uint second_bits(uint x)
+{
+  x ^= (x >> 16u) & 0x0000FFFFu;
+  x ^= (x >> 8u) & 0x00FF00FFu;
+  x ^= (x >> 4u) & 0x0F0F0F0Fu;
+  x ^= (x >> 2u) & 0x33333333u;
+  x ^= (x >> 1u) & 0x55555555u;
+  return reverse_bits(x);
+}
+
 // Owen scrambling by hashing (Burley 2020).
 uint owen_scramble(uint x, uint seed)
 {

@@ -218,11 +218,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   float lit = kernel_visibility(light, r, facing, normal, extent, most, height, blocker);
 #ifdef CONTACT_RAYS
   if (lit > 0.0) {
-    float reach = contact_reach(r);
-    float near = contact_visibility(light, r, pixel, position, normal, reach);
-    // Of blockers that both see the rays alone tell: the darker of a mean and of noise around it would be too dark.
-    bool same = blocker > 0.0 && shadow_distance(r.view, position, towards, r.q + blocker) < 0.5 * reach;
-    lit = same ? near : min(lit, near);
+    lit = contact_visibility(light, r, pixel, position, normal, lit, blocker);
   }
 #endif
   return lit;
