@@ -1,12 +1,13 @@
 """Time of soft shadows by the number of lights, beside that of accumulated maps that leave the same error:
 `python -m bench.soft_lights`.
 
-A family of blockers (bench/soft_scenes.py) under 1, 4, 16 and 64 lights of 1 m on a ring, at 640x360 with variance maps
-of 1024x1024. Times are processor time of whole renders on a software GPU less that of the same render whose lights cast
-no shadow, the least of some that take turns, each after another of its kind, so that none waits for memory that the one
-before had no use for: what is left are maps, tables and lookups. A further sample of accumulated maps is the difference
-between some samples and one. The number of samples with the same error is read off the errors
-under one light at 128x96 against 1,024 maps, between powers of four on logarithmic scales.
+Families of blockers (bench/soft_scenes.py) under one light of 1 m, the first of them also under 4, 16 and 64 on a ring,
+at 640x360 with variance maps of 1024x1024. Times are processor time of whole renders on a software GPU less that of the
+same render whose lights cast no shadow, the least of some that take turns, each after another of its kind, so that none
+waits for memory that the one before had no use for: what is left are maps, tables and lookups. A further sample of
+accumulated maps is the difference between some samples and one. The number of samples with the same error is read off
+the errors under one light, of pictures of the same size, against 1,024 maps, between powers of four on logarithmic
+scales. Those references take some minutes for each family when they are made for the first time.
 
 `--levels` cuts every face of the blockers into four so many times, which changes no picture: what maps cost grows with
 the casters, what lookups cost does not.
@@ -30,8 +31,8 @@ LIGHTS = (1, 4, 16, 64)
 SAMPLES = (4, 16, 64)
 MORE = 4  # samples between which the cost of one is taken
 AFTER_ANOTHER = 1000  # between the seeds of a render and of the one before it, whose maps it must not take over
+FAMILIES = ("foliage", *(name for name in soft_scenes.FAMILIES if name != "foliage"))
 RING = 0.5  # metres, radius of the ring of lights
-ERROR_SIZE = (128, 96)
 KINDS = (soft.Entrant("VSSM", soft.VSSM), soft.Entrant("CSSM", soft.CSSM))
 
 
@@ -100,9 +101,23 @@ def shadow_seconds(scene, size: tuple[int, int], runs: int) -> dict[str, float]:
     return {kind.label: of[kind.label, 1] for kind in KINDS} | {"maps": (of["maps", 1 + MORE] - of["maps", 1]) / MORE}
 
 
+def equal_errors(family: str, scene, size: tuple[int, int], maps: int) -> dict[str, float]:
+    """By label of a kind: the samples at which accumulated maps leave its error, under the family's own light."""
+    expected = soft.truth(family, scene, size, maps)
+
+    def error(entrant):
+        return soft.rms(soft.visibility(scene, entrant, size), expected)
+
+    errors = [error(soft.Entrant("maps", soft.POINTS, soft.BY_MAPS, samples=n)) for n in SAMPLES]
+    return {kind.label: equal_samples(error(kind), SAMPLES, errors) for kind in KINDS}
+
+
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.soft_lights", description=__doc__.splitlines()[0])
-    parser.add_argument("--family", default="foliage", choices=list(soft_scenes.FAMILIES))
+    parser.add_argument(
+        "--families", nargs="+", default=FAMILIES, choices=list(soft_scenes.FAMILIES), metavar="NAME",
+        help="under the first number of lights; more lights and finer blockers of the first family alone",
+    )  # fmt: skip
     parser.add_argument("--lights", nargs="+", type=int, default=LIGHTS, metavar="N")
     parser.add_argument(
         "--levels", nargs="*", type=int, default=[3, 5], metavar="N",
@@ -118,36 +133,30 @@ def main(arguments: list[str]) -> int:
     from addon.gfx import context
 
     addon.register()
-    rows = [("lights", "triangles", "one map", *(f"{kind.label} / map" for kind in KINDS),
+    rows = [("blockers", "lights", "triangles", "one map", *(f"{kind.label} / map" for kind in KINDS),
              *(f"{kind.label}: {word}" for kind in KINDS for word in ("samples", "faster")))]  # fmt: skip
-    with quiet():
-        context.ensure()
-        scene = soft_scenes.build(options.family)
-        expected = soft.truth(options.family, scene, ERROR_SIZE, options.maps)
-
-        def error(entrant):
-            return soft.rms(soft.visibility(scene, entrant, ERROR_SIZE), expected)
-
-        errors = [error(soft.Entrant("maps", soft.POINTS, soft.BY_MAPS, samples=n)) for n in SAMPLES]
-        equal = {kind.label: equal_samples(error(kind), SAMPLES, errors) for kind in KINDS}
-    cases = [(count, 0) for count in options.lights] + [(options.lights[0], level) for level in options.levels]
-    for count, level in cases:
+    equal: dict[str, dict[str, float]] = {}
+    first, *others = options.families
+    cases = [(first, count, 0) for count in options.lights] + [(first, options.lights[0], n) for n in options.levels]
+    for family, count, level in cases + [(family, options.lights[0], 0) for family in others]:
         with quiet():
+            context.ensure()
+            scene = soft_scenes.build(family)
+            if family not in equal:
+                equal[family] = equal_errors(family, scene, options.size, options.maps)
             put_lights(scene, count)
             triangles = put_triangles(scene, level)
             spent = shadow_seconds(scene, options.size, options.runs)
         ratios = {kind.label: spent[kind.label] / spent["maps"] for kind in KINDS}
         one_map = f"{1000 * spent['maps']:.0f} ms"
-        row = [str(count), str(triangles), one_map, *(f"{ratio:.1f}" for ratio in ratios.values())]
+        row = [family, str(count), str(triangles), one_map, *(f"{ratio:.1f}" for ratio in ratios.values())]
         for label, ratio in ratios.items():
-            row += [f"{equal[label]:.1f}", f"{equal[label] / ratio:.1f}"]
+            row += [f"{equal[family][label]:.1f}", f"{equal[family][label] / ratio:.1f}"]
         rows.append(tuple(row))
         print(", ".join(f"{name} {value}" for name, value in zip(rows[0], row)), flush=True)
     print(table(rows))
     if options.page:
-        about = (
-            f"{options.family}, {'x'.join(map(str, options.size))} pixels; maps of as many samples as leave the error."
-        )
+        about = f"{'x'.join(map(str, options.size))} pixels; maps of as many samples as leave the error."
         markdown.put_between(soft.PAGE, COMMAND, f"{about}\n\n{markdown.table(rows)}")
     print("samples: of accumulated maps that leave the same error; faster: than those")
     return 0

@@ -39,7 +39,14 @@ PASS_NAMES = (
     PassName("emission", "Emission", "Emit", "use_pass_emit"),
     PassName("environment", "Environment", "Env", "use_pass_environment"),
 )
-IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES for name in (row.blender, row.before_5)}
+# Named where a view layer asks for them; no comparison switches them on.
+OTHER_NAMES = (
+    PassName("mist", "Mist", "Mist", "use_pass_mist"),
+    PassName("position", "Position", "Position", "use_pass_position"),
+    PassName("object_index", "Object Index", "IndexOB", "use_pass_object_index"),
+    PassName("material_index", "Material Index", "IndexMA", "use_pass_material_index"),
+)
+IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES + OTHER_NAMES for name in (row.blender, row.before_5)}
 
 DIVIDED_BY_COLOR = ("diffuse", "glossy", "transmission")  # these light passes are stored divided by their colour
 

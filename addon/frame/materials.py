@@ -226,7 +226,12 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             (_struct(len(compiled.values)), "material_values"),
             (MATERIAL_SCENE, "material_scene"),
         ),
-        constants=(("INT", "first_instance"), ("INT", "transparent_mode"), ("INT", "glass_bends")),
+        constants=(
+            ("INT", "first_instance"),
+            ("INT", "transparent_mode"),
+            ("INT", "glass_bends"),
+            ("INT", "index_shown"),
+        ),
         defines=CAMERA_DEFINES,
         **_shared(compiled),
     )

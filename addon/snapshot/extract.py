@@ -17,7 +17,7 @@ from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
-from .scene import Camera, Film, Instance, Light, Mesh, Note, Snapshot, Visibility, World
+from .scene import Camera, Film, Instance, Light, Mesh, Mist, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
 from .world import constant_world, read_world, sun_of
 
@@ -82,7 +82,7 @@ def take(
         lights=lights,
         world=world,
         camera=view,
-        film=_film(scene, width, height, border),
+        film=_film(scene, depsgraph.view_layer_eval, width, height, border),
         notes=tuple(dict.fromkeys(notes)),
         scene_name=scene.name,
         sync_stats=stats,
@@ -270,7 +270,11 @@ def _world(
     return world, sun
 
 
-def _film(scene, width: int, height: int, border) -> Film:
+# Exponents of the Mist pass, as Cycles has them.
+FALLOFF = {"QUADRATIC": 2.0, "LINEAR": 1.0, "INVERSE_QUADRATIC": 0.5}
+
+
+def _film(scene, layer, width: int, height: int, border) -> Film:
     cycles = getattr(scene, "cycles", None)  # there while the Cycles add-on is enabled
     return Film(
         width=width,
@@ -279,7 +283,18 @@ def _film(scene, width: int, height: int, border) -> Film:
         filter_width=scene.render.filter_size,
         transparent=scene.render.film_transparent,
         exposure=getattr(cycles, "film_exposure", 1.0),
+        mist=_mist(scene.world) if layer.use_pass_mist else None,
+        position=layer.use_pass_position,
+        indices=layer.use_pass_object_index or layer.use_pass_material_index,
     )
+
+
+def _mist(world) -> Mist:
+    """Of the scene's world; without one, as a new world has it."""
+    if world is None:
+        return Mist(5.0, 25.0, FALLOFF["QUADRATIC"])
+    settings = world.mist_settings
+    return Mist(settings.start, settings.depth, FALLOFF[settings.falloff])
 
 
 def _scene_border(render, width: int, height: int) -> tuple[int, int, int, int] | None:

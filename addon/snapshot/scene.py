@@ -204,10 +204,23 @@ class Film:
     filter_width: float = 1.5  # pixels, Blackman-Harris
     transparent: bool = False
     exposure: float = 1.0
+    mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
+    position: bool = False
+    indices: bool = False
 
     @property
     def border_size(self) -> tuple[int, int]:
         return self.border[2] - self.border[0], self.border[3] - self.border[1]
+
+
+@dataclass(frozen=True)
+class Mist:
+    """What the Mist pass shows of the distance from the camera (orthographic: along its axis): 0 up to `start`, 1 from
+    `start + depth` on, both in metres, and in between the share to the power of `exponent`."""
+
+    start: float
+    depth: float
+    exponent: float
 
 
 @dataclass(frozen=True)

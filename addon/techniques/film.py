@@ -28,12 +28,12 @@ from ..gfx.library import Program
 from . import film_filter, film_points, repeated_light
 from .film_points import PATHS
 from .neighbours import shown_sum
-from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_sample, surface_bindings
+from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_indices, draw_sample, surface_bindings
 
 SUMS = (
     Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
     Write("radiance.environment", "RGBA32F", "The world seen by the camera; alpha: coverage", True),
-    Write("color.diffuse", "RGBA32F", "Albedo of diffuse closures", True),
+    Write("color.diffuse", "RGBA32F", "Albedo of diffuse closures; alpha: mist, where a pass asks for it", True),
     Write("color.glossy", "RGBA32F", "Albedo of glossy closures", True),
     Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
@@ -64,7 +64,7 @@ def collect_program(seen: Seen) -> Program:
             ("R32F", "environment_density_map"),
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"),),
+        constants=(("INT", "light_count"), ("VEC4", "mist")),
         defines=(
             *SOFT_DEFINES[seen.soft], *((name, "1") for name, is_seen in shown if is_seen),
             ("LIGHT_KINDS", str(seen.kinds)),
@@ -85,6 +85,14 @@ DEPTH = passes.fullscreen_program(
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_depth"),),
 )
+POSITION = passes.fullscreen_program(
+    "film position",
+    "film/position.frag.glsl",
+    textures=(("RGBA32F", "surface_position"),),
+    constants=(("VEC3", "render_origin"),),
+    outputs=(("VEC4", "out_position"),),
+)
+NO_MIST = (0.0, 0.0, 0.0, 0.0)
 RESOLVE = passes.fullscreen_program(
     "film resolve",
     "film/resolve.frag.glsl",
@@ -136,6 +144,7 @@ class Film(Technique):
                 textures={"surface_position": frame.images["surface.position"]},
                 blocks={"film_view": frame.view_block},
             )
+            self._first_seen(frame)
         count = film_points.points_of_sample(frame, frame.settings.get(self, film_points.POINTS.name))
         with _borrowed(frame, len(SUMS)) as collected:
             self._collect(frame, surface_bindings(frame), collected)
@@ -149,6 +158,25 @@ class Film(Technique):
         repeated_light.forget(frame)
         for path in self._paths:
             frame.shown[f"radiance.{path}"] = f"film.{path}"
+
+    def _first_seen(self, frame: Frame) -> None:
+        """What passes ask for of the surfaces in the first sample, as Cycles has it: positions and indices."""
+        film = frame.snapshot.film
+        for name in (*(("film.position",) if film.position else ()), *(("film.index",) if film.indices else ())):
+            if name not in frame.images:
+                frame.images[name] = images.pool.take(*frame.size, "RGBA32F")
+        if film.position:
+            passes.fullscreen(
+                POSITION,
+                frame.target("film.position"),
+                textures={"surface_position": frame.images["surface.position"]},
+                constants={"render_origin": tuple(frame.geometry.origin)},
+            )
+        if film.indices:
+            with _borrowed(frame, len(SURFACES)) as drawn, _borrowed(frame, 1, "DEPTH_COMPONENT32F") as (depth,):
+                draw_indices(frame, self, images.Target(drawn, depth))
+                passes.copy(drawn[0], frame.target("film.index"))
+        frame.count(self, "passes", film.position + film.indices)
 
     def _between(self, frame: Frame, count: int) -> Iterator[None]:
         """The same sample's light at other points of the film."""
@@ -192,7 +220,7 @@ class Film(Technique):
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
             },
-            constants={"light_count": self._light_count},
+            constants={"light_count": self._light_count, "mist": _mist_constant(frame)},
         )  # fmt: skip
         frame.count(self, "passes")
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
@@ -229,6 +257,12 @@ class Film(Technique):
     def release(self) -> None:
         self._sources.release()
         self._repeated.release()
+
+
+def _mist_constant(frame: Frame) -> tuple[float, float, float, float]:
+    """Where mist begins, one over how far on it ends, the exponent, and whether it is asked for."""
+    mist = frame.snapshot.film.mist
+    return NO_MIST if mist is None else (mist.start, 1.0 / max(mist.depth, 1e-6), mist.exponent, 1.0)
 
 
 @contextmanager

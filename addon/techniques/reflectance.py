@@ -21,7 +21,7 @@ from ..frame.run import Frame
 from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.struct import Block
-from .surfaces import STOCHASTIC, SURFACE_TEXTURES
+from .surfaces import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result
@@ -100,7 +100,7 @@ class Reflectance:
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
         bindings["blocks"]["film_view"] = Block(VIEW, **_values(overview(low, high, backward)))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
-            shader.bind(**bindings, constants={"first_instance": 0, "transparent_mode": STOCHASTIC, "glass_bends": 0})
+            shader.bind(**bindings, constants={"first_instance": 0, **drawing_constants(STOCHASTIC, False)})
             for call in calls(all_draws, own):
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)

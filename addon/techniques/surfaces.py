@@ -149,10 +149,24 @@ def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mod
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
-    constants = {"transparent_mode": mode, "glass_bends": int(glass)}
     with passes.drawing(target):
-        _submit(frame, technique, frame.materials.surface_program, None, constants)
+        _submit(frame, technique, frame.materials.surface_program, None, drawing_constants(mode, glass))
     frame.count(technique, "passes")
+
+
+def drawing_constants(mode: int, glass: bool) -> dict[str, int]:
+    """Of the programs that draw surfaces, beside the first instance."""
+    return {"transparent_mode": mode, "glass_bends": int(glass), "index_shown": -1}
+
+
+def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> None:
+    """Draw the pass indices of the objects and materials that the camera sees in this sample into the first image of a
+    target as of draw_surfaces; what the others hold then is of no use."""
+    target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+    constants = drawing_constants(STOCHASTIC, refracts(frame))
+    indices = [material.pass_index for material in frame.snapshot.materials]
+    with passes.drawing(target):
+        _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
 
 
 def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
@@ -172,9 +186,11 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
 
 
 def _submit(
-    frame: Frame, technique: Technique, program_of, materials: set[int] | None, constants: dict, textures=None
-) -> None:
-    """Draw what the camera may see of `materials` (None: of all), each with its own program."""
+    frame: Frame, technique: Technique, program_of, materials: set[int] | None, constants: dict, textures=None,
+    indices: list[int] | None = None,
+) -> None:  # fmt: skip
+    """Draw what the camera may see of `materials` (None: of all), each with its own program. `indices`: by material,
+    what is shown instead of where surfaces lie."""
     seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
     material = None
     for call in calls(frame.geometry.draws, seen):
@@ -186,7 +202,8 @@ def _submit(
             bindings = frame.materials.bindings(material, frame.geometry.instances)
             bindings["blocks"]["film_view"] = frame.view_block
             bindings["textures"] |= textures or {}
-            shader.bind(**bindings, constants={"first_instance": call.first, **constants})
+            shown = {"index_shown": indices[material]} if indices is not None else {}
+            shader.bind(**bindings, constants={"first_instance": call.first, **constants, **shown})
         shader.set_constant("first_instance", call.first)
         passes.draw(shader, call.draw.batch, call.count)
         frame.count(technique, "triangles", call.triangles)

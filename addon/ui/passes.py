@@ -17,6 +17,7 @@ class RenderPass:
     channels: str
     kind: str  # of the values, as Blender calls it
     source: str
+    first: int = 0  # channel of the image
 
     @property
     def images(self) -> list[str]:
@@ -26,15 +27,17 @@ class RenderPass:
     def pixels(self, arrays: dict[str, np.ndarray], exposure: float) -> np.ndarray:
         """The pass, (H, W, channels) float32, from the frame's mean images."""
         image, *color = self.images
-        pixels = arrays[image][..., : len(self.channels)]
+        pixels = arrays[image][..., self.first : self.first + len(self.channels)]
         if color:
             pixels = divide_by_color(pixels, arrays[color[0]][..., :3])
         return pixels * exposure if image.startswith("radiance.") else pixels
 
 
-# Switch of the view layer, Blender's name since 5.0 and before, channels, type, source.
+# Switch of the view layer, Blender's name since 5.0 and before, channels, type, source, first channel if not 0.
 _TABLE = (
     ("use_pass_z", "Depth", "Depth", "Z", "VALUE", "film.depth"),
+    ("use_pass_mist", "Mist", "Mist", "Z", "VALUE", "color.diffuse", 3),
+    ("use_pass_position", "Position", "Position", "XYZ", "VECTOR", "film.position"),
     ("use_pass_normal", "Normal", "Normal", "XYZ", "VECTOR", "surface.normal_sum"),
     ("use_pass_diffuse_direct", "Diffuse Direct", "DiffDir", "RGB", "COLOR", "radiance.diffuse_direct / color.diffuse"),
     (
@@ -61,11 +64,13 @@ _TABLE = (
     ),
     ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
     ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),
+    ("use_pass_object_index", "Object Index", "IndexOB", "X", "VALUE", "film.index"),
+    ("use_pass_material_index", "Material Index", "IndexMA", "X", "VALUE", "film.index", 1),
 )  # fmt: skip
 
 PASSES = tuple(
-    RenderPass(switch, name if bpy.app.version >= (5, 0) else old, channels, kind, source)
-    for switch, name, old, channels, kind, source in _TABLE
+    RenderPass(switch, name if bpy.app.version >= (5, 0) else old, channels, kind, source, *first)
+    for switch, name, old, channels, kind, source, *first in _TABLE
 )
 
 
@@ -76,8 +81,7 @@ def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.
 _OTHERS = (
-    ("use_pass_mist", "Mist"), ("use_pass_position", "Position"), ("use_pass_vector", "Vector"), ("use_pass_uv", "UV"),
-    ("use_pass_object_index", "Object Index"), ("use_pass_material_index", "Material Index"),
+    ("use_pass_vector", "Vector"), ("use_pass_uv", "UV"),
     ("use_pass_shadow", "Shadow"), ("use_pass_ambient_occlusion", "Ambient Occlusion"),
     ("use_pass_subsurface_direct", "Subsurface Direct"), ("use_pass_subsurface_indirect", "Subsurface Indirect"),
     ("use_pass_subsurface_color", "Subsurface Color"),

@@ -14,7 +14,7 @@ void main()
   Surface s = SURFACE_READ(pixel);
   out_emission = vec4(0.0);
   out_environment = vec4(0.0);
-  out_diffuse_color = vec4(0.0);
+  out_diffuse_color = vec4(vec3(0.0), mist.w);
   out_glossy_color = vec4(0.0);
   out_transmission_color = vec4(0.0);
   out_normal = vec4(0.0);
@@ -32,6 +32,12 @@ void main()
     out_emission.rgb = s.emission;
     out_diffuse_color.rgb = s.diffuse;
     out_normal = vec4(s.normal, 1.0);
+    if (mist.w > 0.0) {
+      vec3 away = film_view.eye.xyz - s.position;
+      float far = (film_view.eye.w > 0.5) ? dot(away, film_view.backward.xyz) : length(away);
+      float share = clamp((far - mist.x) * mist.y, 0.0, 1.0);
+      out_diffuse_color.a = pow(share, mist.z);
+    }
     bool microfacets = max_component(s.glossy_weight) > 0.0;
 #ifdef SOFT_LOBES
     SoftLobe soft = soft_lobe_begin(s, -direction);

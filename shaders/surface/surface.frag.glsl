@@ -55,4 +55,7 @@ void main()
   out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
                   ior_encode(c.glossy_ior, c.distribution));
   out_emission = vec4(c.emission * covered, c.glossy_roughness);
+  if (index_shown >= 0) {
+    out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
+  }
 }

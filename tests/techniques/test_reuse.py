@@ -257,10 +257,10 @@ def test_absorption_begins_a_new_picture(room):
 
 def test_passes_that_are_not_written_are_named(room):
     layer = room.scene.view_layers[0]
-    layer.use_pass_mist = layer.use_pass_object_index = True
+    layer.use_pass_uv = layer.use_pass_shadow = True
     try:
         room.render(1)
     finally:
-        layer.use_pass_mist = layer.use_pass_object_index = False
+        layer.use_pass_uv = layer.use_pass_shadow = False
     (note,) = (note for note in room.ledger.notes if note.subject == f"View layer '{layer.name}'")
-    assert "Mist, Object Index" in note.text
+    assert "UV, Shadow" in note.text
