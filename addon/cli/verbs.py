@@ -98,6 +98,8 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
     given = list(options.assignments)
     if options.samples is not None:
         given.append(f"samples={options.samples}")
+        for layer in scene.view_layers:
+            layer.samples = 0  # its own number of samples would count
     settings = settings_of(scene, viewport=False).override(REGISTRY, given)
     group = scene.candela
     group.samples, group.seed, group.bounces = settings.samples, settings.seed, settings.bounces
@@ -281,9 +283,9 @@ def _watched(job: Job, then: str = "") -> Iterator[None]:
         advance, seen, wanted = renderer.advance, 0, job.scene.candela.samples
 
         def advance_and_tell(frame) -> None:
-            nonlocal seen
+            nonlocal seen, wanted
             advance(frame)
-            seen = frame.samples_done
+            seen, wanted = frame.samples_done, frame.settings.samples
             progress(terminal, f"Sample {seen} of {wanted}" if seen < wanted else then)
 
         renderer.advance = advance_and_tell

@@ -267,6 +267,7 @@ def render_settings(
         (image, "use_preview", False),
         (image, "color_management", "FOLLOW_SCENE"),
     ]
+    settings.append((view_layer, "samples", 0))  # its own number of samples would count
     for row in PASS_NAMES:
         owner, _, name = row.switch.rpartition(".")
         settings.append((getattr(view_layer, owner, None) if owner else view_layer, name, True))

@@ -85,6 +85,8 @@ def walk(
     changed = cache.changed
     view_layer = depsgraph.view_layer_eval
     hairy, final = len(bpy.data.particles) > 0, depsgraph.mode == "RENDER"
+    strands = view_layer.use_strand
+    included = {"MESH": view_layer.use_solid, "CURVES": strands}  # point clouds are always, as in Cycles
     # Asked of each object only where some collection says so: these two are slower than all else.
     indirect_only, holdout = _collections_say(view_layer.layer_collection)
     for instance in depsgraph.object_instances:
@@ -101,6 +103,8 @@ def walk(
             shells += hair_systems(owner, final)
         for data in shells:
             hair = isinstance(data, HairSystem)
+            if not (strands if hair else included.get(kind, True)):
+                continue
             pointer = data.pointer if hair else data.as_pointer()
             identity = (owner.as_pointer(), parent.as_pointer() if parent else 0, pointer)
             source = known.get(identity)

@@ -14,6 +14,7 @@ _TAKEN = {
     "EEVEE_WORLD_PT_surface",
     "MATERIAL_PT_preview",
     "NODE_DATA_PT_EEVEE_light",
+    "VIEWLAYER_PT_filter",
     "VIEWLAYER_PT_override",
 }
 # Panels for every engine whose settings Candela does not read, or that have a better one in _TAKEN.

@@ -91,11 +91,13 @@ CandelaSceneSettings = type(
 )
 
 
-def settings_of(scene, viewport: bool, preview: bool = False) -> Settings:
-    """The scene's Blender properties as plain settings."""
+def settings_of(scene, viewport: bool, preview: bool = False, layer=None) -> Settings:
+    """The scene's Blender properties as plain settings; in a final render of a view layer, with its number of samples
+    where it has one of its own."""
     group = scene.candela
     tree = group.pass_tree
-    samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else group.samples)
+    final = (layer.samples if layer is not None else 0) or group.samples
+    samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else final)
     settings = Settings(
         samples=samples,
         whole=not viewport,

@@ -40,7 +40,7 @@ float contact_reach(ShadowReceiver r)
 // Visibility past what the map sees (`lit`) and what `rays` rays see (`near`); `same`: both see the same blockers. Of few
 // rays the share that passes is noise around the truth, which the map's answer moderates; where none passes, the map
 // missed what hides the light. Single rays are as many as the samples: their mean has no noise to speak of.
-#define CONTACT_PULL 2.0  // rays that the map's answer stands for
+#define CONTACT_PULL 0.5  // rays that the map's answer stands for
 #define CONTACT_APART 0.4  // share of near blockers beside the light that farther ones hide, not within it
 
 float contact_combined(float lit, float near, float rays, bool same)
