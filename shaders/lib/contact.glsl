@@ -45,12 +45,12 @@ float contact_reach(ShadowReceiver r)
 
 float contact_combined(float lit, float near, float rays, bool same)
 {
-  float told = (contact_rays > 1) ? mix(lit, near, rays / (rays + CONTACT_PULL)) : near;
-  if (same) {
-    return told;
+  if (near <= 0.0) {
+    return 0.0;
   }
+  float told = (contact_rays > 1) ? mix(lit, near, rays / (rays + CONTACT_PULL)) : near;
   // Different blockers hide min(lit, near) of the light where one lies within the other, and lit * near by chance.
-  return mix(min(lit, (near > 0.0) ? told : 0.0), lit * near, CONTACT_APART);
+  return same ? told : mix(min(lit, told), lit * near, CONTACT_APART);
 }
 
 // What passes of the share `lit` that reaches the receiver past blockers at the mean height `blocker` (in q, 0 = none were
