@@ -71,14 +71,14 @@ float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 positi
     mat4 rays = mat4(0.0);
     vec4 weights = vec4(0.0);
     uint asked = 0u;
-    for (int j = 0; j < min(contact_rays - sent, 4); j++) {
+    for (int j = 0; j < 4; j++) {  // also of the single ray: a number of turns that is not known costs more
       vec2 place = vec2(scrambled(int(reverse_bits(uint(sent))), salt.x), scrambled(int(second_bits(uint(sent))), salt.y));
       Light source = contact_point(light, place, r.rectangle.w, position);
       vec3 direction;
       float density;
       vec3 arriving = light_sample(source, position, direction, density);
       float weight = max_component(abs(arriving)) * dot(direction, normal);
-      if (weight > 0.0) {
+      if (weight > 0.0 && sent < contact_rays) {
         weights[j] = weight;
         rays[j] = vec4(direction, min(reach, 0.9999 * light_distance(source, origin, direction)));
         asked |= 1u << uint(j);

@@ -11,34 +11,24 @@ float kernel_weight(Light light, vec2 place, float cell)
   return LIGHT_IS(light, LIGHT_RECTANGLE) ? 1.0 : clamp((1.0 - length(place)) / cell + 0.5, 0.0, 1.0);
 }
 
-// Least and largest q of a pyramid entry; level 0 is the map itself. Where nothing was drawn: 0, behind everything.
-vec2 kernel_entry(ivec2 texel, int level)
-{
-  if (level == 0) {
-    vec4 caster = depth_maps_fetch(texel);
-    return (caster.w > 0.0) ? caster.xx : vec2(0.0);
-  }
-  return depth_bounds_fetch(texel + ivec2(0, bounds_rows - (bounds_rows >> (level - 1)))).xy;
-}
-
-// Bounds of q over the texels first..last (from the view's corner, inclusive): those of a block that contains them.
-// `deepest`: least q of the receiver's plane within that block.
+// Bounds of q over the texels first..last (from the view's corner, inclusive): those of the up to 3 x 3 blocks of the
+// pyramid, of at least 2 x 2 texels, that contain them; 0 where nothing was drawn. `deepest`: least q of the receiver's
+// plane within those blocks.
 vec2 kernel_bounds(ShadowReceiver r, ivec2 first, ivec2 last, out float deepest)
 {
   int span = max(last.x - first.x, last.y - first.y);
-  int level = (span < 2) ? 0 : int(ceil(log2(float(span)))) - 1;
+  int level = max(int(ceil(log2(float(max(span, 1))))) - 1, 1);
   ivec2 origin = ivec2(r.rectangle.xy);
   ivec2 low = (origin + first) >> level;
   ivec2 high = (origin + last) >> level;
   vec2 near_corner = vec2((low << level) - origin) - r.texel;
   vec2 far_corner = vec2(((high + 1) << level) - origin) - r.texel;
   deepest = r.q + dot(min(r.gradient * near_corner, r.gradient * far_corner), vec2(1.0));
+  ivec2 rows = ivec2(0, bounds_rows - (bounds_rows >> (level - 1)));
   vec2 bounds = vec2(1e30, -1e30);
-  for (int y = low.y; y <= high.y; y++) {
-    for (int x = low.x; x <= high.x; x++) {
-      vec2 entry = kernel_entry(ivec2(x, y), level);
-      bounds = vec2(min(bounds.x, entry.x), max(bounds.y, entry.y));
-    }
+  for (int k = 0; k < 9; k++) {  // a loop of few turns whose number is not known took longer than the fetches it saved
+    vec2 entry = depth_bounds_fetch(min(low + ivec2(k % 3, k / 3), high) + rows).xy;
+    bounds = vec2(min(bounds.x, entry.x), max(bounds.y, entry.y));
   }
   return bounds;
 }

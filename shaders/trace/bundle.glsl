@@ -16,6 +16,7 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
   place.leaf = false;
   uint pending[DEEPEST];  // node, and as its last four bits the children still to visit
   int height = 0;
+  uint top = 0u;
   for (int round = 0; round < 4096 && open != 0u; round++) {
     bool more = true;
     while (more && !place.leaf) {
@@ -27,14 +28,20 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
         met |= (((open >> uint(k)) & 1u) != 0u) ? meets : 0u;
       }
       if (met != 0u) {
-        pending[height] = (uint(place.index) << 4u) | met;
-        height++;
+        if (!none_pending(top)) {
+          pending[height] = top;
+          height++;
+        }
+        top = (uint(place.index) << 4u) | met;
       }
-      more = height > 0;
+      more = !none_pending(top);
       if (more) {
         int node;
-        int child = next_pending(pending[height - 1], node);
-        height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+        int child = next_pending(top, node);
+        if (none_pending(top) && height > 0) {
+          height--;
+          top = pending[height];
+        }
         place = node_child(node, child);
       }
     }
@@ -74,12 +81,15 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
         }
       }
     }
-    if (height == 0) {
+    if (none_pending(top)) {
       break;
     }
     int above;
-    int child = next_pending(pending[height - 1], above);
-    height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+    int child = next_pending(top, above);
+    if (none_pending(top) && height > 0) {
+      height--;
+      top = pending[height];
+    }
     place = node_child(above, child);
   }
   return open;

@@ -2,7 +2,8 @@
 //
 // Where some triangles are opaque place by place, OPACITY_TILES is defined (the image of the leaves sees to it).
 //
-// The tree is four-wide. A stack holds nodes of which some children are still to visit, and those children as four bits.
+// The tree is four-wide. A stack holds nodes of which some children are still to visit, and those children as four bits. Its
+// top is a number of its own, `top`, since most entries are taken off before another is put on them.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 
@@ -152,13 +153,18 @@ Place node_child(int node, int child)
   return place;
 }
 
-// Takes one child off an entry of the stack; `node` is whose.
-int next_pending(inout uint entry, out int node)
+// Takes one child off the stack's top; `node` is whose.
+int next_pending(inout uint top, out int node)
 {
-  node = int(entry >> 4u);
-  int child = findLSB(entry & 15u);
-  entry ^= 1u << uint(child);
+  node = int(top >> 4u);
+  int child = findLSB(top & 15u);
+  top ^= 1u << uint(child);
   return child;
+}
+
+bool none_pending(uint top)
+{
+  return (top & 15u) == 0u;
 }
 
 // Boxes of a node's four children, on a grid of 256 steps over the node: texel 0 holds the grid's corner and the exponents
@@ -219,6 +225,7 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
   place.leaf = false;
   uint pending[DEEPEST];  // node, and as its last four bits the children still to visit
   int height = 0;
+  uint top = 0u;
   for (int round = 0; round < 4096; round++) {
     // Down to a leaf, nearest child first; then all rays of a group test triangles together.
     bool more = true;
@@ -234,13 +241,19 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
         child = (enter.x == first) ? 0 : (enter.y == first) ? 1 : (enter.z == first) ? 2 : 3;
         met &= ~(1u << uint(child));
         if (met != 0u) {
-          pending[height] = (uint(node) << 4u) | met;
-          height++;
+          if (!none_pending(top)) {
+            pending[height] = top;
+            height++;
+          }
+          top = (uint(node) << 4u) | met;
         }
       }
-      else if (height > 0) {
-        child = next_pending(pending[height - 1], node);
-        height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+      else if (!none_pending(top)) {
+        child = next_pending(top, node);
+        if (none_pending(top) && height > 0) {
+          height--;
+          top = pending[height];
+        }
       }
       else {
         more = false;
@@ -270,12 +283,15 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
         hit = ivec2(place.index, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
       }
     }
-    if (nearest < enough || height == 0) {
+    if (nearest < enough || none_pending(top)) {
       break;
     }
     int above;
-    int child = next_pending(pending[height - 1], above);
-    height -= ((pending[height - 1] & 15u) == 0u) ? 1 : 0;
+    int child = next_pending(top, above);
+    if (none_pending(top) && height > 0) {
+      height--;
+      top = pending[height];
+    }
     place = node_child(above, child);
   }
   return nearest;

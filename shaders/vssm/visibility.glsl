@@ -9,7 +9,6 @@
 #include "lib/soft_kernel.glsl"
 #include "vssm/range.glsl"
 
-#define CELL_LINES 11  // of a grid of up to 10 x 10 cells: a kernel of 2 MOST_HALF_SIZE texels
 #define CELL_BLOCKS (64 / TABLE_BLOCK)  // widest cell whose sums fit into 32 bits
 
 uvec4 vssm_sum(ivec2 block)
@@ -97,21 +96,21 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 besi
   ivec2 inner = end - block - 2 * border;
   int cells = max(wished, (max(inner.x, inner.y) + CELL_BLOCKS - 1) / CELL_BLOCKS + 2 * border);
   int inner_cells = cells - 2 * border;
+  vec2 inner_cell = vec2(inner) / float(inner_cells);
   ivec2 origin = ivec2(r.rectangle.xy);
   float range = vssm_range(origin);
-  uvec4 row_below[CELL_LINES];
   ivec2 before = block;
-  for (int j = 0; j <= cells; j++) {
+  for (int j = 1; j <= cells; j++) {
     ivec2 line = block;
-    line.y = (j == 0) ? block.y : ((j == cells) ? end.y : block.y + border + inner.y * (j - border) / inner_cells);
-    uvec4 corner_before = uvec4(0u);
-    uvec4 below_before = uvec4(0u);
+    line.y = (j == cells) ? end.y : block.y + border + int(inner_cell.y * float(j - border) + 0.01);
+    // Both corners at a line are fetched again in the next row: to keep them took longer.
+    uvec4 above_before = uvec4(0u);
     before.x = block.x;
     for (int i = 0; i <= cells; i++) {
-      line.x = (i == 0) ? block.x : ((i == cells) ? end.x : block.x + border + inner.x * (i - border) / inner_cells);
-      uvec4 corner = vssm_sum(origin / TABLE_BLOCK + line);
-      uvec4 below = row_below[i];
-      if (j > 0 && i > 0 && all(greaterThan(line, before))) {
+      line.x = (i == 0) ? block.x : ((i == cells) ? end.x : block.x + border + int(inner_cell.x * float(i - border) + 0.01));
+      ivec2 corner = origin / TABLE_BLOCK + line;
+      uvec4 above = vssm_sum(corner) - vssm_sum(ivec2(corner.x, corner.y - line.y + before.y));
+      if (i > 0 && all(greaterThan(line, before))) {
         vec2 a = vec2(TABLE_BLOCK * before);
         vec2 b = vec2(TABLE_BLOCK * line);
         vec2 covered = min(b, high) - max(a, low);
@@ -119,13 +118,11 @@ void kernel_cells(inout Blockers found, Light light, ShadowReceiver r, vec2 besi
         float weight = covered.x * covered.y * kernel_weight(light, place, 2.0 / float(inner_cells));
         float cosine = kernel_cosine(found, place * half_size, 0.5 * (b - a));
         if (weight * cosine > 0.0) {
-          uvec4 sum = corner - corner_before - below + below_before;
+          uvec4 sum = above - above_before;
           vssm_cell(found, r, beside, TABLE_BLOCK * before, TABLE_BLOCK * line - 1, sum, range, weight, cosine);
         }
       }
-      row_below[i] = corner;
-      corner_before = corner;
-      below_before = below;
+      above_before = above;
       before.x = line.x;
     }
     before.y = line.y;
