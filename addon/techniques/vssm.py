@@ -29,7 +29,7 @@ classification by bounds and the plane-relative moments are ours.
 | pyramid | a pass and log2 N - 1 dispatches; 4 bytes per texel |
 | table | 4 log8 N - 1 passes (log8 N rounded up) over blocks of 2 x 2 texels, from 16 samples on over texels |
 | lookup, lit or all blocked pixels | up to 27 loads |
-| lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 41 loads of 16 bytes, up to 225 of 8; up to 9 more per mixed cell |
+| lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 64 loads of 16 bytes, 225 of 8; up to 8 more per mixed cell |
 | contact rays | 4, or 8 where those disagree, per pixel that is not settled and map; from 16 samples on 1 |
 | bytes | 8 per texel and 4 borrowed, beside the map's 20; from 16 samples on 20 and 16 |
 
