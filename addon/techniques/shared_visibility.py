@@ -18,8 +18,8 @@ time of its shadow on a software GPU (as `python -m bench.soft_lights` takes it)
 
 | | thin poles | chain fence | foliage | grid | far background | stacked blockers |
 |---|---|---|---|---|---|---|
-| every pixel | .0234, 329 ms | .0453, 368 ms | .0570, 452 ms | .0417, 367 ms | .0185, 310 ms | .0165, 319 ms |
-| shared | .0235, 107 ms | .0456, 297 ms | .0569, 137 ms | .0419, 186 ms | .0178, 146 ms | .0169, 78 ms |
+| every pixel | .0208, 230 ms | .0360, 448 ms | .0536, 304 ms | .0340, 276 ms | .0182, 248 ms | .0164, 217 ms |
+| shared | .0212, 104 ms | .0361, 348 ms | .0535, 116 ms | .0347, 158 ms | .0175, 87 ms | .0168, 80 ms |
 
 | cost | per four lights, beside the lookups |
 |---|---|
