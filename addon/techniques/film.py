@@ -162,6 +162,8 @@ class Film(Technique):
     def _first_seen(self, frame: Frame) -> None:
         """What passes ask for of the surfaces in the first sample, as Cycles has it: positions and indices."""
         film = frame.snapshot.film
+        if not frame.settings.whole:
+            return  # a viewport shows none of these
         for name in (*(("film.position",) if film.position else ()), *(("film.index",) if film.indices else ())):
             if name not in frame.images:
                 frame.images[name] = images.pool.take(*frame.size, "RGBA32F")
