@@ -221,9 +221,10 @@ class CandelaPlanEngine(bpy.types.RenderEngine):
 
 
 def plan(job: Job) -> None:
-    settings, snapshots = settings_of(job.scene, viewport=False), _snapshots(job)
+    snapshots = _snapshots(job)
     print(job.title)
     for layer, snapshot in snapshots:
+        settings = settings_of(job.scene, viewport=False, layer=job.scene.view_layers[layer])
         try:
             found = make_plan(make_registry(), snapshot, settings)
         except PlanError as error:
