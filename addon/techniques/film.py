@@ -92,7 +92,6 @@ POSITION = passes.fullscreen_program(
     constants=(("VEC3", "render_origin"),),
     outputs=(("VEC4", "out_position"),),
 )
-NO_MIST = (0.0, 0.0, 0.0, 0.0)
 RESOLVE = passes.fullscreen_program(
     "film resolve",
     "film/resolve.frag.glsl",
@@ -125,10 +124,7 @@ class Film(Technique):
     def run(self, frame: Frame) -> Iterator[None]:
         if frame.sample == 0:
             self._paths = film_points.lit_paths(frame)
-            for path in self._paths:
-                if f"film.{path}" not in frame.images:
-                    frame.images[f"film.{path}"] = images.pool.take(*frame.size, "RGBA32F")
-            frame.target(*(f"film.{path}" for path in self._paths)).clear()
+            _target(frame, *(f"film.{path}" for path in self._paths)).clear()
             emitters = frame.emitters
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
@@ -164,20 +160,17 @@ class Film(Technique):
         film = frame.snapshot.film
         if not frame.settings.whole:
             return  # a viewport shows none of these
-        for name in (*(("film.position",) if film.position else ()), *(("film.index",) if film.indices else ())):
-            if name not in frame.images:
-                frame.images[name] = images.pool.take(*frame.size, "RGBA32F")
         if film.position:
             passes.fullscreen(
                 POSITION,
-                frame.target("film.position"),
+                _target(frame, "film.position"),
                 textures={"surface_position": frame.images["surface.position"]},
                 constants={"render_origin": tuple(frame.geometry.origin)},
             )
         if film.indices:
             with _borrowed(frame, len(SURFACES)) as drawn, _borrowed(frame, 1, "DEPTH_COMPONENT32F") as (depth,):
                 draw_indices(frame, self, images.Target(drawn, depth))
-                passes.copy(drawn[0], frame.target("film.index"))
+                passes.copy(drawn[0], _target(frame, "film.index"))
         frame.count(self, "passes", film.position + film.indices)
 
     def _between(self, frame: Frame, count: int) -> Iterator[None]:
@@ -261,10 +254,20 @@ class Film(Technique):
         self._repeated.release()
 
 
+def _target(frame: Frame, *names: str) -> images.Target:
+    """Of images that only some pictures have; those that this one lacks are taken."""
+    for name in names:
+        if name not in frame.images:
+            frame.images[name] = images.pool.take(*frame.size, "RGBA32F")
+    return frame.target(*names)
+
+
 def _mist_constant(frame: Frame) -> tuple[float, float, float, float]:
     """Where mist begins, one over how far on it ends, the exponent, and whether it is asked for."""
     mist = frame.snapshot.film.mist
-    return NO_MIST if mist is None else (mist.start, 1.0 / max(mist.depth, 1e-6), mist.exponent, 1.0)
+    if mist is None:
+        return 0.0, 0.0, 0.0, 0.0
+    return mist.start, 1.0 / mist.depth if mist.depth > 0 else 0.0, mist.exponent, 1.0
 
 
 @contextmanager

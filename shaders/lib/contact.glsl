@@ -54,8 +54,9 @@ float contact_combined(float lit, float near, float rays, bool same)
 }
 
 // What passes of the share `lit` that reaches the receiver past blockers at the mean height `blocker` (in q, 0 = none were
-// found): up to contact_rays rays look for casters near it. More than four are sent only where those disagree.
-float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 position, vec3 normal, float lit, float blocker)
+// found): up to contact_rays rays look for casters near it. `towards`: the direction to the map's point. More than four are sent only where those disagree.
+float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 position, vec3 normal, vec3 towards, float lit,
+                         float blocker)
 {
   float reach = contact_reach(r);
   if (ray_offset(position) > 0.1 * reach) {
@@ -95,7 +96,6 @@ float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 positi
   if (all <= 0.0) {
     return lit;
   }
-  vec3 towards = safe_normalize(kernel_towards(light, position));
   bool same = blocker > 0.0 && shadow_distance(r.view, position, towards, r.q + blocker) < reach;
   return contact_combined(lit, open / all, float(sent), same);
 }

@@ -218,7 +218,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   float lit = kernel_visibility(light, r, facing, normal, extent, most, height, blocker);
 #ifdef CONTACT_RAYS
   if (lit > 0.0) {
-    lit = contact_visibility(light, r, pixel, position, normal, lit, blocker);
+    lit = contact_visibility(light, r, pixel, position, normal, towards, lit, blocker);
   }
 #endif
   return lit;

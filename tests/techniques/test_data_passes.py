@@ -48,6 +48,12 @@ def test_mist_is_that_of_cycles(asked, falloff):
     assert own["mist"].max() == 1.0 and own["mist"].min() < 0.5
 
 
+def test_mist_without_depth_is_that_of_cycles(asked):
+    mist(steps(asked), "LINEAR", depth=0.0)
+    own, cycles = asked.both(1)
+    np.testing.assert_allclose(own["mist"], cycles["mist"], atol=1e-5)
+
+
 def test_mist_shows_what_transparent_layers_let_through(asked):
     mist(asked, "LINEAR")
     asked.camera_above(SPAN)
