@@ -64,6 +64,10 @@ RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
     "Texels of a depth map per pixel of the picture's longer side", 0.125, 16.0,
 )  # fmt: skip
+# Texels decide alone where casters let some light pass, and their error does not fall with samples: where leaves touch
+# it outweighs noise from so many on. alpha_foliage, direct light, 64 samples: relMSE .0008 to .0006 (gloss .0097 to
+# .0084) in 1.13 times the time; with 16 as much would be gained by more samples.
+FINER_BY_LOT, FINER_FROM = 2.0, 64
 MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
 CUTOFF = Param(
     "cutoff", "Shadow cutoff", 0.001,
@@ -307,7 +311,8 @@ class AccumulatedMaps(Technique):
             )
 
     def resolution(self, frame: Frame) -> int:
-        return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+        finer = FINER_BY_LOT if frame.settings.samples >= FINER_FROM and drawn_by_lot(frame) else 1.0
+        return map_resolution(frame, finer * frame.settings.get(self, "texels_per_pixel"))
 
     def cell(self, frame: Frame, number: int, points: float) -> float:
         """Share of a light's extent, along each axis, that the map of point `number` of `points` stands for; 0: a point
