@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, indirect, page, profile, run
+from bench import again, costs, direct, everything, growth, indirect, page, profile, random_scenes, run
 
 VERBS = {
     "run": run,
@@ -16,6 +16,7 @@ VERBS = {
     "indirect": indirect,
     "profile": profile,
     "costs": costs,
+    "random": random_scenes,
     "page": page,
     "all": everything,
 }

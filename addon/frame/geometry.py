@@ -9,6 +9,7 @@ moved is drawn into the image, as parts of a texture cannot be uploaded through 
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from . import casters
 from .culling import closed
+from .envelope import normal_envelope
 from .morton import morton_codes
 
 LARGE, STEPS = 256.0, 16  # m: scenes beyond it are cut into so many places for the origin
@@ -200,6 +202,8 @@ class SceneGeometry:
             rows[k, 6, :2] = instance.uv[1], instance.terminator
         self._written = instances
         if len(instances):
+            users = Counter(instance.mesh for instance in instances)
+            rows[:, 6, 2] = [users[instance.mesh] > 1 for instance in instances]
             relative = matrices[:, :3, :].copy()
             relative[:, :, 3] -= self.origin
             rows[:, :3] = relative
@@ -344,6 +348,7 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
     surface_vertices = gfx_geometry.vertex_buffer(
         position=np.concatenate([mesh.positions[mesh.corner_vertices] for _, mesh, _ in parts]),
         normal=np.concatenate([mesh.corner_normals for _, mesh, _ in parts]),
+        envelope=np.concatenate([normal_envelope(mesh) for _, mesh, _ in parts]),
         local_instance=np.concatenate([np.full(len(mesh.corner_vertices), k, np.int32) for k, mesh, _ in parts]),
     )
     surfaces = []

@@ -31,6 +31,7 @@ DIFFUSE_FLAG, GLOSSY_FLAG, SHADOW_FLAG, SPOT_FLAG, CAMERA_FLAG, TRACED_FLAG, WHO
 NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for it
 TRANSMISSION_FLAG = 256
 SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
+EVEN_FLAG = 1024  # of a world of one colour
 
 
 @dataclass(frozen=True)

@@ -193,12 +193,12 @@ def _shared(compiled: CompiledMaterial) -> dict:
     )
     return {
         "inputs": (
-            ("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance"),
+            ("VEC3", "position"), ("VEC3", "normal"), ("VEC2", "envelope"), ("INT", "local_instance"),
             *(("VEC4", f"attribute{k}") for k in range(count)),
         ),
         "varyings": (
             ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"),
-            ("smooth", "FLOAT", "normal_height"), ("flat", "IVEC2", "instance_flat"),
+            ("smooth", "VEC3", "normal_heights"), ("flat", "IVEC2", "instance_flat"),
             *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
         ),
         "textures": (
@@ -290,7 +290,7 @@ def _opacity_program(compiled: CompiledMaterial) -> Program:
         name=f"opacity {compiled.program_key[:8]}",
         vertex="surface/opacity_map.vert.glsl",
         fragment="surface/opacity_map.frag.glsl",
-        inputs=(*(one for one in like.inputs if one[1] != "local_instance"), ("VEC2", "cell")),
+        inputs=(*(one for one in like.inputs if one[1] not in ("envelope", "local_instance")), ("VEC2", "cell")),
         varyings=(*like.varyings, ("flat", "INT", "sample_flat")),
         outputs=(("VEC4", "out_opacity"),),
         constants=(("INT", "first_instance"), ("VEC2", "tile_scale")),

@@ -69,9 +69,10 @@ class View:
         so that the plane in focus stays where it is.
         """
         left, right, bottom, top = self.frame()
-        if any(lens):
-            x, y = lens[0] / self.camera.aperture.focus, lens[1] / self.camera.aperture.focus
-            left, right, bottom, top = left - x, right - x, bottom - y, top - y
+        orthographic = self.camera.kind == "ORTHOGRAPHIC"
+        shear = np.divide(lens, self.camera.aperture.focus) if any(lens) else np.zeros(2)
+        if not orthographic:
+            left, right, bottom, top = left - shear[0], right - shear[0], bottom - shear[1], top - shear[1]
         frame = left, right, bottom, top
         width, height = self.size
         dx, dy = jitter[0] * (right - left) / width, jitter[1] * (top - bottom) / height
@@ -84,7 +85,6 @@ class View:
 
         depth = affine(-backward)  # distance along the axis
         one = np.array([0.0, 0.0, 0.0, 1.0])
-        orthographic = self.camera.kind == "ORTHOGRAPHIC"
         x, y = affine(right_axis), affine(up)
         start, end = self.camera.clip_start, self.camera.clip_end
         if orthographic:
@@ -92,6 +92,11 @@ class View:
             far = max(end, start + 1e-6)
             q = (one * far - depth) / (far - start)
             near = 1.0
+            x, y = x + shear[0] * depth, y + shear[1] * depth
+            backward = (
+                backward + shear[0] * right_axis + shear[1] * up
+            )  # to where the picture's parallel rays come from
+            backward = backward / np.linalg.norm(backward)
         else:
             w, centre, q = depth, depth, one
             # A tiny clip start would leave the depth buffer no precision; geometry closer than three

@@ -52,8 +52,6 @@ def camera_of_scene(
 def camera_notes(camera, render) -> tuple[Note, ...]:
     """What the camera object asks for that no technique draws; `render` is scene.render."""
     subject, notes = f"Camera '{camera.name}'", []
-    if camera.data.dof.use_dof and camera.data.type == "ORTHO":
-        notes.append(Note(subject, "depth of field is drawn for perspective cameras only; all is in focus."))
     if render.use_motion_blur:
         notes.append(Note(subject, "motion blur is not drawn; the picture shows the frame's own moment."))
     return tuple(notes)
@@ -116,14 +114,16 @@ def _frame(
 def _aperture(camera) -> Aperture | None:
     """The lens of an evaluated camera object; None where depth of field is off or would change nothing."""
     dof = camera.data.dof
-    if not dof.use_dof or camera.data.type != "PERSP":
+    if not dof.use_dof or camera.data.type not in ("PERSP", "ORTHO"):
         return None
     focus = dof.focus_distance
     if dof.focus_object is not None:
         placed = np.array(camera.matrix_world, np.float64)
         towards = np.array(_focus_point(dof), np.float64) - placed[:3, 3]
         focus = abs(float(towards @ _rigid(placed)[:3, 2]))
-    radius = 0.001 * camera.data.lens / (2.0 * max(dof.aperture_fstop, 1e-5))
+    # An orthographic camera has no focal length; as in Cycles its aperture is that of one of a metre.
+    length = 0.001 * camera.data.lens if camera.data.type == "PERSP" else 1.0
+    radius = length / (2.0 * max(dof.aperture_fstop, 1e-5))
     # What is in focus at the eye itself is in focus nowhere; as in Cycles the picture stays sharp then.
     if not (np.isfinite(focus) and np.isfinite(radius) and focus > 1e-6 and radius > 0.0):
         return None

@@ -193,6 +193,11 @@ class World:
     visibility: Visibility = Visibility()
     medium: Medium | None = None  # what fills all space
 
+    @property
+    def even(self) -> bool:
+        """Whether it has the same colour all around."""
+        return self.image is None and self.graph is None
+
 
 @dataclass(frozen=True)
 class Film:

@@ -181,6 +181,7 @@ class EnvironmentLight(Technique):
             + lights.TRACED_FLAG
             + lights.DIFFUSE_FLAG * seen.diffuse
             + lights.GLOSSY_FLAG * seen.glossy
+            + lights.EVEN_FLAG * frame.snapshot.world.even
         )
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         rate = directions_rate(frame)

@@ -17,7 +17,7 @@ void main()
   point.ray = RAY_SHADOW;
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u));
   bits = hash3(uvec3(bits.x, uint(gl_PrimitiveID), uint(sample_index)));
-  Closures c = closures_begin(point.normal, to_unit(bits.y));
+  Closures c = closures_begin(point.normal, to_unit(bits.y), 0.0);
   evaluate_material(point, c);
   closures_end(c);
   if (to_unit(bits.x) < dot(c.transparency, vec3(1.0 / 3.0))) {

@@ -24,16 +24,16 @@ float soft_lobe_albedo(Surface s)
 }
 
 // What a rough diffuse surface reflects of even light to all sides: less than its colour says, of dark ones a sixth.
-vec3 rough_albedo(vec3 color, float roughness)
+vec3 rough_albedo(vec3 albedo, float weight, float roughness)
 {
   float average = oren_nayar_average(roughness);
-  vec3 rho = clamp(color, vec3(0.0), vec3(1.0));
-  return color * average / (vec3(1.0) - rho * (1.0 - average));
+  vec3 rho = clamp(albedo / weight, vec3(0.0), vec3(1.0));
+  return albedo * average / (vec3(1.0) - rho * (1.0 - average));
 }
 
 vec3 surface_albedo(Surface s, float mu)
 {
-  vec3 albedo = rough_albedo(s.diffuse, s.diffuse_roughness);
+  vec3 albedo = rough_albedo(s.diffuse, s.diffuse_weight, s.diffuse_roughness);
   if (s.kind > LOBE_REFRACTION) {
     albedo += s.glossy_weight * soft_lobe_albedo(s);
   }
@@ -93,7 +93,7 @@ vec3 reflection_of(Reflection r, vec3 normal, vec3 light, vec3 viewer)
   float nv = dot(normal, viewer);
   // A loop, since a rasteriser in software skips loops that no pixel enters, but no branches.
   for (float rough = min(r.rough, min(nl, nv) * 1e5); rough > 1e-4; rough = 0.0) {
-    sum = diffuse_reflection(r.diffuse, r.rough, normal, viewer, light) / nl;
+    sum = diffuse_reflection(r.diffuse, 1.0, r.rough, normal, viewer, light) / nl;
   }
   if (max_component(r.grazing) > 0.0 && nl > 0.0 && nv > 0.0) {
     vec3 middle = safe_normalize(light + viewer);

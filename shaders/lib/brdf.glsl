@@ -6,7 +6,7 @@
 #include "lib/gbuffer.glsl"
 
 // Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model. That term depends on
-// the colour; below a layer it gets the colour times what the layer leaves, which darkens it (plastic: 0.6 % at most).
+// the colour: the albedo without the weight of a mix and what a layer leaves.
 float oren_nayar_albedo_term(float c)
 {
   c = clamp(c, 0.0, 1.0);
@@ -25,7 +25,7 @@ float oren_nayar_average(float roughness)
   return (PI + sigma * (2.0 * PI - 5.6) / 3.0) / (PI + sigma * (PI * 0.5 - 2.0 / 3.0));
 }
 
-vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, vec3 light)
+vec3 diffuse_reflection(vec3 albedo, float weight, float roughness, vec3 normal, vec3 view, vec3 light)
 {
   float nl = max(dot(normal, light), 0.0);
   if (roughness < 1e-5) {
@@ -42,7 +42,7 @@ vec3 diffuse_reflection(vec3 albedo, float roughness, vec3 normal, vec3 view, ve
   float view_term = PI * a + b * oren_nayar_albedo_term(nv);
   float light_term = PI * a + b * oren_nayar_albedo_term(nl);
   float average = oren_nayar_average(sigma);
-  vec3 rho = clamp(albedo, vec3(0.0), vec3(1.0));
+  vec3 rho = clamp(albedo / weight, vec3(0.0), vec3(1.0));
   vec3 multiple = rho * rho * (average / (PI * max(1.0 - average, 1e-6))) / max(vec3(1.0) - rho * (1.0 - average), vec3(1e-6));
   return albedo * (nl * (a + b * t)) + albedo * multiple * (nl * (1.0 - view_term) * (1.0 - light_term));
 }
@@ -63,7 +63,7 @@ float bump_shadowing(Surface s, vec3 light)
 // f * cos of the diffuse closure.
 vec3 surface_diffuse_reflection(Surface s, vec3 view, vec3 light)
 {
-  return diffuse_reflection(s.diffuse, s.diffuse_roughness, s.normal, view, light) * bump_shadowing(s, light);
+  return diffuse_reflection(s.diffuse, s.diffuse_weight, s.diffuse_roughness, s.normal, view, light) * bump_shadowing(s, light);
 }
 
 // A lobe of microfacets in its own frame: z along the normal, x along the tangent. Energy compensation is in `scale`.

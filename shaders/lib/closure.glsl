@@ -1,6 +1,6 @@
 // Closures: what a surface point does with light, collected while the material graph is walked.
-// Diffuse weights add up. Of several other lobes (glossy, refraction, sheen, translucent, toon) one is kept per sample with
-// probability proportional to its weight (reservoir sampling) and carries all of their weight, so the lobes stay apart
+// Diffuse weights add up where they may. Of several other lobes (glossy, refraction, sheen, translucent, toon) one is kept per sample with
+// probability by its weight (reservoir sampling) and carries all of their weight, so the lobes stay apart
 // and the mean is exact.
 #include "lib/math.glsl"
 #include "lib/surface_point.glsl"
@@ -61,9 +61,13 @@ float lobe_roughness(vec2 alpha)
 
 struct Closures {
   vec3 base_normal;       // of the surface as it is displaced, before a shader's own normal bumps it
-  vec3 diffuse;           // albedo weight
+  vec3 diffuse;           // albedo
+  float diffuse_weight;   // the part of it that is no colour: of a mix, or what a layer leaves
   float diffuse_roughness;
   vec3 diffuse_normal;
+  float diffuse_sum;      // reservoir state
+  float diffuse_kept;
+  bool diffuse_apart;     // closures of several normals or roughnesses
   vec3 emission;          // radiance
   vec3 transparency;      // fraction that passes straight through
   float holdout;
@@ -78,16 +82,25 @@ struct Closures {
   vec3 glossy_normal;
   int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
   float glossy_sum;       // reservoir state
+  float glossy_count;
+  float glossy_chance;    // that the lobe that is kept was to be
+  float even_share;       // of that chance, which all lobes have alike
   float random;           // uniform 0..1, reused by rescaling
 };
 
-Closures closures_begin(vec3 normal, float random_number)
+// `even_share`: of a lobe's chance to be kept, which all lobes have alike. Without, a faint lobe beside a strong one would be
+// kept in one sample of hundreds, and its own pass, and the highlights of lamps in it, would be noise.
+Closures closures_begin(vec3 normal, float random_number, float even_share)
 {
   Closures c;
   c.base_normal = normal;
   c.diffuse = vec3(0.0);
+  c.diffuse_weight = 0.0;
   c.diffuse_roughness = 0.0;
   c.diffuse_normal = normal;
+  c.diffuse_sum = 0.0;
+  c.diffuse_kept = 0.0;
+  c.diffuse_apart = false;
   c.emission = vec3(0.0);
   c.transparency = vec3(0.0);
   c.holdout = 0.0;
@@ -102,22 +115,43 @@ Closures closures_begin(vec3 normal, float random_number)
   c.glossy_normal = normal;
   c.distribution = DISTRIBUTION_MULTI_GGX;
   c.glossy_sum = 0.0;
+  c.glossy_count = 0.0;
+  c.glossy_chance = 1.0;
+  c.even_share = even_share;
   c.random = random_number;
   return c;
 }
 
-void closure_diffuse(inout Closures c, vec3 weight, float roughness, vec3 normal)
+// Closures with one normal and roughness add up. Of others one is kept with all of their weight, so that the mean is exact.
+void closure_diffuse(inout Closures c, vec3 weight, vec3 color, float roughness, vec3 normal)
 {
+  vec3 albedo = weight * color;
   // Weights near the end of float32 add up to infinity, of which there is no share.
-  float before = min(dot(c.diffuse, vec3(1.0)), 1e30);
-  float added = min(dot(weight, vec3(1.0)), 1e30);
+  float added = min(dot(albedo, vec3(1.0)), 1e30);
   if (!(added > 0.0)) {
     return;
   }
-  float share = added / (before + added);
-  c.diffuse += weight;
-  c.diffuse_roughness = mix(c.diffuse_roughness, roughness, share);
-  c.diffuse_normal = normalize(mix(c.diffuse_normal, normal, share) + vec3(0.0, 0.0, 1e-20));
+  float total = min(c.diffuse_sum + added, 1e30);
+  float share = added / total;
+  bool alike = abs(roughness - c.diffuse_roughness) < 1e-3 && dot(normal, c.diffuse_normal) > 0.9999;
+  if (c.diffuse_sum > 0.0 && (c.diffuse_apart || !alike)) {
+    c.diffuse_apart = true;
+    if (c.random < share) {
+      c.diffuse_kept = 0.0;
+      c.diffuse = vec3(0.0);
+      c.diffuse_weight = 0.0;
+    }
+    c.random = (c.random < share) ? c.random / share : (c.random - share) / max(1.0 - share, 1e-7);
+    c.random = min(c.random, 0.9999999);
+  }
+  c.diffuse_sum = total;
+  if (!c.diffuse_apart || c.diffuse_kept == 0.0) {
+    c.diffuse += albedo;
+    c.diffuse_kept += added;
+    c.diffuse_weight = min(c.diffuse_weight + max(max(weight.x, weight.y), weight.z), 1e30);
+    c.diffuse_roughness = roughness;
+    c.diffuse_normal = normal;
+  }
 }
 
 // True if this lobe replaces the one that is kept; the caller then fills in the lobe.
@@ -129,11 +163,14 @@ bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
     return false;
   }
   c.glossy_sum += w;
-  float p = w / c.glossy_sum;
+  c.glossy_count += 1.0;
+  float p = mix(w / c.glossy_sum, 1.0 / c.glossy_count, c.even_share);
   if (c.random < p) {
     c.random = min(c.random / p, 0.9999999);
+    c.glossy_chance = p;
     return true;
   }
+  c.glossy_chance *= 1.0 - p;
   c.random = min((c.random - p) / max(1.0 - p, 1e-7), 0.9999999);
   return false;
 }
@@ -145,9 +182,7 @@ bool closure_glossy(inout Closures c, vec3 weight, float importance, int kind, v
   bool chosen = closure_glossy_choose(c, weight, importance);
   if (chosen) {
     c.kind = kind;
-    // Kept with probability w / glossy_sum: the division by it is completed in closures_end, when the sum is final.
-    float w = max(max(weight.x, weight.y), weight.z) * max(importance, 1e-4);
-    c.glossy_weight = weight / w;
+    c.glossy_weight = weight;  // to be divided by the chance of it in closures_end, when that is final
     c.glossy_tint = tint;
     c.glossy_edge = edge;
     c.glossy_ior = ior;
@@ -178,7 +213,11 @@ vec3 finite_or_black(vec3 color)
 
 void closures_end(inout Closures c)
 {
-  c.glossy_weight = finite_or_black(c.glossy_weight * c.glossy_sum);
+  if (c.diffuse_apart) {
+    c.diffuse *= c.diffuse_sum / c.diffuse_kept;
+    c.diffuse_weight *= c.diffuse_sum / c.diffuse_kept;
+  }
+  c.glossy_weight = finite_or_black(c.glossy_weight / max(c.glossy_chance, 1e-30));
   c.diffuse = finite_or_black(c.diffuse);
   c.emission = finite_or_black(c.emission);
   c.transparency = finite_or_black(c.transparency);

@@ -1,12 +1,13 @@
 // How a surface's closures are laid out in the images of the surface pass (surface.*), written and read here.
 //
 //   position  xyz relative to the render origin; w: 0 nothing hit, 1 surface, up to 2 held out
-//   normal    octahedral shading normal of the diffuse closure (xy) and of the triangle (zw; in the last bits smooth_lift)
+//   normal    octahedral shading normal of the diffuse closure (xy; of a rough one its weight in the last bits) and of the
+//             triangle (zw; in the last bits smooth_lift)
 //   diffuse   albedo; w: diffuse roughness, anisotropy, turn of the tangent, 8 bits each
 //   tint      weight of the lobe; w: square root of its reflectance at normal incidence, 8 bits each
 //   lobe      octahedral glossy normal (xy); z: kind of lobe (3 bits) and edge reflectance (7 bits each); w: ior, below 0
 //             for distributions other than GGX with multiple scattering
-//   emission  radiance; w: glossy roughness
+//   emission  radiance; w: roughness of the lobe; of a translucent one, which has none, how far below (smooth_lift)
 //
 // Colours stand alone in rgb so that transparent layers in front can tint them by blending (techniques/surfaces.py);
 // where nothing was hit, emission holds what those layers let through.
@@ -21,8 +22,10 @@ struct Surface {
   vec3 geometric_normal;  // on the viewer's side
   vec3 normal;            // of the diffuse closure
   float lift;             // how high above its triangle a smooth surface runs, see smooth_lift
+  float sink;             // and how far below it, where light shines through
   float diffuse_roughness;
-  vec3 diffuse;
+  vec3 diffuse;           // albedo
+  float diffuse_weight;   // of a rough one the part of it that is no colour: of a mix, or what a layer leaves
   vec3 emission;
   float holdout;
   float bump;             // how far a normal map or bump turns the diffuse closure's normal, see bump_encode
@@ -67,26 +70,55 @@ float bump_encode(float holdout, vec3 normal, vec3 bumped, bool displaced)
   return 1.0 + holdout + 2.0 * stored;
 }
 
-// A length beside an octahedral normal: the normal stands on a grid of 2^-16, beneath whose steps 7 bits of either
-// coordinate hold the length's logarithm. Whoever reads the normal alone is 1e-5 off.
-#define LIFT_GRID 65536.0
-#define LIFT_BITS 128.0
+// Numbers beside an octahedral normal: the normal stands on a grid of 2^-16, beneath whose steps 7 bits of either coordinate
+// hold one of 0 to 127. Whoever reads the normal alone is 1e-5 off.
+#define BESIDE_GRID 65536.0
+#define BESIDE_BITS 128.0
+
+vec2 beside_encode(vec2 octahedral, vec2 numbers)
+{
+  return (floor(octahedral * BESIDE_GRID + 0.5) + numbers / BESIDE_BITS) / BESIDE_GRID;
+}
+
+vec2 beside_decode(vec2 stored)
+{
+  return floor(fract(stored * BESIDE_GRID) * BESIDE_BITS + 0.5);
+}
+
+// A length by its logarithm.
+#define LIFT_STEPS (BESIDE_BITS * BESIDE_BITS - 1.0)
 #define LIFT_OCTAVES 64.0  // from 2^-40 on
 
 vec2 lift_encode(vec2 octahedral, float lift)
 {
-  float steps = LIFT_BITS * LIFT_BITS - 1.0;
-  float code = (lift > 0.0) ? clamp(floor((log2(lift) + 40.0) * (steps / LIFT_OCTAVES) + 0.5), 1.0, steps) : 0.0;
-  float high = floor(code / LIFT_BITS);
-  return (floor(octahedral * LIFT_GRID + 0.5) + vec2(high, code - high * LIFT_BITS) / LIFT_BITS) / LIFT_GRID;
+  float code = 0.0;
+  if (lift > 0.0) {
+    code = clamp(floor((log2(lift) + 40.0) * (LIFT_STEPS / LIFT_OCTAVES) + 0.5), 1.0, LIFT_STEPS);
+  }
+  float high = floor(code / BESIDE_BITS);
+  return beside_encode(octahedral, vec2(high, code - high * BESIDE_BITS));
 }
 
 float lift_decode(vec2 stored)
 {
-  vec2 bits = floor(fract(stored * LIFT_GRID) * LIFT_BITS + 0.5);
-  float code = bits.x * LIFT_BITS + bits.y;
-  float steps = LIFT_BITS * LIFT_BITS - 1.0;
-  return (code > 0.0) ? exp2(code * (LIFT_OCTAVES / steps) - 40.0) : 0.0;
+  vec2 numbers = beside_decode(stored);
+  float code = numbers.x * BESIDE_BITS + numbers.y;
+  return (code > 0.0) ? exp2(code * (LIFT_OCTAVES / LIFT_STEPS) - 40.0) : 0.0;
+}
+
+// The diffuse closure's normal, and its weight where that matters. Several added up may weigh more than 1.
+#define WEIGHT_STEPS 64.0
+
+vec2 diffuse_normal_encode(vec3 normal, float weight, float roughness)
+{
+  float code = clamp(floor(weight * WEIGHT_STEPS + 0.5), 1.0, BESIDE_BITS - 1.0);
+  vec2 octahedral = octahedral_encode(normal);
+  return (roughness > 0.0) ? beside_encode(octahedral, vec2(code, 0.0)) : octahedral;
+}
+
+float diffuse_weight_decode(vec2 stored, float roughness)
+{
+  return (roughness > 0.0) ? max(beside_decode(stored).x, 1.0) / WEIGHT_STEPS : 1.0;
 }
 
 // Three numbers in 0..1 in one float, `steps` + 1 levels each; and back.
@@ -160,6 +192,7 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.diffuse = diffuse.xyz;
   vec3 shape = unpack_three(diffuse.w, 255.0);
   s.diffuse_roughness = shape.x;
+  s.diffuse_weight = diffuse_weight_decode(normal.xy, shape.x);
   s.glossy_anisotropy = shape.y;
   s.tangent_angle = shape.z;
   s.glossy_weight = tint.xyz;
@@ -173,6 +206,7 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   vec3 root = unpack_three(tint.w, 255.0);
   s.glossy_tint = root * root * stored_tint_scale(s.kind, s.glossy_ior);
   s.emission = emission.xyz;
-  s.glossy_roughness = emission.w;
+  s.glossy_roughness = (s.kind == LOBE_TRANSLUCENT) ? 1.0 : emission.w;
+  s.sink = (s.kind == LOBE_TRANSLUCENT) ? emission.w : 0.0;
   return s;
 }

@@ -1,6 +1,6 @@
 // Instances from the instance image, eight texels each: three rows of the matrix; random number, pass index, flags,
-// orientation; the object's colour; place on the instancer (generated, first of UV), second of UV, and the object's offset
-// against the shadow terminator; one is free.
+// orientation; the object's colour; place on the instancer (generated, first of UV), second of UV, the object's offset
+// against the shadow terminator, and whether others share its mesh; one is free.
 
 #define FLAG_CAMERA 1
 #define FLAG_SHADOW 2
@@ -58,6 +58,12 @@ vec3 instance_normal(Instance instance, vec3 local)
   return instance.mirrored ? -n : n;
 }
 
+// How many times a volume is as large in world space.
+float instance_volume(Instance instance)
+{
+  return abs(dot(instance.row0.xyz, cross(instance.row1.xyz, instance.row2.xyz)));
+}
+
 // The object's colour, and where on its instancer an instance stands: generated coordinates and UV.
 void instance_extras(int id, out vec4 color, out vec3 generated, out vec2 uv)
 {
@@ -71,6 +77,11 @@ void instance_extras(int id, out vec4 color, out vec3 generated, out vec2 uv)
 float instance_terminator(int id)
 {
   return instances_fetch(instance_place(id) + ivec2(6, 0)).y;
+}
+
+bool instance_shares_mesh(int id)
+{
+  return instances_fetch(instance_place(id) + ivec2(6, 0)).z > 0.5;
 }
 
 bool instance_seen(Instance instance)

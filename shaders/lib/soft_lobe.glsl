@@ -16,6 +16,8 @@ struct SoftLobe {
   vec3 view;
   vec3 normal;
   vec3 tangent;   // sheen: towards the viewer; toon: the axis of the cone
+  vec3 base;      // the surface's normal without the shader's own bump
+  float bump;     // alpha squared of microfacets that deviate as `normal` does from it
 };
 
 SoftLobe soft_lobe_begin(Surface s, vec3 view)
@@ -29,9 +31,14 @@ SoftLobe soft_lobe_begin(Surface s, vec3 view)
   lobe.view = view;
   lobe.normal = s.glossy_normal;
   lobe.tangent = s.glossy_normal;
+  lobe.base = (s.bump > 0.0) ? s.base_normal : s.normal;
+  lobe.bump = 0.0;
   if (!lobe.exists) {
     return lobe;
   }
+  vec3 off = lobe.normal - lobe.base;
+  float deviation = max(abs(dot(lobe.normal, lobe.base)), 1e-3);
+  lobe.bump = (dot(off, off) > 1e-8) ? clamp(0.125 * (1.0 / (deviation * deviation) - 1.0), 0.0, 1.0) : 0.0;
   float mu = dot(lobe.normal, view);
   if (s.kind == LOBE_SHEEN) {
     vec3 terms = sheen_terms(mu, s.glossy_roughness);
@@ -83,8 +90,22 @@ float toon_reflection(SoftLobe lobe, vec3 light)
   return shade / (2.0 * PI * max(1.0 - cos(outer), 1e-6));
 }
 
-// f * cos for a light direction in world space.
-vec3 soft_reflection(SoftLobe lobe, vec3 light)
+// As bump_shadowing (lib/brdf.glsl): nothing passes between a surface and its own bumps, and what is diffuse is dimmed.
+float soft_bump_shadowing(SoftLobe lobe, vec3 light)
+{
+  if (lobe.bump <= 0.0) {
+    return 1.0;
+  }
+  float cosine = dot(lobe.base, light);
+  if (cosine * dot(lobe.normal, light) <= 0.0) {
+    return 0.0;
+  }
+  cosine = max(abs(cosine), 1e-6);
+  return lobe.glossy ? 1.0 : 2.0 / (1.0 + sqrt(1.0 + lobe.bump * (1.0 / (cosine * cosine) - 1.0)));
+}
+
+// f * cos for a light direction in world space, without bumps.
+vec3 soft_shape(SoftLobe lobe, vec3 light)
 {
   float z = dot(lobe.normal, light);
   if (lobe.kind == LOBE_SHEEN) {
@@ -101,4 +122,10 @@ vec3 soft_reflection(SoftLobe lobe, vec3 light)
     return lobe.weight * (max(-z, 0.0) / PI);
   }
   return lobe.weight * toon_reflection(lobe, light);
+}
+
+// f * cos for a light direction in world space.
+vec3 soft_reflection(SoftLobe lobe, vec3 light)
+{
+  return soft_shape(lobe, light) * soft_bump_shadowing(lobe, light);
 }

@@ -9,6 +9,7 @@
 // KNOWN_IRRADIANCE: the lights are directions of the world, whose irradiance is known where nothing is in the way
 // (lib/known_irradiance.glsl); what arrived of the light that was drawn, and that, are left in w, for light/openness.
 #include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
 #include "lib/brdf.glsl"
 #ifdef SOFT_LOBES
 #include "lib/soft_lobe.glsl"
@@ -29,6 +30,20 @@ vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
   vec3 raised = (cosine > 0.05) ? direction : safe_normalize(direction + s.normal * (0.05 - cosine));
   vec3 share = surface_diffuse_reflection(s, to_viewer, raised);
   return share * irradiance / max(dot(s.normal, raised), 1e-3);
+}
+
+// How far off the triangle light from `direction` finds the surface that is meant. Cycles lifts rays that it draws from the
+// world's own light, of which a single colour has none, and not those that it draws from the surface; power heuristic.
+float meant_height(Light light, ivec2 pixel, float lift, vec3 normal, vec3 direction)
+{
+  if (lift <= 0.0 || !LIGHT_IS(light, LIGHT_DIRECTION)) {
+    return lift;
+  }
+  float of_surface = max(dot(normal, direction), 0.0) / PI;
+  float of_world = max(light.area, 0.25 / PI);  // without what guides it to where receivers see the world
+  float share = of_world * of_world / (of_world * of_world + of_surface * of_surface);
+  bool lifted = to_unit(roll_of(pixel, film_view.sample_index, film_view.seed, 31).x) < share;
+  return (lifted && (light.flags & LIGHT_EVEN) == 0) ? lift : 0.0;
 }
 
 void main()
@@ -75,7 +90,6 @@ void main()
     int parts = by_points ? (whole ? WHOLE_PARTS : 1) : 0;
     vec3 from_diffuse = vec3(0.0);
     vec3 from_glossy = vec3(0.0);
-    vec3 facing = s.geometric_normal;
     vec3 towards = vec3(0.0);
 #ifdef KNOWN_IRRADIANCE
     vec3 falling = vec3(0.0);
@@ -105,7 +119,9 @@ void main()
       }
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       towards = whole ? towards : direction;
-      if (on_glossy && (s.lift > 0.0 || dot(direction, s.geometric_normal) > 0.0)) {
+      // None between a surface and the mirror's normal that was bent up from it (reflecting_normal).
+      bool in_front = s.bump > 0.0 || dot(direction, s.normal) > 0.0;
+      if (on_glossy && in_front && (s.lift > 0.0 || dot(direction, s.geometric_normal) > 0.0)) {
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
         if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
@@ -120,16 +136,20 @@ void main()
         vec3 from_soft = soft_reflection(soft, direction) * arriving;
         from_diffuse += ((light.flags & LIGHT_DIFFUSE) != 0 && !soft.glossy) ? from_soft : vec3(0.0);
         from_glossy += ((light.flags & LIGHT_GLOSSY) != 0 && soft.glossy) ? from_soft : vec3(0.0);
-        if (soft.kind == LOBE_TRANSLUCENT && dot(direction, s.geometric_normal) < 0.0) {
-          facing = -s.geometric_normal;
-        }
       }
 #endif
     }
     if (max_component(abs(from_diffuse) + abs(from_glossy)) > 0.0) {
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        vec3 start = light_start(s.position, s.normal, s.geometric_normal, s.lift, towards, facing);
+        float side = 1.0;
+#ifdef SOFT_LOBES
+        // What shines through arrives at the other side of the surface that is meant, whichever side of the triangle that is.
+        side = (soft.exists && soft.kind == LOBE_TRANSLUCENT && dot(s.normal, towards) < 0.0) ? -1.0 : 1.0;
+#endif
+        vec3 facing = side * s.geometric_normal;
+        float lift = meant_height(light, pixel, (side < 0.0) ? s.sink : s.lift, side * s.normal, towards);
+        vec3 start = light_start(s.position, side * s.normal, facing, lift, towards, facing);
         visibility = light_visibility(light, pixel, start, facing);
       }
       diffuse += from_diffuse * visibility;

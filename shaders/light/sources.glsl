@@ -30,6 +30,7 @@
 #define LIGHT_TRACED 32  // rays of narrow lobes look for it (light/traced.frag.glsl)
 #define LIGHT_TRANSMISSION 256
 #define LIGHT_SIDED 512
+#define LIGHT_EVEN 1024
 
 // What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/frame/lights.py). What
 // is left out some drivers would compute and mask.

@@ -1,7 +1,8 @@
 // Where a ray to a light begins on a smooth-shaded surface of few triangles, which shades as a curved one would but casts
 // shadows as it is: without more, light ends at edges of triangles. As Cycles does (Object > Shading > Shadow Terminator,
 // Geometry Offset .1): for light that comes in along the triangle or from below it, the ray begins where the curved surface
-// would be (after Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021).
+// would be (after Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021). For light that shines through, all of
+// it is turned around.
 #define TERMINATOR_CUTOFF 0.1
 
 // `facing`: the plane on which the receiver lies, for what asks maps.

@@ -14,6 +14,13 @@ float visibility_at(ivec2 pixel, int index)
   vec3 position = surface_position_fetch(pixel).xyz;
   vec3 facing = octahedral_decode(normals.zw);
   vec3 towards = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - position);
-  vec3 start = light_start(position, octahedral_decode(normals.xy), facing, lift_decode(normals.zw), towards, facing);
+  vec3 normal = octahedral_decode(normals.xy);
+  float lift = lift_decode(normals.zw);
+  if (dot(normal, towards) < 0.0) {  // light that shines through arrives at the other side
+    normal = -normal;
+    facing = -facing;
+    lift = 0.0;
+  }
+  vec3 start = light_start(position, normal, facing, lift, towards, facing);
   return light_visibility(light, pixel, start, facing);
 }

@@ -105,7 +105,7 @@ vec3 add_sheen(inout Closures closures, SurfacePoint point, vec3 weight, float r
 
 void shader_diffuse(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
 {
-  closure_diffuse(closures, weight * max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));
+  closure_diffuse(closures, weight, max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));
 }
 
 void shader_sheen(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
@@ -122,7 +122,7 @@ void shader_velvet(inout Closures closures, SurfacePoint point, vec3 weight, vec
 void shader_translucent(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 normal)
 {
   add_soft(closures, LOBE_TRANSLUCENT, weight * max(color, vec3(0.0)), 1.0, 0.0, vec3(1.0),
-           unit_or(normal, point.normal));
+           reflecting_normal(point, unit_or(normal, point.normal)));
 }
 
 void shader_toon(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float size, float smoothness,
@@ -378,5 +378,5 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
     add_soft(closures, LOBE_TRANSLUCENT, w * base * forward, 1.0, 0.0, vec3(1.0), n);
     w *= 1.0 - forward;
   }
-  closure_diffuse(closures, w * base, clamp(diffuse_roughness, 0.0, 1.0), n);
+  closure_diffuse(closures, w, base, clamp(diffuse_roughness, 0.0, 1.0), n);
 }

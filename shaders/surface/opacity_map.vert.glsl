@@ -8,7 +8,7 @@ void main()
   Instance instance = instance_read(first_instance);
   world_position = instance_position(instance, position);
   world_normal = instance_normal(instance, normal);
-  normal_height = 0.0;
+  normal_heights = vec3(0.0);
   // Tiles run anticlockwise, so that their front is drawn: the second number turns it around.
   instance_flat = ivec2(first_instance, gl_InstanceID & 1);
   sample_flat = gl_InstanceID >> 1;

@@ -17,16 +17,21 @@ vec2 window_steps(vec3 step, vec3 plane_normal)
   return (area != 0.0) ? vec2(dot(cross(step, y), plane_normal), dot(cross(x, step), plane_normal)) / area : vec2(0.0);
 }
 
-// How high above its triangle a smooth-shaded surface is meant to run: with barycentric coordinates b, corners V and
-// normals N the parabola  sum over edges of b_i b_j (V_j - V_i) . (N_j - N_i),  which is what V . N, interpolated, is more
-// than the point's own. Zero where normals do not diverge towards the viewer.
-float smooth_lift(Instance instance, bool back)
+// How high above its triangle (x) and how far below it (y) a smooth-shaded surface is meant to run, on the viewer's side.
+// With barycentric coordinates b, corners V and normals N the parabola  sum over edges of b_i b_j (V_j - V_i) . (N_j - N_i),
+// which is what V . N, interpolated, is more than the point's own; and where normals lean together, up to the plane through
+// the corner that lies furthest along them (addon/frame/envelope.py).
+vec2 smooth_lift(Instance instance, bool back)
 {
   float reach = length(world_normal);
+  if (reach <= 0.0) {
+    return vec2(0.0);
+  }
   vec3 from_origin = world_position - instance_origin(instance);
-  float height = (normal_height - dot(from_origin, world_normal)) / max(reach, 1e-30);
-  height = back ? -height : height;
-  return (reach > 0.0 && height > 4e-6 * length(from_origin)) ? height : 0.0;
+  float height = (normal_heights.x - dot(from_origin, world_normal)) / reach;
+  vec2 lift = max(vec2(height, -height), normal_heights.yz / reach);
+  lift *= step(vec2(4e-6 * length(from_origin)), lift);
+  return back ? lift.yx : lift;
 }
 
 // The point that a mesh fragment shades. Both normals are turned to the viewer's side, as Cycles does.

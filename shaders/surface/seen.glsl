@@ -11,7 +11,7 @@ Closures closures_seen(vec3 incoming, int ray, out bool behind)
   SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
   point.ray = ray;
   behind = point.backfacing;
-  Closures c = closures_begin(point.normal, 0.5);
+  Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);
   closures_end(c);
   return c;

@@ -7,6 +7,10 @@
 #include "generated/material"
 #include "surface/point.glsl"
 
+// Pictures of few samples are about all light together, and lobes in proportion to their light serve that best.
+#define FIRST_EVEN 16
+#define EVEN_SHARE 0.125
+
 void main()
 {
   vec3 eye = film_view.eye.xyz;
@@ -21,7 +25,8 @@ void main()
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
-  Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z));
+  float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
+  Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z), even_share);
   evaluate_material(point, c);
   closures_end(c);
 
@@ -48,13 +53,15 @@ void main()
 
   bool displaced = dot(c.base_normal, point.mesh_normal) < 0.9999;
   out_position = vec4(world_position, bump_encode(holdout, c.base_normal, c.diffuse_normal, displaced));
-  float lift = (instance_terminator(instance_flat.x) > 0.0) ? smooth_lift(instance, point.backfacing) : 0.0;
-  out_normal = vec4(octahedral_encode(c.diffuse_normal), lift_encode(octahedral_encode(point.geometric_normal), lift));
+  vec2 lift = (instance_terminator(instance_flat.x) > 0.0) ? smooth_lift(instance, point.backfacing) : vec2(0.0);
+  float rough = floor(clamp(c.diffuse_roughness, 0.0, 1.0) * 255.0 + 0.5) / 255.0;  // as it will be read
+  out_normal = vec4(diffuse_normal_encode(c.diffuse_normal, c.diffuse_weight * covered, rough),
+                    lift_encode(octahedral_encode(point.geometric_normal), lift.x));
   out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, half_turns), 255.0));
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
   out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
                   ior_encode(c.glossy_ior, c.distribution));
-  out_emission = vec4(c.emission * covered, c.glossy_roughness);
+  out_emission = vec4(c.emission * covered, (c.kind == LOBE_TRANSLUCENT) ? lift.y : c.glossy_roughness);
   if (index_shown >= 0) {
     out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
   }

@@ -8,8 +8,13 @@ void main()
   int id = first_instance + local_instance + gl_InstanceID;
   Instance instance = instance_read(id);
   world_position = instance_position(instance, position);
-  world_normal = instance_normal(instance, normal);
-  normal_height = dot(world_position - instance_origin(instance), world_normal);
+  // Between corners normals run as Cycles has them: of unit length in world space where no other object shows this mesh.
+  vec3 turned = instance_normal(instance, normal);
+  float unit = instance_shares_mesh(id) ? 1.0 : 1.0 / max(length(turned), 1e-30);
+  world_normal = turned * unit;
+  // Of lengths along normals, a transform by cofactors makes those in world space times its determinant.
+  normal_heights.x = dot(world_position - instance_origin(instance), world_normal);
+  normal_heights.yz = (instance_volume(instance) * unit) * envelope;
   instance_flat = ivec2(id, instance.mirrored ? 1 : 0);
   copy_attributes();
   gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);

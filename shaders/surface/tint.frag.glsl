@@ -24,7 +24,7 @@ void main()
   vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
   SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
   point.refracts = glass_bends != 0;
-  Closures c = closures_begin(point.normal, 0.5);
+  Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);
   closures_end(c);
   float mean = dot(c.transparency, vec3(1.0 / 3.0));

@@ -34,7 +34,7 @@ SurfacePoint world_point(vec3 direction, int ray)
 vec3 world_radiance(vec3 direction, int ray)
 {
   SurfacePoint point = world_point(direction, ray);
-  Closures c = closures_begin(point.normal, 0.5);
+  Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);
   closures_end(c);
   return c.emission;

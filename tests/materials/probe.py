@@ -58,7 +58,7 @@ void main()
     point.attributes_dx[i] = vec4(0.0);
     point.attributes_dy[i] = vec4(0.0);
   }
-  Closures c = closures_begin(point.normal, texelFetch(points, ivec2(3, row), 0).y);
+  Closures c = closures_begin(point.normal, texelFetch(points, ivec2(3, row), 0).y, 0.0);
   evaluate_material(point, c);
   closures_end(c);
   float mu = clamp(dot(c.glossy_normal, point.incoming), 0.0, 1.0);

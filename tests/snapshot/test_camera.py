@@ -135,13 +135,15 @@ def test_a_focus_at_the_eye_blurs_nothing(stage):
     assert stage.take().camera.aperture is None
 
 
-def test_depth_of_field_without_perspective_and_motion_blur_are_named(stage):
+def test_an_orthographic_aperture_has_no_focal_length(stage):
     lens = stage.camera().data
-    lens.type, lens.dof.use_dof = "ORTHO", True
+    lens.type, lens.dof.use_dof, lens.dof.aperture_fstop = "ORTHO", True, 4.0
+    assert stage.take().camera.aperture.radius == pytest.approx(1 / 8)
+
+
+def test_motion_blur_is_named(stage):
     stage.scene.render.use_motion_blur = True
-    said = [note.text for note in stage.take().notes]
-    assert any("depth of field" in text for text in said)
-    assert any("motion blur" in text for text in said)
+    assert any("motion blur" in note.text for note in stage.take().notes)
 
 
 def view_of(view, window, perspective):

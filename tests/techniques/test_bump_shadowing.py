@@ -13,13 +13,13 @@ ALBEDO = 0.8
 def lit(stage):
     """Diffuse direct radiance of a floor whose normal map turns all normals by `tilt` towards +x."""
 
-    def lit(tilt, samples=16, **options):
-        material = stage.diffuse(ALBEDO)
+    def lit(tilt, samples=16, kind="Diffuse", **options):
+        material = stage.material(f"ShaderNodeBsdf{kind}", Color=(ALBEDO, ALBEDO, ALBEDO, 1.0))
         nodes, links = material.node_tree.nodes, material.node_tree.links
         turned = nodes.new("ShaderNodeNormalMap")
         turned.space = "WORLD"
         turned.inputs["Color"].default_value = (0.5 + 0.5 * np.sin(tilt), 0.5, 0.5 + 0.5 * np.cos(tilt), 1.0)
-        shader = next(node for node in nodes if node.bl_idname == "ShaderNodeBsdfDiffuse")
+        shader = next(node for node in nodes if node.bl_idname == f"ShaderNodeBsdf{kind}")
         links.new(turned.outputs[0], shader.inputs["Normal"])
         for placed in [placed for placed in stage.scene.objects if placed.type == "MESH"]:
             bpy.data.objects.remove(placed)
@@ -38,6 +38,14 @@ def test_the_sun_on_a_tilted_normal_is_dimmed_by_the_bump(stage, lit, tilt, sun)
     shadowing = 2.0 / (1.0 + np.sqrt(1.0 + roughness_squared * np.tan(sun) ** 2))
     expected = ALBEDO * np.cos(tilt - sun) * shadowing
     assert lit(tilt) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("sun", [-2.8, -2.1, -1.7, -0.7, 0.0, 1.2, 1.5, 1.7, 2.4])
+@pytest.mark.parametrize("kind", ["Translucent", "Sheen", "Toon"])
+def test_other_diffuse_shaders_are_dimmed_as_by_cycles(stage, lit, kind, sun):
+    stage.light("SUN", turn=(0.0, sun, 0.0), energy=np.pi, angle=0.0)
+    expected = lit(0.8, 4, kind, engine="CYCLES")  # along the floor's diagonal it loses some of the light from behind
+    assert lit(0.8, 4, kind) == pytest.approx(expected, rel=0.02, abs=2e-3)
 
 
 def test_light_does_not_come_through_the_surface_onto_a_bump(stage, lit):

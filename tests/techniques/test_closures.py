@@ -148,6 +148,68 @@ def test_lobes_reflect_a_sun_as_in_cycles(stage, kind):
         stage.scene.collection.objects.unlink(sun)
 
 
+def joined(stage, node_type, *closures, **settings):
+    """A material whose Mix or Add Shader joins closures, each a node's type and inputs."""
+    made = stage.material(closures[0][0])
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    nodes.clear()
+    both, output = nodes.new(node_type), nodes.new("ShaderNodeOutputMaterial")
+    sockets = [socket for socket in both.inputs if socket.type == "SHADER"]
+    for socket, (kind, inputs) in zip(sockets, closures):
+        shader = nodes.new(kind)
+        for name, value in inputs.items():
+            shader.inputs[name].default_value = value
+        links.new(shader.outputs[0], socket)
+    if "factor" in settings:
+        both.inputs[0].default_value = settings["factor"]
+    links.new(both.outputs[0], output.inputs["Surface"])
+    return made
+
+
+ROUGH = ("ShaderNodeBsdfDiffuse", {"Color": (0.95, 0.6, 0.2, 1.0), "Roughness": 1.0})
+BLACK = ("ShaderNodeBsdfDiffuse", {"Color": (0.0, 0.0, 0.0, 1.0)})
+
+
+def test_the_weight_of_a_rough_diffuse_closure_is_no_colour(stage):
+    """Light that is scattered several times takes on the closure's colour, not that of the whole mix."""
+    materials = [
+        joined(stage, "ShaderNodeMixShader", BLACK, ROUGH, factor=0.1),
+        joined(stage, "ShaderNodeMixShader", BLACK, ROUGH, factor=0.5),
+        joined(stage, "ShaderNodeAddShader", ROUGH, ROUGH),
+        stage.principled(Base_Color=ROUGH[1]["Color"], Diffuse_Roughness=1.0, Metallic=0.7, Roughness=0.5),
+        stage.principled(Base_Color=ROUGH[1]["Color"], Diffuse_Roughness=1.0, Coat_Weight=1.0, Roughness=0.5),
+    ]
+    size = strips(stage, materials, 60)
+    ours = means(stage.render(64, size), "diffuse_direct")
+    cycles = means(stage.render(1024, size, engine="CYCLES"), "diffuse_direct")
+    np.testing.assert_allclose(ours, cycles, rtol=0.012)
+
+
+@pytest.mark.parametrize("turn", [(0, 0.2, 0), (0, 1.2, 0), (1.0, 0, 0)])
+def test_diffuse_closures_that_differ_keep_their_normals_and_roughness(stage, turn):
+    plain = ("ShaderNodeBsdfDiffuse", {"Color": (0.2, 0.9, 0.4, 1.0)})
+    material = joined(stage, "ShaderNodeAddShader", ROUGH, plain)
+    bumped = next(node for node in material.node_tree.nodes if node.inputs.get("Roughness") and node.outputs)
+    normal = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
+    normal.inputs[0].default_value, normal.inputs[2].default_value = -0.6, 0.8
+    material.node_tree.links.new(normal.outputs[0], bumped.inputs["Normal"])
+    stage.floor(material=material)
+    stage.light("SUN", turn=turn, angle=0.0)
+    stage.camera_above(4.0)
+    ours = stage.render(64, (8, 8))["diffuse_direct"][..., :3].mean(axis=(0, 1))
+    cycles = stage.render(64, (8, 8), engine="CYCLES")["diffuse_direct"][..., :3].mean(axis=(0, 1))
+    np.testing.assert_allclose(ours, cycles, rtol=0.01)
+
+
+def test_a_closure_of_little_weight_is_not_left_to_chance(stage):
+    """One lobe is kept a sample: a faint one often enough for its own pass."""
+    faint = ("ShaderNodeBsdfGlossy", {"Roughness": 0.6})
+    strong = ("ShaderNodeBsdfTranslucent", {})
+    size = strips(stage, [joined(stage, "ShaderNodeMixShader", strong, faint, factor=0.003)], 30)
+    pixels = stage.render(64, size)["glossy_direct"][..., 0].astype(float)
+    assert pixels.std() < 0.5 * pixels.mean()
+
+
 @pytest.mark.parametrize("degrees", [pytest.param(20, marks=SLOW), 70])
 def test_thin_walls_have_cycles_albedo(stage, degrees):
     inputs = [

@@ -60,6 +60,19 @@ def test_the_plane_in_focus_stays_sharp(stage):
     np.testing.assert_allclose(blurred, stage.render(16, SIZE)["emission"], atol=1e-5)
 
 
+def test_an_orthographic_camera_blurs_as_by_cycles(stage):
+    for k in range(5):
+        lamp(stage, 0.4, 2.0 * k).location.x = 1.5 * k - 3
+    placed = stage.camera_above(8.0)
+    placed.rotation_euler.y = 0.2
+    placed.data.dof.use_dof, placed.data.dof.focus_distance, placed.data.dof.aperture_fstop = True, FOCUS, 1.0
+    expected = stage.render(1024, SIZE, engine="CYCLES")["emission"]
+    found = stage.render(256, SIZE)["emission"]
+    placed.data.dof.use_dof = False
+    assert np.abs(stage.render(256, SIZE)["emission"] - expected).max() > 0.3
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.01
+
+
 def test_the_focus_object_wins_over_the_distance(stage):
     lens = camera(stage, fstop=0.1, focus_object=stage.link("Target", None, (3, 1, 10 - FOCUS)))
     lens.dof.focus_distance = 1.0

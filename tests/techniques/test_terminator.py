@@ -91,3 +91,77 @@ def test_other_things_still_cast_their_shadow_there(lit):
     shaded = np.zeros(SIZE, bool)
     shaded[:40] = True
     assert found[shaded & (open_light > 0)].max() < 1e-3 * open_light.max()
+
+
+TURNS = (-170, -130, -100, -80, -60, 35, 80, 95, 110, 130, 160)  # degrees of the sun from above the card
+
+
+@pytest.fixture
+def card(stage):
+    """What both engines show under a sun of a card whose normals all lean by `tilt` degrees, as those of leaves do that
+    were taken from a ball around the crown."""
+    kinds = {"ShaderNodeBsdfTranslucent": {}, "ShaderNodeBsdfDiffuse": {}, "ShaderNodeBsdfGlossy": {"Roughness": 0.6}}
+
+    def show(kind, tilt, angle):
+        stage.clear()
+        stage.camera_above(0.5)
+        material = stage.material(kind, **kinds[kind])
+        made = stage.rectangle((-1, -1), (1, 1), material=material)
+        lean = (np.sin(np.radians(tilt)), 0, np.cos(np.radians(tilt)))
+        made.data.shade_smooth()
+        made.data.normals_split_custom_set_from_vertices([lean] * len(made.data.vertices))
+        stage.light("SUN", turn=(0, np.radians(angle), 0), angle=0.0, energy=np.pi)
+        found = []
+        for engine in ("CANDELA", "CYCLES"):
+            passes = stage.render(4, (8, 8), engine=engine)
+            light = passes["diffuse_direct"] + passes["glossy_direct"]
+            found.append(float(np.median(light[..., 0])))
+        return found
+
+    return show
+
+
+@pytest.mark.parametrize("tilt", [0, 30, 60])
+@pytest.mark.parametrize("kind", ["Translucent", "Diffuse", "Glossy"])
+def test_cards_whose_normals_lean_are_lit_by_what_their_normals_face(card, kind, tilt):
+    found = np.array([card(f"ShaderNodeBsdf{kind}", tilt, angle) for angle in TURNS])
+    assert found[:, 1].max() > 0.1
+    np.testing.assert_allclose(found[:, 0], found[:, 1], atol=0.01 * found[:, 1].max())
+
+
+@pytest.mark.parametrize("light", ["SUN", "AREA"])
+def test_nothing_shines_into_a_closed_body_whose_normals_are_smooth(stage, light):
+    stage.camera_above(span=2.4)
+    made = ball(stage, 4, 2, turn=(0.3, 0.4, 0.2))
+    stage.light(light, (6, 0, 2.4), turn=LOW_SUN)
+    bright = irradiance(stage, 16, SIZE).mean()
+    made.data.materials[0] = stage.material("ShaderNodeBsdfTranslucent")
+    assert irradiance(stage, 16, SIZE).mean() < 1e-3 * bright
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_light_of_the_world_ends_as_by_cycles(stage, even):
+    """Cycles lifts rays that it draws from the world's own light, of which a single colour has none."""
+    stage.camera_above(span=2.4)
+    ball(stage, 4, 2, turn=(0.3, 0.4, 0.2))
+    stage.world()
+    if not even:
+        tree = stage.scene.world.node_tree
+        background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+        sky = tree.nodes.new("ShaderNodeTexSky")
+        sky.sun_disc = False
+        tree.links.new(sky.outputs[0], background.inputs["Color"])
+    found = stage.render(64, SIZE)["diffuse_direct"]
+    expected = stage.render(256, SIZE, engine="CYCLES")["diffuse_direct"]
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.005 if even else 0.01)
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_normals_of_a_squashed_body_run_as_by_cycles(lit, shared):
+    """In world space where one object alone shows a mesh, in the mesh's own where several do."""
+    made = ball(lit, scale=(1.0, 0.4, 0.7))
+    if shared:
+        other = made.copy()
+        other.location.x += 20
+        lit.scene.collection.objects.link(other)
+    assert off(irradiance(lit, 1, SIZE), by_cycles(lit)) < OUTLINE
