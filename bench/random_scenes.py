@@ -41,9 +41,9 @@ OBJECTS: dict[str, Callable] = {
     "text": bpy.ops.object.text_add,
     "metaball": lambda: bpy.ops.object.metaball_add(type="BALL", radius=1),
 }
-MODIFIERS = {
+MODIFIERS = {  # not Bevel, whose normals Blender 5.2 computes anew each time, and otherwise
     "SUBSURF": {"levels": 2, "render_levels": 2}, "ARRAY": {"count": 3}, "WIREFRAME": {"thickness": 0.08},
-    "BEVEL": {"width": 0.1, "segments": 3}, "WEIGHTED_NORMAL": {},
+    "SOLIDIFY": {"thickness": 0.1}, "WEIGHTED_NORMAL": {},
 }  # fmt: skip
 HIDDEN = {"visible_shadow": 0.1, "visible_camera": 0.06, "visible_diffuse": 0.06}  # how often
 

@@ -93,9 +93,8 @@ class View:
             q = (one * far - depth) / (far - start)
             near = 1.0
             x, y = x + shear[0] * depth, y + shear[1] * depth
-            backward = (
-                backward + shear[0] * right_axis + shear[1] * up
-            )  # to where the picture's parallel rays come from
+            # What the shaders take for the axis is the direction from which the picture's parallel rays come.
+            backward = backward + shear[0] * right_axis + shear[1] * up
             backward = backward / np.linalg.norm(backward)
         else:
             w, centre, q = depth, depth, one

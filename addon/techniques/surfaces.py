@@ -67,10 +67,11 @@ def surface_bindings(frame: Frame) -> dict[str, images.Image]:
 MARKS = "surface.marks"
 ANY_SURFACE, NARROW_LOBE = "LESS_EQUAL", "LESS"
 LIT_SURFACES = (*SURFACES, MARKS)
+MARK_IMAGES = ("position", "tint", "lobe", "emission")
 MARK = passes.fullscreen_program(
     "surface marks",
     "surface/marks.frag.glsl",
-    textures=tuple(("RGBA32F", f"surface_{name}") for name in ("position", "tint", "emission")),
+    textures=tuple(("RGBA32F", f"surface_{name}") for name in MARK_IMAGES),
     constants=(("FLOAT", "roughness"),),
     writes_depth=True,
 )
@@ -103,7 +104,7 @@ class Surfaces(Technique):
         passes.fullscreen(
             MARK,
             frame.target(depth=MARKS),
-            textures={f"surface_{name}": frame.images[f"surface.{name}"] for name in ("position", "tint", "emission")},
+            textures={f"surface_{name}": frame.images[f"surface.{name}"] for name in MARK_IMAGES},
             constants={"roughness": frame.services.get("traced_roughness", -1.0)},
         )
         frame.count(self, "passes")

@@ -1,7 +1,7 @@
 // Closures: what a surface point does with light, collected while the material graph is walked.
-// Diffuse weights add up where they may. Of several other lobes (glossy, refraction, sheen, translucent, toon) one is kept per sample with
-// probability by its weight (reservoir sampling) and carries all of their weight, so the lobes stay apart
-// and the mean is exact.
+// Diffuse weights add up where normal and roughness are the same. Of those that differ, and of several other lobes (glossy,
+// refraction, sheen, translucent, toon), one is kept per sample with probability by its weight (reservoir sampling) and
+// carries all of their weight, so they stay apart and the mean is exact.
 #include "lib/math.glsl"
 #include "lib/surface_point.glsl"
 

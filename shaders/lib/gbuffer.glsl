@@ -171,6 +171,11 @@ bool soft_lobe_is_glossy(Surface s)
   return s.kind == LOBE_VELVET || (s.kind == LOBE_TOON && s.glossy_edge.x > 0.5);
 }
 
+int lobe_kind(vec4 lobe)
+{
+  return int(floor(lobe.z / 2097152.0));
+}
+
 Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4 lobe, vec4 emission)
 {
   Surface s;
@@ -197,9 +202,8 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.tangent_angle = shape.z;
   s.glossy_weight = tint.xyz;
   s.glossy_normal = octahedral_decode(lobe.xy);
-  float kind = floor(lobe.z / 2097152.0);
-  s.kind = int(kind);
-  s.glossy_edge = unpack_three(lobe.z - kind * 2097152.0, 127.0);
+  s.kind = lobe_kind(lobe);
+  s.glossy_edge = unpack_three(lobe.z - float(s.kind) * 2097152.0, 127.0);
   s.glossy_ior = abs(lobe.w);
   s.distribution = (lobe.w < 0.0) ? int(s.glossy_ior / OTHER_DISTRIBUTION) : DISTRIBUTION_MULTI_GGX;
   s.glossy_ior = (s.distribution > DISTRIBUTION_MULTI_GGX) ? 1.5 : s.glossy_ior;

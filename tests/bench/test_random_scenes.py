@@ -1,0 +1,40 @@
+"""Scenes made by lot: the same number makes the same scene, and what differs is said."""
+
+import numpy as np
+import pytest
+
+from bench import random_scenes
+
+
+def test_a_number_makes_one_scene():
+    scene, notes = random_scenes.build(3)
+    placed = [(one.type, tuple(one.matrix_basis.translation)) for one in scene.objects]
+    again, same = random_scenes.build(3)
+    assert same == notes
+    assert [(one.type, tuple(one.matrix_basis.translation)) for one in again.objects] == placed
+    assert random_scenes.build(4)[1] != notes
+
+
+@pytest.mark.parametrize("number", range(0, 40, 4))
+def test_every_scene_holds_what_is_rendered(number):
+    scene, notes = random_scenes.build(number)
+    kinds = [one.type for one in scene.objects]
+    assert scene.camera is not None and "LIGHT" in kinds and len(kinds) >= 5
+    assert "material:" in notes
+
+
+def picture(value):
+    return {"direct_light": np.full((8, 8, 3), value, np.float32)}
+
+
+@pytest.mark.parametrize(("value", "off"), [(1.0, False), (1.01, False), (1.05, True), (np.nan, True)])
+def test_what_differs_by_more_than_noise_is_off(value, off):
+    found, is_off = random_scenes.differences(picture(value), picture(1.0), picture(1.0), 0.01)
+    assert is_off == off
+    assert found[0].startswith("direct_light")
+
+
+def test_worst_pixels_do_not_decide():
+    own = picture(1.0)
+    own["direct_light"][0, 0] = 1.02
+    assert not random_scenes.differences(own, picture(1.0), picture(1.0), 1e-6)[1]
