@@ -72,7 +72,7 @@ MARK = passes.fullscreen_program(
     "surface marks",
     "surface/marks.frag.glsl",
     textures=tuple(("RGBA32F", f"surface_{name}") for name in MARK_IMAGES),
-    constants=(("FLOAT", "roughness"),),
+    constants=(("FLOAT", "traced_roughness"),),
     writes_depth=True,
 )
 TILE_BOUNDS = passes.fullscreen_program(
@@ -105,7 +105,7 @@ class Surfaces(Technique):
             MARK,
             frame.target(depth=MARKS),
             textures={f"surface_{name}": frame.images[f"surface.{name}"] for name in MARK_IMAGES},
-            constants={"roughness": frame.services.get("traced_roughness", -1.0)},
+            constants={"traced_roughness": frame.services.get("traced_roughness", -1.0)},
         )
         frame.count(self, "passes")
 
