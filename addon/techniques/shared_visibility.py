@@ -67,6 +67,7 @@ MANY_PIXELS = 100_000
 LIGHTS = 4  # whose visibility one image holds
 DEFINES = (("RATE", str(RATE)), ("FACING", "0.9"), ("OFF_PLANE", "2.0"))
 SEEN = tuple(texture for texture in SURFACE_TEXTURES if texture[1] in ("surface_position", "surface_normal"))
+LOBE = ("RGBA32F", "surface_lobe")  # whether light may shine through; last, since few pixels ask it
 FOUND = ("R32F", "pixel_visibility")  # of all pixels, lights one above the other
 BETWEEN = Lookup("shared visibility", "light/shared_visibility.glsl", textures=(FOUND,), maps=False)
 CELLS = passes.fullscreen_program(
@@ -97,10 +98,10 @@ LISTING, MARKING = _between(True), _between(False)
 SHARE = 16  # of a list's room: entries that a thread may take
 
 
-def _looking(lookup: Lookup, kinds: int) -> dict:
+def _looking(lookup: Lookup, kinds: int, *more: tuple[str, str]) -> dict:
     """What all programs that look up the visibility of lights of these kinds declare."""
     return {
-        "textures": (*lookup.textures, ("RGBA32F", "depth_maps"), *SEEN),
+        "textures": (*lookup.textures, ("RGBA32F", "depth_maps"), *SEEN, *more, LOBE),
         "blocks": ((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
         "constants": (*lookup.constants, ("INT", "light_count")),
         "defines": (*DEFINES, *lookup.defines, ("LIGHT_KINDS", str(kinds))),
@@ -121,14 +122,13 @@ def looking(lookup: Lookup, kinds: int = -1) -> Program:
 @cache
 def looking_apart(lookup: Lookup, kinds: int = -1, listed: bool = True) -> Program:
     """The dispatch that looks it up at the pixels that look for themselves: those listed, or all that are marked."""
-    declared = _looking(lookup, kinds)
+    declared = _looking(lookup, kinds, *(lists.READ if listed else ()))
     return Program(
         name=f"visibility at {'listed' if listed else 'marked'} pixels, {lookup.name}",
         compute="light/visibility_apart.comp.glsl",
         images=((FOUND[1], FOUND[0], "FLOAT_2D", "WRITE" if listed else "READ_WRITE"),),
         group=(lists.RUN, 1, 1),
         **declared | {
-            "textures": (*declared["textures"], *(lists.READ if listed else ())),
             "constants": (*declared["constants"], ("INT", "first_row"), *((("INT", "columns"),) if listed else ())),
             "defines": (*declared["defines"], *(LISTED if listed else ())),
         },
@@ -155,7 +155,13 @@ def _find(
 
     def bound(constants: dict, textures: dict | None = None) -> dict:
         return {
-            "textures": {**seen, "depth_maps": maps.atlas, **maps.textures, **(textures or {})},
+            "textures": {
+                **seen,
+                LOBE[1]: bindings[LOBE[1]],
+                "depth_maps": maps.atlas,
+                **maps.textures,
+                **(textures or {}),
+            },
             "blocks": {**view, "sources": sources.set(rows, maps.views), **maps.blocks},
             "constants": {**count, **constants, **maps.constants},
         }

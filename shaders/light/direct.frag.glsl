@@ -142,11 +142,7 @@ void main()
     if (max_component(abs(from_diffuse) + abs(from_glossy)) > 0.0) {
       float visibility = 1.0;
       if ((light.flags & LIGHT_SHADOW) != 0) {
-        float side = 1.0;
-#ifdef SOFT_LOBES
-        // What shines through arrives at the other side of the surface that is meant, whichever side of the triangle that is.
-        side = (soft.exists && soft.kind == LOBE_TRANSLUCENT && dot(s.normal, towards) < 0.0) ? -1.0 : 1.0;
-#endif
+        float side = shines_through(s.kind, s.normal, towards) ? -1.0 : 1.0;
         vec3 facing = side * s.geometric_normal;
         float lift = meant_height(light, pixel, (side < 0.0) ? s.sink : s.lift, side * s.normal, towards);
         vec3 start = light_start(s.position, side * s.normal, facing, lift, towards, facing);

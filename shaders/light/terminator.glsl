@@ -5,6 +5,12 @@
 // it is turned around.
 #define TERMINATOR_CUTOFF 0.1
 
+// Whether light arrives at the other side of the surface that is meant, whichever side of the triangle that is.
+bool shines_through(int lobe_of_surface, vec3 normal, vec3 direction)
+{
+  return lobe_of_surface == LOBE_TRANSLUCENT && dot(normal, direction) < 0.0;
+}
+
 // `facing`: the plane on which the receiver lies, for what asks maps.
 vec3 light_start(vec3 position, vec3 normal, vec3 plane, float lift, vec3 direction, inout vec3 facing)
 {

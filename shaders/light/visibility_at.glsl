@@ -16,7 +16,7 @@ float visibility_at(ivec2 pixel, int index)
   vec3 towards = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - position);
   vec3 normal = octahedral_decode(normals.xy);
   float lift = lift_decode(normals.zw);
-  if (dot(normal, towards) < 0.0) {  // light that shines through arrives at the other side
+  if (shines_through(lobe_kind(surface_lobe_fetch(pixel)), normal, towards)) {
     normal = -normal;
     facing = -facing;
     lift = 0.0;
