@@ -3,7 +3,7 @@
 Each number makes one scene: objects of several kinds under modifiers, Principled materials with random values, textures
 and mixes, lamps of all kinds and shapes, a world, a camera; in metres, hundredths or hundreds of them. Both engines
 render it without bounces, or with all light, and what differs by more than noise is printed with what the scene holds.
-A scene that differs shows which of its parts does it once the others are taken away.
+`--save` writes a scene to a file instead, to be taken apart.
 """
 
 from __future__ import annotations

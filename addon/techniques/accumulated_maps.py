@@ -13,7 +13,7 @@ stored per texel (shaders/lib/shadow.glsl). Casters with alpha are drawn stochas
 | vertices | those of all casters, once per view |
 | lookup per pixel and light | 1 texel of the map, 3 to 5 of the view list; with edge rays 4 texels |
 | edge rays | 1 per pixel and light where the four texels do not agree and the penumbra is narrower than 4 texels |
-| bytes | 20 per texel, (2 texels per picture pixel)^2 by default |
+| bytes | 20 per texel, (2 texels per picture pixel)^2 by default; 4 where light passes casters, from 64 samples on |
 
 Where a ray of each pixel costs less than the maps of a light, or of the world's directions, or of points on emissive
 surfaces, rays take their place (addon/frame/ray_costs.py): the same points of the light, without texels. Seconds and

@@ -57,7 +57,7 @@ float bump_shadowing(Surface s, vec3 light)
     return 1.0;
   }
   float cosine = clamp(dot(s.base_normal, light), 1e-6, 1.0);  // none arrives from below
-  return 2.0 / (1.0 + sqrt(1.0 + s.bump * s.bump * (1.0 / (cosine * cosine) - 1.0)));
+  return bump_dimming(s.bump * s.bump, cosine);
 }
 
 // f * cos of the diffuse closure.

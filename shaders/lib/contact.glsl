@@ -54,7 +54,8 @@ float contact_combined(float lit, float near, float rays, bool same)
 }
 
 // What passes of the share `lit` that reaches the receiver past blockers at the mean height `blocker` (in q, 0 = none were
-// found): up to contact_rays rays look for casters near it. `towards`: the direction to the map's point. More than four are sent only where those disagree.
+// found): up to contact_rays rays look for casters near it, more than four only where those disagree. `towards`: the
+// direction to the map's point.
 float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 position, vec3 normal, vec3 towards, float lit,
                          float blocker)
 {

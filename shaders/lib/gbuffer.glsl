@@ -47,6 +47,19 @@ struct Surface {
                  surface_diffuse_fetch(pixel), surface_tint_fetch(pixel), \
                  surface_lobe_fetch(pixel), surface_emission_fetch(pixel))
 
+// Alpha squared of microfacets that deviate from the normal as the bumped one does.
+float bump_squared(vec3 normal, vec3 bumped)
+{
+  float cosine = clamp(abs(dot(normal, bumped)), 1e-3, 1.0);
+  return clamp(0.125 * (1.0 / (cosine * cosine) - 1.0), 0.0, 1.0);
+}
+
+// Smith's shadowing of such microfacets, for light at this cosine from the normal.
+float bump_dimming(float squared, float cosine)
+{
+  return 2.0 / (1.0 + sqrt(1.0 + squared * (1.0 / (cosine * cosine) - 1.0)));
+}
+
 #define BUMP_STEPS 255.0
 
 // What w of the position holds for a surface: 1 + holdout, and the roughness of a surface of microfacets whose normals
@@ -58,9 +71,7 @@ struct Surface {
 float bump_encode(float holdout, vec3 normal, vec3 bumped, bool displaced)
 {
   vec3 off = bumped - normal;
-  float cosine = clamp(abs(dot(normal, bumped)), 1e-3, 1.0);
-  float squared = clamp(0.125 * (1.0 / (cosine * cosine) - 1.0), 0.0, 1.0);
-  float bump = (dot(off, off) > 1e-10) ? sqrt(squared) : 0.0;
+  float bump = (dot(off, off) > 1e-10) ? sqrt(bump_squared(normal, bumped)) : 0.0;
   float stored = floor(bump * BUMP_STEPS + 0.5);
   if (displaced && bump > 0.0) {
     vec2 cell = min(floor((octahedral_encode(normal) * 0.5 + 0.5) * BASE_STEPS), vec2(BASE_STEPS - 1.0));

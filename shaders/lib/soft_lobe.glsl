@@ -37,8 +37,7 @@ SoftLobe soft_lobe_begin(Surface s, vec3 view)
     return lobe;
   }
   vec3 off = lobe.normal - lobe.base;
-  float deviation = max(abs(dot(lobe.normal, lobe.base)), 1e-3);
-  lobe.bump = (dot(off, off) > 1e-8) ? clamp(0.125 * (1.0 / (deviation * deviation) - 1.0), 0.0, 1.0) : 0.0;
+  lobe.bump = (dot(off, off) > 1e-8) ? bump_squared(lobe.base, lobe.normal) : 0.0;
   float mu = dot(lobe.normal, view);
   if (s.kind == LOBE_SHEEN) {
     vec3 terms = sheen_terms(mu, s.glossy_roughness);
@@ -100,8 +99,7 @@ float soft_bump_shadowing(SoftLobe lobe, vec3 light)
   if (cosine * dot(lobe.normal, light) <= 0.0) {
     return 0.0;
   }
-  cosine = max(abs(cosine), 1e-6);
-  return lobe.glossy ? 1.0 : 2.0 / (1.0 + sqrt(1.0 + lobe.bump * (1.0 / (cosine * cosine) - 1.0)));
+  return lobe.glossy ? 1.0 : bump_dimming(lobe.bump, max(abs(cosine), 1e-6));
 }
 
 // f * cos for a light direction in world space, without bumps.
