@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, indirect, page, profile, random_scenes, run
+from bench import again, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
 
 VERBS = {
     "run": run,
@@ -18,6 +18,7 @@ VERBS = {
     "costs": costs,
     "random": random_scenes,
     "page": page,
+    "hashes": hashes,
     "all": everything,
 }
 

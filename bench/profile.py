@@ -78,7 +78,7 @@ def dearest(stats: dict, count: int) -> list[tuple[str, float]]:
 
 
 def place(function: tuple[str, int, str]) -> str:
-    """`frame/culling.py: seen`."""
+    """`scene/culling.py: seen`."""
     file = function[0].replace("\\", "/").rpartition("/addon/")[2]
     return f"{file}: {function[2]}"
 

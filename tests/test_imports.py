@@ -21,8 +21,10 @@ class Room:
 
 
 DATA = ("materials", "snapshot.scene")
-BELOW_TECHNIQUES = ("gfx", "frame", *DATA)
-BELOW_COMPARE = ("gfx", "frame", "materials", "snapshot", "techniques")
+BELOW_FRAME = ("gfx", "sampling", "kernels", "scene", "sources", *DATA)
+ON_A_FRAME = ("surfaces", "film", "lighting")  # pieces that techniques share, each on those before it
+BELOW_TECHNIQUES = (*BELOW_FRAME, "frame", *ON_A_FRAME)
+BELOW_COMPARE = (*BELOW_TECHNIQUES, "materials", "snapshot", "techniques")
 BLENDER = ("bpy", "bpy_extras", "mathutils", "bl_math", "idprop", "numpy")
 
 # The longest name that fits is the one that counts: gfx.context has its own line, the rest of gfx another.
@@ -33,7 +35,14 @@ ROOMS = {
     "materials.reader": Room(modules=BLENDER),
     "snapshot": Room(rooms=("materials",), modules=BLENDER),
     "snapshot.scene": Room(rooms=("materials",), modules=("numpy",)),
-    "frame": Room(rooms=("gfx", *DATA), modules=("numpy",)),
+    "sampling": Room(rooms=DATA, modules=("numpy",)),
+    "kernels": Room(rooms=("gfx",), modules=("numpy",)),
+    "scene": Room(rooms=("gfx", "sampling", "kernels", *DATA), modules=("numpy",)),
+    "sources": Room(rooms=("gfx", "sampling", "kernels", "scene", *DATA), modules=("numpy",)),
+    "frame": Room(rooms=BELOW_FRAME, modules=("numpy",)),
+    "surfaces": Room(rooms=(*BELOW_FRAME, "frame"), modules=("numpy",)),
+    "film": Room(rooms=(*BELOW_FRAME, "frame", "surfaces"), modules=("numpy",)),
+    "lighting": Room(rooms=(*BELOW_FRAME, "frame", "surfaces", "film"), modules=("numpy",)),
     "techniques": Room(rooms=BELOW_TECHNIQUES, modules=("numpy",)),
     "compare": Room(rooms=BELOW_COMPARE, modules=("numpy",), optional=("flip_evaluator", "matplotlib")),
     "compare.reference": Room(rooms=BELOW_COMPARE, modules=BLENDER),

@@ -13,26 +13,26 @@ from ..gfx import context, images
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
+from ..sampling.lens import point_of
+from ..sampling.sequence import FILM, LENS, lot, point, third
+from ..scene.acceleration import Hierarchy, HierarchyCache
+from ..scene.geometry import SceneGeometry
+from ..scene.materials import MaterialSet, compile_programs
+from ..scene.opacity_maps import OpacityMaps
+from ..scene.receivers import Receivers
+from ..scene.surface_means import SurfaceMeans
+from ..scene.view import VIEW, View, blackman_harris_offset
+from ..scene.world_tree import WorldTree
 from ..snapshot.scene import Snapshot
+from ..sources.environment import Environment
+from ..sources.lights import Emitter, emitters
+from ..sources.rates import Rate
 from . import ledger as ledger_module
-from .acceleration import Hierarchy, HierarchyCache
 from .bands import Bands
-from .depth_maps import Receivers
-from .environment import Environment
-from .geometry import SceneGeometry
 from .ledger import RAN, REUSED, Ledger, Row
-from .lens import point_of
-from .lights import Emitter, emitters
-from .materials import MaterialSet, compile_programs
-from .opacity_maps import OpacityMaps
 from .plan import Plan, make_plan
-from .rates import Rate
-from .sequence import FILM, LENS, lot, point, third
 from .settings import Settings
-from .surface_means import SurfaceMeans
 from .technique import Technique
-from .view import VIEW, View, blackman_harris_offset
-from .world_tree import WorldTree
 
 FAR_BEYOND = 300.0  # by the typical distance of what is seen
 ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm

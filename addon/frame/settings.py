@@ -36,9 +36,13 @@ class Settings:
         """Value of a technique's parameter; KeyError if it is not declared."""
         for param in technique.params:
             if param.name == name:
-                value = self.values.get((technique.name, name), param.default)
-                return min(value, param.draft) if self.draft and param.draft is not None else value
+                return self.value(technique.name, param)
         raise KeyError(f"Technique {technique.name} declares no parameter '{name}'.")
+
+    def value(self, owner: str, param: Param):
+        """Value of a parameter that the technique named `owner` declares."""
+        value = self.values.get((owner, param.name), param.default)
+        return min(value, param.draft) if self.draft and param.draft is not None else value
 
     def as_draft(self) -> Settings:
         """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""

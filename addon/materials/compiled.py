@@ -40,7 +40,7 @@ class CompiledMaterial:
     emission: tuple[float, float, float]
     emission_behind: tuple[float, float, float]
     opacity: float  # mean coverage 0..1
-    # Opacity, emission vary: what they are depends on the surfaces (frame/opacity_maps.py, frame/surface_means.py).
+    # Opacity, emission vary: what they are depends on the surfaces (scene/opacity_maps.py, scene/surface_means.py).
     uneven: bool
     uneven_emission: bool
     diffuse: bool  # has a diffuse closure

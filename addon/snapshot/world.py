@@ -1,6 +1,6 @@
 """The world out of its flat node graph: a constant colour or an equirectangular image where the tree says no more.
 
-These two need no program. Any other tree is handed on as it is and compiled (frame/world_tree.py).
+These two need no program. Any other tree is handed on as it is and compiled (scene/world_tree.py).
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@
 
 Members are virtual lights (virtual_lights.py); their kernels G, their bound s near surfaces, the short rays that give
 back what the bound takes, and gathering by regions are those of multires_radiosity.py. What differs is visibility. Each
-cluster (addon/frame/clusters.py: k-means over place and normal) has one map of what it sees from its middle, and is an
-area light with its members' extent in it: V_m. That alone is the source's method: smooth, but what only some members of
-a cluster see, through the gap of a door, all of them light or none.
+cluster (addon/sources/clusters.py: k-means over place and normal) has one map of what it sees from its middle, and is
+an area light with its members' extent in it: V_m. That alone is the source's method: smooth, but what only some members
+of a cluster see, through the gap of a door, all of them light or none.
 
 So the clusters are a guess, a control variate. They are split into `rays` groups; in each, one cluster m is drawn in
 proportion to its doubt D_m = |U_m| sqrt(V_m (1 - V_m)), at least a tenth of |U_m| (D: the group's sum), one member i by
@@ -87,19 +87,19 @@ from functools import cache
 
 import numpy as np
 
-from ..frame import lights
-from ..frame.clusters import Clusters, cluster, members
-from ..frame.convolution import PYRAMID, Basis, series
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.tables import level_program
 from ..frame.technique import Param
 from ..gfx import images, passes
+from ..kernels.convolution import PYRAMID, Basis, series
+from ..kernels.tables import level_program
+from ..lighting.soft_maps import REFINE
+from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, BoundGather, Gather, VirtualLightSet
 from ..snapshot.scene import Snapshot
+from ..sources import lights
+from ..sources.clusters import Clusters, cluster, members
 from .cssm import ORDERS, SEARCH_OFFSET
 from .multires_radiosity import LEVELS, MANY_PIXELS, NEAR_BOUNCES, MultiresRadiosity, pixels_shown_alone, regions
-from .soft_maps import REFINE
-from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, BoundGather, Gather, VirtualLightSet
 
 TEXELS, CONVOLUTION = "TEXELS", "CONVOLUTION"
 FILTERS = ((TEXELS, "Texels", 0), (CONVOLUTION, "Convolution", 1))

@@ -1,6 +1,6 @@
 """Convolution soft shadow maps: blocker search and penumbra as filters of one depth map that was prefiltered.
 
-The comparison of depths becomes a Fourier series whose terms can be averaged beforehand (addon/frame/convolution.py).
+The comparison of depths becomes a Fourier series whose terms can be averaged beforehand (addon/kernels/convolution.py).
 The blocker search asks it for the share of nearer texels and their mean depth,
 
     z_avg = [W * f z] / [W * f],   f(d, z) = 1 where z < d,
@@ -16,7 +16,7 @@ light below the receiver's horizon does not count; a min-max pyramid settles mos
 
 | cost | per map of N x N texels, order M |
 |---|---|
-| basis, by table | passes as for one table (frame/tables.py), 16 (M + 1) bytes per texel kept, as much borrowed |
+| basis, by table | passes as for one table (kernels/tables.py), 16 (M + 1) bytes per texel kept, as much borrowed |
 | basis, by pyramid | log2 N dispatches, 4 (M + 1) bytes per texel |
 | lookup | cells^2 boxes, each (M + 1) + M / 2 means: 4 fetches by table, 8 by pyramid |
 
@@ -38,14 +38,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..frame import tables
-from ..frame.convolution import PYRAMID, TABLE, Basis, series
 from ..frame.run import Frame
 from ..frame.technique import Param
-from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
-from .direct_light import lighting
-from .shared_visibility import programs_of
-from .soft_maps import CONTACTS, LIMIT_CONSTANTS, LIMIT_TEXTURES, REFINE, SPARSE, SoftMaps, soft_lookup, with_contacts
+from ..kernels import tables
+from ..kernels.convolution import PYRAMID, TABLE, Basis, series
+from ..lighting.loop import lighting
+from ..lighting.point_maps import CUTOFF
+from ..lighting.shared_visibility import programs_of
+from ..lighting.soft_maps import (
+    CONTACTS,
+    LIMIT_CONSTANTS,
+    LIMIT_TEXTURES,
+    REFINE,
+    SPARSE,
+    SoftMaps,
+    soft_lookup,
+    with_contacts,
+)
+from ..lighting.visibility import RESOLUTION, Lookup, Maps
 
 ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
 PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))

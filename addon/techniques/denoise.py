@@ -61,13 +61,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..film.points import shown_paths
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
-from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from .film_points import shown_paths
 from .instant_radiosity import no_diffuse_light
 
 

@@ -4,7 +4,7 @@ For a point x with view v and a light sample y of density p (per steradian) in d
 
     L(x, v) = mean over samples of  f(x, v, w) cos(w) Le(y, -w) V(x, y) / p
 
-with Cycles' light shapes and units (addon/frame/lights.py) and Cycles' closures (shaders/lib/brdf.glsl). V comes from
+with Cycles' light shapes and units (addon/sources/lights.py) and Cycles' closures (shaders/lib/brdf.glsl). V comes from
 the technique in the shadow slot. All pixels share y, so there is no noise, only the quadrature error of a
 low-discrepancy set; where a narrow lobe would see dots, traced rays take over part of the light (see traced_glossy).
 
@@ -27,27 +27,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
-from ..frame import acceleration, lights
-from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import Param, Technique, Write
-from ..frame.view import VIEW
-from ..gfx import passes
-from ..gfx.library import Program
-from ..snapshot.scene import Snapshot
-from . import repeated_light, shared_visibility
-from .accumulated_maps import (
+from ..frame.technique import Param, Technique
+from ..lighting import shared_visibility
+from ..lighting.loop import DIRECT_WRITES, lighting, shade
+from ..lighting.point_maps import PointMaps
+from ..lighting.visibility import (
     ATLAS_TEXELS,
     EDGES,
     HARD,
     RAY_CONSTANTS,
     RAYS,
-    AccumulatedMaps,
     DepthMapService,
     Lookup,
     Maps,
@@ -55,13 +49,12 @@ from .accumulated_maps import (
     rounds,
     traced_shadows,
 )
+from ..scene import acceleration
+from ..snapshot.scene import Snapshot
+from ..sources import lights
+from ..sources.rates import Rate
+from ..surfaces.draw import LIT_SURFACES
 from .light_probes import rate_of
-from .repeated_light import Lit
-from .surfaces import ANY_SURFACE, LIT_SURFACES, SOFT_DEFINES, SURFACE_TEXTURES
-
-CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
-TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
-
 
 # A point of a round light is drawn in its ball; the light arrives from the ball's projection towards the receiver.
 # A map from the point shows what blocks the light as long as the ball is small beside its distance.
@@ -74,66 +67,11 @@ RAYS_WHERE_NEAR = Lookup(
 )
 
 
-@cache
-def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
-    """The lighting pass with the visibility of a technique, for scenes with or without soft lobes, and for lights of
-    these kinds (bits as in lights.LAMPS; -1: any light)."""
-    return passes.fullscreen_program(
-        f"direct light, {lookup.name}",
-        "light/direct.frag.glsl",
-        textures=(
-            *lookup.textures,
-            *((("RGBA32F", "depth_maps"),) if lookup.maps else ()),
-            ("RGBA32F", "energy_table"),
-            *SURFACE_TEXTURES,
-        ),
-        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
-        constants=(("INT", "light_count"), ("FLOAT", "traced_roughness"), *lookup.constants),
-        defines=(
-            *TRACED_DEFINES,
-            *SOFT_DEFINES[soft_lobes],
-            *lookup.defines,
-            ("LIGHT_KINDS", str(kinds)),
-        ),
-        snippets=(("generated/visibility", f'#include "{lookup.file}"\n'),),
-        outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
-    )
-
-
 LIGHTING = tuple(
     lighting(lookup, soft_lobes)
     for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS, shared_visibility.BETWEEN)
     for soft_lobes in (False, True)
 )
-DIRECT_WRITES = (
-    Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive straight from sources", True),
-    Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
-)
-
-
-def shade(
-    frame: Frame, technique: Technique, rows: list[np.ndarray], kinds: int, sources: lights.Sources, maps: Maps
-) -> Iterator[None]:
-    """Add the light of `rows` (each (TEXELS, 4)), of these `kinds`, to the radiance images, in
-    parts."""
-    drawn = {} if maps.atlas is None else {"depth_maps": maps.atlas}
-    bindings = {
-        "textures": {**drawn, "energy_table": frame.materials.energy_table, **maps.textures},
-        "blocks": maps.blocks,
-        "constants": {
-            "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
-            **maps.constants,
-        },
-    }  # fmt: skip
-    program = lighting(maps.lookup, frame.materials.soft, kinds)
-    lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
-    if maps.sparse:
-        between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
-        yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
-    else:
-        yield from repeated_light.add(frame, technique, sources, lit)
-        frame.count(technique, "passes")
-    frame.count(technique, "light samples", len(rows))
 
 
 class DirectLight(Technique):
@@ -171,7 +109,7 @@ class DirectLight(Technique):
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
         service = frame.services.get("shadow")
-        items: dict[AccumulatedMaps | None, list] = {}
+        items: dict[PointMaps | None, list] = {}
         traced: list[np.ndarray] = []
         kinds = lights.kinds_of(self._emitters)
         for emitter, weight in self._chosen(frame):
@@ -216,7 +154,7 @@ class DirectLight(Technique):
                 if near:
                     yield from shade(frame, self, near, kinds, self._sources, self._with_rays(frame, maps))
 
-    def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: AccumulatedMaps) -> bool:
+    def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: PointMaps) -> bool:
         """Whether the light has rays in place of maps; asked when it is first drawn, as one of many may never be."""
         key = emitter.light.key
         if key not in self._by_rays:

@@ -44,20 +44,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frame import acceleration
-from ..frame.environment import WORLD, Environment
+from ..film.neighbours import reflect
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..lighting import repeated_light
+from ..lighting.loop import DIRECT_WRITES
+from ..scene import acceleration
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from . import repeated_light
-from .direct_light import DIRECT_WRITES
+from ..sources.environment import WORLD, Environment
+from ..surfaces.draw import SURFACES
 from .environment_light import no_environment_light
-from .neighbours import reflect
 from .ssdo import BITS, FAN_CONSTANTS, FAN_TEXTURES, fan_bindings, fan_params
-from .surfaces import SURFACES
 
 CELLS = (32, 64)
 ENVIRONMENT_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))

@@ -4,7 +4,7 @@
 
 with E_l the irradiance of a cone of even radiance in closed form (shaders/light/whole.glsl) and V_l its visibility by
 variance or convolution soft shadow maps, with the settings of those. The lights are fitted to the map once per world
-(addon/frame/area_fit.py); a small bright part becomes a small light with a sharp shadow, an even sky a few wide ones.
+(addon/sources/area_fit.py); a small bright part becomes a small light with a sharp shadow, an even sky a few wide ones.
 
 One sample shows all of the world, smoothly, where environment_light shows a few hard shadows. With more samples each
 map stands for a part of its light, so that shadows get better; what stays is that the world is even within each light.
@@ -40,18 +40,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame import area_fit, depth_maps, lights
-from ..frame.environment import Environment
 from ..frame.run import Frame
 from ..frame.settings import AUTO, Settings
 from ..frame.technique import Param, Technique
+from ..lighting import depth_maps
+from ..lighting.loop import DIRECT_WRITES, shade
+from ..lighting.soft_maps import SoftMaps
+from ..lighting.visibility import map_resolution, rounds
 from ..snapshot.scene import Snapshot
-from .accumulated_maps import map_resolution, rounds
+from ..sources import area_fit, lights
+from ..sources.environment import Environment
+from ..surfaces.draw import LIT_SURFACES
 from .cssm import ConvolutionSoftShadows
-from .direct_light import DIRECT_WRITES, shade
 from .environment_light import EnvironmentLight
-from .soft_maps import SoftMaps
-from .surfaces import LIT_SURFACES
 from .vssm import VarianceSoftShadows
 
 SHADOWS = (("VARIANCE", "Variance", 0), ("CONVOLUTION", "Convolution", 1))

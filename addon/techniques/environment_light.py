@@ -5,20 +5,20 @@ and no scene spends them on the ground below it.
 
     L(x, v) = mean over samples of  f(x, v, w) cos(w) L_world(w) V(x, w) / p(w)
 
-Directions w come from a low-discrepancy set warped by the world's luminance (addon/frame/environment.py); V is an
+Directions w come from a low-discrepancy set warped by the world's luminance (addon/sources/environment.py); V is an
 orthographic depth map along w over what the camera sees, so it converges to the truth with any occluder.
 
 What shared directions bring where nothing is in the way has a known mean, the irradiance of a normal
-(addon/frame/irradiance.py), and differs from it by noise that all pixels share. Diffuse surfaces have that noise taken
-off, as much of it as light arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl): an
-open floor has its exact light in every sample. Directions count there by how open the probes found the scene towards
+(addon/sources/irradiance.py), and differs from it by noise that all pixels share. Diffuse surfaces have that noise
+taken off, as much of it as light arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl):
+an open floor has its exact light in every sample. Directions count there by how open the probes found the scene towards
 them; with what is hardly seen, and hardly drawn, counted in full, there would be more noise than before. relMSE of the
 picture, 256x192, 1, 4 and 16 samples, without and with: product .0558 .0134 .00199 and .0455 .0106 .00181, and its mean
 1.029 1.016 .997 and .993 1.000 .999 of Cycles'; instances .113 .0367 and .112 .0357; garden, foliage 0 to 3 % less.
 
 Where many pixels see little of the world (a gallery behind columns), most of the shared directions bring them nothing.
 There each pixel of a final picture traces a ray instead of each two directions, drawn from a table of its tile
-(addon/frame/world_tiles.py). The probes tell beforehand which of the two leaves less: an open sky and a sun in a
+(addon/sources/world_tiles.py). The probes tell beforehand which of the two leaves less: an open sky and a sun in a
 picture of the sky are shared. The noise of rays differs from pixel to pixel, so Denoise takes out more of it.
 relMSE of 256x192 pixels, denoised, by shared directions and by rays:
 
@@ -35,7 +35,7 @@ Where a ray of each pixel costs less than a map (accumulated_maps.py), rays answ
 | passes | 2 over the screen |
 | rays | 1 per pixel instead of each 2 maps |
 
-Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/frame/rates.py).
+Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
 
 Bias: the first sample takes its own share of the known light, an error that falls with its directions and with the
 samples; the irradiance is known to within 0.3 % (irradiance.py). Rough diffuse surfaces have it as Lambert's do, which
@@ -52,14 +52,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame import acceleration, depth_maps, environment, lights, world_tiles
-from ..frame.rates import Rate
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
-from ..snapshot.scene import Snapshot
-from .accumulated_maps import (
+from ..lighting import depth_maps
+from ..lighting.loop import DIRECT_WRITES, lighting, shade
+from ..lighting.visibility import (
     HARD,
     NO_VIEWS,
     RAY_CONSTANTS,
@@ -74,9 +73,12 @@ from .accumulated_maps import (
     rounds,
     traced_shadows,
 )
-from .direct_light import DIRECT_WRITES, lighting, shade
+from ..scene import acceleration
+from ..snapshot.scene import Snapshot
+from ..sources import environment, lights, world_tiles
+from ..sources.rates import Rate
+from ..surfaces.draw import LIT_SURFACES
 from .light_probes import WORLD
-from .surfaces import LIT_SURFACES
 
 WORLD_RAYS = Lookup(
     "world rays",

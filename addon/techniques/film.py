@@ -16,19 +16,21 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 
-from ..frame import lights
-from ..frame.environment import WORLD
-from ..frame.materials import SURFACE_IMAGES, may_be_glossy
+from ..film import filter as film_filter
+from ..film import points as film_points
+from ..film.neighbours import shown_sum
+from ..film.points import PATHS
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
-from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from . import film_filter, film_points, repeated_light
-from .film_points import PATHS
-from .neighbours import shown_sum
-from .surfaces import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_indices, draw_sample, surface_bindings
+from ..lighting import repeated_light
+from ..scene.materials import SURFACE_IMAGES, may_be_glossy
+from ..scene.view import VIEW
+from ..sources import lights
+from ..sources.environment import WORLD
+from ..surfaces.draw import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_indices, draw_sample, surface_bindings
 
 SUMS = (
     Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),

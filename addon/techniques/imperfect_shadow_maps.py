@@ -10,7 +10,7 @@ and b to its term of B; rays find v_a and v_b, whether those are seen. In the me
 that of tracing every virtual light; its noise is that of what the maps show wrong. Each channel draws by itself, with
 the same numbers, mostly the same light: so no channel loses more than it has, and light stays positive.
 
-All maps are drawn at once, from a coarse stand-in for the scene (frame/surface_points.py): triangles that are large
+All maps are drawn at once, from a coarse stand-in for the scene (scene/surface_points.py): triangles that are large
 beside the spacing of points as themselves, the rest as discs about `points` points, 1.2 times as wide as the area that
 a point stands for, cut off at the bounds of their object. Each map takes other points. A map is the half ball over its
 light's surface as a disc, (x, y) / (1 + z), in which circles stay circles, so that a square holds each disc's picture.
@@ -72,13 +72,13 @@ import numpy as np
 
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.surface_points import RUNS, TEXELS, SurfacePoints
 from ..frame.technique import Param, Technique
 from ..gfx import geometry, images, passes
 from ..gfx.library import Program
+from ..lighting.virtual_lights import BoundGather, Gather, VirtualLightSet
+from ..scene.surface_points import RUNS, TEXELS, SurfacePoints
 from ..snapshot.scene import Snapshot
 from .multires_radiosity import LEVELS, NEAR_BOUNCES, MultiresRadiosity, regions
-from .virtual_lights import BoundGather, Gather, VirtualLightSet
 
 FILL_LEVELS = 2
 THRESHOLD = 0.05  # of the distance, on the finest level, between what lies on one plane and what is seen through it

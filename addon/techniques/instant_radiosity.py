@@ -61,19 +61,14 @@ from functools import cache
 
 import numpy as np
 
-from ..frame import acceleration
+from ..film.neighbours import smooth
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
-from ..materials.compiler import may_emit
-from ..materials.graph import Graph
-from ..snapshot.scene import Snapshot
-from .neighbours import smooth
-from .surfaces import ANY_SURFACE, LIT_SURFACES, MARKS
-from .virtual_lights import (
+from ..lighting.virtual_lights import (
     PATH_BLOCKS,
     PATH_CONSTANTS,
     PATH_TEXTURES,
@@ -82,6 +77,11 @@ from .virtual_lights import (
     VirtualLightSet,
     near_radius,
 )
+from ..materials.compiler import may_emit
+from ..materials.graph import Graph
+from ..scene import acceleration
+from ..snapshot.scene import Snapshot
+from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, MARKS
 
 DEEPER = 2  # samples, one of which looks for light that close surfaces reflect to each other again and again
 DEEPER_ORDER = (0, 0, 1, 1, 1, 1, 0, 0)  # which of each two: of 16, all numbers of the sequence in each quarter twice

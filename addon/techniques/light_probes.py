@@ -7,7 +7,7 @@ Two questions are asked at pixels of a coarse grid, by rays through the hierarch
   window spends them on the window. What each probe sees is also left for tables of single tiles (environment_light.py).
 - How much do single points of a light differ in what they bring? (432 probes, 8 to 32 points per light; beyond a door
   ajar 8 find a quarter of the variance that 32 find.) Their variance, in units of the light that the probe gets, is the
-  error that one point leaves; frame/rates.py turns it into the number of points per sample. Only for pictures whose
+  error that one point leaves; sources/rates.py turns it into the number of points per sample. Only for pictures whose
   samples are shown together: otherwise every sample has one point per light.
 
 | cost | once per picture |
@@ -23,17 +23,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame import acceleration, environment, lights
-from ..frame.rates import USUAL_SAMPLES, Rate, allocate, budget_for, directions_for, paying
 from ..frame.run import Frame
-from ..frame.sequence import point, third
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..sampling.sequence import point, third
+from ..scene import acceleration
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot, World
+from ..sources import environment, lights
+from ..sources.rates import USUAL_SAMPLES, Rate, allocate, budget_for, directions_for, paying
+from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 from .accumulated_maps import AccumulatedMaps
-from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
 
 GUIDE_PROBES, SPREAD_PROBES = (12, 9), (24, 18)
 FINE_PROBES = (24, 18)  # for guiding, where their rays are few

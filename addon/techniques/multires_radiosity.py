@@ -56,14 +56,17 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from functools import cache
 
-from ..frame import lists
+from ..film.neighbours import smooth
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
-from ..frame.view import VIEW
 from ..gfx import context, images, passes
 from ..gfx.library import Program
+from ..kernels import lists
+from ..lighting.virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
+from ..surfaces.draw import ANY_SURFACE, MARKS, surface_bindings
 from .instant_radiosity import (
     GATHER_CONSTANTS,
     GATHER_TEXTURES,
@@ -72,9 +75,6 @@ from .instant_radiosity import (
     gather_defines,
     lobes_of,
 )
-from .neighbours import smooth
-from .surfaces import ANY_SURFACE, MARKS, surface_bindings
-from .virtual_lights import PATH_BLOCKS, TRACED, BoundGather, Gather, VirtualLightSet
 
 # From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
 MANY_PIXELS = 60_000

@@ -29,14 +29,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame import lights
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
+from ..lighting.point_maps import PointMaps
+from ..lighting.soft_maps import SoftMaps
 from ..snapshot.scene import Light, Snapshot
+from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
 from .cssm import ConvolutionSoftShadows
-from .soft_maps import SoftMaps
 from .vssm import VarianceSoftShadows
 
 PLAIN = "lights without penumbra: plain maps"
@@ -56,7 +57,7 @@ class FewBoxes(ConvolutionSoftShadows):
         return min(super().cells(frame), 2)
 
 
-class ShadowsByLight(AccumulatedMaps):
+class ShadowsByLight(PointMaps):
     name = "shadows_by_light"
     label = "Shadow maps by light"
     slot = "shadow"
@@ -89,7 +90,7 @@ class ShadowsByLight(AccumulatedMaps):
             self._services[kind].run(frame)
         frame.services["shadow"] = self
 
-    def serving(self, emitter: lights.Emitter) -> AccumulatedMaps:
+    def serving(self, emitter: lights.Emitter) -> PointMaps:
         return self._services[self._kinds.get(emitter.light.key, PLAIN)]
 
     def _chosen(self, frame: Frame) -> dict[str, str]:

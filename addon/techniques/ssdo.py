@@ -58,18 +58,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..frame import acceleration
+from ..film.neighbours import reflect
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
-from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..lighting.virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
+from ..scene import acceleration
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
+from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 from .instant_radiosity import INDIRECT_WRITES, no_indirect_light
-from .neighbours import reflect
-from .surfaces import SURFACE_TEXTURES, SURFACES, surface_bindings
-from .virtual_lights import PATH_BLOCKS, PATH_CONSTANTS, PATH_TEXTURES, VirtualLights
 
 FAN_TEXTURES = (*SURFACE_TEXTURES, ("RGBA32F", "energy_table"))
 FAN_CONSTANTS = (("INT", "fan_count"), ("INT", "step_count"), ("FLOAT", "farthest"), ("FLOAT", "thickness"))

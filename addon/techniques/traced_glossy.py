@@ -8,7 +8,7 @@ by the power heuristic (Veach 1997), so that rough lobes keep the noise-free one
 
     sum over lights and world of  F G2/G1 * Le(w) * V(x, w) * (4 p_lobe)^2 / ((4 p_lobe)^2 + (n p_light)^2)
 
-V comes from a bounding volume hierarchy (addon/frame/acceleration.py): no depth map has a view per pixel's direction.
+V comes from a bounding volume hierarchy (addon/scene/acceleration.py): no depth map has a view per pixel's direction.
 
 | cost | per sample |
 |---|---|
@@ -28,22 +28,23 @@ from collections.abc import Hashable, Iterator
 
 import numpy as np
 
-from ..frame import acceleration, lights
-from ..frame.environment import WORLD
-from ..frame.materials import may_be_glossy
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..frame.view import VIEW
 from ..gfx import passes
+from ..lighting import repeated_light
+from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
+from ..lighting.repeated_light import Lit
 from ..materials.compiler import may_emit
+from ..scene import acceleration
+from ..scene.materials import may_be_glossy
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from . import repeated_light
-from .direct_light import DIRECT_WRITES, TRACED_DEFINES
+from ..sources import lights
+from ..sources.environment import WORLD
+from ..surfaces.draw import LIT_SURFACES, NARROW_LOBE, SURFACE_TEXTURES
 from .environment_light import directions_rate
 from .light_probes import rate_of
-from .repeated_light import Lit
-from .surfaces import LIT_SURFACES, NARROW_LOBE, SURFACE_TEXTURES
 
 TRACED = passes.fullscreen_program(
     "traced glossy",

@@ -40,19 +40,20 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ..frame import acceleration, lights
-from ..frame.environment import WORLD
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
-from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..lighting.emissive_triangles import EmissiveTriangles
 from ..materials.compiler import may_emit, may_refract
+from ..scene import acceleration
+from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from .emissive_light import EmissiveTriangles
+from ..sources import lights
+from ..sources.environment import WORLD
+from ..surfaces.draw import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
+from ..surfaces.reflectance import Reflectance
 from .instant_radiosity import NEAR_CONSTANTS, OFFERED
-from .reflectance import Reflectance
-from .surfaces import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2

@@ -52,13 +52,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..frame import tables
 from ..frame.run import Frame
 from ..frame.technique import Param
-from .accumulated_maps import CUTOFF, RESOLUTION, Lookup, Maps
-from .direct_light import lighting
-from .shared_visibility import programs_of
-from .soft_maps import (
+from ..kernels import tables
+from ..lighting.loop import lighting
+from ..lighting.point_maps import CUTOFF
+from ..lighting.shared_visibility import programs_of
+from ..lighting.soft_maps import (
     CONTACTS,
     LIMIT_CONSTANTS,
     LIMIT_TEXTURES,
@@ -69,6 +69,7 @@ from .soft_maps import (
     soft_lookup,
     with_contacts,
 )
+from ..lighting.visibility import RESOLUTION, Lookup, Maps
 
 RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
 FINE, COARSE = 1, 2  # texels along each side of the blocks that a table has entries for

@@ -1,4 +1,4 @@
-// Depth comparisons over boxes of a map whose basis was averaged beforehand (addon/frame/convolution.py): what convolution
+// Depth comparisons over boxes of a map whose basis was averaged beforehand (addon/kernels/convolution.py): what convolution
 // shadow maps of every projection ask. Binds the basis, by table or by pyramid, and `base_extent`, `tile_columns`,
 // `basis_rows`, `top_level`.
 #include "lib/convolution.glsl"

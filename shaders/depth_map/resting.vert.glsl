@@ -1,4 +1,4 @@
-// Casters in world space: addon/frame/casters.py has left out what is hidden or lets light pass.
+// Casters in world space: addon/scene/casters.py has left out what is hidden or lets light pass.
 #include "lib/projection.glsl"
 
 void main()

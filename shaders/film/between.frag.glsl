@@ -2,7 +2,7 @@
 // points (`known`): light arrives there as at the nearest of those where that lies on the same surface, else as at the
 // pixels around it that do, else as nearby; and leaves by the colours of the surface that is seen.
 // REPEATED: where the nearest own point lies elsewhere, and the light of pixels around that lie there is not even, direct
-// light is left out, but for that through glass, and the pixel marked by its depth (techniques/repeated_light.py).
+// light is left out, but for that through glass, and the pixel marked by its depth (lighting/repeated_light.py).
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 

@@ -1,5 +1,5 @@
 // One point of the film, which lies at the same place of every pixel, added to all pixels whose filter covers it
-// (techniques/film_filter.py). `film_pixel`: which pixel, counted from the own one, it lies in.
+// (film/filter.py). `film_pixel`: which pixel, counted from the own one, it lies in.
 #define TAPS (2 * PIXELS + 1)
 
 // Weight of the point `tap` pixels from the first one around, along one axis. At the picture's rim, where pixels around

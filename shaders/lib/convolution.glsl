@@ -4,7 +4,7 @@
 //     [z < d]  =  1/2 + 2 sum over k of sin(c_k (d - z)) / c_k,   c_k = (2 k - 1) pi,  k = 1 .. ORDER
 //
 // sin(c_k (d - z)) separates into products of functions of d and of z. Tile t of the basis images holds, for four
-// values of k each, sin(c_k z), cos(c_k z), z sin(c_k z), z cos(c_k z), and the last tile z (addon/frame/convolution.py).
+// values of k each, sin(c_k z), cos(c_k z), z sin(c_k z), z cos(c_k z), and the last tile z (addon/kernels/convolution.py).
 // Depths are linear and lie in 0.05 .. 0.95: the series has period 2 and flips where |d - z| nears 1.
 #include "lib/math.glsl"
 

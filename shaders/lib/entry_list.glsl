@@ -1,4 +1,4 @@
-// Where the entries of a list lie (addon/frame/lists.py): runs of RUN one above the other, in as many rows as the picture
+// Where the entries of a list lie (addon/kernels/lists.py): runs of RUN one above the other, in as many rows as the picture
 // `surface_position` has, so that some rows of the list hold their share of it.
 ivec2 entry_place(int index)
 {

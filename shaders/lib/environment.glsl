@@ -1,5 +1,5 @@
 // Radiance and sampling density of the world by direction. `environment_map` holds radiance over `world_light.color`,
-// `environment_density_map` the density per steradian with which addon/frame/environment.py draws directions.
+// `environment_density_map` the density per steradian with which addon/sources/environment.py draws directions.
 #include "lib/math.glsl"
 
 // Blender's equirectangular convention: u = 0.5 looks along +X, u grows towards -Y, v grows upwards.

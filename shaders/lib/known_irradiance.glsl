@@ -1,4 +1,4 @@
-// Irradiance of the unoccluded world by normal (addon/frame/irradiance.py), and how open each pixel was to it so far.
+// Irradiance of the unoccluded world by normal (addon/sources/irradiance.py), and how open each pixel was to it so far.
 //
 // Shared directions draw the world's light U = sum of L cos / p together with its shadows, sum of L cos V / p. U has a
 // known mean, E(n), so U - E(n) is noise without a mean that goes with the noise of the light that arrives (a control

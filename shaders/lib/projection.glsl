@@ -1,4 +1,4 @@
-// One projection for all views: rows give clip x, y, w and the depth measure q (see addon/frame/view.py).
+// One projection for all views: rows give clip x, y, w and the depth measure q (see addon/scene/view.py).
 // z = w - 2 near q: for perspective an infinite far plane, for orthographic q in [0, 1].
 
 vec4 project(vec3 p, vec4 to_x, vec4 to_y, vec4 to_w, vec4 to_q, float nearest)

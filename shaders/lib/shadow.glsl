@@ -5,7 +5,7 @@
 // with the receiver's plane continued to the texel's centre. Only if both say "behind" there is shadow. A surface
 // therefore never shadows itself, flat or convex, and no bias in metres is needed.
 //
-// The uniform block `sources` (addon/frame/lights.py) lists in `view[]`, per view, rows x, y, w, q and the rectangle
+// The uniform block `sources` (addon/sources/lights.py) lists in `view[]`, per view, rows x, y, w, q and the rectangle
 // (origin, size) in the atlas `depth_maps`.
 
 #define VIEW_TEXELS 5

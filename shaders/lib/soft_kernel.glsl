@@ -34,7 +34,7 @@ vec2 kernel_bounds(ShadowReceiver r, ivec2 first, ivec2 last, out float deepest)
 }
 
 // Texels of the view (first..last) that can hold blockers: in front of an area light's plane, in whole blocks of a
-// table. Views beside its axis have that plane's horizon along a row or a column (turn_along in addon/frame/depth_maps.py).
+// table. Views beside its axis have that plane's horizon along a row or a column (turn_along in addon/lighting/depth_maps.py).
 void kernel_limits(Light light, ShadowReceiver r, out vec2 first, out vec2 last)
 {
   first = vec2(0.0);

@@ -1,4 +1,4 @@
-// Visibility of up to four lights that was found before, of the lights one above the other (techniques/shared_visibility.py).
+// Visibility of up to four lights that was found before, of the lights one above the other (lighting/shared_visibility.py).
 #include "light/sources.glsl"
 
 float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)

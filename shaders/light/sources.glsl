@@ -1,10 +1,10 @@
 // Light sources as Cycles has them: where a sample of each lies for a receiver, how much it gives, and what a ray hits.
 //
-// The uniform block `sources` (addon/frame/lights.py) holds LIGHT_TEXELS vec4 per light, in `light[]`:
+// The uniform block `sources` (addon/sources/lights.py) holds LIGHT_TEXELS vec4 per light, in `light[]`:
 //   0: kind, flags, first depth-map view, number of views
 //   1: centre, radius                 (sun, direction: unit vector towards the light, half angle)
 //   2: this sample's point            (point, spot: offset from the centre; area: position; sun: direction)
-//      w: how many points of the light a sample of the picture has on average (addon/frame/rates.py)
+//      w: how many points of the light a sample of the picture has on average (addon/sources/rates.py)
 //   3: radiance, area                 (radius 0: radiant intensity; direction: radiance / density, density;
 //                                      point of an emissive surface: radiance, 1 / density)
 //   4: emission axis (unit)           w: tan of the half spread, 0 = Lambertian
@@ -32,7 +32,7 @@
 #define LIGHT_SIDED 512
 #define LIGHT_EVEN 1024
 
-// What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/frame/lights.py). What
+// What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/sources/lights.py). What
 // is left out some drivers would compute and mask.
 #ifndef LIGHT_KINDS
 #define LIGHT_KINDS -1

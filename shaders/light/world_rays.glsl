@@ -1,4 +1,4 @@
-// Directions of the world of each pixel's own, drawn from the table of its tile (addon/frame/world_tiles.py), and their
+// Directions of the world of each pixel's own, drawn from the table of its tile (addon/sources/world_tiles.py), and their
 // visibility by rays. In place of the directions that the other lookups share among all pixels.
 #include "light/sources.glsl"
 #include "lib/environment.glsl"

@@ -1,4 +1,4 @@
-// A mesh's triangles laid out flat, each on a tile of its own, for each side and sample that addon/frame/opacity_maps.py
+// A mesh's triangles laid out flat, each on a tile of its own, for each side and sample that addon/scene/opacity_maps.py
 // adds up: their numbers are those of the instances drawn.
 #include "lib/instance.glsl"
 #include "generated/attributes"

@@ -20,7 +20,7 @@ vec2 window_steps(vec3 step, vec3 plane_normal)
 // How high above its triangle (x) and how far below it (y) a smooth-shaded surface is meant to run, on the viewer's side.
 // With barycentric coordinates b, corners V and normals N the parabola  sum over edges of b_i b_j (V_j - V_i) . (N_j - N_i),
 // which is what V . N, interpolated, is more than the point's own; and where normals lean together, up to the plane through
-// the corner that lies furthest along them (addon/frame/envelope.py).
+// the corner that lies furthest along them (addon/scene/envelope.py).
 vec2 smooth_lift(Instance instance, bool back)
 {
   float reach = length(world_normal);

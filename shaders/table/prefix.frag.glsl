@@ -1,5 +1,5 @@
 // Sums up to and including each texel along STEP: those of its own chunk, and of all chunks before it if the image has
-// more than one (addon/frame/tables.py).
+// more than one (addon/kernels/tables.py).
 void main()
 {
   ivec2 texel = ivec2(gl_FragCoord.xy);

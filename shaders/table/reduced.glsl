@@ -1,4 +1,4 @@
-// An entry of a pyramid, least and largest value or mean, from 2x2 entries of the level below (addon/frame/tables.py).
+// An entry of a pyramid, least and largest value or mean, from 2x2 entries of the level below (addon/kernels/tables.py).
 #include "generated/source"
 
 vec4 reduced(ivec2 below)

@@ -1,4 +1,4 @@
-// Sums of chunks of CHUNK texels along STEP (addon/frame/tables.py).
+// Sums of chunks of CHUNK texels along STEP (addon/kernels/tables.py).
 void main()
 {
   ivec2 chunk = ivec2(gl_FragCoord.xy);

@@ -1,4 +1,4 @@
-// What is summed, texel by texel (addon/frame/tables.py).
+// What is summed, texel by texel (addon/kernels/tables.py).
 #include "generated/source"
 
 void main()

@@ -1,4 +1,4 @@
-// Nearest hit of a ray in the bounding volume hierarchy of addon/frame/acceleration.py.
+// Nearest hit of a ray in the bounding volume hierarchy of addon/scene/acceleration.py.
 //
 // Where some triangles are opaque place by place, OPACITY_TILES is defined (the image of the leaves sees to it).
 //
@@ -8,7 +8,7 @@
 #include "lib/random.glsl"
 
 #define NODE_TEXELS 4
-#define DEEPEST 32  // nodes above each other, as in addon/frame/box_tree.py
+#define DEEPEST 32  // nodes above each other, as in addon/scene/box_tree.py
 #define LEAF_TEXELS 17
 #define OPACITY_TEXEL 9  // opacity_of_four
 #define SIDES 2048.0     // one more than what an opaque side has
@@ -93,7 +93,7 @@ vec2 triangle_place(ivec2 hit, vec3 position)
 }
 
 #ifdef OPACITY_TILES
-// Coverage of a triangle where a ray meets it, from the tile that its code names (addon/frame/opacity_maps.py).
+// Coverage of a triangle where a ray meets it, from the tile that its code names (addon/scene/opacity_maps.py).
 float tile_opacity(ivec2 hit, float code, bool front, vec3 position)
 {
   int number = int(code) >> 1;  // of tile and side: corners of an odd one run the other way round

@@ -62,7 +62,7 @@ def test_growth_names_exponent_and_counters_that_grew():
 
 def test_profile_tells_python_from_the_gpu():
     draw, compiling = ("~", 0, "<method 'draw' of 'GPUBatch' objects>"), ("~", 0, "<gpu.shader.create_from_info>")
-    own, numpy = ("/x/addon/frame/culling.py", 43, "seen"), ("/y/numpy/linspace.py", 7, "linspace")
+    own, numpy = ("/x/addon/scene/culling.py", 43, "seen"), ("/y/numpy/linspace.py", 7, "linspace")
     stats = {
         draw: (1, 1, 6.0, 6.0, {}),
         compiling: (1, 1, 1.0, 1.0, {}),
@@ -74,6 +74,6 @@ def test_profile_tells_python_from_the_gpu():
     assert share == pytest.approx(
         {"sync": 0.05, "compile": 0.1, "GPU": 0.5, "readback": 0.1, "Python": 0.15, "Blender": 0.1}
     )
-    assert profile.dearest(stats, 3) == [("frame/culling.py: seen", 2.0)]
+    assert profile.dearest(stats, 3) == [("scene/culling.py: seen", 2.0)]
     row = {"scene": "room", "warm": 1.0, "unchanged": 0.6, "shares": share, "dearest": [["a: b", 0.2]]}
     assert len(profile.missed(row)) == 2

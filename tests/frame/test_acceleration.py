@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame import acceleration
+from addon.scene import acceleration
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from addon.frame import box_tree
+from addon.scene import box_tree
 
 RNG = np.random.default_rng(7)
 

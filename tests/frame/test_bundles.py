@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from addon.frame import acceleration
 from addon.gfx import images, passes
 from addon.gfx.library import Program
+from addon.scene import acceleration
 
 BUNDLES, RAYS = 512, 4
 OPAQUE, SHEER = 2047 * 2049, 1000 * 2049  # codes of both sides alike

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from addon.frame.clusters import cluster, members
+from addon.sources.clusters import cluster, members
 
 
 def square(count=400, seed=1):

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.frame import casters
-from addon.frame.culling import Boxes, calls, closed, closed_triangles
+from addon.scene import casters
+from addon.scene.culling import Boxes, calls, closed, closed_triangles
 
 
 def mesh(positions, triangles):

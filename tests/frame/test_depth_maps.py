@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.frame.depth_maps import Receivers, directional_views, point_views
+from addon.lighting.depth_maps import directional_views, point_views
+from addon.scene.receivers import Receivers
 
 RESOLUTION = 256
 

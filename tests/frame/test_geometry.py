@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.frame import geometry
-from addon.frame.geometry import MOST_MOVED, SceneGeometry
-from addon.frame.materials import MaterialSet
 from addon.gfx import geometry as gfx_geometry
 from addon.gfx import images
+from addon.scene import geometry
+from addon.scene.geometry import MOST_MOVED, SceneGeometry
+from addon.scene.materials import MaterialSet
 from addon.snapshot import SnapshotCache, take
 
 COUNT = 300  # more than a row of the list holds

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.irradiance import COLUMNS, ROWS, WorldCells
+from addon.sources.irradiance import COLUMNS, ROWS, WorldCells
 
 HEIGHT, WIDTH = 256, 512
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, directions_for, left, paying
+from addon.sources.rates import FEWEST_POINTS, LITTLE, Rate, allocate, budget_for, directions_for, left, paying
 
 
 @pytest.mark.parametrize(("exponent", "numbers"), [(0, [[0], [1], [2], [3]]), (1, [[0, 1], [2, 3], [4, 5], [6, 7]])])

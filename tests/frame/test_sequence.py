@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from addon.frame import sequence
-from addon.frame.sequence import FILM, pixel_bits, point, points
-from addon.frame.view import blackman_harris_offset
+from addon.sampling import sequence
+from addon.sampling.sequence import FILM, pixel_bits, point, points
+from addon.scene.view import blackman_harris_offset
 
 USES = [FILM, "light/Lamp", "light/Sun", "environment", "map/Lamp", "map/Lamp/turn"]
 

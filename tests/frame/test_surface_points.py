@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.surface_points import COVER, RUNS, Surfaces, spread
+from addon.scene.surface_points import COVER, RUNS, Surfaces, spread
 
 POINTS = 64
 EYE = np.zeros(3)

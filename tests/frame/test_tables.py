@@ -5,9 +5,9 @@ import time
 import numpy as np
 import pytest
 
-from addon.frame import tables
 from addon.gfx import images, passes
 from addon.gfx.library import Program
+from addon.kernels import tables
 
 FLOATS = tables.TableSource(
     "floats",

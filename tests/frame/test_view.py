@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame.view import VIEW, View
+from addon.scene.view import VIEW, View
 from addon.snapshot.scene import Camera, Film
 
 # Right, up and backward of a camera that looks somewhere between all axes, and where it stands.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame import world_tiles
+from addon.sources import world_tiles
 
 TILES, GRID = (6, 8), (16, 32)
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 import addon
-from addon.frame import materials
-from addon.frame.world_tree import background_program, bake_program
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
 from addon.materials import nodes
 from addon.materials.compiler import compile_material, default_graph
+from addon.scene import materials
+from addon.scene.world_tree import background_program, bake_program
 
 
 def _found(kind: type) -> list:

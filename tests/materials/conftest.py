@@ -9,10 +9,10 @@ from addon.materials.energy import energy_texture
 @pytest.fixture(scope="session")
 def evaluate(gpu_context):
     """`evaluate(material, points, images)` -> dict of closure fields, (N, 3) or (N,) float32."""
-    from addon.frame.materials import MATERIAL_SCENE
     from addon.gfx import images as gpu_images
     from addon.gfx import passes
     from addon.gfx.struct import Block
+    from addon.scene.materials import MATERIAL_SCENE
     from tests.materials.probe import FIELDS, material_program, points
 
     scene = Block(

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from addon.frame.materials import MATERIAL_SCENE
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
+from addon.scene.materials import MATERIAL_SCENE
 
 # What the probe writes, one texel each, as (name, components).
 FIELDS = (

@@ -30,8 +30,8 @@ def snapshot(materials):
 
 
 def test_200_materials_of_10_topologies_make_10_programs(gpu_context):
-    from addon.frame.materials import MaterialSet
     from addon.gfx import library
+    from addon.scene.materials import MaterialSet
 
     materials = [Material(f"{k}", f"Material {k}", chain(1 + k % 10, 0.001 * k)) for k in range(200)]
     shown = MaterialSet()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame import convolution
+from addon.kernels import convolution
 from tests.techniques.test_shadows import EVERYWHERE, HEIGHT, LIGHTS, irradiance, receivers
 from tests.techniques.test_vssm import EDGE, expected_visibility, floor, rms, visibility  # noqa: F401 - a fixture
 

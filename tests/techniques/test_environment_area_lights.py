@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.frame import area_fit
+from addon.sources import area_fit
 from tests.techniques.conftest import places
 
 IDENTITY = np.eye(3)

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.frame.rates import Rate
+from addon.sources.rates import Rate
 from addon.techniques import environment_light
 from tests.techniques.conftest import places
 

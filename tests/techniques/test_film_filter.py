@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
-from addon.frame.view import blackman_harris, blackman_harris_offset
-from addon.techniques import film_filter
+from addon.film import filter as film_filter
+from addon.scene.view import blackman_harris, blackman_harris_offset
 
 SPAN = 4.0
 

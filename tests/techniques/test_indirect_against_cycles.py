@@ -16,7 +16,7 @@ import pytest
 from addon.compare.metrics import compare_radiance
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
-from addon.frame import sequence
+from addon.sampling import sequence
 
 SCENES = Path(__file__).resolve().parents[2] / "sample_blends"
 SIZE, SAMPLES, REFERENCE_SAMPLES, BOUNCES = (64, 48), 64, 128, 16

@@ -8,10 +8,10 @@ import pytest
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
-from addon.frame.sequence import point
 from addon.gfx import images
+from addon.sampling.sequence import point
+from addon.surfaces.reflectance import BANDS, COLUMNS, Reflectance
 from addon.techniques.instant_radiosity import DEEPER, InstantRadiosity, deeper_weight
-from addon.techniques.reflectance import BANDS, COLUMNS, Reflectance
 
 SAMPLES = 32
 

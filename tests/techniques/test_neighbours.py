@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
-from addon.frame.view import VIEW
+from addon.film.neighbours import FEW, shown_sum, smooth
 from addon.gfx import images
 from addon.gfx.struct import Block
-from addon.techniques.neighbours import FEW, shown_sum, smooth
+from addon.scene.view import VIEW
 from tests.techniques.conftest import places
 from tests.techniques.test_instant_radiosity import corner
 

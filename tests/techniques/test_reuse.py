@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from addon import engine
-from addon.frame import ray_costs
 from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, images, library
+from addon.lighting import ray_costs
 from addon.techniques.accumulated_maps import AccumulatedMaps
 
 

@@ -312,7 +312,7 @@ def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, k
     """Closed, mirrored and open casters: written out in world space or drawn as instances, the picture is the same."""
     import bpy
 
-    from addon.frame import casters
+    from addon.scene import casters
 
     stage.floor()
     stage.camera_above(SPAN)

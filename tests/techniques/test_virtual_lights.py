@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.techniques.virtual_lights import CELL, _resample
+from addon.lighting.virtual_lights import CELL, _resample
 
 COUNT = 512
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .morton import morton_codes
+from ..kernels.morton import morton_codes
 
 LEAF = 4  # boxes
 WIDTH = 4  # children

@@ -30,13 +30,13 @@ the next pixel on the surface; light's own edges are half a pixel wider. It ends
 
 from __future__ import annotations
 
-from ..frame.materials import may_be_glossy
 from ..frame.run import Frame
 from ..frame.technique import Param
-from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.library import Program
-from .surfaces import refracts
+from ..scene.materials import may_be_glossy
+from ..scene.view import VIEW
+from ..surfaces.draw import refracts
 
 POINTS = Param(
     "points", "Film points", 8,

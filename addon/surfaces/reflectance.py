@@ -1,7 +1,7 @@
 """Mean reflectance of each material: what surfaces out of the camera's sight reflect of the light that meets them.
 
 A node tree is only known as a program that runs per pixel. So each material is drawn once, all its surfaces over one
-another, from the two directions of frame/overview.py, and the pixels are averaged.
+another, from the two directions of scene/overview.py, and the pixels are averaged.
 
 | cost | once per set of materials and geometry |
 |---|---|
@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame.culling import calls
-from ..frame.materials import SURFACE_IMAGES
-from ..frame.overview import DIRECTIONS, overview, some
 from ..frame.run import Frame
-from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.struct import Block
-from .surfaces import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
+from ..scene.culling import calls
+from ..scene.materials import SURFACE_IMAGES
+from ..scene.overview import DIRECTIONS, overview, some
+from ..scene.view import VIEW
+from .draw import STOCHASTIC, SURFACE_TEXTURES, drawing_constants
 
 SIDE = 16  # pixels of one view
 COLUMNS = 16  # materials in a row of the result

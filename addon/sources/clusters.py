@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .morton import morton_codes
+from ..kernels.morton import morton_codes
 
 PLACE, TURN = 0.7, 0.3
 WIDEST = 0.5  # cosine between a point's normal and its group's

@@ -3,8 +3,8 @@
 A thin lens maps every point of the plane in focus to one point of the film, whichever part of the aperture the light
 takes. One sample looks through one point of it, the same for all pixels, with the frustum sheared about that plane
 (Haeberli, Akeley 1990, "The Accumulation Buffer", section 4). Each sample is a sharp picture that any technique can
-draw, and the mean converges to the truth at the rate of the sequence (frame/sequence.py). With n samples a point that
-is blurred over more than about n pixels shows as separate copies; more samples are the cure.
+draw, and the mean converges to the truth at the rate of the sequence (sampling/sequence.py). With n samples a point
+that is blurred over more than about n pixels shows as separate copies; more samples are the cure.
 """
 
 from __future__ import annotations

@@ -13,11 +13,11 @@ import numpy as np
 
 from ..gfx import images
 from ..gfx.struct import Block, Struct
+from ..scene.world_tree import WorldTree
 from ..snapshot.scene import Note, World
 from . import irradiance
 from .irradiance import WorldCells
 from .lights import LUMINANCE
-from .world_tree import WorldTree
 
 WORLD = Struct(
     "World",

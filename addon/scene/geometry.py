@@ -17,12 +17,12 @@ import numpy as np
 from ..gfx import geometry as gfx_geometry
 from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
+from ..kernels.morton import morton_codes
 from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from . import casters
 from .culling import closed
 from .envelope import normal_envelope
-from .morton import morton_codes
 
 LARGE, STEPS = 256.0, 16  # m: scenes beyond it are cut into so many places for the origin
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16

@@ -10,7 +10,7 @@ Pixels of the cell on that plane interpolate, all others look for themselves:
     max V - min V <= ALIKE there, or <= LINEAR where second differences, one corner further too, are at most BEND
 
 What is lit, or in full shadow, is as exact as before; so are outlines, contacts and the bends of penumbrae. The pixels
-that look for themselves lie scattered, and lanes of a GPU beside them would idle: they are listed (frame/lists.py),
+that look for themselves lie scattered, and lanes of a GPU beside them would idle: they are listed (kernels/lists.py),
 light by light, and looked up in one dispatch.
 
 Beside looking at every pixel, one variance map of 1024x1024, 640x360 pixels: RMS error of the visibility, and processor
@@ -49,15 +49,16 @@ from functools import cache
 
 import numpy as np
 
-from ..frame import lights, lists
 from ..frame.run import Frame
 from ..frame.technique import Technique
-from ..frame.view import VIEW
 from ..gfx import context, images, passes
 from ..gfx.library import Program
+from ..kernels import lists
+from ..scene.view import VIEW
+from ..sources import lights
+from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from . import repeated_light
-from .accumulated_maps import Lookup, Maps
-from .surfaces import SURFACE_TEXTURES, surface_bindings
+from .visibility import Lookup, Maps
 
 RATE = 4  # pixels between lookups, along both axes
 # Differences of visibility between a cell's corners up to which pixels within it interpolate: whatever lies around, and

@@ -1,7 +1,7 @@
 """What shadow techniques share that see a light as a whole, or a part of it, from one depth map.
 
 Which part a map stands for follows from the samples: all of the light with one, a part whose extents shrink by sqrt(n)
-with n (AccumulatedMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they
+with n (PointMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they
 are lit or in full shadow, and the limits of its depths. Maps are kept, from frame to frame too, as long as the casters
 and what they are seen from are the same: a light may change its power or colour.
 
@@ -22,21 +22,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame import acceleration, depth_maps, lights, tables
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images
-from . import shared_visibility
-from .accumulated_maps import (
-    PART_TEXELS,
-    RAY_CONSTANTS,
-    AccumulatedMaps,
-    Lookup,
-    Maps,
-    drawn_by_lot,
-    map_resolution,
-    ray_bindings,
-)
+from ..kernels import tables
+from ..scene import acceleration
+from ..sources import lights
+from . import depth_maps, shared_visibility
+from .point_maps import PointMaps
+from .visibility import PART_TEXELS, RAY_CONSTANTS, Lookup, Maps, drawn_by_lot, map_resolution, ray_bindings
 
 REFINE = Param(
     "refine", "Refine", True,
@@ -92,7 +86,7 @@ def few_samples(frame: Frame) -> bool:
     return frame.settings.samples < FEWEST_POINTS
 
 
-class SoftMaps(AccumulatedMaps):
+class SoftMaps(PointMaps):
     """Base of the techniques; `filtered` is theirs."""
 
     atlas_texels = 2**22  # filtered maps take several times the bytes of plain ones

@@ -19,10 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..gfx import geometry as gfx_geometry
+from ..kernels.morton import morton_codes
 from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
 from .culling import Boxes, closed_triangles
-from .morton import morton_codes
 
 LARGEST = 2_000_000  # triangles
 NOBODY = np.zeros(0, np.int64)

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gfx import images
+from ..sampling.sequence import bits
 from . import acceleration
-from .sequence import bits
 
 RUNS = 32
 COVER = 1.2  # radius of a disc beside that of the area which its point stands for

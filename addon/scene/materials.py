@@ -14,7 +14,7 @@ from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..snapshot.scene import Image, Note, Snapshot
-from .depth_maps import PROJECTION_CONSTANTS, PROJECTION_DEFINES
+from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
 from .view import VIEW, View
 
 # The camera as node trees see it. Positions are relative to the render origin.

@@ -33,12 +33,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frame import lights
 from ..frame.run import Frame
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
-from .surfaces import MARKS, surface_bindings
+from ..sources import lights
+from ..surfaces.draw import MARKS, surface_bindings
 
 EDGES = Param(
     "edges", "Light edges", True,

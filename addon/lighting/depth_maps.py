@@ -10,50 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ..gfx import images, passes
 from ..gfx.library import Program, Shader
-from .casters import Clusters
-from .culling import CORNERS, Boxes, calls
-from .geometry import SHADOW_FLAG, Draw, SceneGeometry
-from .lights import VIEW_TEXELS
+from ..scene.casters import Clusters
+from ..scene.culling import CORNERS, Boxes, calls
+from ..scene.geometry import Draw, SceneGeometry
+from ..scene.projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES, ROWS
+from ..scene.receivers import Receivers
+from ..sources.lights import VIEW_TEXELS
 
 WIDEST_TANGENT = 2.5  # a single view up to 68 degrees half angle; beyond it, cube faces
 
 
 @dataclass(frozen=True)
-class Receivers:
-    """Boxes around what the camera sees, relative to the render origin, in order of distance from the camera."""
-
-    low: np.ndarray  # (T, 3)
-    high: np.ndarray  # (T, 3)
-    distance: np.ndarray  # (T,) from the camera, metres
-
-    @cached_property
-    def typical_distance(self) -> float:
-        """The median, m; asked where there are any."""
-        return float(np.median(self.distance))
-
-    @property
-    def corners(self) -> np.ndarray:
-        """(T, 8, 3)"""
-        return self.low[:, None] + CORNERS[None] * (self.high - self.low)[:, None]
-
-    def groups(self) -> list[np.ndarray]:
-        """Indices by distance, each group reaching at most four times as far as the one before."""
-        if not len(self.distance):
-            return []
-        far = max(float(self.distance.max()), 1e-30)
-        level = np.clip(np.floor(np.log(far / np.maximum(self.distance, far * 1e-9)) / np.log(4.0)), 0, 3)
-        return [np.flatnonzero(level == k) for k in (3, 2, 1, 0) if (level == k).any()]
-
-
-@dataclass(frozen=True)
 class MapView:
-    """One projection: rows x, y, w, q (see addon/frame/view.py) and the near distance of its depth buffer."""
+    """One projection: rows x, y, w, q (see addon/scene/view.py) and the near distance of its depth buffer."""
 
     rows: np.ndarray  # (4, 4) float64
     near: float
@@ -234,9 +208,6 @@ def _unit(v):
 
 # ------------------------------------------------------------------------------------------------ atlas and drawing
 
-ROWS = (("VEC4", "row_x"), ("VEC4", "row_y"), ("VEC4", "row_w"), ("VEC4", "row_q"), ("FLOAT", "near"))
-PROJECTION_CONSTANTS = (*ROWS, ("INT", "first_instance"))
-PROJECTION_DEFINES = (("PROJECTION", "row_x, row_y, row_w, row_q, near"), ("VISIBILITY_FLAG", str(SHADOW_FLAG)))
 
 OPAQUE = Program(
     name="depth map",

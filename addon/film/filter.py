@@ -34,9 +34,9 @@ from functools import cache
 import numpy as np
 
 from ..frame.run import Frame
-from ..frame.view import blackman_harris
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..scene.view import blackman_harris
 
 FARTHEST = 2  # pixels on each side: wider filters would cost more than samples
 MOST_IMAGES = 6  # that Blender lets a pass draw into

@@ -35,8 +35,8 @@ from contextlib import ExitStack, contextmanager
 
 from ..frame.run import Frame
 from ..frame.technique import Technique
-from ..frame.view import VIEW
 from ..gfx import images, passes
+from ..scene.view import VIEW
 
 APART = 3  # pixels, of those in the second mean
 FEW = 8  # samples at rest in a viewport: up to here it shows indirect light filtered

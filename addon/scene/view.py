@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from ..gfx.struct import Struct
+from ..sampling.sequence import pixel_bits
 from ..snapshot.scene import Camera, Film
 from .geometry import CAMERA_FLAG
-from .sequence import pixel_bits
 
 # `q` is the depth measure of every projection in Candela: it is an affine function of window coordinates on any
 # plane (1/distance for perspective, distance along the axis for orthographic), and grows towards the viewer.
@@ -32,7 +32,7 @@ VIEW = Struct(
     ("int", "bits_y"),
     ("int", "bits_z"),
     ("int", "bits_w"),
-    ("int", "visibility"),  # flag of the instances that this view shows (addon/frame/geometry.py)
+    ("int", "visibility"),  # flag of the instances that this view shows (addon/scene/geometry.py)
 )
 
 

@@ -56,18 +56,19 @@ from functools import cache
 
 import numpy as np
 
-from ..frame import acceleration, lights
-from ..frame.morton import BITS, morton_codes
 from ..frame.run import Frame
-from ..frame.view import VIEW
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block
+from ..kernels.morton import BITS, morton_codes
 from ..materials.compiler import may_emit
-from .emissive_light import EmissiveTriangles
-from .reflectance import Reflectance
-from .surfaces import SURFACE_TEXTURES, surface_bindings
+from ..scene import acceleration
+from ..scene.view import VIEW
+from ..sources import lights
+from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
+from ..surfaces.reflectance import Reflectance
+from .emissive_triangles import EmissiveTriangles
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe

@@ -1,9 +1,9 @@
 """A world's node tree on the GPU: compiled like a material, baked into a map that lights, shown exactly behind all.
 
 Light needs directions drawn in proportion to radiance, so the tree is evaluated once per texel of an equirectangular
-map, which is read back (frame/environment.py builds its tables from it). The map holds what light rays see; the camera
-sees the tree itself, evaluated per pixel and sample (techniques/film.py), so that a Light Path node may show it another
-background, and fine detail is not blurred.
+map, which is read back (sources/environment.py builds its tables from it). The map holds what light rays see; the
+camera sees the tree itself, evaluated per pixel and sample (techniques/film.py), so that a Light Path node may show it
+another background, and fine detail is not blurred.
 
 As in Cycles, the point that the tree shades stands in the ray's direction, one unit from the origin, and its normal
 points against the ray.

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..frame.run import Frame
 from ..gfx import context
-from .culling import Boxes
+from ..scene.culling import Boxes
 from .depth_maps import MapView
-from .run import Frame
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ REPEATED = 0.15  # share of the pixels in which light is asked again for another
 
 def rays_cost_less(frame: Frame, views: list[MapView], resolution: int, repeats: int) -> bool:
     """Whether a ray of each pixel costs less than these views of a light, drawn with `resolution`. `repeats`: so many
-    times their light is asked again at edges (techniques/repeated_light.py)."""
+    times their light is asked again at edges (lighting/repeated_light.py)."""
     costs = IN_SOFTWARE if context.draws_slowly() else ON_GPU
     boxes = Boxes.of(frame.geometry.opaque_casters)
     triangles = np.array([draw.triangles for draw in frame.geometry.opaque_casters], float)

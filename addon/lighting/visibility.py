@@ -1,0 +1,201 @@
+"""Whether a point of a light is seen from a surface: what tells it (depth maps or rays), and drawing the maps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..film import points as film_points
+from ..frame.run import Frame
+from ..frame.technique import Param, Technique
+from ..gfx import images, passes
+from ..gfx.struct import Block, Struct
+from ..scene import acceleration
+from ..scene.geometry import Draw
+from ..scene.receivers import TILE
+from ..sources import lights
+from . import depth_maps, repeated_light
+from .ray_costs import rays_cost_less
+
+RESOLUTION = Param(
+    "texels_per_pixel", "Map resolution", 2.0,
+    "Texels of a depth map per pixel of the picture's longer side", 0.125, 16.0,
+)  # fmt: skip
+# Texels decide alone where casters let some light pass, and their error does not fall with samples: where leaves touch
+# it outweighs noise from so many on. alpha_foliage, direct light, 64 samples: relMSE .0008 to .0006 (gloss .0097 to
+# .0084) in 1.13 times the time; with 16 as much would be gained by more samples.
+FINER_BY_LOT, FINER_FROM = 2.0, 64
+MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
+
+BY_COST, BY_MAPS, BY_RAYS = "COST", "MAPS", "RAYS"
+SHADOWS_BY = Param(
+    "by", "Shadows by", BY_COST,
+    "What tells whether a point of a light is seen. Rays need opaque casters, and a hierarchy of all triangles",
+    items=((BY_COST, "What costs less", 0), (BY_MAPS, "Depth maps", 1), (BY_RAYS, "Rays", 2)),
+)  # fmt: skip
+PIXEL_SHARE = 0.1  # of a pixel's side on the nearest surfaces, by which rays may begin off them
+ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds
+PART_TEXELS = 2**21  # after as many of a sample that is drawn in parts, a window answers
+
+
+def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
+    """Side of a depth map in texels."""
+    wished = max(frame.size) * texels_per_pixel
+    return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """GLSL file with `float light_visibility(Light, ivec2 pixel, vec3 position, vec3 normal)` and what else it binds.
+    `maps`: it reads depth maps."""
+
+    name: str
+    file: str
+    textures: tuple[tuple[str, str], ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+    defines: tuple[tuple[str, str], ...] = ()
+    blocks: tuple[tuple[Struct, str], ...] = ()
+    maps: bool = True
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Depth maps that were drawn: the atlas (None: rays take their place), its views for the uniform block, and what
+    the lookup binds besides. `sparse`: they are asked at some pixels, and between where that does not suffice."""
+
+    atlas: images.Image | None
+    views: np.ndarray  # (V, VIEW_TEXELS, 4)
+    lookup: Lookup
+    textures: dict[str, images.Image] = field(default_factory=dict)
+    constants: dict[str, object] = field(default_factory=dict)
+    blocks: dict[str, Block] = field(default_factory=dict)
+    sparse: bool = False
+    drawing: Iterator[None] = field(default_factory=lambda: iter(()))  # to be exhausted before they are asked
+
+
+# What lookups by rays bind besides the hierarchy.
+RAY_CONSTANTS = (("FLOAT", "offset_size"),)
+HARD = Lookup("hard", "lib/hard_visibility.glsl")
+EDGES = Lookup(
+    "edge rays",
+    "lib/edge_visibility.glsl",
+    textures=acceleration.HIERARCHY_TEXTURES,
+    constants=RAY_CONSTANTS,
+)
+RAYS = Lookup(
+    "rays",
+    "light/ray_visibility.glsl",
+    textures=acceleration.HIERARCHY_TEXTURES,
+    constants=RAY_CONSTANTS,
+    maps=False,
+)
+
+
+def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, object]]:
+    """Textures and RAY_CONSTANTS: what casts shadows, for rays."""
+    hierarchy = frame.hierarchy("shadow")
+    textures = hierarchy.textures
+    return textures, {"offset_size": frame.offset_size}
+
+
+def drawn_by_lot(frame: Frame) -> list[Draw]:
+    """Casters that let some light pass."""
+    return [draw for draw in frame.geometry.draws if frame.materials.compiled[draw.material].casts_by_lot]
+
+
+def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:
+    """Whether rays take the place of maps. `views` makes those of such a map, where they are asked for; without any
+    there is no shadow to trace."""
+    wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
+    if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
+        return False
+    if drawn_by_lot(frame):  # maps ask the material itself; rays know it by cells
+        return False
+    asked = views()
+    if not asked or wanted == BY_RAYS:
+        return bool(asked)
+    points = film_points.points_of_sample(frame, frame.settings.value("film", film_points.POINTS))
+    repeats = points - 1 if frame.settings.samples >= repeated_light.FEWEST else 0
+    return not _far_off(frame) and rays_cost_less(frame, asked, resolution, repeats)
+
+
+def _far_off(frame: Frame) -> bool:
+    """Whether rays, which begin as far off a surface as float32 may be wrong about it, would pass below what touches it
+    in a way that the picture shows: in pixels with little of a huge scene."""
+    receivers = frame.receivers
+    sides = (receivers.high - receivers.low).max(axis=1)
+    return bool(len(sides)) and frame.offset_size > PIXEL_SHARE * float(np.percentile(sides, 10)) / TILE
+
+
+NO_VIEWS = np.zeros((0, lights.VIEW_TEXELS, 4))
+
+
+def traced_shadows(frame: Frame) -> Maps:
+    """What is asked in place of maps: rays."""
+    return Maps(None, NO_VIEWS, RAYS, *ray_bindings(frame))
+
+
+class DepthMapService:
+    """Draws depth maps for any technique that needs visibility from points or directions."""
+
+    def __init__(self):
+        self._atlas = depth_maps.Atlas()
+
+    def alpha_casters(self, frame: Frame) -> depth_maps.AlphaCasters:
+        """What lets some light pass, and how to draw it."""
+        materials, draws = frame.materials, drawn_by_lot(frame)
+        programs = {
+            index: (passes.get(materials.caster_program(index)), materials.bindings(index, frame.geometry.instances))
+            for index in {draw.material for draw in draws}
+        }
+        return depth_maps.AlphaCasters(draws, programs)
+
+    def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> Maps:
+        """Draw the views, to be asked point by point, once `drawing` is exhausted."""
+        cells, texels = self._atlas.prepare(views or [_NO_VIEW], resolution if views else 1)
+        drawing = self._in_parts(frame, technique, views, cells) if views else iter(())
+        return Maps(self._atlas.target.colors[0], texels, HARD, drawing=drawing)
+
+    def _in_parts(self, frame: Frame, technique: Technique, views: list, cells) -> Iterator[None]:
+        """Draws the views; yields now and then where a window waits."""
+        drawn = depth_maps.draw_views(
+            self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample,
+            lasting=not frame.settings.draft,
+        )  # fmt: skip
+        frame.count(technique, "maps", len(views))
+        texels = 0
+        for (_, _, side), sent in zip(cells, drawn):
+            frame.count(technique, "caster triangles", sent)
+            texels += side * side
+            if texels >= PART_TEXELS and frame.shared_out is not None:
+                texels = 0
+                yield
+
+    def release(self) -> None:
+        self._atlas.release()
+
+
+_NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
+
+
+def rounds(
+    frame: Frame, items: list[tuple[np.ndarray, list]], resolution: int, most_texels: int = ATLAS_TEXELS
+) -> Iterator[tuple[list[np.ndarray], list]]:
+    """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers. Maps of a
+    second round lie where those of the first were, whose light then cannot be repeated."""
+    rows, views, texels = [], [], 0
+    for row, own in items:
+        size = sum((resolution // view.scale) ** 2 for view in own)
+        full = texels + size > most_texels or len(views) + len(own) > lights.MOST_VIEWS
+        if rows and (full or len(rows) == lights.MOST_LIGHTS):
+            yield rows, views
+            repeated_light.forbid(frame)
+            rows, views, texels = [], [], 0
+        texels += size
+        row[0, 2:4] = len(views), len(own)
+        rows.append(row)
+        views += own
+    if rows:
+        yield rows, views

@@ -1,0 +1,101 @@
+"""Draws the surfaces that a view shows, as closures of their materials, into six images (the G-buffer)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import images, passes
+from ..scene.culling import Boxes, calls
+from ..scene.materials import SURFACE_IMAGES
+
+STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
+TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
+
+SURFACES = tuple(f"surface.{name}" for name in SURFACE_IMAGES)
+SURFACE_TEXTURES = tuple(("RGBA32F", f"surface_{name}") for name in SURFACE_IMAGES)
+# Defines of the programs that light surfaces: without and with soft lobes, which few scenes have.
+SOFT_DEFINES = ((), (("SOFT_LOBES", ""),))
+
+
+def surface_bindings(frame: Frame) -> dict[str, images.Image]:
+    """The surface images under the names that shaders/lib/gbuffer.glsl reads."""
+    return {f"surface_{name}": frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}
+
+
+# Which pixels a pass that adds light is about: `where` of passes.fullscreen, with MARKS as depth of the target.
+MARKS = "surface.marks"
+ANY_SURFACE, NARROW_LOBE = "LESS_EQUAL", "LESS"
+LIT_SURFACES = (*SURFACES, MARKS)
+
+
+def refracts(frame: Frame) -> bool:
+    """Whether light through glass is followed; else glass is a transparent layer."""
+    return frame.plan.fills("transmission")
+
+
+def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mode: int, glass: bool) -> None:
+    """Draw what the camera sees into six surface images with a depth buffer. `mode`: STOCHASTIC, OPAQUE or LEFT_OUT
+    says what becomes of transparent layers; `glass`: it is drawn as a surface, and is no such layer."""
+    target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+    # What reaches the eye where nothing is hit:
+    images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
+    with passes.drawing(target):
+        _submit(frame, technique, frame.materials.surface_program, None, drawing_constants(mode, glass))
+    frame.count(technique, "passes")
+
+
+def drawing_constants(mode: int, glass: bool) -> dict[str, int]:
+    """Of the programs that draw surfaces, beside the first instance."""
+    return {"transparent_mode": mode, "glass_bends": int(glass), "index_shown": -1}
+
+
+def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> None:
+    """Draw the pass indices of the objects and materials that the camera sees in this sample into the first image of a
+    target as of draw_surfaces; what the others hold then is of no use."""
+    target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+    constants = drawing_constants(STOCHASTIC, refracts(frame))
+    indices = [material.pass_index for material in frame.snapshot.materials]
+    with passes.drawing(target):
+        _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
+
+
+def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
+    """Draw what the camera sees in one sample into six surface images with a depth buffer."""
+    glass = refracts(frame)
+    draw_surfaces(frame, technique, target, STOCHASTIC, glass)
+    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
+    if not tinted:
+        return
+    # Multiply what was hit by the colour of the layers before it that let this sample pass.
+    drawn = dict(zip(SURFACES, target.colors))
+    colors = images.Target(tuple(drawn[name] for name in TINTED))
+    position = {"surface_position": drawn["surface.position"]}
+    with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
+        _submit(frame, technique, frame.materials.tint_program, tinted, {"glass_bends": int(glass)}, position)
+    frame.count(technique, "passes")
+
+
+def _submit(
+    frame: Frame, technique: Technique, program_of, materials: set[int] | None, constants: dict, textures=None,
+    indices: list[int] | None = None,
+) -> None:  # fmt: skip
+    """Draw what the camera may see of `materials` (None: of all), each with its own program. `indices`: by material,
+    what is shown instead of where surfaces lie."""
+    seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
+    material = None
+    for call in calls(frame.geometry.draws, seen):
+        if materials is not None and call.draw.material not in materials:
+            continue
+        if call.draw.material != material:
+            material = call.draw.material
+            shader = passes.get(program_of(material))
+            bindings = frame.materials.bindings(material, frame.geometry.instances)
+            bindings["blocks"]["film_view"] = frame.view_block
+            bindings["textures"] |= textures or {}
+            shown = {"index_shown": indices[material]} if indices is not None else {}
+            shader.bind(**bindings, constants={"first_instance": call.first, **constants, **shown})
+        shader.set_constant("first_instance", call.first)
+        passes.draw(shader, call.draw.batch, call.count)
+        frame.count(technique, "triangles", call.triangles)
