@@ -13,6 +13,7 @@ from .emissive_light import EmissiveLight
 from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .film import Film
+from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
@@ -43,6 +44,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ImageSpaceSubsurface,
     Film,
     Denoise,
 )

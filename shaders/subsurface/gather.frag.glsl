@@ -1,0 +1,184 @@
+// Light that leaves a pixel's surface, of what entered its object elsewhere (techniques/image_space_subsurface.py):
+//
+//   E(x) = c_near mean of E over pixels within the window + (1 - c_near) mean of E over points of the mesh beyond it,
+//
+// each by the profile, per channel. `light_*` hold the radiance of the picture's pixels, albedo included; points are white.
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "subsurface/image.glsl"
+#include "subsurface/profile.glsl"
+
+#define ROW 64
+#define LEAST_COLOR 1e-5  // what is darker tells nothing of the light that arrives
+#define GOLDEN 2.39996323
+#define LITTLE 0.01  // of the far light's share: where points bring less, pixels nearby stand in
+
+struct Arriving {
+  vec3 direct;
+  vec3 indirect;
+  vec3 whole;
+};
+
+// Light that arrives at a pixel over pi, per channel, weighted.
+void arriving_pixel(inout Arriving sum, ivec2 pixel, vec3 weight)
+{
+  vec3 albedo = surface_diffuse_fetch(pixel).rgb;
+  vec3 known = step(vec3(LEAST_COLOR), albedo) * weight;
+  vec3 per = known / max(albedo, vec3(LEAST_COLOR));
+  sum.direct += per * light_direct_fetch(pixel).rgb;
+  sum.indirect += per * light_indirect_fetch(pixel).rgb;
+  sum.whole += known;
+}
+
+bool pixel_seen(vec3 place, out ivec2 pixel)
+{
+  vec4 p = vec4(place, 1.0);
+  float w = dot(film_view.row_w, p);
+  pixel = ivec2(0);
+  if (w <= 0.0) {
+    return false;
+  }
+  ivec2 size = surface_position_size();
+  pixel = ivec2(floor((vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * vec2(size)));
+  return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, size));
+}
+
+float pixel_width_at(vec3 position)
+{
+  float w = dot(film_view.row_w, vec4(position, 1.0));
+  float across = (film_view.frame.y - film_view.frame.x) / film_view.film.x;
+  return (film_view.eye.w > 0.5) ? across : across * w;
+}
+
+// Mean of what arrives at pixels of the object within `range`, by the windowed profile; taps on a spiral, denser inwards.
+Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float range, float pixel_size)
+{
+  Arriving sum;
+  sum.direct = sum.indirect = sum.whole = vec3(0.0);
+  vec3 tangent;
+  vec3 bitangent;
+  orthonormal_basis(normal, tangent, bitangent);
+  uvec3 roll = roll_of(here, film_view.sample_index, film_view.seed, 211);
+  float turn = to_unit(roll.x) * 2.0 * PI;
+  float shift = to_unit(roll.y);
+  float inner = max(0.5 * pixel_size, 1e-3 * range);
+  float ratio = log(1.0 + range / inner);
+  for (int k = 0; k < taps; k++) {
+    float r = inner * (exp((float(k) + shift) / float(taps) * ratio) - 1.0);
+    float angle = turn + GOLDEN * float(k);
+    ivec2 pixel;
+    if (!pixel_seen(position + r * (cos(angle) * tangent + sin(angle) * bitangent), pixel)) {
+      continue;
+    }
+    float away = r;
+    if (any(notEqual(pixel, here))) {
+      if (floor(scatter_share_fetch(pixel).w * 0.25) != object) {
+        continue;
+      }
+      float apart = distance(surface_position_fetch(pixel).xyz, position);
+      away = (abs(apart - r) < 2.0 * pixel_size) ? r : apart;
+    }
+    // The density of taps at r is 1 / ((r + inner) ratio).
+    float weight = near_window(away, range) * (r + inner) * (r / max(away, 1e-20));
+    arriving_pixel(sum, pixel, profile_radial(profile, away) * weight);
+  }
+  return sum;
+}
+
+// Sums over points of the object within reach and beyond the window: `whole` is the integral of the profile there.
+Arriving far_light(vec3 position, Profile profile, vec4 object, float range)
+{
+  Arriving sum;
+  sum.direct = sum.indirect = sum.whole = vec3(0.0);
+  float reach = profile_reach(profile);
+  int first = int(object.x + 0.5);
+  int last = first + int(object.y + 0.5);
+  for (int row = first; row < last; row++) {
+    vec4 bound = cell_bounds_fetch(ivec2(0, row));
+    if (distance(bound.xyz, position) - bound.w > reach) {
+      continue;
+    }
+    for (int k = 0; k < ROW; k++) {
+      ivec2 texel = ivec2(k, row);
+      vec4 cell = cells_fetch(texel);
+      float r = distance(cell.xyz, position);
+      if (r < reach) {
+        float scale = cell.w * (1.0 - near_window(r, range)) / (2.0 * PI * max(r, 1e-3 * range));
+        vec3 weight = profile_radial(profile, r) * scale;
+        sum.direct += weight * cell_direct_fetch(texel).rgb;
+        sum.indirect += weight * cell_indirect_fetch(texel).rgb;
+        sum.whole += weight;
+      }
+    }
+  }
+  return sum;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  out_direct = light_direct_fetch(pixel);
+  out_indirect = light_indirect_fetch(pixel);
+  out_whole = whole_before_fetch(pixel);
+  vec4 share = scatter_share_fetch(pixel);
+  if (share.w < 4.0) {
+    return;
+  }
+  vec4 length_m = scatter_length_fetch(pixel);
+  vec3 position = surface_position_fetch(pixel).xyz;
+  vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
+  vec3 albedo = surface_diffuse_fetch(pixel).rgb;
+  vec3 color = unpack_three(length_m.w, 255.0);
+  int method = scatter_method(share.w);
+  int kind = (method == SCATTER_BURLEY) ? PROFILE_BURLEY : PROFILE_WALK;
+  Profile profile = profile_of(kind, length_m.xyz, color);
+  float width = pixel_width_at(position);
+
+  Arriving own;
+  own.direct = own.indirect = own.whole = vec3(0.0);
+  arriving_pixel(own, pixel, vec3(1.0));
+  vec3 direct = own.direct;
+  vec3 indirect = own.indirect;
+  float code = floor(share.w * 0.25);
+  int place = first_object + int(code) - 1;
+  vec4 object = scatter_objects_fetch(ivec2(place & 2047, place >> 11));
+  float reach = profile_reach(profile);
+  if (reach > width) {  // else all of it lies within the pixel
+    // Without points all is taken from pixels.
+    bool has_points = object.y > 0.5 && reach > 2.0 * width && points_lit != 0;
+    float range = has_points ? min(RANGE * object.z, reach) : reach;
+    Arriving near = near_light(pixel, position, normal, profile, code, range, width);
+    vec3 found = step(vec3(1e-20), near.whole);
+    direct = mix(own.direct, near.direct / max(near.whole, vec3(1e-20)), found);
+    indirect = mix(own.indirect, near.indirect / max(near.whole, vec3(1e-20)), found);
+    if (has_points) {
+      vec3 inside = profile_near(profile, range);
+      vec3 outside = max(vec3(1.0) - inside, vec3(0.0));
+      Arriving far = far_light(position, profile, object, range);
+      vec3 spare = LITTLE * outside + vec3(1e-12);
+      vec3 whole = far.whole + spare;
+      vec3 scale = outside;
+      if (kind == PROFILE_BURLEY) {
+        // Cycles sums the profile over the surface as it is, thin or bent: the mean of that over the samples so far.
+        out_whole += vec4(far.whole, 1.0);
+        scale = min(out_whole.xyz / out_whole.w, vec3(4.0));
+      }
+      vec3 far_direct = (far.direct + spare * direct) / whole;
+      vec3 far_indirect = (far.indirect + spare * indirect) / whole;
+      direct = inside * direct + scale * far_direct;
+      indirect = inside * indirect + scale * far_indirect;
+    }
+  }
+  if (kind == PROFILE_WALK) {
+    // What enters steeply comes out less often than the albedo says, which is for light from all sides.
+    vec3 absorption = walk_absorption(color);
+    vec3 returned = walk_returned(absorption, clamp(scatter_entry(share.w), 0.01, 1.0));
+    vec3 factor = returned / max(color, vec3(1e-3));
+    factor = (method == SCATTER_SKIN) ? 0.5 * (factor + vec3(1.0)) : factor;
+    direct *= factor;
+    indirect *= factor;
+  }
+  vec3 stays = vec3(1.0) - share.rgb;
+  out_direct.rgb = out_direct.rgb * stays + albedo * share.rgb * direct;
+  out_indirect.rgb = out_indirect.rgb * stays + albedo * share.rgb * indirect;
+}
