@@ -3,7 +3,8 @@
 Four models, all per channel, in closed form where one is known:
 
 - **Dipole** (Jensen et al. 2001) and **multipole** for slabs (Donner and Jensen 2005), from scattering coefficients.
-- **Christensen-Burley** (2015): R(r) = (exp(-r/d) + exp(-r/3d)) / (8 pi d r), of total 1, d from the surface's albedo.
+- **Christensen-Burley** (2015): R(r) = (exp(-r/d) + exp(-r/3d)) / (8 pi d r), of total 1. Cycles' d is radius / 4 pi,
+  whatever the albedo; the paper's follows from it (`burley_length`).
 - **Random walk**: what a path in an index-matched half-space brings, isotropic after similarity. Its distances are
   a mixture of three exponentials for each single-scattering albedo, fitted by expectation maximisation to 100,000 walks
   that entered at a cosine of 0.9 (RANDOM_WALK; `python -m bench subsurface --fit` makes it anew; the largest difference
@@ -14,7 +15,7 @@ shaders/subsurface/profile.glsl evaluates: three exponentials a channel, cumulat
 
 Albedo to coefficients: the dipole's by bisection on its total; the walk's by d'Eon, "A Hitchhiker's Guide to Multiple
 Scattering", eq. 53.7, as in Cycles. A walk that enters in a given direction returns 1 - g H(mu) with Chandrasekhar's H
-(Hapke's approximation, 2002, within 1 %), less than its albedo where it enters steeply.
+(Hapke's approximation, 2002, corrected by a fit to the equation's solution: within 0.3 %), less than its albedo where it enters steeply.
 
 Fails: all distances are those of a plane; thin and strongly curved parts differ (docs/subsurface.md has figures).
 """
@@ -27,7 +28,6 @@ import numpy as np
 
 FOUR_PI = 4.0 * np.pi
 LEAST_ABSORPTION = 1e-3  # of the reduced extinction: with less the dipole's range has no bound
-SKIN_METHOD = "RANDOM_WALK_SKIN"
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ def walk_returned(absorption: np.ndarray, cosine: np.ndarray) -> np.ndarray:
     g, mu = np.asarray(absorption, float), np.asarray(cosine, float)
     r0 = (1.0 - g) / (1.0 + g)
     h = 1.0 / (1.0 - (1.0 - g * g) * mu * (r0 + (1.0 - 2.0 * r0 * mu) / 2.0 * np.log((1.0 + mu) / np.maximum(mu, 1e-6))))
-    return 1.0 - g * h
+    return (1.0 - g * h) * (1.0 - 0.033 * g + 0.021 * g * g)
 
 
 def skin_scale(albedo: np.ndarray, ior: float = 1.4) -> np.ndarray:

@@ -56,8 +56,8 @@ class ScatterPoints:
         self.bounds: images.Image | None = None  # by row: centre and radius
         self.table: images.Image | None = None  # by instance: 1 + number of the object, or 0; then the objects
 
-    def update(self, frame, most: int) -> None:
-        """Make points anew if surfaces moved or scatter otherwise. At most `most` cells in all."""
+    def update(self, frame, most: int) -> bool:
+        """Make points anew if surfaces moved or scatter otherwise; True if so. At most `most` cells in all."""
         snapshot, materials = frame.snapshot, frame.materials.compiled
         reach = tuple(m.scatter for m in materials)
         shown = [
@@ -72,9 +72,10 @@ class ScatterPoints:
             ),
         )  # fmt: skip
         if key == self._key:
-            return
+            return False
         self._key = key
         self._make(snapshot, shown, reach, frame.geometry.origin, most)
+        return True
 
     def surface(self, run: int) -> tuple[images.Image, images.Image]:
         """Positions and normals of a run, as shaders/lib/gbuffer.glsl reads them."""

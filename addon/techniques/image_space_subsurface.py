@@ -73,7 +73,7 @@ GATHER = passes.fullscreen_program(
         ("RGBA32F", name)
         for name in (
             "cells", "cell_direct", "cell_indirect", *PICTURE, "cell_bounds", "scatter_objects", "walk_lobes",
-            "whole_before",
+            "whole_before", "cell_shapes",
         )
     ),
     blocks=((VIEW, "film_view"),),
@@ -94,6 +94,14 @@ INDIRECT = passes.fullscreen_program(
     blocks=PATH_BLOCKS,
     constants=(*(one for one in GATHER_CONSTANTS if one[1] != "lobe_rays"), ("INT", "rays")),
     outputs=(("VEC4", "out_indirect"),),
+)
+CHORD = passes.fullscreen_program(
+    "subsurface chord",
+    "subsurface/chord.frag.glsl",
+    textures=(*RAYS.textures, ("RGBA32F", "point_position"), ("RGBA32F", "point_normal")),
+    blocks=((VIEW, "film_view"),),
+    constants=(*RAYS.constants, ("FLOAT", "longest")),
+    outputs=(("VEC4", "out_shape"),),
 )
 LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 
@@ -126,6 +134,7 @@ class ImageSpaceSubsurface(Technique):
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._emissive: EmissiveTriangles | None = None
+        self._shapes: images.Image | None = None  # of cells: normal and mean length of lines through the object
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         shown = {material for instance in snapshot.instances for material in instance.materials}
@@ -150,7 +159,8 @@ class ImageSpaceSubsurface(Technique):
             images.pool.give(image)
 
     def _begin(self, frame: Frame) -> None:
-        self.points.update(frame, frame.settings.get(self, "points"))
+        if self.points.update(frame, frame.settings.get(self, "points")) or self._shapes is None:
+            self._measure(frame)
         if self._lobes is None:
             self._lobes = images.upload(diffusion.table())
         self._give_whole()
@@ -163,6 +173,20 @@ class ImageSpaceSubsurface(Technique):
             self._emissive = triangles if triangles.power > 0.0 else None
         frame.count(self, "points", self.points.rows * ROW)
         frame.count(self, "objects", len(self.points.objects))
+
+    def _measure(self, frame: Frame) -> None:
+        """How thick objects are at their points."""
+        self._give_shapes()
+        if not self.points.rows:
+            return
+        self._shapes = images.pool.take(ROW, self.points.rows, "RGBA32F")
+        position, normal = self.points.surface(0)
+        textures, constants = ray_bindings(frame)
+        passes.fullscreen(
+            CHORD, images.Target((self._shapes,)),
+            textures={**textures, "point_position": position, "point_normal": normal},
+            blocks={"film_view": frame.view_block}, constants={**constants, "longest": 2.0 * frame.geometry.size},
+        )  # fmt: skip
 
     # Light at points of the mesh --------------------------------------------------------------------------------------
 
@@ -268,6 +292,7 @@ class ImageSpaceSubsurface(Technique):
             "cell_direct": lit[0] if lit else nothing,
             "cell_indirect": lit[1] if lit else nothing,
             "cell_bounds": self.points.bounds if lit else nothing,
+            "cell_shapes": self._shapes if lit else nothing,
             "scatter_objects": self.points.table,
             "walk_lobes": self._lobes,
         }
@@ -298,6 +323,11 @@ class ImageSpaceSubsurface(Technique):
         self._whole = [after, before]
         frame.count(self, "passes", 2)
 
+    def _give_shapes(self) -> None:
+        if self._shapes is not None:
+            images.pool.give(self._shapes)
+        self._shapes = None
+
     def _give_whole(self) -> None:
         for target in self._whole:
             images.pool.give(target.colors[0])
@@ -314,6 +344,7 @@ class ImageSpaceSubsurface(Technique):
         self._sources.release()
         self._give_whole()
         self._give_white()
+        self._give_shapes()
         self._lobes = self._emissive = None
 
 

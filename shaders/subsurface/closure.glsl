@@ -8,7 +8,8 @@
 #define METHOD_SKIN 2
 #define METHOD_LEGACY 3
 
-// Radii are sizes that look alike; a quarter of one over pi is a mean free path.
+// Of two methods radii are sizes that look alike: a quarter of one over pi is Burley's d, or a mean free path. Those of the
+// random walk (since Blender 5.2) are mean free paths, and those for skin the diffuse ones.
 #define FREE_PATH (0.25 / PI)
 
 // sqrt(3 (1 - alpha)) of the dipole with this total: by what the method for skin multiplies radii.
@@ -28,16 +29,14 @@ float skin_scale(float albedo, float ior)
   return sqrt(3.0 * (1.0 - 0.5 * (low + high)));
 }
 
-// Cosine inside at which the view's ray enters: refracted, and spread by roughness towards the mean of all directions.
-float entry_cosine(float cosine, float ior, float roughness)
+// Cosine inside at which the view's ray enters.
+float entry_cosine(float cosine, float ior)
 {
-  float inside = sqrt(max(1.0 - (1.0 - cosine * cosine) / (ior * ior), 0.0));
-  float alpha = roughness * roughness;
-  return mix(inside, 0.5 * (inside + 0.85), alpha);
+  return sqrt(max(1.0 - (1.0 - cosine * cosine) / (ior * ior), 0.0));
 }
 
-void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, float ior, float roughness,
-                        float anisotropy, float cosine, int method)
+void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, float ior, float anisotropy,
+                        float cosine, int method)
 {
   vec3 albedo = weight * color;
   float added = min(dot(albedo, vec3(1.0)), 1e30);
@@ -51,15 +50,12 @@ void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, 
   if (method == METHOD_SKIN) {
     path *= vec3(skin_scale(a.x, index), skin_scale(a.y, index), skin_scale(a.z, index));
   }
-  else {
-    path *= FREE_PATH;
-  }
-  if (method == METHOD_BURLEY) {
-    path /= vec3(1.9) - a + 3.5 * (a - vec3(0.8)) * (a - vec3(0.8));
-  }
   else if (method == METHOD_RANDOM_WALK) {
     vec3 s = walk_absorption(a);
     path *= (vec3(1.0) - g * s * s) / (1.0 - g);
+  }
+  else {
+    path *= FREE_PATH;
   }
   c.scatter += albedo;
   c.scatter_length += albedo * path;
@@ -67,6 +63,6 @@ void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, 
   if (added > c.scatter_most) {
     c.scatter_most = added;
     c.scatter_method = (method == METHOD_LEGACY) ? SCATTER_WALK : method;
-    c.scatter_entry = entry_cosine(cosine, index, (method == METHOD_SKIN) ? 1.0 : clamp(roughness, 0.0, 1.0));
+    c.scatter_entry = (method == METHOD_SKIN) ? 0.5 * (entry_cosine(cosine, index) + 0.85) : entry_cosine(cosine, index);
   }
 }

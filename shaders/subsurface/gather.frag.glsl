@@ -85,33 +85,75 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
   return sum;
 }
 
-// Sums over points of the object within reach and beyond the window: `whole` is the integral of the profile there.
-Arriving far_light(vec3 position, Profile profile, vec4 object, float range)
+// Light from points of the object within reach. `whole` of what faces as the pixel does and lies beyond the window: the
+// integral of the profile there. `behind`: of what faces away, all of it, which no pixel near stands for.
+struct Far {
+  Arriving ahead;
+  Arriving behind;
+  float chord;  // mean length of lines through the object from here, m
+};
+
+// Of points that face the other way, how much more a walk finds them than a plane's profile says, at `paths` mean free paths:
+// fitted to walks in slabs and spheres (docs/subsurface.md).
+vec3 walk_through(float r, vec3 free_path, vec3 absorption)
 {
-  Arriving sum;
-  sum.direct = sum.indirect = sum.whole = vec3(0.0);
+  vec3 paths = max(vec3(r) / free_path, vec3(0.1));
+  return min(vec3(1.5) + 1.7 / paths + 2.0 * absorption * paths, vec3(12.0));
+}
+
+void far_add(inout Arriving sum, ivec2 texel, vec3 weight)
+{
+  sum.direct += weight * cell_direct_fetch(texel).rgb;
+  sum.indirect += weight * cell_indirect_fetch(texel).rgb;
+  sum.whole += weight;
+}
+
+Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float range, int kind, vec3 free_path,
+              vec3 absorption)
+{
+  Far far;
+  far.ahead.direct = far.ahead.indirect = far.ahead.whole = vec3(0.0);
+  far.behind = far.ahead;
   float reach = profile_reach(profile);
+  float chords = 0.0;
+  float chord_weight = 0.0;
   int first = int(object.x + 0.5);
   int last = first + int(object.y + 0.5);
   for (int row = first; row < last; row++) {
     vec4 bound = cell_bounds_fetch(ivec2(0, row));
-    if (distance(bound.xyz, position) - bound.w > reach) {
+    if (distance(bound.xyz, position) - bound.w > max(reach, 2.0 * object.z)) {
       continue;
     }
     for (int k = 0; k < ROW; k++) {
       ivec2 texel = ivec2(k, row);
       vec4 cell = cells_fetch(texel);
       float r = distance(cell.xyz, position);
-      if (r < reach) {
-        float scale = cell.w * (1.0 - near_window(r, range)) / (2.0 * PI * max(r, 1e-3 * range));
-        vec3 weight = profile_radial(profile, r) * scale;
-        sum.direct += weight * cell_direct_fetch(texel).rgb;
-        sum.indirect += weight * cell_indirect_fetch(texel).rgb;
-        sum.whole += weight;
+      if (r < max(reach, 2.0 * object.z)) {
+        vec4 shape = cell_shapes_fetch(texel);
+        float facing = dot(octahedral_decode(shape.xy), normal);
+        float front = smoothstep(-0.2, 0.4, facing);
+        float nearness = front / (r * r + object.z * object.z);
+        chords += nearness * shape.z;
+        chord_weight += nearness;
+        vec3 weight = profile_radial(profile, r) * (cell.w / (2.0 * PI * max(r, 0.25 * object.z)));
+        far_add(far.ahead, texel, weight * front * (1.0 - near_window(r, range)));
+        if (kind == PROFILE_WALK) {
+          weight *= mix(vec3(1.0), walk_through(r, free_path, absorption), clamp(0.5 - 0.5 * facing, 0.0, 1.0));
+        }
+        far_add(far.behind, texel, weight * (1.0 - front));
       }
     }
   }
-  return sum;
+  far.chord = (chord_weight > 0.0) ? chords / chord_weight : 1e30;
+  return far;
+}
+
+// Where an object is thin against a walk's range, more of it comes out again than of a plane, to the power of this:
+// `chord` in mean free paths; fitted as above.
+vec3 walk_exponent(vec3 chord, vec3 absorption)
+{
+  vec3 x = min(0.5 * chord * absorption, vec3(20.0));
+  return vec3(1.0) - exp(-x * (vec3(0.68) + 0.42 * x));
 }
 
 void main()
@@ -133,6 +175,9 @@ void main()
   int kind = (method == SCATTER_BURLEY) ? PROFILE_BURLEY : PROFILE_WALK;
   Profile profile = profile_of(kind, length_m.xyz, color);
   float width = pixel_width_at(position);
+  vec3 absorption = walk_absorption(color);
+  vec3 free_path = max(length_m.xyz, vec3(LEAST_SCALE));
+  float chord = 1e30;
 
   Arriving own;
   own.direct = own.indirect = own.whole = vec3(0.0);
@@ -154,27 +199,28 @@ void main()
     if (has_points) {
       vec3 inside = profile_near(profile, range);
       vec3 outside = max(vec3(1.0) - inside, vec3(0.0));
-      Arriving far = far_light(position, profile, object, range);
+      Far far = far_light(position, normal, profile, object, range, kind, free_path, absorption);
+      chord = far.chord;
       vec3 spare = LITTLE * outside + vec3(1e-12);
-      vec3 whole = far.whole + spare;
+      vec3 whole = far.ahead.whole + spare;
       vec3 scale = outside;
+      vec3 all = vec3(1.0) + far.behind.whole;
       if (kind == PROFILE_BURLEY) {
         // Cycles sums the profile over the surface as it is, thin or bent: the mean of that over the samples so far.
-        out_whole += vec4(far.whole, 1.0);
+        out_whole += vec4(far.ahead.whole, 1.0);
         scale = min(out_whole.xyz / out_whole.w, vec3(4.0));
+        all = vec3(1.0);
       }
-      vec3 far_direct = (far.direct + spare * direct) / whole;
-      vec3 far_indirect = (far.indirect + spare * indirect) / whole;
-      direct = inside * direct + scale * far_direct;
-      indirect = inside * indirect + scale * far_indirect;
+      direct = (inside * direct + scale * (far.ahead.direct + spare * direct) / whole + far.behind.direct) / all;
+      indirect = (inside * indirect + scale * (far.ahead.indirect + spare * indirect) / whole + far.behind.indirect) / all;
     }
   }
   if (kind == PROFILE_WALK) {
     // What enters steeply comes out less often than the albedo says, which is for light from all sides.
-    vec3 absorption = walk_absorption(color);
     vec3 returned = walk_returned(absorption, clamp(scatter_entry(share.w), 0.01, 1.0));
-    vec3 factor = returned / max(color, vec3(1e-3));
-    factor = (method == SCATTER_SKIN) ? 0.5 * (factor + vec3(1.0)) : factor;
+    returned = (method == SCATTER_SKIN) ? 0.5 * (returned + color) : returned;
+    vec3 power = walk_exponent(vec3(chord) / free_path, absorption);
+    vec3 factor = pow(clamp(returned, vec3(1e-4), vec3(1.0)), power) / max(color, vec3(1e-3));
     direct *= factor;
     indirect *= factor;
   }

@@ -26,14 +26,16 @@ vec3 walk_absorption(vec3 albedo)
   return clamp(4.20863 * a - root + vec3(4.09712), vec3(0.0), vec3(1.0));
 }
 
-// Of light that entered at this cosine inside, the share that comes out again: 1 - g H(cosine), H after Hapke (2002).
+// Of light that entered at this cosine inside, the share that comes out again: 1 - g H(cosine), H after Hapke (2002), with
+// what that is too bright by (1 %) fitted to the solution of Chandrasekhar's equation.
 vec3 walk_returned(vec3 absorption, float cosine)
 {
   vec3 r0 = (vec3(1.0) - absorption) / (vec3(1.0) + absorption);
   float series = log((1.0 + cosine) / max(cosine, 1e-6));
   vec3 inner = r0 + (vec3(0.5) - r0 * cosine) * series;
   vec3 h = vec3(1.0) / (vec3(1.0) - (vec3(1.0) - absorption * absorption) * cosine * inner);
-  return max(vec3(1.0) - absorption * h, vec3(0.0));
+  vec3 correction = vec3(1.0) - absorption * (vec3(0.033) - 0.021 * absorption);
+  return max(vec3(1.0) - absorption * h, vec3(0.0)) * correction;
 }
 
 #ifdef WALK_LOBES

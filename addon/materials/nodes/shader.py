@@ -27,10 +27,10 @@ BECKMANN_GLASS = (("distribution", ("BECKMANN",), "Glass of Beckmann's distribut
 NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
 TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
-# SCATTER_* of shaders/lib/closure.glsl. The older random walk differs in how its radius counts with anisotropy.
+# METHOD_* of shaders/subsurface/closure.glsl.
 SUBSURFACE_METHODS = {"BURLEY": 0, "RANDOM_WALK": 1, "RANDOM_WALK_SKIN": 2, "RANDOM_WALK_LEGACY": 3}
 # About the longest scale of the profile over the radius: by these the points of light below surfaces are spread.
-SUBSURFACE_REACH = {"BURLEY": 0.2, "RANDOM_WALK": 0.2, "RANDOM_WALK_SKIN": 0.6, "RANDOM_WALK_LEGACY": 0.2}
+SUBSURFACE_REACH = {"BURLEY": 0.24, "RANDOM_WALK": 3.0, "RANDOM_WALK_SKIN": 0.6, "RANDOM_WALK_LEGACY": 0.24}
 THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
 
 
@@ -328,7 +328,6 @@ ENTRIES = (
             Socket("Scale", "FLOAT", 0.05),
             Socket("Radius", "VECTOR", (1.0, 0.2, 0.1)),
             Socket("IOR", "FLOAT", 1.4),
-            Socket("Roughness", "FLOAT", 1.0),
             Socket("Anisotropy", "FLOAT"),
             NORMAL,
             Choice("falloff", SUBSURFACE_METHODS, missing=1),
