@@ -7,15 +7,16 @@ Four models, all per channel, in closed form where one is known:
   whatever the albedo; the paper's follows from it (`burley_length`).
 - **Random walk**: what a path in an index-matched half-space brings, isotropic after similarity. Its distances are
   a mixture of three exponentials for each single-scattering albedo, fitted by expectation maximisation to 100,000 walks
-  that entered at a cosine of 0.9 (RANDOM_WALK; `python -m bench subsurface --fit` makes it anew; the largest difference
-  of the cumulative distributions is 0.006).
+  that entered at a cosine of 0.9 (RANDOM_WALK; the largest difference of the cumulative distributions is 0.006, and
+  0.010 for the least absorption; `tools/fit_walk.py` makes it anew).
 
 Burley's profile and the walk have one form, a mixture of lobes exp(-r / s) / (2 pi s r) of total 1, which is what
 shaders/subsurface/profile.glsl evaluates: three exponentials a channel, cumulative distribution 1 - sum w exp(-r / s).
 
 Albedo to coefficients: the dipole's by bisection on its total; the walk's by d'Eon, "A Hitchhiker's Guide to Multiple
 Scattering", eq. 53.7, as in Cycles. A walk that enters in a given direction returns 1 - g H(mu) with Chandrasekhar's H
-(Hapke's approximation, 2002, corrected by a fit to the equation's solution: within 0.3 %), less than its albedo where it enters steeply.
+(Hapke's approximation, 2002, corrected by a fit to the equation's solution: within 0.3 %), less than its albedo where
+it enters steeply.
 
 Fails: all distances are those of a plane; thin and strongly curved parts differ (docs/subsurface.md has figures).
 """
@@ -156,7 +157,7 @@ def stacked(first: tuple, second: tuple) -> tuple[np.ndarray, np.ndarray]:
     return r1 + t1 * r2 * t1 / (1.0 - r1 * r2), t1 * t2 / (1.0 - r1 * r2)
 
 
-# Christensen-Burley and the random walk: mixtures of lobes -------------------------------------------------------------
+# Christensen-Burley and the random walk: mixtures of lobes ------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,7 @@ class Lobes:
         return (self.shares / np.sqrt(1.0 + np.square(np.asarray(k, float)[..., None] * self.scales))).sum(axis=-1)
 
     def edge(self, x: np.ndarray) -> np.ndarray:
-        """Light at signed distances x, m, from the edge of a half-plane that is lit evenly: 1/2 at 0, 1 far inside.
+        """Light at signed distances x, m, from the edge of a half-plane that is lit evenly: 1/2 there, 1 inside.
 
         Along a line the lobe is K0(|x| / s) / (pi s) (its integral across); integrated by quadrature on u, x = s sinh u.
         """
@@ -225,7 +226,8 @@ def walk_returned(absorption: np.ndarray, cosine: np.ndarray) -> np.ndarray:
     """Share of light that entered at this cosine and comes out again, 1 - g H(cosine)."""
     g, mu = np.asarray(absorption, float), np.asarray(cosine, float)
     r0 = (1.0 - g) / (1.0 + g)
-    h = 1.0 / (1.0 - (1.0 - g * g) * mu * (r0 + (1.0 - 2.0 * r0 * mu) / 2.0 * np.log((1.0 + mu) / np.maximum(mu, 1e-6))))
+    series = np.log((1.0 + mu) / np.maximum(mu, 1e-6))
+    h = 1.0 / (1.0 - (1.0 - g * g) * mu * (r0 + (0.5 - r0 * mu) * series))
     return (1.0 - g * h) * (1.0 - 0.033 * g + 0.021 * g * g)
 
 

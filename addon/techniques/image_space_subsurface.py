@@ -13,9 +13,10 @@ points of the mesh, which also know what the camera does not see. A smooth windo
   world and emissive meshes by rays, and by indirect light (the virtual lights of the technique in that slot). Pixels
   gather them row by row, leaving out rows beyond the profile's reach.
 
-Objects do not exchange light. Albedo and radius are those of the place where light leaves, as in Cycles. The random walk
-keeps its total, thin or bent: its mean over points is divided by the profile's; Burley's is summed over the surface as
-it is. What the walk returns depends on the angle of view (Chandrasekhar), as in Cycles.
+Objects do not exchange light. Albedo and radius are those of the place where light leaves, as in Cycles. Burley's
+profile is summed over the surface as it is, thin or bent, in Cycles' measure. The walk's mean over points is divided by
+the profile's, what faces away counts as often as walks through slabs and spheres find it, and the total follows from
+the mean length of lines through the object. What the walk returns depends on the angle of view (Chandrasekhar).
 
 | cost | per sample |
 |---|---|
@@ -35,31 +36,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
+from ..frame.light_paths import SUBSURFACE
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..kernels import diffusion
 from ..lighting import repeated_light
-from ..lighting.emissive_triangles import EmissiveTriangles
-from ..lighting.loop import lighting
+from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.visibility import RAYS, ray_bindings
-from ..materials.compiler import may_emit, may_scatter
+from ..materials.compiler import may_scatter
 from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
 from ..scene.scatter_points import ROW, ScatterPoints
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from ..sources import lights
 from ..surfaces.draw import SURFACES, draw_scatter
-from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, OFFERED, PATH_BLOCKS
+from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
 
 RANGE = 2.5  # distances between points: where pixels stop and points begin
 RAYS_INDIRECT = 4  # of a point in a sample
-FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
-WORLD_POINTS = 4  # in each sample
 IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
 
 PICTURE = (
@@ -109,7 +106,7 @@ LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
 class ImageSpaceSubsurface(Technique):
     name = "image_space_subsurface"
     label = "Image-space subsurface"
-    slot = "subsurface"
+    fills = ("subsurface",)
     params = (
         Param(
             "points", "Points", 4096,
@@ -119,8 +116,9 @@ class ImageSpaceSubsurface(Technique):
         Param("taps", "Taps", 24, "Pixels around each that light below its surface is taken from in a sample", 1, 256),
     )  # fmt: skip
     reads = SURFACES
-    closes = LIGHT
-    uses = (OFFERED,)
+    finishes = LIGHT
+    requests = (GatherBindings,)
+    owns = (SUBSURFACE,)
     writes = (
         Write(IMAGES[0], "RGBA32F", "How far light spreads below the surface, m; the albedo that says how"),
         Write(IMAGES[1], "RGBA32F", "Share of the diffuse albedo that does; the object"),
@@ -129,11 +127,10 @@ class ImageSpaceSubsurface(Technique):
 
     def __init__(self):
         self.points = ScatterPoints()
-        self._sources = lights.Sources()
+        self._light = PointLight("subsurface")
         self._lobes: images.Image | None = None
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
-        self._emissive: EmissiveTriangles | None = None
         self._shapes: images.Image | None = None  # of cells: normal and mean length of lines through the object
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -142,23 +139,26 @@ class ImageSpaceSubsurface(Technique):
             return "no material scatters light below its surface"
         return acceleration.too_many(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
-        materials = {k for k, material in enumerate(frame.materials.compiled) if material.scatter > 0.0}
-        if not materials or frame.receivers is None or not len(frame.receivers.distance):
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return GATHER, APPLY, CHORD, LIGHTING
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        if not self._materials or frame.receivers is None or not len(frame.receivers.distance):
             frame.target(*IMAGES).clear()
             return
-        if frame.sample == 0:
-            self._begin(frame)
         # Light at other points of the film is taken from pixels: repeated, it would be light that enters there.
         repeated_light.forbid(frame)
-        draw_scatter(frame, self, frame.target(*IMAGES), self.points.table, materials)
+        draw_scatter(frame, self, frame.target(*IMAGES), self.points.table, self._materials)
         lit = self._lit_points(frame) if self.points.rows else None
         yield
         yield from self._gather(frame, lit)
         for image in lit or ():
             images.pool.give(image)
 
-    def _begin(self, frame: Frame) -> None:
+    def begin(self, frame: Frame) -> None:
+        self._materials = {k for k, material in enumerate(frame.materials.compiled) if material.scatter > 0.0}
+        if not self._materials:
+            return
         if self.points.update(frame, frame.settings.get(self, "points")) or self._shapes is None:
             self._measure(frame)
         if self._lobes is None:
@@ -166,11 +166,7 @@ class ImageSpaceSubsurface(Technique):
         self._give_whole()
         self._whole = [images.Target((images.pool.take(*frame.size, "RGBA32F"),)) for _ in range(2)]
         self._whole[0].clear()
-        used = {material for instance in frame.snapshot.instances for material in instance.materials}
-        self._emissive = None
-        if any(may_emit(frame.snapshot.materials[material].graph) for material in used):
-            triangles = EmissiveTriangles(frame, ("diffuse",))
-            self._emissive = triangles if triangles.power > 0.0 else None
+        self._light.begin(frame)
         frame.count(self, "points", self.points.rows * ROW)
         frame.count(self, "objects", len(self.points.objects))
 
@@ -197,31 +193,22 @@ class ImageSpaceSubsurface(Technique):
         position, normal = self.points.surface(frame.sample)
         target = images.Target((direct, unused))
         target.clear()
-        rows = [*self._lamps(frame), *self._world(frame), *self._emitted(frame)]
         white, black = self._constant_images(size)
-        textures, constants = ray_bindings(frame)
         surfaces = {"position": position, "normal": normal, "diffuse": white, "tint": black, "lobe": black}
-        bound = {f"surface_{name}": image for name, image in {**surfaces, "emission": black}.items()}
-        for first in range(0, len(rows), lights.MOST_LIGHTS):
-            some = rows[first : first + lights.MOST_LIGHTS]
-            passes.fullscreen(
-                LIGHTING, target, blend="ADDITIVE_PREMULT",
-                textures={**bound, **textures, "energy_table": frame.materials.energy_table},
-                blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
-                constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
-            )  # fmt: skip
-            frame.count(self, "passes")
+        drawn, rays = self._light.add(frame, {**surfaces, "emission": black}, target)
+        frame.count(self, "passes", drawn)
         images.pool.give(unused)
-        frame.count(self, "rays", len(rows) * ROW * self.points.rows)
+        frame.count(self, "rays", rays * ROW * self.points.rows)
         self._light_indirectly(frame, position, normal, indirect)
         return direct, indirect
 
     def _light_indirectly(self, frame: Frame, position, normal, indirect: images.Image) -> None:
         target = images.Target((indirect,))
-        offered = frame.services.get(OFFERED)
-        if offered is None:
+        provided = frame.service(GatherBindings)
+        if provided is None:
             target.clear()
             return
+        offered = provided.bindings
         names = {name for _, name in GATHER_CONSTANTS} - {"lobe_rays"}
         passes.fullscreen(
             INDIRECT, target,
@@ -233,44 +220,6 @@ class ImageSpaceSubsurface(Technique):
             constants={**{name: offered["constants"][name] for name in names}, "rays": RAYS_INDIRECT},
         )  # fmt: skip
         frame.count(self, "passes")
-
-    def _lamps(self, frame: Frame) -> Iterator[np.ndarray]:
-        """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power."""
-        settings = frame.settings
-        emitters = [one for one in frame.emitters if one.flags & lights.DIFFUSE_FLAG]
-        chosen = [(emitter, 1.0) for emitter in emitters]
-        if len(chosen) > FEW_POINTS:
-            power = np.array([emitter.power for emitter in emitters])
-            chance = np.minimum(FEW_POINTS * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
-            edges = np.concatenate([[0.0], np.cumsum(chance)])
-            marks = np.arange(FEW_POINTS) + frame.lot("subsurface/choose")
-            picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
-            chosen = [(emitters[k], 1.0 / chance[k]) for k in picked]
-        for emitter, weight in chosen:
-            each = max(FEW_POINTS // settings.samples, 1) if emitter.extended else 1
-            for number in range(frame.sample * each, (frame.sample + 1) * each):
-                sample = emitter.sample(*frame.random_volume_at(number, "subsurface/light"))
-                shadowed = int(emitter.light.cast_shadow)
-                yield emitter.row(sample, 0, shadowed, weight, each, each * settings.samples / weight)
-
-    def _world(self, frame: Frame) -> Iterator[np.ndarray]:
-        world = frame.snapshot.world
-        if not frame.environment.power > 0 or not world.visibility.diffuse:
-            return
-        each = max(FEW_POINTS // frame.settings.samples, WORLD_POINTS)
-        numbers = range(frame.sample * each, (frame.sample + 1) * each)
-        drawn = np.array([frame.random_at(number, "subsurface/world") for number in numbers])
-        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
-        for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
-            yield lights.direction_row(direction, radiance / density, density, flags, 0, 1, each)
-
-    def _emitted(self, frame: Frame) -> Iterator[np.ndarray]:
-        if self._emissive is None:
-            return
-        each = max(FEW_POINTS // frame.settings.samples, WORLD_POINTS)
-        for number in range(frame.sample * each, (frame.sample + 1) * each):
-            numbers = frame.random_volume_at(number, "subsurface/emissive")
-            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=frame.settings.samples)
 
     def _constant_images(self, size: tuple[int, int]) -> tuple[images.Image, images.Image]:
         """A white image and a black one."""
@@ -341,11 +290,8 @@ class ImageSpaceSubsurface(Technique):
 
     def release(self) -> None:
         self.points.release()
-        self._sources.release()
+        self._light.release()
         self._give_whole()
         self._give_white()
         self._give_shapes()
-        self._lobes = self._emissive = None
-
-
-LIGHTING = lighting(RAYS, False)
+        self._lobes = None

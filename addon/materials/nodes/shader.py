@@ -116,9 +116,9 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
         ),
         tinted=tinted,
         glass=glass,
-        scatter=0.0 if thin or not (sockets["Subsurface Weight"].high > 0.0).any() else _reach(
-            sockets, "Subsurface Radius", "Subsurface Scale", "subsurface_method"
-        ),
+        scatter=0.0
+        if thin or not (sockets["Subsurface Weight"].high > 0.0).any()
+        else _reach(sockets, "Subsurface Radius", "Subsurface Scale", "subsurface_method"),
     )
 
 
