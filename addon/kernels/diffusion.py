@@ -183,7 +183,7 @@ class Lobes:
     def edge(self, x: np.ndarray) -> np.ndarray:
         """Light at signed distances x, m, from the edge of a half-plane that is lit evenly: 1/2 there, 1 inside.
 
-        Along a line the lobe is K0(|x| / s) / (pi s) (its integral across); integrated by quadrature on u, x = s sinh u.
+        Along a line the lobe is K0(|x| / s) / (pi s) (its integral across); integrated by quadrature.
         """
         x = np.atleast_1d(np.asarray(x, float))
         out = np.zeros_like(x)

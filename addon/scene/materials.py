@@ -259,7 +259,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
     )
 
 
-SCATTER_IMAGES = ("length", "share")  # layout: shaders/subsurface/image.glsl
+SCATTER_IMAGES = ("length", "share", "entry")  # layout: shaders/subsurface/image.glsl
 
 
 def _scatter_program(compiled: CompiledMaterial) -> Program:

@@ -22,6 +22,9 @@ import numpy as np
 
 from ..gfx import images
 from ..kernels.morton import morton_codes
+from ..materials import translucency
+from ..materials.translucency import maps_of
+from ..materials.values import LUMINANCE
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance, Mesh, Snapshot
 
@@ -52,6 +55,7 @@ class ScatterPoints:
         self.rows = 0
         self._positions: list[images.Image] = []  # by run: place relative to the render origin, w = 1 (0: unused)
         self._normals: list[images.Image] = []
+        self._entries: list[images.Image] = []  # by run: painted tint and translucency
         self.cells: list[images.Image] = []  # by run: place, w = area of the cell, m2
         self.bounds: images.Image | None = None  # by row: centre and radius
         self.table: images.Image | None = None  # by instance: 1 + number of the object, or 0; then the objects
@@ -64,26 +68,35 @@ class ScatterPoints:
             k for k, instance in enumerate(snapshot.instances)
             if any(reach[m] > 0.0 for m in instance.materials) and snapshot.meshes[instance.mesh].triangle_count
         ]  # fmt: skip
-        key = (
-            most, tuple(frame.geometry.origin), reach, len(snapshot.instances),
-            tuple(
-                (k, one.mesh, snapshot.meshes[one.mesh].version, one.matrix.tobytes(), one.materials)
-                for k, one in ((k, snapshot.instances[k]) for k in shown)
-            ),
-        )  # fmt: skip
+        maps = [maps_of(material.graph) for material in snapshot.materials]
+        painted = [(k, *one, snapshot.images[one[1]].version) for k, found in enumerate(maps) for one in found.items()]
+        moved = [
+            (k, one.mesh, snapshot.meshes[one.mesh].version, one.matrix.tobytes(), one.materials)
+            for k, one in ((k, snapshot.instances[k]) for k in shown)
+        ]
+        origin = tuple(frame.geometry.origin)
+        key = (most, tuple(painted), origin, reach, len(snapshot.instances), tuple(moved))
         if key == self._key:
             return False
         self._key = key
-        self._make(snapshot, shown, reach, frame.geometry.origin, most)
+        self._make(snapshot, shown, reach, maps, frame.geometry.origin, most)
         return True
+
+    def entries(self, run: int) -> images.Image:
+        """Painted tint and translucency of a run's points."""
+        return self._entries[run % RUNS]
 
     def surface(self, run: int) -> tuple[images.Image, images.Image]:
         """Positions and normals of a run, as shaders/lib/gbuffer.glsl reads them."""
         return self._positions[run % RUNS], self._normals[run % RUNS]
 
-    def _make(self, snapshot: Snapshot, shown: list[int], reach: tuple, origin: np.ndarray, most: int) -> None:
-        surfaces = [_Surface.of(snapshot.instances[k], snapshot.meshes[snapshot.instances[k].mesh], reach, origin)
-                    for k in shown]  # fmt: skip
+    def _make(
+        self, snapshot: Snapshot, shown: list[int], reach: tuple, maps: list, origin: np.ndarray, most: int
+    ) -> None:
+        surfaces = [
+            _Surface.of(snapshot.instances[k], snapshot.meshes[snapshot.instances[k].mesh], reach, origin)
+            for k in shown
+        ]
         wished = np.array([one.area / max(SPACING * one.reach, 1e-30) ** 2 for one in surfaces])
         wished = np.maximum(np.nan_to_num(wished, posinf=1e12), FEWEST)
         if wished.sum() > most:
@@ -101,7 +114,8 @@ class ScatterPoints:
         for k, surface, count in zip(shown, surfaces, counts):
             if not count or not surface.area > 0.0:
                 continue
-            blocks.append(surface.cells(int(count)))
+            *block, triangle, uv = surface.cells(int(count))
+            blocks.append((*block, _painted(surface.materials[triangle], uv, maps, snapshot.images)))
             spacing = float(np.sqrt(surface.area / count))
             self.objects.append(ScatteringObject(k, row, int(count) // ROW, spacing, surface.area))
             table[k] = len(self.objects), 0.0, 0.0, 0.0
@@ -113,10 +127,10 @@ class ScatterPoints:
         self._upload(blocks)
 
     def _upload(self, blocks: list) -> None:
-        self._positions, self._normals, self.cells, self.bounds = [], [], [], None
+        self._positions, self._normals, self._entries, self.cells, self.bounds = [], [], [], [], None
         if not blocks:
             return
-        place, normal, face, area = (np.concatenate(parts) for parts in zip(*blocks))
+        place, normal, face, area, entry = (np.concatenate(parts) for parts in zip(*blocks))
         rows = len(place) // ROW
         by_row = place.reshape(rows, ROW * RUNS, 3)
         low, high = by_row.min(axis=1), by_row.max(axis=1)
@@ -129,6 +143,7 @@ class ScatterPoints:
             self._positions.append(_image(np.concatenate([place[:, run], one], axis=1)))
             packed = np.concatenate([_octahedral(normal[:, run]), _octahedral(face[:, run])], axis=1)
             self._normals.append(_image(packed))
+            self._entries.append(_image(entry[:, run]))
             self.cells.append(_image(np.concatenate([place[:, run], area[:, None]], axis=1)))
 
     def release(self) -> None:
@@ -137,12 +152,14 @@ class ScatterPoints:
 
 @dataclass(frozen=True)
 class _Surface:
-    """Triangles of an instance that scatter: corners and corner normals (T, 3, 3), areas (T,), and how far light
-    spreads, m."""
+    """Triangles of an instance that scatter: corners and corner normals (T, 3, 3), areas (T,), texture coordinates
+    (T, 3, 2), numbers of materials (T,), and how far light spreads, m."""
 
     corners: np.ndarray
     normals: np.ndarray
     areas: np.ndarray
+    uv: np.ndarray
+    materials: np.ndarray
     reach: float
 
     @property
@@ -172,11 +189,22 @@ class _Surface:
             normals = -normals
         finite = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(areas)
         positive = of_triangle[of_triangle > 0.0]
-        return cls(corners[finite], normals[finite], areas[finite], float(positive.min()) if len(positive) else 0.0)
+        layer = mesh.uv_maps.get(mesh.active_uv)
+        uv = np.zeros((len(shown), 3, 2)) if layer is None else layer[shown].astype(np.float64)
+        own = material[of_triangle > 0.0]
+        return cls(
+            corners[finite],
+            normals[finite],
+            areas[finite],
+            uv[finite],
+            own[finite],
+            float(positive.min()) if len(positive) else 0.0,
+        )
 
-    def cells(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, areas (count,)."""
-        place, normal, face = self._cloud(count * RUNS)
+    def cells(self, count: int) -> tuple[np.ndarray, ...]:
+        """Points (count, RUNS, 3), shading normals and triangles' normals of the same shape, areas (count,), numbers of
+        triangles (count, RUNS) and texture coordinates (count, RUNS, 2)."""
+        place, normal, face, triangle, uv = self._cloud(count * RUNS)
         size = np.sqrt(self.area / count)
         centre, owner = _farthest(np.concatenate([place, TURN / 2 * size * face], axis=1).astype(np.float32), count)
         sums = np.bincount(owner, minlength=count)
@@ -188,10 +216,12 @@ class _Surface:
         member[:, 0] = centre
         along = np.argsort(morton_codes(place[centre]), kind="stable")
         member, sums = member[along], sums[along]
-        return place[member], normal[member], face[member], sums * (self.area / len(place))
+        areas = sums * (self.area / len(place))
+        return place[member], normal[member], face[member], areas, triangle[member], uv[member]
 
-    def _cloud(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Evenly spread points, with shading normals and those of their triangles."""
+    def _cloud(self, count: int) -> tuple[np.ndarray, ...]:
+        """Evenly spread points, with shading normals, those of their triangles, the triangles' numbers and texture
+        coordinates."""
         edges = np.concatenate([[0.0], np.cumsum(self.areas)])
         u, v, w = (bits(np.arange(count), dimension) / 2.0**32 for dimension in range(3))
         triangle = np.clip(np.searchsorted(edges, u * edges[-1], side="right") - 1, 0, len(self.areas) - 1)
@@ -202,7 +232,21 @@ class _Surface:
         face = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         face *= np.where((face * normal).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
         normal = np.where((normal * normal).sum(axis=1, keepdims=True) > 0.5, normal, face)
-        return (share * corners).sum(axis=1), normal, face
+        return (share * corners).sum(axis=1), normal, face, triangle, (share * self.uv[triangle]).sum(axis=1)
+
+
+def _painted(material: np.ndarray, uv: np.ndarray, maps: list, pictures: dict) -> np.ndarray:
+    """(cells, RUNS, 4) tint and translucency at points with these materials and texture coordinates."""
+    out = np.ones((*material.shape, 4))
+    for number in np.unique(material):
+        for name, image in maps[number].items():
+            own = material == number
+            if name == translucency.TINT:
+                out[own, :3] = translucency.sampled(pictures[image], uv[own])
+            elif name == translucency.TRANSLUCENCY:
+                color = translucency.sampled(pictures[image], uv[own])
+                out[own, 3] = np.clip(color @ LUMINANCE, 0.0, 1.0)
+    return out
 
 
 def _farthest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -39,13 +39,14 @@ from collections.abc import Iterator
 from ..frame.light_paths import SUBSURFACE
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import Param, Technique, Write
+from ..frame.technique import MATERIAL, Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import diffusion
 from ..lighting import repeated_light
 from ..lighting.point_light import LIGHTING, PointLight
 from ..lighting.visibility import RAYS, ray_bindings
+from ..materials import translucency
 from ..materials.compiler import may_scatter
 from ..scene import acceleration
 from ..scene.materials import SCATTER_IMAGES
@@ -59,8 +60,10 @@ RANGE = 2.5  # distances between points: where pixels stop and points begin
 RAYS_INDIRECT = 4  # of a point in a sample
 IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
 
+POINT_TEXTURES = (("RGBA32F", "point_position"), ("RGBA32F", "point_normal"), ("RGBA32F", "point_entry"))
 PICTURE = (
-    "surface_position", "surface_normal", "surface_diffuse", "scatter_length", "scatter_share", "light_direct",
+    "surface_position", "surface_normal", "surface_diffuse", "scatter_length", "scatter_share", "scatter_entry",
+    "light_direct",
     "light_indirect",
 )  # fmt: skip
 GATHER = passes.fullscreen_program(
@@ -87,7 +90,7 @@ APPLY = passes.fullscreen_program(
 INDIRECT = passes.fullscreen_program(
     "subsurface indirect",
     "subsurface/indirect.frag.glsl",
-    textures=(*GATHER_TEXTURES, ("RGBA32F", "point_position"), ("RGBA32F", "point_normal")),
+    textures=(*GATHER_TEXTURES, *POINT_TEXTURES),
     blocks=PATH_BLOCKS,
     constants=(*(one for one in GATHER_CONSTANTS if one[1] != "lobe_rays"), ("INT", "rays")),
     outputs=(("VEC4", "out_indirect"),),
@@ -95,7 +98,7 @@ INDIRECT = passes.fullscreen_program(
 CHORD = passes.fullscreen_program(
     "subsurface chord",
     "subsurface/chord.frag.glsl",
-    textures=(*RAYS.textures, ("RGBA32F", "point_position"), ("RGBA32F", "point_normal")),
+    textures=(*RAYS.textures, *POINT_TEXTURES),
     blocks=((VIEW, "film_view"),),
     constants=(*RAYS.constants, ("FLOAT", "longest")),
     outputs=(("VEC4", "out_shape"),),
@@ -114,6 +117,18 @@ class ImageSpaceSubsurface(Technique):
             draft=512,
         ),
         Param("taps", "Taps", 24, "Pixels around each that light below its surface is taken from in a sample", 1, 256),
+        Param(
+            translucency.BLUR, "Blur Map", "", "Painted: how far light spreads below the surface; 0.5 as the material "
+            "says, 1 eight times as far, 0 an eighth", scope=MATERIAL, image=True,
+        ),
+        Param(
+            translucency.TINT, "Tint Map", "", "Painted: colour of light that enters here, below the skin",
+            scope=MATERIAL, image=True,
+        ),
+        Param(
+            translucency.TRANSLUCENCY, "Translucency Map", "", "Painted: where light scatters below the surface; black "
+            "is plain diffuse", scope=MATERIAL, image=True,
+        ),
     )  # fmt: skip
     reads = SURFACES
     finishes = LIGHT
@@ -122,6 +137,7 @@ class ImageSpaceSubsurface(Technique):
     writes = (
         Write(IMAGES[0], "RGBA32F", "How far light spreads below the surface, m; the albedo that says how"),
         Write(IMAGES[1], "RGBA32F", "Share of the diffuse albedo that does; the object"),
+        Write(IMAGES[2], "RGBA32F", "Painted: tint of the light that enters; how translucent the surface is"),
         *(Write(name, "RGBA32F", "What left the surface takes the place of what entered", True) for name in LIGHT),
     )
 
@@ -180,21 +196,25 @@ class ImageSpaceSubsurface(Technique):
         textures, constants = ray_bindings(frame)
         passes.fullscreen(
             CHORD, images.Target((self._shapes,)),
-            textures={**textures, "point_position": position, "point_normal": normal},
+            textures={
+                **textures, "point_position": position, "point_normal": normal, "point_entry": self.points.entries(0),
+            },
             blocks={"film_view": frame.view_block}, constants={**constants, "longest": 2.0 * frame.geometry.size},
         )  # fmt: skip
 
     # Light at points of the mesh --------------------------------------------------------------------------------------
 
     def _lit_points(self, frame: Frame) -> tuple[images.Image, images.Image]:
-        """Direct and indirect light of this sample at the points, as white surfaces there reflect it."""
+        """Direct and indirect light of this sample at the points, as surfaces of the painted tint
+        there reflect it."""
         size = (ROW, self.points.rows)
         direct, unused, indirect = (images.pool.take(*size, "RGBA32F") for _ in range(3))
         position, normal = self.points.surface(frame.sample)
         target = images.Target((direct, unused))
         target.clear()
-        white, black = self._constant_images(size)
-        surfaces = {"position": position, "normal": normal, "diffuse": white, "tint": black, "lobe": black}
+        black = self._constant_images(size)[1]
+        tint = self.points.entries(frame.sample)
+        surfaces = {"position": position, "normal": normal, "diffuse": tint, "tint": black, "lobe": black}
         drawn, rays = self._light.add(frame, {**surfaces, "emission": black}, target)
         frame.count(self, "passes", drawn)
         images.pool.give(unused)
@@ -214,7 +234,7 @@ class ImageSpaceSubsurface(Technique):
             INDIRECT, target,
             textures={
                 **{name: offered["textures"][name] for _, name in GATHER_TEXTURES},
-                "point_position": position, "point_normal": normal,
+                "point_position": position, "point_normal": normal, "point_entry": self.points.entries(frame.sample),
             },
             blocks=offered["blocks"],
             constants={**{name: offered["constants"][name] for name in names}, "rays": RAYS_INDIRECT},
@@ -247,7 +267,7 @@ class ImageSpaceSubsurface(Technique):
         }
         picture = (
             shown["surface.position"], shown["surface.normal"], shown["surface.diffuse"], shown[IMAGES[0]],
-            shown[IMAGES[1]], shown[LIGHT[0]], shown[LIGHT[1]],
+            shown[IMAGES[1]], shown[IMAGES[2]], shown[LIGHT[0]], shown[LIGHT[1]],
         )  # fmt: skip
         left = [images.pool.take(*frame.size, "RGBA32F") for _ in LIGHT]
         before, after = self._whole

@@ -93,6 +93,8 @@ struct Closures {
   float scatter_most;     // albedo of the one that the next two are of
   int scatter_method;     // SCATTER_*
   float scatter_entry;    // cosine at which the view's ray enters
+  float map_length;       // painted: factor of the length
+  vec4 map_entry;         // painted: tint of light that enters, and how much of it scatters
 #endif
 };
 
@@ -139,6 +141,8 @@ Closures closures_begin(vec3 normal, float random_number, float even_share)
   c.scatter_most = 0.0;
   c.scatter_method = SCATTER_BURLEY;
   c.scatter_entry = 1.0;
+  c.map_length = 1.0;
+  c.map_entry = vec4(1.0);
 #endif
   return c;
 }

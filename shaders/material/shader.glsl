@@ -114,19 +114,30 @@ void shader_diffuse(inout Closures closures, SurfacePoint point, vec3 weight, ve
 
 // Diffuse where it is lit; the pass of light below surfaces spreads it (subsurface/closure.glsl). `radius` in metres.
 void add_subsurface(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 radius, float ior,
-                    float anisotropy, vec3 normal, int method)
+                    float roughness, float anisotropy, vec3 normal, int method)
 {
 #ifdef SUBSURFACE
-  closure_subsurface(closures, weight, color, radius, ior, anisotropy, view_cosine(point, normal), method);
+  closure_subsurface(closures, weight, color, radius, ior, roughness, anisotropy, view_cosine(point, normal),
+                     method);
+#endif
+}
+
+// Maps that an artist paints (materials/translucency.py): of the pass of light below surfaces alone.
+void shader_translucency_maps(inout Closures closures, SurfacePoint point, vec3 weight, float blur, vec3 tint,
+                              float translucency)
+{
+#ifdef SUBSURFACE
+  closures.map_length = exp2(6.0 * (clamp(blur, 0.0, 1.0) - 0.5));
+  closures.map_entry = vec4(max(tint, vec3(0.0)), clamp(translucency, 0.0, 1.0));
 #endif
 }
 
 void shader_subsurface(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float scale, vec3 radius,
-                       float ior, float anisotropy, vec3 normal, int method)
+                       float ior, float roughness, float anisotropy, vec3 normal, int method)
 {
   vec3 n = unit_or(normal, point.normal);
   vec3 base = max(color, vec3(0.0));
-  add_subsurface(closures, point, weight, base, radius * scale, ior, anisotropy, n, method);
+  add_subsurface(closures, point, weight, base, radius * scale, ior, roughness, anisotropy, n, method);
   closure_diffuse(closures, weight, base, 0.0, n);
 }
 
@@ -404,7 +415,7 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
   }
   else if (subsurface > SMALLEST_WEIGHT) {
     add_subsurface(closures, point, w * clamp(subsurface, 0.0, 1.0), base, subsurface_radius * subsurface_scale,
-                   subsurface_ior, subsurface_anisotropy, n, subsurface_method);
+                   (subsurface_method == 2) ? subsurface_ior : specular_ior, r, subsurface_anisotropy, n, subsurface_method);
   }
   closure_diffuse(closures, w, base, clamp(diffuse_roughness, 0.0, 1.0), n);
 }

@@ -1,5 +1,5 @@
-// For points on an object: the mean length of lines from there through it, m, by rays of the cosine's density inwards, and the
-// shading normal. What no ray leaves again, since the mesh is open, counts as `longest`.
+// For points on an object: the mean length of lines from there through it, m, by rays of the cosine's density inwards, the shading
+// normal, and how translucent the surface is there. What no ray leaves again, since the mesh is open, counts as `longest`.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "trace/rays.glsl"
@@ -21,5 +21,5 @@ void main()
     vec3 direction = cosine_direction(-face, u);
     sum += min(trace_until(origin, direction, longest, longest, roll.z + uint(k), hit), longest);
   }
-  out_shape = vec4(normals.xy, sum / float(CHORDS), 0.0);
+  out_shape = vec4(normals.xy, sum / float(CHORDS), point_entry_fetch(texel).w);
 }

@@ -29,14 +29,16 @@ float skin_scale(float albedo, float ior)
   return sqrt(3.0 * (1.0 - 0.5 * (low + high)));
 }
 
-// Cosine inside at which the view's ray enters.
-float entry_cosine(float cosine, float ior)
+// Cosine inside at which the view's ray enters: refracted where the surface is smooth. Of a rough one a mean that gives what
+// Cycles returns of walks that enter at 0 to 86 degrees, whatever the index of refraction.
+float entry_cosine(float cosine, float ior, float roughness)
 {
-  return sqrt(max(1.0 - (1.0 - cosine * cosine) / (ior * ior), 0.0));
+  float refracted = sqrt(max(1.0 - (1.0 - cosine * cosine) / (ior * ior), 0.0));
+  return mix(refracted, 0.15 + 0.78 * cosine, roughness * roughness);
 }
 
-void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, float ior, float anisotropy,
-                        float cosine, int method)
+void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, float ior, float roughness,
+                        float anisotropy, float cosine, int method)
 {
   vec3 albedo = weight * color;
   float added = min(dot(albedo, vec3(1.0)), 1e30);
@@ -63,6 +65,6 @@ void closure_subsurface(inout Closures c, vec3 weight, vec3 color, vec3 radius, 
   if (added > c.scatter_most) {
     c.scatter_most = added;
     c.scatter_method = (method == METHOD_LEGACY) ? SCATTER_WALK : method;
-    c.scatter_entry = (method == METHOD_SKIN) ? 0.5 * (entry_cosine(cosine, index) + 0.85) : entry_cosine(cosine, index);
+    c.scatter_entry = entry_cosine(cosine, index, (method == METHOD_SKIN) ? 1.0 : clamp(roughness, 0.0, 1.0));
   }
 }

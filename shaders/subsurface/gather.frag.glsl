@@ -20,11 +20,12 @@ struct Arriving {
 };
 
 // Light that arrives at a pixel over pi, per channel, weighted.
-void arriving_pixel(inout Arriving sum, ivec2 pixel, vec3 weight)
+void arriving_pixel(inout Arriving sum, ivec2 pixel, float translucency, vec3 weight)
 {
   vec3 albedo = surface_diffuse_fetch(pixel).rgb;
   vec3 known = step(vec3(LEAST_COLOR), albedo) * weight;
-  vec3 per = known / max(albedo, vec3(LEAST_COLOR));
+  vec4 entry = scatter_entry_fetch(pixel);
+  vec3 per = known / max(albedo, vec3(LEAST_COLOR)) * entry.rgb * min(entry.w, translucency);
   sum.direct += per * light_direct_fetch(pixel).rgb;
   sum.indirect += per * light_indirect_fetch(pixel).rgb;
   sum.whole += known;
@@ -51,7 +52,8 @@ float pixel_width_at(vec3 position)
 }
 
 // Mean of what arrives at pixels of the object within `range`, by the windowed profile; taps on a spiral, denser inwards.
-Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float range, float pixel_size)
+Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float range, float pixel_size,
+                    float translucency)
 {
   Arriving sum;
   sum.direct = sum.indirect = sum.whole = vec3(0.0);
@@ -80,7 +82,7 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
     }
     // The density of taps at r is 1 / ((r + inner) ratio).
     float weight = near_window(away, range) * (r + inner) * (r / max(away, 1e-20));
-    arriving_pixel(sum, pixel, profile_radial(profile, away) * weight);
+    arriving_pixel(sum, pixel, translucency, profile_radial(profile, away) * weight);
   }
   return sum;
 }
@@ -114,15 +116,15 @@ float burley_lines(vec3 path, vec3 face, vec3 normal, vec3 tangent, vec3 bitange
   return sqrt(squared) * dot(density, vec3(1.0) / foot) / max(dot(density, vec3(1.0)), 1e-12);
 }
 
-void far_add(inout Arriving sum, ivec2 texel, vec3 weight)
+void far_add(inout Arriving sum, ivec2 texel, float translucency, vec3 weight)
 {
-  sum.direct += weight * cell_direct_fetch(texel).rgb;
-  sum.indirect += weight * cell_indirect_fetch(texel).rgb;
+  sum.direct += weight * translucency * cell_direct_fetch(texel).rgb;
+  sum.indirect += weight * translucency * cell_indirect_fetch(texel).rgb;
   sum.whole += weight;
 }
 
 Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float range, int kind, vec3 free_path,
-              vec3 absorption)
+              vec3 absorption, float translucency)
 {
   Far far;
   far.ahead.direct = far.ahead.indirect = far.ahead.whole = vec3(0.0);
@@ -156,11 +158,11 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
         if (kind == PROFILE_BURLEY) {
           weight *= burley_lines(cell.xyz - position, face, normal, tangent, bitangent, 0.25 * object.z);
         }
-        far_add(far.ahead, texel, weight * front * (1.0 - near_window(r, range)));
+        far_add(far.ahead, texel, min(shape.w, translucency), weight * front * (1.0 - near_window(r, range)));
         if (kind == PROFILE_WALK) {
           weight *= mix(vec3(1.0), walk_through(r, free_path, absorption), clamp(0.5 - 0.5 * facing, 0.0, 1.0));
         }
-        far_add(far.behind, texel, weight * (1.0 - front));
+        far_add(far.behind, texel, min(shape.w, translucency), weight * (1.0 - front));
       }
     }
   }
@@ -173,7 +175,7 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
 vec3 walk_exponent(vec3 chord, vec3 absorption)
 {
   vec3 x = min(0.5 * chord * absorption, vec3(20.0));
-  return vec3(1.0) - exp(-x * (vec3(0.68) + 0.42 * x));
+  return vec3(1.0) - exp(-x * (vec3(0.8) + 0.2 * x));
 }
 
 void main()
@@ -201,7 +203,8 @@ void main()
 
   Arriving own;
   own.direct = own.indirect = own.whole = vec3(0.0);
-  arriving_pixel(own, pixel, vec3(1.0));
+  float translucency = scatter_entry_fetch(pixel).w;
+  arriving_pixel(own, pixel, translucency, vec3(1.0));
   vec3 direct = own.direct;
   vec3 indirect = own.indirect;
   float code = floor(share.w * 0.25);
@@ -212,14 +215,14 @@ void main()
     // Without points all is taken from pixels.
     bool has_points = object.y > 0.5 && reach > 2.0 * width && points_lit != 0;
     float range = has_points ? min(RANGE * object.z, reach) : reach;
-    Arriving near = near_light(pixel, position, normal, profile, code, range, width);
+    Arriving near = near_light(pixel, position, normal, profile, code, range, width, translucency);
     vec3 found = step(vec3(1e-20), near.whole);
     direct = mix(own.direct, near.direct / max(near.whole, vec3(1e-20)), found);
     indirect = mix(own.indirect, near.indirect / max(near.whole, vec3(1e-20)), found);
     if (has_points) {
       vec3 inside = profile_near(profile, range);
       vec3 outside = max(vec3(1.0) - inside, vec3(0.0));
-      Far far = far_light(position, normal, profile, object, range, kind, free_path, absorption);
+      Far far = far_light(position, normal, profile, object, range, kind, free_path, absorption, translucency);
       chord = far.chord;
       vec3 spare = LITTLE * outside + vec3(1e-12);
       vec3 whole = far.ahead.whole + spare;
@@ -244,7 +247,7 @@ void main()
     direct *= factor;
     indirect *= factor;
   }
-  vec3 stays = vec3(1.0) - share.rgb;
+  vec3 stays = vec3(1.0) - share.rgb * translucency;
   out_direct.rgb = out_direct.rgb * stays + albedo * share.rgb * direct;
   out_indirect.rgb = out_indirect.rgb * stays + albedo * share.rgb * indirect;
 }

@@ -24,4 +24,5 @@ void main()
       out_indirect.rgb += near_radiance(origin, direction, true, roll) / float(rays);
     }
   }
+  out_indirect.rgb *= point_entry_fetch(texel).rgb;
 }

@@ -328,12 +328,21 @@ ENTRIES = (
             Socket("Scale", "FLOAT", 0.05),
             Socket("Radius", "VECTOR", (1.0, 0.2, 0.1)),
             Socket("IOR", "FLOAT", 1.4),
+            Socket("Roughness", "FLOAT", 1.0),
             Socket("Anisotropy", "FLOAT"),
             NORMAL,
             Choice("falloff", SUBSURFACE_METHODS, missing=1),
         ),
         include="material/shader.glsl",
         summary=_subsurface,
+    ),
+    # Painted translucency: not a node of Blender's, see materials/translucency.py.
+    Entry(
+        "CandelaTranslucency",
+        "shader_translucency_maps",
+        (Socket("Blur", "FLOAT", 0.5), Socket("Tint", "COLOR", WHITE), Socket("Translucency", "FLOAT", 1.0)),
+        include="material/shader.glsl",
+        summary=lambda sockets: Summary(),
     ),
 )
 
