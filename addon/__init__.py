@@ -27,10 +27,11 @@ def _parts() -> tuple:
         properties,
         quality,
         scoped_panels,
+        translucency,
         tuning,
     )
 
     return (
-        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, tuning,
-        pass_operators, compare_editor, cli,
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, translucency,
+        tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip
