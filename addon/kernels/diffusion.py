@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 FOUR_PI = 4.0 * np.pi
-LEAST_ABSORPTION = 1e-3  # of the reduced extinction: with less the dipole's range has no bound
+LEAST_ABSORPTION = 1e-4  # of the reduced extinction: with less the dipole's range has no bound
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class Lobes:
         out = np.zeros_like(x)
         for share, scale in zip(self.shares, self.scales):
             # Integral of K0(t) from a on is the integral over u >= 0 of exp(-a cosh u) / cosh u.
-            u = np.linspace(0.0, 12.0, 4001)
+            u = np.linspace(0.0, 24.0, 8001)
             tail = np.exp(-np.abs(x[:, None]) / scale * np.cosh(u)) / np.cosh(u)
             beyond = np.trapezoid(tail, u, axis=1) / np.pi
             out += share * np.where(x >= 0.0, 1.0 - beyond, beyond)

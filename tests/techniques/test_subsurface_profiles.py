@@ -64,7 +64,7 @@ def test_a_thick_slab_is_the_dipole_and_a_clear_one_loses_nothing():
     k = np.array([0.0, 0.5, 2.0])
     assert diffusion.multipole(THESIS, 200.0, k)[0] == pytest.approx(diffusion.dipole_hankel(THESIS, k), rel=1e-6)
     reflected, transmitted = diffusion.multipole(Medium(1e-9, 2.0, 0.0, 1.2), 1.0)
-    # Absorption counts as a thousandth of the extinction, so that the range is bounded.
+    # Absorption counts as a ten-thousandth of the extinction, so that the range is bounded.
     assert float(reflected + transmitted) == pytest.approx(1.0, abs=0.02)
 
 
@@ -88,7 +88,7 @@ def test_the_walk_returns_its_albedo_of_light_from_all_sides():
     cosines = (np.arange(2000) + 0.5) / 2000
     for albedo in (0.1, 0.5, 0.8, 0.95):
         returned = diffusion.walk_returned(diffusion.walk_absorption(albedo), cosines)
-        assert np.mean(2 * cosines * returned) == pytest.approx(albedo, rel=0.01)
+        assert np.mean(2 * cosines * returned) == pytest.approx(albedo, abs=0.003)
 
 
 def test_the_skin_scale_inverts_the_dipole():
