@@ -240,7 +240,7 @@ void main()
   }
   if (kind == PROFILE_WALK) {
     // What enters steeply comes out less often than the albedo says, which is for light from all sides.
-    vec3 returned = walk_returned(absorption, clamp(scatter_entry(share.w), 0.01, 1.0));
+    vec3 returned = walk_returned(absorption, clamp(scatter_cosine(share.w), 0.01, 1.0));
     returned = (method == SCATTER_SKIN) ? 0.5 * (returned + color) : returned;
     vec3 power = walk_exponent(vec3(chord) / free_path, absorption);
     vec3 factor = pow(clamp(returned, vec3(1e-4), vec3(1.0)), power) / max(color, vec3(1e-3));

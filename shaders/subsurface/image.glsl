@@ -22,7 +22,7 @@ int scatter_method(float code)
   return int(floor(code)) - 4 * scatter_object(code);
 }
 
-float scatter_entry(float code)
+float scatter_cosine(float code)
 {
   return fract(code) / 0.99;
 }
