@@ -3,10 +3,10 @@
 import bpy
 import numpy as np
 import pytest
-from conftest import places
 
 from addon.kernels import diffusion
 from addon.techniques import instant_radiosity
+from tests.techniques.conftest import places
 
 COLOR = (0.8, 0.5, 0.2)
 PATH = 0.25 / np.pi  # of a radius: Burley's d
