@@ -62,6 +62,7 @@ class Frame:
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
+    drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     receivers: Receivers | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
@@ -306,7 +307,7 @@ class Renderer:
         A sample that is not brought to its end leaves sums that are good for nothing: the next `begin` starts anew.
         """
         try:
-            yield from self._parts_of_sample(frame)
+            yield from _timed(frame, self._parts_of_sample(frame))
         finally:
             if self.frame is frame and frame.samples_done == frame.sample:
                 self._frame_key = None
@@ -315,12 +316,16 @@ class Renderer:
         frame.sample = frame.samples_done
         frame.look()
         frame.shown.clear()
+        samples, profiler = frame.settings.samples if frame.settings.whole else 0, frame.profiler
         if frame.sample == 0:
             self._clear_sums(frame)
-            yield from _stage(frame, "begin")
-        yield from _stage(frame, "sample")
+            with profiler.once(samples):
+                yield from _stage(frame, "begin")
+        with profiler.measured(frame.sample, samples):
+            yield from _stage(frame, "sample")
         if frame.sample + 1 == frame.settings.samples:
-            yield from _stage(frame, "end")
+            with profiler.once(samples):
+                yield from _stage(frame, "end")
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
 
@@ -355,21 +360,20 @@ class Renderer:
             out[name] = pixels
         ledger = frame.ledger
         if not ledger.rows:
-            seconds = frame.profiler.seconds
+            ledger.times["passes"] = frame.drawn_s + frame.profiler.awaited + waited - started
+            spent = frame.profiler.shares([t.name for t in frame.plan.techniques], ledger.times["passes"])
             ledger.rows = [
                 Row(
                     t.name,
                     t.label,
                     RAN,
                     "",
-                    1000 * seconds.get(t.name, 0.0),
+                    1000 * spent[t.name],
                     ", ".join(frame.plan.slots_of(t)),
                     frame.counters.get(t.name, {}),
                 )
                 for t in frame.plan.techniques
             ] + list(frame.plan.skipped)
-            drawn = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques)
-            ledger.times["passes"] = drawn + frame.profiler.awaited + waited - started
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad
@@ -460,3 +464,15 @@ def _stage(frame: Frame, stage: str) -> Iterator[None]:
             parts = iter(run(frame) or ())
         for _ in frame.profiler.steps(technique.name, parts):
             yield
+
+
+def _timed(frame: Frame, parts: Iterator[None]) -> Iterator[None]:
+    """The same parts; what they take is added to the frame's time."""
+    end = object()
+    while True:
+        started = time.perf_counter()
+        part = next(parts, end)
+        frame.drawn_s += time.perf_counter() - started
+        if part is end:
+            return
+        yield
