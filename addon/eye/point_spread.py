@@ -197,7 +197,9 @@ def colour(pattern: images.Image, target: images.Target, least: int = 32, most: 
     )  # fmt: skip
 
 
-def make_pattern(aperture: Aperture, side: int, defocus: float, least: int = 32, most=optics.MOST_WAVELENGTHS) -> Pattern:
+def make_pattern(
+    aperture: Aperture, side: int, defocus: float, least: int = 32, most=optics.MOST_WAVELENGTHS
+) -> Pattern:
     """Everything up to the colours."""
     fine = SUPERSAMPLING * side
     made = Pattern(images.pool.take(side, side, "RGBA32F"), images.pool.take(fine, fine, "R16F"))

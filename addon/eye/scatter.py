@@ -29,7 +29,7 @@ Source: Ritschel et al. 2009, which convolves the whole picture with the whole k
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..gfx import images, library, passes
 from ..gfx.library import Program
@@ -126,7 +126,7 @@ class Scatter:
     """Keeps the transform of the kernel it used last."""
 
     _kernel: Kernel | None = None
-    _transformed: images.Target | None = field(default=None)
+    _transformed: images.Target | None = None
 
     def convolve(
         self, picture: images.Image, kernel: Kernel, target: images.Target, *, white: float, strength: float,
@@ -140,17 +140,18 @@ class Scatter:
         padded = tuple(fft.fitting_side(side + kernel.scale.reach) for side in size)
         number = FACTORS.index(factor)
         limits = {"white": white, "most_light": MOST_LIGHT}
-        with images.borrowed(*padded, "RGBA32F") as field_, images.borrowed(*padded, "RGBA32F") as spare:
-            transformed = self._transform_of(kernel, padded, spare)
-            rows = (0, size[1])
-            passes.fullscreen(BRIGHT[number], field_, rows=rows, textures={"picture": picture}, constants=limits)
-            found, other = fft.transform(field_, spare, rows=size[1])
+        with images.borrowed(*padded, "RGBA32F") as bright, images.borrowed(*padded, "RGBA32F") as spare:
+            transformed = self._transform_of(kernel, padded)
+            passes.fullscreen(
+                BRIGHT[number], bright, viewport=(0, 0, *size), textures={"picture": picture}, constants=limits
+            )
+            found, other = fft.transform(bright, spare, extent=size)
             fft.multiply(found.colors[0], transformed.colors[0], other)
-            found, _ = fft.transform(other, found, inverse=True, rows=size[1])
+            found, _ = fft.transform(other, found, inverse=True, extent=size)
             self._combine(number, picture, found.colors[0], kernel, target, strength, dimming, limits)
         return 3 + 2 * fft.pass_count(*padded)
 
-    def _transform_of(self, kernel: Kernel, padded: tuple[int, int], spare: images.Target) -> images.Target:
+    def _transform_of(self, kernel: Kernel, padded: tuple[int, int]) -> images.Target:
         if self._kernel is kernel and self._transformed.size == padded:
             return self._transformed
         self.release()

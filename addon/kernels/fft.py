@@ -17,8 +17,8 @@ pixel of a draw 3 to 7. A texel computes its own output of a butterfly as a poly
 | fetches, writes per texel | sum of the factors per axis: 24 for 1024; one write per pass |
 | bytes per texel | 16 (RG32F: 8), and as many of a second image |
 
-Sides are 2^a or 3 * 2^a (`fitting_side`), whatever is padded to them must be zero. Rows that are zero before, or that
-nobody reads after, are left out (`rows`).
+Sides are 2^a or 3 * 2^a (`fitting_side`). A picture in the corner of a larger image need not be padded: what lies
+beyond counts as zero and is not read, rows that are zero before, or that nobody reads after, are left out (`extent`).
 
 Bias: none; float32 leaves 2e-7 of the root mean square of the transform. Fails for other sides: ValueError.
 
@@ -39,10 +39,16 @@ PASSES = {
         f"Fourier transform, radix {radix}, axis {axis}, {kind}",
         "fft/pass.frag.glsl",
         textures=((kind, "field"),),
-        constants=(("INT", "done"), ("INT", "apart"), ("FLOAT", "direction"), ("FLOAT", "scale")),
+        constants=(
+            ("INT", "done"),
+            ("INT", "apart"),
+            ("INT", "filled"),
+            ("FLOAT", "direction"),
+            ("FLOAT", "scale"),
+        ),
         defines=(("RADIX", str(radix)), ("STEP", _STEPS[axis]), *((("TWO", "1"),) if kind == "RGBA32F" else ())),
         outputs=(("VEC4", "out_field"),),
-    )
+    )  # fmt: skip
     for radix in RADICES
     for axis in (0, 1)
     for kind in FORMATS
@@ -77,25 +83,28 @@ def factors(side: int) -> list[int]:
 
 
 def transform(
-    field: Target, spare: Target, *, inverse: bool = False, rows: int | None = None
+    field: Target, spare: Target, *, inverse: bool = False, extent: tuple[int, int] | None = None
 ) -> tuple[Target, Target]:
     """Transform the image of `field`; `spare` is a target of the same size and format.
 
-    Returns them in the order (result, other). `rows`: forward, rows from this one on are zero; inverse, nobody reads
-    them. Raises ValueError for a side that cannot be transformed.
+    Returns them in the order (result, other). `extent`: the rectangle from the corner that is not zero (forward), or
+    that is read afterwards (inverse); what the image holds beyond does not matter. Raises ValueError for a side that
+    cannot be transformed.
     """
-    width, height = field.size
-    kept = (0, rows if rows is not None else height)
-    axes = ((1, height, None), (0, width, kept)) if inverse else ((0, width, kept), (1, height, None))
-    steps = [(axis, side, shown, radix) for axis, side, shown in axes for radix in factors(side)]
+    size = field.size
+    extent = extent or size
+    steps = [(axis, radix) for axis in ((1, 0) if inverse else (0, 1)) for radix in factors(size[axis])]
     done = 1
-    for number, (axis, side, shown, radix) in enumerate(steps, 1):
+    for number, (axis, radix) in enumerate(steps, 1):
+        side = size[axis]
         passes.fullscreen(
-            PASSES[radix, axis, field.colors[0].format], spare, rows=shown,
+            PASSES[radix, axis, field.colors[0].format], spare,
+            rows=(0, extent[1]) if axis == 0 else None,  # the others are zero, or nobody reads them
             textures={"field": field.colors[0]},
             constants={
                 "done": done, "apart": side // radix, "direction": 1.0 if inverse else -1.0,
-                "scale": 1.0 / (width * height) if inverse and number == len(steps) else 1.0,
+                "filled": extent[axis] if done == 1 and not inverse else side,
+                "scale": 1.0 / (size[0] * size[1]) if inverse and number == len(steps) else 1.0,
             },
         )  # fmt: skip
         field, spare = spare, field

@@ -56,9 +56,7 @@ def reduce(source: ReductionSource, extent: tuple[int, int], target: images.Targ
             width, height = (-(-side // BLOCK) for side in extent)
             last = width == height == 1
             into = target if last else stack.enter_context(images.borrowed(width, height, "RGBA32F"))
-            passes.fullscreen(
-                program, into, textures=textures, constants={"extent": extent, **(constants or {})}
-            )
+            passes.fullscreen(program, into, textures=textures, constants={"extent": extent, **(constants or {})})
             done += 1
             if last:
                 return done

@@ -27,10 +27,14 @@ void main()
   float angle = direction * TURN * share;
   vec2 twiddle = vec2(cos(angle), sin(angle));
   ivec2 input_texel = texel + along * (first + (RADIX - 1) * apart - place);
-  vec4 sum = field_fetch(input_texel);
-  for (int k = 1; k < RADIX; k++) {
+  vec4 sum = vec4(0.0);
+  for (int k = 0; k < RADIX; k++) {
+    sum = product(sum, twiddle);
+    // Beyond `filled` the image is zero, whatever it holds.
+    if (input_texel.x * along.x + input_texel.y * along.y < filled) {
+      sum += field_fetch(input_texel);
+    }
     input_texel -= along * apart;
-    sum = field_fetch(input_texel) + product(sum, twiddle);
   }
   out_field = sum * scale;
 }

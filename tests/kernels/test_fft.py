@@ -63,13 +63,15 @@ def test_energy_is_kept_as_parseval_says(gpu_context):
     assert energy == pytest.approx((pixels.astype(np.float64) ** 2).sum(), rel=1e-5)
 
 
-def test_rows_that_are_zero_or_unread_are_left_out(gpu_context):
-    pixels = noise(64, 64)
-    pixels[40:] = 0.0
-    found = transformed(pixels, rows=40)
-    np.testing.assert_allclose(found, transformed(pixels), atol=1e-3)
-    back = transformed(found, inverse=True, rows=40)
-    np.testing.assert_allclose(back[:40], pixels[:40], atol=1e-4)
+@pytest.mark.parametrize("extent", [(64, 40), (13, 64), (1, 1), (33, 7)])
+def test_what_lies_beyond_the_extent_counts_as_zero_and_is_not_needed_back(gpu_context, extent):
+    inside = np.s_[: extent[1], : extent[0]]
+    pixels, clean = noise(64, 64), np.zeros((64, 64, 4), np.float32)
+    clean[inside] = pixels[inside]
+    found = transformed(pixels, extent=extent)
+    np.testing.assert_allclose(found, transformed(clean), atol=1e-3)
+    back = transformed(found, inverse=True, extent=extent)
+    np.testing.assert_allclose(back[inside], pixels[inside], atol=1e-4)
 
 
 def test_a_product_of_transforms_convolves_each_of_four_channels_with_its_own_kernel(gpu_context):
