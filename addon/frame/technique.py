@@ -1,4 +1,4 @@
-"""What a technique is: data about itself, and the passes it runs for one sample."""
+"""The contract of a technique: data about itself, and the stages in which it works on a picture."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ..gfx.library import Program
     from ..snapshot.scene import Snapshot
     from .run import Frame
     from .settings import Settings
@@ -72,35 +73,40 @@ def _refuse(value):
 
 @dataclass(frozen=True)
 class Write:
-    """An image that a technique writes: its format, what it holds, and whether what is drawn there adds up: of all
-    samples, or of all techniques in one sample where a technique closes it."""
+    """An image that a technique writes. `accumulates`: what techniques draw there adds up, over all samples, or over
+    one where a technique finishes it. `by_need`: it is made only where another technique of the plan writes it, too."""
 
     name: str
     format: str
     description: str
     accumulates: bool = False
+    by_need: bool = False
+
+
+class Service:
+    """What one technique provides to others while a picture is made. Asked for by its class (Frame.service)."""
+
+    name = ""  # of its socket in a pass tree
 
 
 class Technique:
     """Base of all techniques. Instances live as long as a Renderer and may keep GPU resources of their own.
 
-    `reads` and `writes` are checked by the plan; `slot` names the exclusive place a technique fills, if any.
+    A picture is made in stages: `begin` of all techniques in the plan's order, `sample` of all for each sample, `end`
+    of all after the last sample, and `show` of all whenever the mean of the samples so far is shown. A stage that takes
+    long is a generator: at each `yield` a viewport may pause to answer its user.
     """
 
     name = ""
     label = ""
-    slot = ""
+    fills: tuple[str, ...] = ()  # slots: of the techniques that fill one, one runs
     params: tuple[Param, ...] = ()
     reads: tuple[str, ...] = ()
     writes: tuple[Write, ...] = ()
-    closes: tuple[str, ...] = ()  # of what it writes, sums that are taken up by it after all others have added to them
-    offers: tuple[str, ...] = ()  # what others may ask for in frame.services or frame.rates, apart from its slot
-    uses: tuple[str, ...] = ()  # what it asks for there, if a technique of the plan offers it
-
-    @classmethod
-    def offered(cls) -> tuple[str, ...]:
-        """All that it offers to others: a technique without images that fills a slot offers that."""
-        return (cls.slot, *cls.offers) if cls.slot and not cls.writes else cls.offers
+    finishes: tuple[str, ...] = ()  # images that it takes up after all other techniques that write them
+    provides: tuple[type[Service], ...] = ()
+    requests: tuple[type[Service], ...] = ()  # services whose providers run before it in each stage
+    owns: tuple[str, ...] = ()  # kinds of transport that it takes over (light_paths.TRANSPORTS)
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         """Why this scene does not need the technique, as a sentence; None if it does. Cheap, no GPU."""
@@ -115,14 +121,23 @@ class Technique:
         return None
 
     def prepare(self, frame: Frame) -> None:
-        """Work that does not depend on the sample. Runs when the key has changed."""
+        """Work that outlives the picture. Runs when the key has changed."""
 
-    def run(self, frame: Frame) -> Iterator[None] | None:
-        """The passes of sample `frame.sample`.
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        """Programs that the picture will need, to be compiled ahead; any that are missing compile when first used."""
+        return ()
 
-        Where that takes long, as a generator: at each `yield` a viewport may pause to answer its user.
-        """
-        raise NotImplementedError
+    def begin(self, frame: Frame) -> Iterator[None] | None:
+        """Once for each picture, before its first sample."""
+
+    def sample(self, frame: Frame) -> Iterator[None] | None:
+        """The passes of sample number `frame.sample`."""
+
+    def end(self, frame: Frame) -> Iterator[None] | None:
+        """Once for each picture, after its last sample."""
+
+    def show(self, frame: Frame) -> Iterator[None] | None:
+        """Work on the mean of the samples so far, each time when it is shown."""
 
     def release(self) -> None:
         """Drop GPU resources."""

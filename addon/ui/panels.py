@@ -84,8 +84,8 @@ def _technique_panel(technique) -> type:
 
     @classmethod
     def poll(cls, context):
-        chosen = getattr(context.scene.candela, f"slot_{technique.slot}") if technique.slot else technique.name
-        return _CandelaPanel.poll.__func__(cls, context) and chosen in (AUTO, technique.name)
+        chosen = {getattr(context.scene.candela, f"slot_{slot}") for slot in technique.fills} or {technique.name}
+        return _CandelaPanel.poll.__func__(cls, context) and not chosen.isdisjoint((AUTO, technique.name))
 
     def draw(self, context):
         column = _columns(self)
@@ -174,7 +174,10 @@ class CANDELA_VIEWLAYER_PT_passes(_CandelaPanel, bpy.types.Panel):
         column = _columns(self, animatable=False)
         for number, render_pass in enumerate(PASSES):
             part = column.column(align=True, heading="Include" if number == 0 else "")
-            part.prop(context.view_layer, render_pass.switch, text=render_pass.name)
+            *owner, switch = render_pass.switch.split(".")
+            holder = getattr(context.view_layer, owner[0], None) if owner else context.view_layer
+            if holder is not None:  # switches that Cycles brings are there while it is enabled
+                part.prop(holder, switch, text=render_pass.name)
 
 
 class CANDELA_LIGHT_PT_beam_shape(_CandelaPanel, bpy.types.Panel):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import bpy
 
-from ..frame.settings import AUTO, BOUNCES, SAMPLES, SEED, Settings
+from ..frame.settings import AUTO, BOUNCES, OFF, SAMPLES, SEED, Settings
 from ..frame.technique import Param
 from ..techniques import REGISTRY
 from .pass_tree import TREE, order_of
 
+OFF_NUMBER = 255  # of the item in slots' menus, beyond all techniques
 PREVIEW_SAMPLES = 8  # of material icons, which are drafts
 
 
@@ -48,15 +49,15 @@ def identifier(technique: str, param: str) -> str:
 
 def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
     items = [(AUTO, "Auto", "Let Candela choose by what the scene holds", 0)]
-    for number, technique in enumerate((t for t in REGISTRY if t.slot == slot), 1):
+    for number, technique in enumerate((t for t in REGISTRY if slot in t.fills), 1):
         summary = (technique.__module__ and __import__(technique.__module__, fromlist=["_"]).__doc__) or ""
         items.append((technique.name, technique.label, summary.strip().splitlines()[0], number))
-    return items
+    return [*items, (OFF, "Off", "Leave this light out", OFF_NUMBER)]
 
 
 def slots() -> list[str]:
     """Names of all slots, in the registry's order."""
-    return list(dict.fromkeys(t.slot for t in REGISTRY if t.slot))
+    return list(dict.fromkeys(slot for t in REGISTRY for slot in t.fills))
 
 
 def _annotations() -> dict:

@@ -31,8 +31,8 @@ def choices(scene) -> dict[str, list[str]]:
     """Techniques to try by slot, the one that is set first; slots without a choice stay away."""
     found: dict[str, list[str]] = {}
     for technique in REGISTRY:
-        if technique.slot:
-            found.setdefault(technique.slot, []).append(technique.name)
+        for slot in technique.fills:
+            found.setdefault(slot, []).append(technique.name)
     chosen = {slot: getattr(scene.candela, f"slot_{slot}") for slot in found}
     return {
         slot: sorted(names, key=lambda name: name != chosen[slot]) for slot, names in found.items() if len(names) > 1

@@ -96,15 +96,16 @@ def test_parameters_are_those_of_the_techniques_in_question(scene):
 
     assert shown() == {technique for technique in REGISTRY if technique.params}
     scene.candela.slot_shadow = "vssm"
-    assert all(technique.name == "vssm" for technique in shown() if technique.slot == "shadow")
-    assert {technique for technique in REGISTRY if technique.params and technique.slot != "shadow"} <= shown()
+    assert all(technique.name == "vssm" for technique in shown() if "shadow" in technique.fills)
+    assert {technique for technique in REGISTRY if technique.params and "shadow" not in technique.fills} <= shown()
 
 
 def test_all_passes_can_be_chosen_and_are_wanted_then(scene):
     layer = bpy.context.view_layer
-    assert drawn(panels.CANDELA_VIEWLAYER_PT_passes) == [render_pass.switch for render_pass in PASSES]
+    assert drawn(panels.CANDELA_VIEWLAYER_PT_passes) == [render_pass.switch.split(".")[-1] for render_pass in PASSES]
     for render_pass in PASSES:
-        setattr(layer, render_pass.switch, True)
+        owner, _, switch = render_pass.switch.rpartition(".")
+        setattr(getattr(layer, owner) if owner else layer, switch, True)
     assert wanted_passes(layer) == list(PASSES)
 
 
