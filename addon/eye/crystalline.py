@@ -37,7 +37,7 @@ _MUSCLE, _NARROW = 2, 3  # streams of noise
 
 @dataclass(frozen=True)
 class MassSpring:
-    """The linear grid: stiffness (2 n, 2 n) over mass in 1/s2; which of its 2 n coordinates are free; the driven one."""
+    """The linear grid: stiffness (2 n, 2 n) over mass in 1/s2, which coordinates are free, the driven one."""
 
     rest: np.ndarray  # (SIDE, SIDE, 2) mm, radius and axis
     stiffness: np.ndarray

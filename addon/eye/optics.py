@@ -179,7 +179,7 @@ def excess(picture: np.ndarray, white: float, most: float) -> np.ndarray:
 
 
 def convolve(picture: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Sum over places of light times kernel, nothing coming from outside of the picture; shapes (h, w, 3), (k, k, 3)."""
+    """Sum over places of light times kernel, none coming from outside of the picture; shapes (h, w, 3), (k, k, 3)."""
     height, width = picture.shape[:2]
     reach = len(kernel) // 2
     shape = (height + 2 * reach, width + 2 * reach)

@@ -93,13 +93,6 @@ TAIL = passes.fullscreen_program(
     constants=(("INT", "reach"), ("FLOAT", "core")),
     outputs=(("VEC4", "out_weight"),),
 )
-PROGRAMS = (PUPIL, STROKES, FIELD, INTENSITY, COLOURS, OVER_PIXELS, TAIL, reduction.BLOCKS)
-
-
-def programs(side: int) -> list[Program]:
-    """All that patterns of this side are drawn with."""
-    transforms = [fft.PASSES[radix, axis, "RG32F"] for radix in dict.fromkeys(fft.factors(side)) for axis in (0, 1)]
-    return [*PROGRAMS, *transforms]
 
 
 @dataclass(eq=False)

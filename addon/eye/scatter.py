@@ -100,12 +100,12 @@ vec4 reduction_source(ivec2 texel)
     textures=(("RGBA32F", "picture"),),
     constants=_WHITE,
 )
-MEASURE = reduction.block_program(BRIGHTNESS)
+MEASURE, BLOCKS = reduction.block_program(BRIGHTNESS), reduction.BLOCKS
 
 
 @dataclass(frozen=True)
 class Brightness:
-    """Of a picture: the mean of its luminance, the sum of what exceeds white, and the brightest channel of any pixel."""
+    """Of a picture: the mean of its luminance, the sum of what exceeds white, the brightest channel of any pixel."""
 
     mean: float
     excess: float
@@ -119,6 +119,23 @@ def measure(picture: images.Image, white: float) -> Brightness:
         reduction.reduce(BRIGHTNESS, picture.size, target, {"picture": picture}, constants)
         mean, excess, _, most = images.read(target.colors[0])[0, 0]
     return Brightness(float(mean) / (picture.width * picture.height), float(excess), float(most))
+
+
+def measure_passes(picture: images.Image) -> int:
+    """Passes of `measure`."""
+    return reduction.pass_count(picture.size)
+
+
+def dim(picture: images.Image, target: images.Target, dimming: float) -> int:
+    """The picture with less light, and no glare. Returns the number of passes."""
+    with images.borrowed(1, 1, "RGBA32F") as nothing:
+        nothing.clear()
+        passes.fullscreen(
+            COMBINE[0], target,
+            textures={"picture": picture, "scattered": picture, "share": nothing.colors[0]},
+            constants={"strength": 0.0, "dimming": dimming, "white": MOST_LIGHT, "most_light": MOST_LIGHT},
+        )  # fmt: skip
+    return 1
 
 
 @dataclass(eq=False)
@@ -198,13 +215,3 @@ class Scatter:
         if self._transformed is not None:
             images.pool.give(self._transformed.colors[0])
         self._transformed = self._kernel = None
-
-
-def programs(size: tuple[int, int], reach: int, factor: int, billboards: bool) -> list[Program]:
-    """All that a picture of this size is scattered with."""
-    if billboards:
-        return [MEASURE, reduction.BLOCKS, TILES, BILLBOARDS, COMBINE[0]]
-    sides = [fft.fitting_side(-(-side // factor) + reach) for side in size]
-    transforms = [fft.PASSES[radix, axis, "RGBA32F"] for axis in (0, 1) for radix in fft.factors(sides[axis])]
-    number = FACTORS.index(factor)
-    return [MEASURE, reduction.BLOCKS, BRIGHT[number], WRAP, fft.MULTIPLY, COMBINE[number], *dict.fromkeys(transforms)]

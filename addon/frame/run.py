@@ -29,7 +29,7 @@ from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
 from .bands import Bands
-from .ledger import RAN, REUSED, Ledger, Row
+from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
 from .technique import Service, Technique
@@ -67,6 +67,7 @@ class Frame:
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
+    needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -191,6 +192,10 @@ class Frame:
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
 
+    def leave(self, technique: Technique, reason: str) -> None:
+        """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
+        self.needless[technique.name] = reason
+
     def to_show(self, name: str) -> images.Image:
         """The image of that name, or, of sums, the one that shows them better."""
         return self.images[self.shown.get(name, name)]
@@ -270,6 +275,7 @@ class Renderer:
             self.frame.profiler = Profiler(settings.profile)
             self.frame.counters = {}
             self.frame.settings = settings
+            self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
         self._frame_key = key
         self._drop_frame()
@@ -327,9 +333,21 @@ class Renderer:
     def show(self, frame: Frame) -> images.Image | None:
         """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
         where no technique of the plan makes it. It changes with the next call. No sample may be half drawn."""
+        frame.picture = Frame.picture
+        frame.needless.clear()
         for _ in _stage(frame, "show"):
             pass
         return frame.images.get(frame.picture)
+
+    def drawn_with(self, settings: Settings) -> dict:
+        """The values of settings that samples depend on."""
+        showing = {technique.name for technique in self.techniques if technique.only_shows}
+        return {name: value for name, value in settings.values.items() if name[0] not in showing}
+
+    def shown_with(self, frame: Frame) -> tuple:
+        """What decides how the frame's samples are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in frame.plan.techniques if technique.only_shows]
+        return tuple((t.name, frame.settings.of(t), frame.snapshot.moment) for t in showing)
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -354,20 +372,12 @@ class Renderer:
                 pixels /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
-        if not ledger.rows:
-            seconds = frame.profiler.seconds
-            ledger.rows = [
-                Row(
-                    t.name,
-                    t.label,
-                    RAN,
-                    "",
-                    1000 * seconds.get(t.name, 0.0),
-                    ", ".join(frame.plan.slots_of(t)),
-                    frame.counters.get(t.name, {}),
-                )
-                for t in frame.plan.techniques
-            ] + list(frame.plan.skipped)
+        seconds = frame.profiler.seconds
+        if ledger.rows:  # reused but for what was done to show them
+            shown = {t.name: self._row(frame, t) for t in frame.plan.techniques if t.only_shows and t.name in seconds}
+            ledger.rows = [shown.get(row.name, row) for row in ledger.rows]
+        else:
+            ledger.rows = [self._row(frame, t) for t in frame.plan.techniques] + list(frame.plan.skipped)
             drawn = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques)
             ledger.times["passes"] = drawn + frame.profiler.awaited + waited - started
         ledger.times["readback"] = time.perf_counter() - waited
@@ -375,6 +385,14 @@ class Renderer:
         ledger.bad_pixels = bad
         ledger_module.publish(ledger)
         return out
+
+    def _row(self, frame: Frame, technique: Technique) -> Row:
+        slot = ", ".join(frame.plan.slots_of(technique))
+        if technique.name in frame.needless:
+            return Row(technique.name, technique.label, SKIPPED, frame.needless[technique.name], slot=slot)
+        milliseconds = 1000 * frame.profiler.seconds.get(technique.name, 0.0)
+        counters = frame.counters.get(technique.name, {})
+        return Row(technique.name, technique.label, RAN, "", milliseconds, slot, counters)
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -438,7 +456,7 @@ class Renderer:
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
-            tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
+            tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
         )  # fmt: skip
 

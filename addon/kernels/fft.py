@@ -34,21 +34,16 @@ from ..gfx.images import Image, Target
 RADICES = (8, 4, 3, 2)
 FORMATS = ("RG32F", "RGBA32F")
 _STEPS = ("ivec2(1, 0)", "ivec2(0, 1)")
+_CONSTANTS = (("INT", "done"), ("INT", "apart"), ("INT", "filled"), ("FLOAT", "direction"), ("FLOAT", "scale"))
 PASSES = {
     (radix, axis, kind): passes.fullscreen_program(
         f"Fourier transform, radix {radix}, axis {axis}, {kind}",
         "fft/pass.frag.glsl",
         textures=((kind, "field"),),
-        constants=(
-            ("INT", "done"),
-            ("INT", "apart"),
-            ("INT", "filled"),
-            ("FLOAT", "direction"),
-            ("FLOAT", "scale"),
-        ),
+        constants=_CONSTANTS,
         defines=(("RADIX", str(radix)), ("STEP", _STEPS[axis]), *((("TWO", "1"),) if kind == "RGBA32F" else ())),
         outputs=(("VEC4", "out_field"),),
-    )  # fmt: skip
+    )
     for radix in RADICES
     for axis in (0, 1)
     for kind in FORMATS

@@ -61,3 +61,11 @@ def reduce(source: ReductionSource, extent: tuple[int, int], target: images.Targ
             if last:
                 return done
             program, extent, textures, constants = BLOCKS, (width, height), {"reduced": into.colors[0]}, None
+
+
+def pass_count(extent: tuple[int, int]) -> int:
+    """Passes of `reduce`."""
+    count = 0
+    while count == 0 or max(extent) > 1:
+        extent, count = tuple(-(-side // BLOCK) for side in extent), count + 1
+    return count

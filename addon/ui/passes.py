@@ -74,9 +74,19 @@ PASSES = tuple(
 )
 
 
+# The picture as an eye sees it, beside a Combined that stays as it is; written where glare is on.
+GLARE = RenderPass("", "Glare", "RGBA", "COLOR", "film.lens")
+
+
 def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
-    """The passes that a view layer asks for."""
-    return [render_pass for render_pass in PASSES if _ticked(layer, render_pass.switch)]
+    """The passes that a view layer asks for, and those of its scene's lens."""
+    wanted = [render_pass for render_pass in PASSES if _ticked(layer, render_pass.switch)]
+    return [*wanted, GLARE] if glare_is_on(layer.id_data) else wanted
+
+
+def glare_is_on(scene: bpy.types.Scene) -> bool:
+    """Whether a picture of the scene's camera is shown with glare."""
+    return scene is not None and scene.candela.glare_mode != "OFF"
 
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.

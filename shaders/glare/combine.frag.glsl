@@ -9,13 +9,13 @@ vec3 scattered_at(vec2 pixel)
   // Bilinear between the middles of FACTOR x FACTOR pixels; at the borders the outermost are meant.
   vec2 place = pixel / float(FACTOR) - 0.5;
   ivec2 first = ivec2(floor(place));
-  vec2 share = place - floor(place);
+  vec2 between = place - floor(place);
   ivec2 last = (picture_size() + FACTOR - 1) / FACTOR - 1;
   ivec2 low = clamp(first, ivec2(0), last);
   ivec2 high = clamp(first + 1, ivec2(0), last);
-  vec3 below = mix(scattered_fetch(low).rgb, scattered_fetch(ivec2(high.x, low.y)).rgb, share.x);
-  vec3 above = mix(scattered_fetch(ivec2(low.x, high.y)).rgb, scattered_fetch(high).rgb, share.x);
-  return mix(below, above, share.y);
+  vec3 below = mix(scattered_fetch(low).rgb, scattered_fetch(ivec2(high.x, low.y)).rgb, between.x);
+  vec3 above = mix(scattered_fetch(ivec2(low.x, high.y)).rgb, scattered_fetch(high).rgb, between.x);
+  return mix(below, above, between.y);
 #endif
 }
 

@@ -8,9 +8,9 @@ vec3 finite_light(vec3 light)
   return kept;
 }
 
-vec3 excess_of(vec3 light, float white, float most)
+vec3 excess_of(vec3 light, float threshold, float limit)
 {
-  vec3 kept = clamp(finite_light(light), vec3(0.0), vec3(most));
+  vec3 kept = clamp(finite_light(light), vec3(0.0), vec3(limit));
   float peak = max_component(kept);
-  return (peak > white) ? kept * ((peak - white) / peak) : vec3(0.0);
+  return (peak > threshold) ? kept * ((peak - threshold) / peak) : vec3(0.0);
 }
