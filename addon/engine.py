@@ -140,7 +140,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
         shared = session(scene, "preview" if self.is_preview else "final")
-        settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer)
+        settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer, depsgraph=depsgraph)
         try:
             check_tree(settings.passes)
             snapshot = self._seen(depsgraph, snapshot, eye)

@@ -362,7 +362,9 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
     try:
         camera = camera_of_view(region_data, space, looks_through)
         border = render_border(depsgraph, space, camera, looks_through, size)
-        viewport.draw_frame(source, camera, size, settings_of(depsgraph.scene, viewport=True), border=border)
+        viewport.draw_frame(
+            source, camera, size, settings_of(depsgraph.scene, viewport=True, depsgraph=depsgraph), border=border
+        )
     except (UnsupportedScene, ValueError, RuntimeError) as error:
         _fail(viewport, engine, str(error))
     except Exception as error:

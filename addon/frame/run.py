@@ -448,7 +448,7 @@ class Renderer:
         lights = tuple(
             (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
              light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.bounces, light.visibility)
+             light.spot_blend, light.cast_shadow, light.bounces, light.visibility, light.own)
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera
@@ -458,6 +458,7 @@ class Renderer:
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
+            tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
 
     def _clear_sums(self, frame: Frame) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,27 +16,42 @@ if TYPE_CHECKING:
 NEEDED = {bool: "on or off", int: "a whole number", float: "a number", str: "a word"}  # for messages, by type
 
 
+SCENE, CAMERA, WORLD, LIGHT, MATERIAL, OBJECT = "SCENE", "CAMERA", "WORLD", "LIGHT", "MATERIAL", "OBJECT"
+OF_A_PICTURE = (SCENE, CAMERA, WORLD)  # scopes of which a picture has one data-block: their values are its settings
+POINT, DIRECTION = "POINT", "DIRECTION"
+
+
 @dataclass(frozen=True)
 class Param:
     """One parameter, declared once. Blender property, command-line override, benchmark axis and manual derive from it.
 
-    `default` fixes the type: bool, int, float, or str for a choice among `items` (identifier, label, number).
+    `default` fixes the type: bool, int, float, str for a choice among `items` (identifier, label, number), or a tuple
+    of three floats. `scope` is the kind of data-block that has it: the scene, the picture's camera or world, or each
+    lamp, material or object (whose values come with the snapshot; see `own_value`).
+
+    With `many` it is a list of groups of those parameters, a tuple of {name: value}. A vector with a `handle` (POINT or
+    DIRECTION, in the object's space) can be dragged in the 3D viewport. `image`: a name of an image data-block.
     """
 
     name: str
     label: str
-    default: bool | int | float | str
+    default: bool | int | float | str | tuple
     description: str
     minimum: float | None = None
     maximum: float | None = None
     unit: str = ""  # Blender property unit: PIXEL, FACTOR, …
     items: tuple[tuple[str, str, int], ...] = ()
-    subtype: str = field(default="NONE")
+    scope: str = SCENE
+    many: tuple[Param, ...] = ()
+    handle: str = ""
+    image: bool = False
     draft: bool | int | float | None = None  # its most in a draft: a picture of a moment, as of a view that moves
 
     def check(self, value):
         """`value` in this parameter's type and range, or ValueError with a sentence."""
         kind = type(self.default)
+        if kind is tuple:
+            raise ValueError(f"'{self.name}' is set on data-blocks in Blender, not by a text.")
         try:
             value = _as_bool(value) if kind is bool else kind(value)
         except (TypeError, ValueError):
@@ -49,6 +64,21 @@ class Param:
             if self.maximum is not None and value > self.maximum:
                 raise ValueError(f"'{self.name}' must be at most {self.maximum}, not {value}.")
         return value
+
+
+def own_value(own: tuple[tuple[str, object], ...], technique: Technique | type[Technique], name: str):
+    """Value of a technique's parameter of a lamp, material or object, from what its data-block has set (`own` of the
+    snapshot's Light, Material or Instance). KeyError if no such parameter is declared."""
+    param = next((param for param in technique.params if param.name == name), None)
+    if param is None:
+        raise KeyError(f"Technique {technique.name} declares no parameter '{name}'.")
+    value = dict(own).get(identifier(technique.name, name), param.default)
+    return tuple(dict(entry) for entry in value) if param.many else value
+
+
+def identifier(technique: str, param: str) -> str:
+    """Name of the Blender property that holds a technique's parameter."""
+    return f"{technique}_{param}"
 
 
 def _as_bool(value) -> bool:
@@ -107,6 +137,11 @@ class Technique:
     provides: tuple[type[Service], ...] = ()
     requests: tuple[type[Service], ...] = ()  # services whose providers run before it in each stage
     owns: tuple[str, ...] = ()  # kinds of transport that it takes over (light_paths.TRANSPORTS)
+
+    @classmethod
+    def params_of(cls, *scopes: str) -> tuple[Param, ...]:
+        """The parameters of these scopes, in order."""
+        return tuple(param for param in cls.params if param.scope in scopes)
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         """Why this scene does not need the technique, as a sentence; None if it does. Cheap, no GPU."""

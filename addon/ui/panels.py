@@ -11,10 +11,11 @@ import bpy
 
 from ..frame import ledger as ledgers
 from ..frame.settings import AUTO
+from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
 from . import ENGINE, blender_panels, notes
 from .passes import PASSES
-from .properties import identifier, slots
+from .properties import slots
 from .quality import CANDELA_PT_quality_presets
 
 MOST_NOTES = 12  # more than these are counted only
@@ -89,7 +90,7 @@ def _technique_panel(technique) -> type:
 
     def draw(self, context):
         column = _columns(self)
-        for param in technique.params:
+        for param in technique.params_of(SCENE):
             column.prop(context.scene.candela, identifier(technique.name, param.name))
 
     body = {
@@ -319,7 +320,11 @@ _CLASSES = (
     CANDELA_RENDER_PT_sampling,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_parameters,
-    *(_technique_panel(technique) for technique in REGISTRY if technique.params and technique.name not in _WITH_OTHERS),
+    *(
+        _technique_panel(technique)
+        for technique in REGISTRY
+        if technique.params_of(SCENE) and technique.name not in _WITH_OTHERS
+    ),
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_notes,

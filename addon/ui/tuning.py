@@ -16,11 +16,12 @@ import bpy
 from ..compare import metrics, tune
 from ..compare.beside import reference_steps
 from ..frame.ledger import RAN
+from ..frame.technique import identifier
 from ..techniques import REGISTRY
 from . import ENGINE, shown_otherwise
 from .jobs import Job, draw_progress, part
 from .pass_run import Rendered, render_steps
-from .properties import identifier, settings_of
+from .properties import settings_of
 
 SEED = 11  # of timed renders; programs are compiled by a render of another one
 REFERENCE_SHARE = 0.3  # of the progress
