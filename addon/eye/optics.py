@@ -4,7 +4,8 @@ by step with the same definitions (addon/eye/point_spread.py, addon/eye/scatter.
     field      T exp(i pi dD (x^2 + y^2) / lambda)        a residual defocus of dD dioptres; Fraunhofer for 0
     intensity  |F{field}|^2 at 575 nm, one texel = lambda / window in angle
     colours    sum over wavelengths of rgb(lambda) intensity(x 575 / lambda)
-    kernel     the colours over the picture's pixels, box-averaged, its core taken out, each channel over its whole sum
+    kernel     the colours over the picture's pixels, box-averaged, each channel over its whole sum, and beneath the
+               core no more than at its rim
     picture    I - s w H + s (H * kernel), H what exceeds white, w the kernel's sum, s the strength
 
 The lens of an eye cancels the quadratic phase of free space over 20 mm, which no grid could hold; what is left of it is
@@ -22,10 +23,11 @@ from . import lids, spectrum
 from .aperture import WINDOW, Aperture
 
 NANOMETRE = 1e-6  # mm
-FADE_FROM = 0.85  # of the usable radius, where the pattern begins to fade out
+FADE_FROM = 0.5  # of the usable radius, where the pattern begins to fade out
 MOST_WAVELENGTHS = 256
 STEPS_PER_TEXEL = 0.68  # wavelengths per texel of radius that leave no gap between a ring and the next
 LEAST_CORE = 1.5  # pixels
+RIM = 1.5  # of the core's radius, where the tail has taken over
 
 
 @dataclass(frozen=True)
@@ -160,12 +162,22 @@ def over_pixels(pattern: np.ndarray, scale: Scale) -> np.ndarray:
     return kernel / np.maximum(kernel.sum(axis=(0, 1)), 1e-30)
 
 
-def tail(kernel: np.ndarray, scale: Scale) -> np.ndarray:
-    """What is left of a kernel outside of its core, which ends softly."""
+def rim(scale: Scale) -> np.ndarray:
+    """(extent, extent) True where the core ends, between once and one and a half times its radius."""
     offset = np.arange(-scale.reach, scale.reach + 1)
     radius = np.hypot(offset[None], offset[:, None])
-    share = np.clip((radius / scale.core - 1.0) / 0.5, 0, 1)
-    return kernel * (share * share * (3 - 2 * share))[..., None]
+    return (radius >= scale.core) & (radius < RIM * scale.core)
+
+
+def tail(kernel: np.ndarray, scale: Scale) -> np.ndarray:
+    """A kernel without the light of its core: scattered light goes on beneath it, as much as at its rim."""
+    offset = np.arange(-scale.reach, scale.reach + 1)
+    radius = np.hypot(offset[None], offset[:, None])
+    share = np.clip((radius / scale.core - 1.0) / (RIM - 1.0), 0, 1)
+    share = (share * share * (3 - 2 * share))[..., None]
+    at_rim = rim(scale)
+    beneath = kernel[at_rim].mean(axis=0) if at_rim.any() else np.zeros(3)
+    return share * kernel + (1.0 - share) * beneath
 
 
 # ------------------------------------------------------------------------------------------------------------- picture

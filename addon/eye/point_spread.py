@@ -12,7 +12,7 @@ twice the side (else the transform turns its jagged edges into light), obstacles
 | intensity | 1 | R32F N x N |
 | colours, within 1/1.51 of the radius | 5 x 32 up to 5 x .68 radius | RGBA32F N x N |
 | over pixels | 4 per pixel, or about 4 N^2 in all | RGBA32F, kernel |
-| two sums, tail | 3 in all | RGBA32F, kernel |
+| three sums, tail | 4 in all | RGBA32F, kernel |
 
 Bytes: 60 N^2 borrowed while it runs, 16 per texel of the kernel kept.
 
@@ -89,10 +89,24 @@ OVER_PIXELS = passes.fullscreen_program(
 TAIL = passes.fullscreen_program(
     "eye: kernel without its core",
     "eye/tail.frag.glsl",
-    textures=(("RGBA32F", "weights"), ("RGBA32F", "kernel_sum")),
-    constants=(("INT", "reach"), ("FLOAT", "core")),
+    textures=(("RGBA32F", "weights"), ("RGBA32F", "kernel_sum"), ("RGBA32F", "rim_sum")),
+    constants=(("INT", "reach"), ("FLOAT", "core"), ("FLOAT", "rim"), ("FLOAT", "per_rim_texel")),
     outputs=(("VEC4", "out_weight"),),
 )
+
+RIM_LIGHT = reduction.ReductionSource(
+    "rim of the core",
+    """vec4 reduction_source(ivec2 texel)
+{
+  float radius = length(vec2(texel - ivec2(reach)));
+  bool on_rim = radius >= core && radius < rim * core;
+  return on_rim ? vec4(weights_fetch(texel).rgb, 0.0) : vec4(0.0);
+}
+""",
+    textures=(("RGBA32F", "weights"),),
+    constants=(("INT", "reach"), ("FLOAT", "core"), ("FLOAT", "rim")),
+)
+RIM_SUM = reduction.block_program(RIM_LIGHT)
 
 
 @dataclass(eq=False)
@@ -207,7 +221,13 @@ def make_kernel(pattern: images.Image, scale: optics.Scale, sharp: bool = True) 
     """The pattern over a picture's pixels; `sharp`: without its core."""
     extent = scale.extent
     made = Kernel(images.pool.take(extent, extent, "RGBA32F"), images.pool.take(1, 1, "RGBA32F"), scale)
-    with images.borrowed(extent, extent, "RGBA32F") as whole, images.borrowed(1, 1, "RGBA32F") as total:
+    core = {"reach": scale.reach, "core": scale.core if sharp else 0.0, "rim": optics.RIM}
+    rim_texels = int(optics.rim(scale).sum()) if sharp else 0
+    with (
+        images.borrowed(extent, extent, "RGBA32F") as whole,
+        images.borrowed(1, 1, "RGBA32F") as total,
+        images.borrowed(1, 1, "RGBA32F") as rim,
+    ):
         passes.fullscreen(
             OVER_PIXELS, whole, textures={"pattern": pattern},
             constants={
@@ -216,10 +236,13 @@ def make_kernel(pattern: images.Image, scale: optics.Scale, sharp: bool = True) 
             },
         )  # fmt: skip
         reduction.reduce(reduction.TEXELS, (extent, extent), total, {"reduced": whole.colors[0]})
+        rim.clear()
+        if rim_texels:
+            reduction.reduce(RIM_LIGHT, (extent, extent), rim, {"weights": whole.colors[0]}, core)
         passes.fullscreen(
             TAIL, images.Target((made.weights,)),
-            textures={"weights": whole.colors[0], "kernel_sum": total.colors[0]},
-            constants={"reach": scale.reach, "core": scale.core if sharp else 0.0},
+            textures={"weights": whole.colors[0], "kernel_sum": total.colors[0], "rim_sum": rim.colors[0]},
+            constants={**core, "per_rim_texel": 1.0 / rim_texels if rim_texels else 0.0},
         )  # fmt: skip
     reduction.reduce(reduction.TEXELS, (extent, extent), images.Target((made.share,)), {"reduced": made.weights})
     return made

@@ -18,20 +18,22 @@ the pictures before it. Bias and sources: addon/eye/point_spread.py.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..eye import optics, point_spread
 from ..eye.aperture import Aperture, Eye, aperture_at
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import Param, Service, Technique
+from ..frame.technique import CAMERA, Param, Service, Technique
 from ..snapshot.scene import Snapshot
 
 GLARE = "glare"  # the technique that asks for the point spread, and its choice of how
 OFF, CONVOLUTION, BILLBOARDS = "OFF", "CONVOLUTION", "BILLBOARDS"
 MODE = Param(
     "mode", "Glare", OFF, "Show the picture as an eye sees it",
-    items=((OFF, "Off", 0), (CONVOLUTION, "Convolution", 1), (BILLBOARDS, "Billboards", 2)),
+    items=((OFF, "Off", 0), (CONVOLUTION, "Convolution", 1), (BILLBOARDS, "Billboards", 2)), scope=CAMERA,
 )  # fmt: skip
 LUMINANCE_STEP = 0.02  # decades; as much as noise of the first samples changes the mean, and 0.02 mm of a pupil
 DRAFT_SIDE = 256
@@ -83,6 +85,10 @@ class PointSpread(Service):
             self._kernel = (key, point_spread.make_kernel(pattern.colours, scale, sharp))
         return self._kernel[1]
 
+    def leave(self, frame: Frame) -> None:
+        """Nobody will ask for a kernel of this picture."""
+        frame.leave(self._technique, "the picture has no light that would dazzle it")
+
     def _drop(self) -> None:
         for kept in (self._kernel, self._pattern):
             if kept is not None:
@@ -128,6 +134,7 @@ class EyeModel(Technique):
         Param("wavelengths", "Wavelengths", 32, "At least summed for each texel; further out more are taken", 8, 256),
         Param("person", "Person", 0, "Another number gives another observer's eye", 0, 2**20),
     )  # fmt: skip
+    params = tuple(replace(param, scope=CAMERA) for param in params)
     provides = (PointSpread,)
 
     def __init__(self):

@@ -28,6 +28,8 @@ core and tail, the threshold and the placement by magnification are ours.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..eye import scatter
@@ -36,7 +38,7 @@ from ..eye.optics import Scale
 from ..film.resolve import COMBINED
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import Param, Technique, Write
+from ..frame.technique import CAMERA, Param, Technique, Write
 from ..gfx import passes
 from ..snapshot.scene import Snapshot
 from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
@@ -70,6 +72,7 @@ class TemporalGlare(Technique):
             items=RESOLUTIONS,
         ),
     )  # fmt: skip
+    params = tuple(replace(param, scope=CAMERA) for param in params)
     reads = (COMBINED,)
     writes = (Write(LENS, "RGBA32F", "The picture as the eye sees it, premultiplied by alpha"),)
     requests = (PointSpread,)
@@ -106,6 +109,7 @@ class TemporalGlare(Technique):
         reason = needless(measured, aperture, scale, strength, white, factor)
         if reason and aperture.light == 1.0:
             self._leave(frame, reason)
+            service.leave(frame)
             return
         target = frame.target(LENS)
         if reason or aperture.light == 0.0:  # lids move, and there is nothing, or nobody, to be dazzled

@@ -1,11 +1,11 @@
 """Temporal glare in rendered pictures: when it runs, what it leaves as it is, and that time alone decides its state."""
 
-import bpy
 import numpy as np
 import pytest
 
 from addon.eye import optics
 from addon.frame.ledger import RAN, SKIPPED
+from addon.gfx import images as gpu_images
 from addon.gfx import library
 
 SIZE = (72, 54)
@@ -20,9 +20,9 @@ def night(stage):
     for x, y in ((-1.0, 0.6), (0.4, -0.7), (1.3, 0.9)):
         stage.rectangle((x, y), (x + 0.06, y + 0.06), 0.1, material=lamp)
     stage.camera_above()
-    settings = stage.scene.candela
+    settings = stage.scene.camera.data.candela
     settings.glare_mode = "CONVOLUTION"
-    settings.eye_side = "128"
+    settings.eye_side, settings.glare_magnification = "128", 100.0  # of a picture of few pixels
     stage.scene.frame_set(24)
     return stage
 
@@ -34,7 +34,7 @@ def glare_row(stage):
 def test_glare_is_a_pass_beside_a_combined_that_stays_as_it_is(night):
     with_glare = night.render(size=SIZE)
     assert glare_row(night).state == RAN
-    night.scene.candela.glare_mode = "OFF"
+    night.scene.camera.data.candela.glare_mode = "OFF"
     without = night.render(size=SIZE)
     assert "glare" not in without
     np.testing.assert_array_equal(with_glare["combined"], without["combined"])
@@ -42,19 +42,17 @@ def test_glare_is_a_pass_beside_a_combined_that_stays_as_it_is(night):
     lens, combined = with_glare["glare"][..., :3], with_glare["combined"][..., :3]
     assert (lens >= 0).all()
     added = (lens - combined).clip(0)
-    assert (added.max(axis=-1) > 1e-3 * combined.max()).mean() > 0.2
+    assert (added.max(axis=-1) > 1e-3).mean() > 0.2
     np.testing.assert_array_equal(with_glare["glare"][..., 3], with_glare["combined"][..., 3])
 
 
 @pytest.mark.parametrize("resolution", ["FULL", "HALF"])
 def test_the_picture_is_the_convolution_by_numpy_of_the_linear_picture(night, resolution):
     """With the kernel of the reference, from the aperture on."""
-    night.scene.candela.glare_resolution = resolution
+    night.scene.camera.data.candela.glare_resolution = resolution
     images = night.render(size=SIZE)
     service = night.renderer.frame.service(_point_spread())
     kernel = service._kernel[1]
-    from addon.gfx import images as gpu_images
-
     weights = gpu_images.read(kernel.weights)[..., :3].astype(np.float64)
     pattern = service._pattern[1]
     side = kernel.scale.side
@@ -91,7 +89,7 @@ def test_a_picture_without_bright_light_is_left_to_the_bit_and_no_transform_comp
 
 
 def test_one_faint_highlight_is_not_worth_it(night):
-    night.scene.candela.glare_strength = 1e-3
+    night.scene.camera.data.candela.glare_strength = 1e-4
     images = night.render(size=SIZE)
     assert "half a step" in glare_row(night).reason
     np.testing.assert_array_equal(images["glare"], images["combined"])
@@ -116,7 +114,7 @@ def test_another_time_draws_no_sample_anew(night):
     night.render(size=SIZE)
     assert night.ledger.row("film").state == "reused"
     assert glare_row(night).state == RAN
-    night.scene.candela.glare_strength = 0.5
+    night.scene.camera.data.candela.glare_strength = 0.5
     night.render(size=SIZE)
     assert night.ledger.row("film").state == "reused"
 
@@ -125,7 +123,7 @@ def test_billboards_show_needles_where_a_convolution_washes_them_out(night):
     candle = night.material("ShaderNodeEmission", Color=(1, 0.6, 0.3, 1), Strength=60.0)
     night.rectangle((-0.1, -0.1), (0.1, 0.7), 0.2, material=candle)
     convolved = night.render(size=SIZE)["glare"]
-    night.scene.candela.glare_mode = "BILLBOARDS"
+    night.scene.camera.data.candela.glare_mode = "BILLBOARDS"
     boards = night.render(size=SIZE)["glare"]
     assert np.abs(boards - convolved).mean() > 1e-3 * convolved.mean()
     assert boards.sum() == pytest.approx(convolved.sum(), rel=0.02)
@@ -133,9 +131,9 @@ def test_billboards_show_needles_where_a_convolution_washes_them_out(night):
 
 def test_a_blink_darkens_the_picture_and_shut_lids_leave_nothing(night):
     before = night.render(size=SIZE)["glare"][..., :3]
-    night.scene.candela.eye_blink = 0.75
+    night.scene.camera.data.candela.eye_blink = 0.75
     half = night.render(size=SIZE)["glare"][..., :3]
-    night.scene.candela.eye_blink = 1.0
+    night.scene.camera.data.candela.eye_blink = 1.0
     shut = night.render(size=SIZE)
     assert 0.0 < half.sum() < 0.9 * before.sum()
     assert not shut["glare"][..., :3].any()
@@ -151,12 +149,12 @@ def test_a_bright_field_makes_the_pupil_small(night):
         assert service is technique._service
         return service._pattern[0][3]
 
-    night.scene.candela.eye_restlessness = 0.0
-    night.scene.candela.glare_luminance = 0.01
+    night.scene.camera.data.candela.eye_restlessness = 0.0
+    night.scene.camera.data.candela.glare_luminance = 0.01
     dark = diameter()
-    night.scene.candela.glare_luminance = 1e4
+    night.scene.camera.data.candela.glare_luminance = 1e4
     assert diameter() < dark - 1.0
-    night.scene.candela.eye_pupil = 6.0
+    night.scene.camera.data.candela.eye_pupil = 6.0
     assert diameter() == pytest.approx(6.0)
 
 
@@ -167,13 +165,32 @@ def test_odd_pictures_are_drawn(night, change):
     if change.get("border"):
         render.use_border = True
         render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.1, 0.93, 0.2, 0.77
-    night.scene.candela.glare_sharp = False
-    night.scene.candela.eye_fibres = 1.0
+    night.scene.camera.data.candela.glare_sharp = False
+    night.scene.camera.data.candela.eye_fibres = 1.0
     images = night.render(size=(53, 31))
     assert np.isfinite(images["glare"]).all()
 
 
-def test_a_viewport_shows_the_lens_and_shows_anew_at_another_time(registered, night):
-    from tests.viewport.region import Region  # noqa: F401  (the region's stand-in, as the viewport's own tests use it)
+def test_a_viewport_shows_the_lens_and_shows_its_samples_anew_at_another_time(night):
+    from tests.viewport.region import SIZE as REGION_SIZE
+    from tests.viewport.region import Region
 
-    assert bpy.context.scene.candela.glare_mode == "CONVOLUTION"
+    night.scene.camera.data.candela.glare_white = 0.5
+    region = Region(samples=2)
+    first = region.rest()
+    frame = region.viewport.frame
+    assert frame.picture == "film.lens"
+    linear = region.viewport.renderer.frame.images["film.combined"]
+    assert (first[..., :3] != gpu_images.read(linear)[..., :3]).any()
+    night.scene.frame_set(30)
+    region.viewport.dirty = True
+    second = gpu_images.read(region.draw())
+    assert region.viewport.frame is frame
+    assert second.shape == (REGION_SIZE[1], REGION_SIZE[0], 4)
+    assert (first != second).any()
+    night.scene.camera.data.candela.glare_strength = 0.25
+    region.viewport.dirty = True
+    weaker = gpu_images.read(region.draw())
+    assert region.viewport.frame is frame
+    assert np.abs(weaker - gpu_images.read(linear)).sum() < np.abs(second - gpu_images.read(linear)).sum()
+    region.viewport.release()
