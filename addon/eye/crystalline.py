@@ -31,7 +31,7 @@ STIFFNESS = 1e4  # of a spring over a mass, 1/s2
 DAMPING = 50.0  # 1/s
 AMPLITUDE = 0.03  # mm
 FIBRES = 200
-FIBRES_FROM, FIBRES_TO = 1.9, 4.4  # mm from the axis: the cortex
+FIBRES_FROM, FIBRES_TO = 2.5, 4.4  # mm from the axis: the cortex
 _MUSCLE, _NARROW = 2, 3  # streams of noise
 
 
