@@ -53,8 +53,10 @@ class PointSpread(Service):
     def aperture(self, frame: Frame, luminance: float) -> Aperture:
         """While the eye looks at a picture of this mean luminance, cd/m2."""
         decades = np.round(np.log10(max(luminance, 1e-6)) / LUMINANCE_STEP) * LUMINANCE_STEP
-        eye, seconds = self._technique.eye(frame.settings), frame.snapshot.moment.seconds
-        return aperture_at(eye, seconds * frame.settings.get(self._technique, "speed"), 10.0**decades)
+        seconds = frame.snapshot.moment.seconds
+        return aperture_at(
+            eye_of(frame.settings), seconds * frame.settings.get(self._technique, "speed"), 10.0**decades
+        )
 
     def scale(self, frame: Frame, aperture: Aperture, degrees_per_pixel: float, magnification: float) -> optics.Scale:
         """How the pattern lies on pixels of this size."""
@@ -145,14 +147,6 @@ class EyeModel(Technique):
             return "nothing asks for the eye's point spread"
         return None
 
-    def eye(self, settings: Settings) -> Eye:
-        """The observer as set."""
-        names = (
-            "age", "pupil", "restlessness", "tremor", "movement", "scatter", "fibres", "lashes", "squint", "blink",
-            "blinks_per_minute",
-        )  # fmt: skip
-        return Eye(seed=settings.get(self, "person"), **{name: settings.get(self, name) for name in names})
-
     def side(self, settings: Settings) -> int:
         """Of the pattern, texels."""
         side = int(settings.get(self, "side"))
@@ -163,3 +157,13 @@ class EyeModel(Technique):
 
     def release(self) -> None:
         self._service.release()
+
+
+def eye_of(settings: Settings) -> Eye:
+    """The observer as set."""
+    names = (
+        "age", "pupil", "restlessness", "tremor", "movement", "scatter", "fibres", "lashes", "squint", "blink",
+        "blinks_per_minute",
+    )  # fmt: skip
+    values = {param.name: settings.value(EyeModel.name, param) for param in EyeModel.params}
+    return Eye(seed=values["person"], **{name: values[name] for name in names})

@@ -40,7 +40,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import CAMERA, Param, Technique, Write
 from ..gfx import passes
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import Camera, Snapshot
 from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
 
 LENS = "film.lens"
@@ -105,7 +105,7 @@ class TemporalGlare(Technique):
         measured = scatter.measure(picture, white)
         frame.count(self, "passes", scatter.measure_passes(picture))
         aperture = service.aperture(frame, luminance * measured.mean)
-        scale = service.scale(frame, aperture, factor * degrees_per_pixel(frame), magnification)
+        scale = service.scale(frame, aperture, factor * _pixel_angle(frame), magnification)
         reason = needless(measured, aperture, scale, strength, white, factor)
         if reason and aperture.light == 1.0:
             self._leave(frame, reason)
@@ -150,10 +150,14 @@ def needless(
     return None
 
 
-def degrees_per_pixel(frame: Frame) -> float:
-    """In the middle of the picture."""
-    camera, film = frame.snapshot.camera, frame.snapshot.film
+def _pixel_angle(frame: Frame) -> float:
+    film = frame.snapshot.film
+    return degrees_per_pixel(frame.snapshot.camera, film.width, film.height)
+
+
+def degrees_per_pixel(camera: Camera, width: int, height: int) -> float:
+    """In the middle of a picture of that many pixels; orthographic views have none, and take that of a common lens."""
     _, _, bottom, top = camera.frame
     if camera.kind == "ORTHOGRAPHIC":
-        return ORTHOGRAPHIC_DEGREES / max(film.width, film.height)
-    return float(np.degrees((top - bottom) / film.height))
+        return ORTHOGRAPHIC_DEGREES / max(width, height)
+    return float(np.degrees((top - bottom) / height))
