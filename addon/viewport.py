@@ -98,7 +98,7 @@ class Viewport:
         self._changed_at = 0.0
         self._finished = False
         self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
-        self._shown_with: tuple = ()  # what the picture was shown with, see Renderer.shown_with
+        self._shown_with: tuple = ()  # what the picture was shown with, see Frame.shown_with
         self._waits = False  # what is shown is this view of this scene, only coarser
         self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
         self._sample: Iterator | None = None  # what is left of a sample that was begun
@@ -159,7 +159,7 @@ class Viewport:
         frame, started = self.frame, clock()
         if self._target is None and self._sample is None and frame.samples_done:
             self._resolve(frame)  # the frame outlived an error that took its picture
-        elif self._sample is None and frame.samples_done and self.renderer.shown_with(frame) != self._shown_with:
+        elif self._sample is None and frame.samples_done and frame.shown_with != self._shown_with:
             self._resolve(frame)  # the same samples, at another time or with other settings of a `show` stage
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
         while frame.samples_done < settings.samples:
@@ -204,7 +204,7 @@ class Viewport:
             self._drop_picture()
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
         passes.copy(self.renderer.show(frame), self._target)
-        self._shown_with = self.renderer.shown_with(frame)
+        self._shown_with = frame.shown_with
         film = frame.snapshot.film
         x, y = self._size[0] / film.width, self._size[1] / film.height
         x0, y0, x1, y1 = film.border

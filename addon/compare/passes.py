@@ -37,10 +37,11 @@ OTHER_NAMES = (
     PassName("mist", "Mist", "Mist", "use_pass_mist"),
     PassName("position", "Position", "Position", "use_pass_position"),
     PassName("object_index", "Object Index", "IndexOB", "use_pass_object_index"),
-    PassName("glare", "Glare", "Glare", ""),
     PassName("material_index", "Material Index", "IndexMA", "use_pass_material_index"),
 )
-IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES + OTHER_NAMES for name in (row.blender, row.before_5)}
+IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES + OTHER_NAMES for name in (row.blender, row.before_5)} | {
+    "Glare": "glare"  # written where a camera sees with an eye, without a switch of the view layer
+}
 
 
 @dataclass(frozen=True)

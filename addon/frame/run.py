@@ -187,6 +187,12 @@ class Frame:
         """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
         return self.plan.owner(transport) is not None
 
+    @property
+    def shown_with(self) -> tuple:
+        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in self.plan.techniques if technique.only_shows]
+        return tuple((t.name, self.settings.of(t), self.snapshot.moment) for t in showing)
+
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
@@ -344,11 +350,6 @@ class Renderer:
         showing = {technique.name for technique in self.techniques if technique.only_shows}
         return {name: value for name, value in settings.values.items() if name[0] not in showing}
 
-    def shown_with(self, frame: Frame) -> tuple:
-        """What decides how the frame's samples are shown: where it differs, `show` shows them otherwise."""
-        showing = [technique for technique in frame.plan.techniques if technique.only_shows]
-        return tuple((t.name, frame.settings.of(t), frame.snapshot.moment) for t in showing)
-
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
 
@@ -374,7 +375,8 @@ class Renderer:
         ledger = frame.ledger
         seconds = frame.profiler.seconds
         if ledger.rows:  # reused but for what was done to show them
-            shown = {t.name: self._row(frame, t) for t in frame.plan.techniques if t.only_shows and t.name in seconds}
+            worked = frame.counters.keys() | frame.needless.keys()
+            shown = {t.name: self._row(frame, t) for t in frame.plan.techniques if t.only_shows and t.name in worked}
             ledger.rows = [shown.get(row.name, row) for row in ledger.rows]
         else:
             ledger.rows = [self._row(frame, t) for t in frame.plan.techniques] + list(frame.plan.skipped)

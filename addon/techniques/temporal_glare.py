@@ -28,6 +28,7 @@ core and tail, the threshold and the placement by magnification are ours.
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -79,6 +80,11 @@ class TemporalGlare(Technique):
 
     def __init__(self):
         self._scatter = scatter.Scatter()
+        self._shown_for, self._shown, self._reason = (
+            lambda: None,
+            (),
+            None,
+        )  # the picture that film.lens is of, and why not
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if settings.get(self, "mode") == OFF:
@@ -91,10 +97,23 @@ class TemporalGlare(Technique):
         return scatter.MEASURE, scatter.BLOCKS  # what else there is may never be needed
 
     def show(self, frame: Frame) -> None:
+        now = (frame.samples_done, frame.shown_with)
+        if self._shown_for() is not frame or self._shown != now:
+            self._reason = self._show(frame)
+            self._shown_for, self._shown = weakref.ref(frame), now
+        if self._reason is None:
+            frame.picture = LENS
+        else:
+            frame.leave(self, self._reason)
+            service = frame.service(PointSpread)
+            if service is not None:
+                service.leave(frame)
+
+    def _show(self, frame: Frame) -> str | None:
+        """Draw the lens' image; or why not, as a sentence."""
         service = frame.service(PointSpread)
         if service is None:  # a pass tree without an eye
-            self._leave(frame, "no eye brings a point spread: add the pass Eye to the tree")
-            return
+            return self._unseen(frame, "no eye brings a point spread: add the pass Eye to the tree")
         picture = frame.images[COMBINED]
         white, strength, magnification, luminance, sharp = (
             frame.settings.get(self, name) for name in ("white", "strength", "magnification", "luminance", "sharp")
@@ -108,9 +127,7 @@ class TemporalGlare(Technique):
         scale = service.scale(frame, aperture, factor * _pixel_angle(frame), magnification)
         reason = needless(measured, aperture, scale, strength, white, factor)
         if reason and aperture.light == 1.0:
-            self._leave(frame, reason)
-            service.leave(frame)
-            return
+            return self._unseen(frame, reason)
         target = frame.target(LENS)
         if reason or aperture.light == 0.0:  # lids move, and there is nothing, or nobody, to be dazzled
             frame.count(self, "passes", scatter.dim(picture, target, aperture.light))
@@ -122,13 +139,13 @@ class TemporalGlare(Technique):
             else:
                 done = self._scatter.convolve(picture, kernel, target, factor=factor, **how)
             frame.count(self, "passes", done)
-        frame.picture = LENS
+        return None
 
-    def _leave(self, frame: Frame, reason: str) -> None:
-        """Show the picture as it is; a render pass of it has to be the same."""
+    def _unseen(self, frame: Frame, reason: str) -> str:
+        """The picture is shown as it is; a render pass of the lens has to be the same."""
         if frame.settings.whole:
             passes.copy(frame.images[COMBINED], frame.target(LENS))
-        frame.leave(self, reason)
+        return reason
 
     def release(self) -> None:
         self._scatter.release()

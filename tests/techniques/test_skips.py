@@ -58,6 +58,10 @@ def dark(stage):
     no_emission(stage)
 
 
+def no_glare(stage):
+    stage.scene.camera.data.candela.glare_mode = "OFF"
+
+
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
@@ -79,6 +83,8 @@ WITHOUT = {
     "imperfect_shadow_maps": no_bounces,
     "ssdo": no_bounces,
     "denoise": dark,
+    "eye": no_glare,
+    "glare": no_glare,
 }
 
 
@@ -114,6 +120,9 @@ def bound(monkeypatch):
 
 
 def choose(stage, technique):
+    if technique.name in ("eye", "glare"):
+        stage.scene.camera.data.candela.glare_mode = "CONVOLUTION"
+        stage.scene.camera.data.candela.glare_white = 0.01
     for slot in technique.fills:
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 
