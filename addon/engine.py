@@ -26,7 +26,7 @@ from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import RenderPass, missing_passes, wanted_passes
+from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
@@ -94,7 +94,7 @@ class CandelaEngine(bpy.types.RenderEngine):
     def update_render_passes(self, scene=None, renderlayer=None):
         """Tell Blender (and the compositor) which passes will come."""
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
-        for asked in wanted_passes(renderlayer):
+        for asked in wanted_passes(renderlayer, scene):
             self.register_pass(scene, renderlayer, asked.name, len(asked.channels), asked.channels, asked.kind)
 
     def update(self, data, depsgraph):
@@ -162,7 +162,7 @@ class CandelaEngine(bpy.types.RenderEngine):
                     with context.turn:
                         shared.renderer.finish(frame, ())
                     return
-            wanted = wanted_passes(layer)
+            wanted = wanted_passes(layer, scene)
             with context.turn:
                 pixels = _finished(shared.renderer, frame, wanted)
             for name, array in pixels.items():
@@ -245,5 +245,7 @@ def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dic
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     renderer.show(frame)
     arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
+    if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
+        arrays[GLARE.source] = arrays["film.combined"]
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays["film.combined"], **pixels}

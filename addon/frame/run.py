@@ -29,7 +29,7 @@ from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
 from .bands import Bands
-from .ledger import RAN, REUSED, Ledger, Row
+from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
 from .technique import Service, Technique
@@ -68,6 +68,7 @@ class Frame:
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
+    needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -187,10 +188,20 @@ class Frame:
         """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
         return self.plan.owner(transport) is not None
 
+    @property
+    def shown_with(self) -> tuple:
+        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in self.plan.techniques if technique.only_shows]
+        return tuple((t.name, self.settings.of(t), self.snapshot.moment) for t in showing)
+
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
+
+    def leave(self, technique: Technique, reason: str) -> None:
+        """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
+        self.needless[technique.name] = reason
 
     def to_show(self, name: str) -> images.Image:
         """The image of that name, or, of sums, the one that shows them better."""
@@ -271,6 +282,7 @@ class Renderer:
             self.frame.profiler = Profiler(settings.profile)
             self.frame.counters = {}
             self.frame.settings = settings
+            self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
         self._frame_key = key
         self._drop_frame()
@@ -332,9 +344,16 @@ class Renderer:
     def show(self, frame: Frame) -> images.Image | None:
         """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
         where no technique of the plan makes it. It changes with the next call. No sample may be half drawn."""
+        frame.picture = Frame.picture
+        frame.needless.clear()
         for _ in _stage(frame, "show"):
             pass
         return frame.images.get(frame.picture)
+
+    def drawn_with(self, settings: Settings) -> dict:
+        """The values of settings that samples depend on."""
+        showing = {technique.name for technique in self.techniques if technique.only_shows}
+        return {name: value for name, value in settings.values.items() if name[0] not in showing}
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -359,26 +378,33 @@ class Renderer:
                 pixels /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
-        if not ledger.rows:
-            ledger.times["passes"] = frame.drawn_s + frame.profiler.awaited + waited - started
-            spent = frame.profiler.shares([t.name for t in frame.plan.techniques], ledger.times["passes"])
-            ledger.rows = [
-                Row(
-                    t.name,
-                    t.label,
-                    RAN,
-                    "",
-                    1000 * spent[t.name],
-                    ", ".join(frame.plan.slots_of(t)),
-                    frame.counters.get(t.name, {}),
-                )
+        took = frame.drawn_s + frame.profiler.awaited + waited - started
+        spent = frame.profiler.shares([t.name for t in frame.plan.techniques], took)
+        if ledger.rows:  # reused but for what was done to show them
+            worked = frame.counters.keys() | frame.needless.keys()
+            shown = {
+                t.name: self._row(frame, t, spent[t.name])
                 for t in frame.plan.techniques
-            ] + list(frame.plan.skipped)
+                if t.only_shows and t.name in worked
+            }
+            ledger.rows = [shown.get(row.name, row) for row in ledger.rows]
+        else:
+            rows = [self._row(frame, t, spent[t.name]) for t in frame.plan.techniques]
+            ledger.rows = rows + list(frame.plan.skipped)
+            ledger.times["passes"] = took
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad
         ledger_module.publish(ledger)
         return out
+
+    @staticmethod
+    def _row(frame: Frame, technique: Technique, seconds: float) -> Row:
+        slot = ", ".join(frame.plan.slots_of(technique))
+        if technique.name in frame.needless:
+            return Row(technique.name, technique.label, SKIPPED, frame.needless[technique.name], slot=slot)
+        counters = frame.counters.get(technique.name, {})
+        return Row(technique.name, technique.label, RAN, "", 1000 * seconds, slot, counters)
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -442,7 +468,7 @@ class Renderer:
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
-            tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
+            tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
