@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bench import markdown
+from bench.markdown import write_whole
 from bench.quick import size_of, table
 
 SCENES = Path(__file__).resolve().parent.parent / "sample_blends"
@@ -103,5 +104,5 @@ def command(options: argparse.Namespace) -> int:
         print(table([HEAD, *added]), flush=True)
         rows += added
         if options.page:  # after each scene: what is measured stays when the run is ended
-            options.page.write_text(page(rows, options.samples, options.size, options.reference), encoding="utf-8")
+            write_whole(options.page, page(rows, options.samples, options.size, options.reference))
     return 0

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from bench import markdown
 from bench.cells import Scene, Series
+from bench.markdown import write_whole
 
 BOUNCES = 16
 SAMPLES = (1, 16)
@@ -243,7 +244,7 @@ def write(path: Path, scenes, techniques: list[str], size: tuple[int, int], refe
 
     def save(title: str, head, rows) -> None:
         print(f"\n{title}\n{table([head, *rows])}", flush=True)
-        path.write_text(page(about, size, reference, by_scene, gathered, grown, moved), encoding="utf-8")
+        write_whole(path, page(about, size, reference, by_scene, gathered, grown, moved))
 
     for name in scenes:
         by_scene[name] = measured(name, techniques, size, reference)

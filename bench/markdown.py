@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 END = "<!-- end of what is written -->"
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Replace the file at once: whoever reads or interrupts finds the old text or the new one."""
+    path = path.resolve()
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
 
 
 def begin(command: str) -> str:
@@ -26,4 +42,4 @@ def put_between(path: Path, command: str, part: str) -> None:
     _, end, after = rest.partition(END)
     if not (found and end):
         raise ValueError(f"{path.name} lacks the marks '{mark}' and '{END}'.")
-    path.write_text(f"{before}{mark}\n\n{part}\n\n{END}{after}", encoding="utf-8")
+    write_whole(path, f"{before}{mark}\n\n{part}\n\n{END}{after}")

@@ -16,6 +16,7 @@ import numpy as np
 import addon
 from addon.materials import nodes
 from addon.materials.nodes.entry import Entry
+from bench.markdown import write_whole
 
 from .node_cases import Case, Difference, compare, new_material
 from .node_list import CASES
@@ -146,7 +147,7 @@ def main() -> None:
             print(f"{difference.largest:7.2f} {difference.percentile_99:7.2f}  {state:5}  {difference.case.name}")
     else:
         contact_sheet(found, arguments.output / "images" / "nodes.png")
-        (arguments.output / "nodes.md").write_text(page(found, arguments.pixels), encoding="utf-8")
+        write_whole(arguments.output / "nodes.md", page(found, arguments.pixels))
         print(f"{sum(difference.good for difference in found)} of {len(found)} cases agree; see docs/nodes.md")
     # As in the tests: Blender 4.5 as a module does not come back from its exit handlers once a GPU was used.
     sys.stdout.flush()

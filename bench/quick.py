@@ -29,6 +29,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.markdown import write_whole
+
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_blends"
 SLOW = 30.0  # seconds of a cold render; what is slower is timed once instead of several times
@@ -391,7 +393,7 @@ def main(arguments: list[str]) -> int:
                 found[name] = measure(path, options.size, options.runs, options.reference_samples, tick)
         print(f"{name}: EEVEE / Candela {ratio(found[name]):.1f}", flush=True)
         options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(as_json(found, about), encoding="utf-8")
+        write_whole(options.json, as_json(found, about))
         draw(found, about, options.picture)
     print(f"\n{report(found)}")
     print(f"\n{options.json}\n{options.picture}")

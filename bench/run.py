@@ -42,6 +42,7 @@ from bench.cells import (
     Store,
     in_turns,
 )
+from bench.markdown import write_whole
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
@@ -302,7 +303,7 @@ def beside(rows: list[dict], before: list[dict]) -> list[dict]:
 def write_results(path: Path, about: dict, references: dict, rows: list[dict], left_out: list[str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     data = {"about": about, "references": references, "left_out": left_out, "cells": rows}
-    path.write_text(one_row_per_line(data), encoding="utf-8")
+    write_whole(path, one_row_per_line(data))
 
 
 def one_row_per_line(data: dict) -> str:

@@ -16,6 +16,8 @@ from pathlib import Path
 
 import bpy
 
+from ..compare.cache import LIMIT_BYTES
+from ..compare.reference import cache_folder
 from ..frame.settings import SAMPLES
 from ..techniques import REGISTRY
 from . import tuning, verbs
@@ -78,6 +80,10 @@ def _parser(program: str) -> argparse.ArgumentParser:
         "--set", metavar="NAME=VALUE", action="append", default=[], dest="assignments",
         help=f"a setting of Candela, such as {_example()}; may be repeated; a wrong name gets the list",
     )  # fmt: skip
+    shared.add_argument(
+        "--run-scripts", action="store_true",
+        help="run the file's scripts and drivers in Python; only for files that you trust",
+    )  # fmt: skip
     shared.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
 
     parser = _Parser(prog=program, description="Candela, a render engine for Blender.", allow_abbrev=False)
@@ -85,6 +91,10 @@ def _parser(program: str) -> argparse.ArgumentParser:
     add = {"parents": [shared], "allow_abbrev": False}
     render = commands.add_parser("render", help="render a picture", **add)
     render.add_argument("--output", metavar="PATH", type=Path, help=".png, or .exr with all passes of the file")
+    render.add_argument(
+        "--compositing", action="store_true",
+        help="run the file's compositor; its File Output nodes write below the folder of the output, or not at all",
+    )  # fmt: skip
     render.set_defaults(verb=verbs.render)
     against = commands.add_parser("compare", help="render by Candela and by Cycles, and compare", **add)
     against.add_argument("--output", metavar="FOLDER", type=Path, help="for index.html and the pictures")
@@ -100,6 +110,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
         help="both engines without bounces",
     )  # fmt: skip
     against.add_argument("--no-cache", action="store_true", help="render the reference anew and do not keep it")
+    _add_cache(against)
     against.set_defaults(verb=verbs.compare)
     plan = commands.add_parser("plan", help="print what would run and why the rest is skipped", **add)
     plan.set_defaults(verb=verbs.plan)
@@ -113,8 +124,16 @@ def _parser(program: str) -> argparse.ArgumentParser:
     )
     tune.add_argument("--apply", action="store_true", help="write what was found into the file, or into --output")
     tune.add_argument("--output", metavar="PATH.blend", type=Path, help="with --apply: leave FILE as it is")
+    _add_cache(tune)
     tune.set_defaults(verb=tuning.tune_scene)
     return parser
+
+
+def _add_cache(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--cache", metavar="FOLDER", type=Path,
+        help=f"for references, up to {LIMIT_BYTES >> 30} GiB (default: {cache_folder()})".replace("%", "%%"),
+    )  # fmt: skip
 
 
 def _example() -> str:

@@ -58,15 +58,21 @@ def _stands(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def placed_in(folder: Path) -> Iterator[Path]:
-    """A temporary folder, whose files are moved into `folder` at the end. Raises Refused; then nothing is left."""
+def placed_in(folder: Path, last: str = "") -> Iterator[Path]:
+    """A temporary folder, whose files are moved into `folder` at the end, that of the name `last` after all others.
+
+    Raises Refused; then nothing is left.
+    """
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".writing_", dir=folder) as place:
             yield Path(place)
-            for file in sorted(Path(place).iterdir()):
-                file.replace(folder / file.name)
+            found = sorted(file for file in Path(place).rglob("*") if file.is_file())
+            for file in sorted(found, key=lambda file: file.name == last):
+                final = folder / file.relative_to(place)
+                final.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(final)
     except BaseException as error:
         for place in made:
             with contextlib.suppress(OSError):

@@ -20,6 +20,7 @@ from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
 from ..techniques import REGISTRY, make_registry
 from ..ui.properties import identifier, settings_of
+from . import untrusted
 from .files import output, placed_in, refuse_blend
 from .refused import USAGE, Refused, reason
 from .terminal import progress, quiet
@@ -34,6 +35,7 @@ class Job:
     options: argparse.Namespace
     scene: bpy.types.Scene
     layer: bpy.types.ViewLayer | None  # None: all that are rendered
+    held_back: tuple[str, ...] = ()  # what the file would have done beside being rendered, as sentences
 
     @property
     def title(self) -> str:
@@ -53,7 +55,8 @@ def open_job(options: argparse.Namespace) -> Job:
     """Check the file, open it and apply the options. Raises Refused."""
     refuse_blend(options.file)
     with quiet(options.verbose):
-        why = open_mainfile(options.file)
+        why = open_mainfile(options.file, options.run_scripts)
+        held_back = untrusted.contain(getattr(options, "compositing", False))
     if why:
         raise Refused(f"{options.file} could not be opened: {why}.")
     scene = _named("scene", options.scene, bpy.data.scenes) or bpy.context.scene
@@ -72,14 +75,14 @@ def open_job(options: argparse.Namespace) -> Job:
             scene.frame_set(options.frame)
     if scene.camera is None:
         raise Refused(f"Scene '{scene.name}' in {options.file} has no camera: add one, or make one active.")
-    return Job(options, scene, layer)
+    return Job(options, scene, layer, tuple(held_back))
 
 
-def open_mainfile(path: Path) -> str:
+def open_mainfile(path: Path, run_scripts: bool = False) -> str:
     """Open the file in Blender; why it could not be opened, or an empty string."""
     full = str(path.resolve())
     try:
-        bpy.ops.wm.open_mainfile(filepath=full)
+        bpy.ops.wm.open_mainfile(filepath=full, use_scripts=run_scripts)
     except RuntimeError as error:
         if bpy.data.filepath != full:  # else it is open, and only something that it links to is missing
             return reason(error)
@@ -116,20 +119,25 @@ def render(job: Job) -> None:
     path = output(job.options.output or Path(f"{job.options.file.stem}.png"), folder=False)
     if path.suffix.lower() not in (".png", ".exr"):
         raise Refused(f"The output must end in .png or .exr, and {path.name} does not.", USAGE)
+    untrusted.refuse_inputs([path])
     target = {"layer": job.layer.name} if job.layer else {}
-    with _watched(job):
-        try:
-            bpy.ops.render.render(scene=job.scene.name, **target)
-        except RuntimeError as error:
-            raise Refused(f"{job.options.file} could not be rendered: {reason(error)}.") from None
-    _choose_format(job.scene.render.image_settings, path.suffix.lower(), job.scene.render.film_transparent)
-    with placed_in(path.parent) as folder, quiet(job.options.verbose):
-        result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
-        result.save_render(str(folder / path.name), scene=job.scene)
+    with placed_in(path.parent, path.name) as folder:
+        held_back = [*job.held_back, *untrusted.hold_file_outputs(job.scene, path.parent, folder)]
+        with _watched(job):
+            try:
+                bpy.ops.render.render(scene=job.scene.name, **target)
+            except RuntimeError as error:
+                raise Refused(f"{job.options.file} could not be rendered: {reason(error)}.") from None
+        _choose_format(job.scene.render.image_settings, path.suffix.lower(), job.scene.render.film_transparent)
+        with quiet(job.options.verbose):
+            result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
+            result.save_render(str(folder / path.name), scene=job.scene)
         if not (folder / path.name).is_file():
             raise OSError(None, "Blender wrote no file")
+        held_back += untrusted.leave_what_stands(folder, path.parent, path.name)
     print(job.title)
     _print_ledger()
+    _print_held_back(held_back)
     print(path)
 
 
@@ -149,6 +157,13 @@ def _print_ledger() -> None:
     _print_notes(ledger.notes)
 
 
+def _print_held_back(sentences) -> None:
+    if sentences:
+        print("Held back of what the file would do beside the picture:")
+    for sentence in dict.fromkeys(sentences):
+        print(f"  {sentence}")
+
+
 def _print_notes(notes) -> None:
     texts = dict.fromkeys(str(note) for note in notes)
     if texts:
@@ -160,9 +175,13 @@ def _print_notes(notes) -> None:
 # ------------------------------------------------------------------------------------------------------------ compare
 
 
+PICTURES = ("candela.png", "cycles.png")
+
+
 def compare(job: Job) -> None:
     options = job.options
     folder = output(options.output or Path(f"{options.file.stem}_compare"), folder=True)
+    untrusted.refuse_inputs([folder / name for name in ("index.html", *PICTURES)])
     try:
         with _watched(job, f"Cycles renders the reference, 2 × {options.reference_samples} samples"):
             data = compare_scene(
@@ -171,6 +190,7 @@ def compare(job: Job) -> None:
                 options.reference_samples,
                 direct_only=options.direct_only,
                 use_cache=not options.no_cache,
+                folder=options.cache,
                 view_layer=job.layer,
                 seed=job.scene.candela.seed,
             )
@@ -179,7 +199,7 @@ def compare(job: Job) -> None:
     with placed_in(folder) as place:
         write_report(place / "index.html", data)
         combined = data.pictures[0]
-        for name, pixels in (("candela.png", combined.x), ("cycles.png", combined.reference)):
+        for name, pixels in zip(PICTURES, (combined.x, combined.reference)):
             if pixels is not None:
                 shown = metrics.display(pixels[::-1])
                 (place / name).write_bytes(png.png((shown * 255 + 0.5).astype("uint8")))
@@ -191,6 +211,7 @@ def compare(job: Job) -> None:
     print(f"Candela {data.seconds:.2f} s, Cycles {data.reference_seconds / 2:.2f} s per reference")
     print(ledgers.latest().text())
     _print_notes(data.notes)
+    _print_held_back(job.held_back)
     print(folder / "index.html")
 
 
