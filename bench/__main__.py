@@ -6,7 +6,20 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    costs,
+    direct,
+    everything,
+    growth,
+    hashes,
+    indirect,
+    mutations,
+    page,
+    profile,
+    random_scenes,
+    run,
+)
 
 VERBS = {
     "run": run,
@@ -19,6 +32,7 @@ VERBS = {
     "random": random_scenes,
     "page": page,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 
