@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..gfx import context, images
+from ..gfx import context, images, passes
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
@@ -209,6 +209,8 @@ class Renderer:
     def _begin(self, snapshot: Snapshot, settings: Settings, progress) -> Frame:
         if snapshot.camera is None:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
+        if settings.samples_to_draw < 1:
+            raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
         started = time.perf_counter()
         context.ensure()
         ledger = Ledger(samples=0)
@@ -267,25 +269,57 @@ class Renderer:
 
         A sample that is not brought to its end leaves sums that are good for nothing: the next `begin` starts anew.
         """
+        done = frame.samples_done
         try:
             yield from self._parts_of_sample(frame)
         finally:
-            if self.frame is frame and frame.samples_done == frame.sample:
+            if self.frame is frame and frame.samples_done == done:
                 self._frame_key = None
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
-        frame.sample = frame.samples_done
+        if frame.samples_done == 0:
+            self._clear_sums(frame)
+            if frame.settings.sample_offset:
+                # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
+                # picture; its light is that of another slice.
+                yield from self._draw_sample(frame, 0)
+                self._clear_sums(frame)
+        yield from self._draw_sample(frame, frame.settings.sample_offset + frame.samples_done)
+        frame.samples_done += 1
+        frame.ledger.rows = []  # what was reused up to here is being added to
+        if frame.samples_done == frame.settings.samples:
+            yield from self._end(frame)
+
+    def _end(self, frame: Frame) -> Iterator[None]:
+        for technique in frame.plan.techniques:
+            with frame.profiler.step(technique.name):
+                parts = iter(technique.end(frame) or ())
+            for _ in frame.profiler.steps(technique.name, parts):
+                yield
+
+    def merge(self, frame: Frame, sums: dict[str, np.ndarray]) -> None:
+        """Bring a frame to its end with sums over all samples that were drawn elsewhere (frame/slices.py)."""
+        self._clear_sums(frame)
+        for _ in self._draw_sample(frame, 0):
+            pass
+        for name, pixels in sums.items():
+            if name in frame.images:
+                passes.copy(images.upload(pixels, frame.images[name].format), frame.target(name))
+        frame.sample, frame.samples_done = frame.settings.samples - 1, frame.settings.samples
+        frame.look()
+        for _ in self._end(frame):
+            pass
+        frame.ledger.rows = []
+
+    def _draw_sample(self, frame: Frame, number: int) -> Iterator[None]:
+        frame.sample = number
         frame.look()
         frame.shown.clear()
-        if frame.sample == 0:
-            self._clear_sums(frame)
         for technique in frame.plan.techniques:
             with frame.profiler.step(technique.name):
                 parts = iter(technique.run(frame) or ())
             for _ in frame.profiler.steps(technique.name, parts):
                 yield
-        frame.samples_done += 1
-        frame.ledger.rows = []  # what was reused up to here is being added to
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -378,6 +412,7 @@ class Renderer:
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
+            settings.whole and (settings.sample_offset, settings.samples_to_draw),
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
             tuple(t.name for t in plan.techniques),
         )  # fmt: skip

@@ -124,5 +124,8 @@ class Technique:
         """
         raise NotImplementedError
 
+    def end(self, frame: Frame) -> Iterator[None] | None:
+        """What follows the last sample of a picture, once; a generator where that takes long."""
+
     def release(self) -> None:
         """Drop GPU resources."""

@@ -137,9 +137,6 @@ class Denoise(Technique):
         ),
     )
 
-    def __init__(self):
-        self._half_count = 0
-
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if settings.draft:
             return "it is a draft"
@@ -151,7 +148,7 @@ class Denoise(Technique):
             return "the scene has no surface"
         return no_diffuse_light(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def run(self, frame: Frame) -> None:
         done = frame.sample + 1
         if frame.sample == 0:
             for write in self.writes:
@@ -160,11 +157,11 @@ class Denoise(Technique):
         if done == frame.settings.samples // 2:
             for path in self._paths(frame):
                 passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
-            self._half_count = done
-        if done == frame.settings.samples:
-            for path in self._paths(frame):
-                yield from self._filter(frame, path, done)
-                frame.shown[f"radiance.{path}"] = f"denoise.{path}"
+
+    def end(self, frame: Frame) -> Iterator[None]:
+        for path in self._paths(frame):
+            yield from self._filter(frame, path, frame.settings.samples)
+            frame.shown[f"radiance.{path}"] = f"denoise.{path}"
 
     def _paths(self, frame: Frame) -> list[str]:
         shown = shown_paths(frame)
@@ -181,7 +178,7 @@ class Denoise(Technique):
                 passes.fullscreen(
                     BEGIN, light, rows=rows, blocks=blocks,
                     textures={**guides, **sums, "half_sum": frame.images[f"denoise.{path}_half"]},
-                    constants={"count": count, "half_count": self._half_count, "sharpness": how.sharpness},
+                    constants={"count": count, "half_count": count // 2, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
             tolerance = how.tolerance * frame.settings.get(self, "strength")

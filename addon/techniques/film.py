@@ -124,9 +124,10 @@ class Film(Technique):
         self._repeated = lights.Sources()
 
     def run(self, frame: Frame) -> Iterator[None]:
+        if frame.samples_done == 0:
+            _target(frame, *(f"film.{path}" for path in film_points.lit_paths(frame))).clear()
         if frame.sample == 0:
             self._paths = film_points.lit_paths(frame)
-            _target(frame, *(f"film.{path}" for path in self._paths)).clear()
             emitters = frame.emitters
             seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
             self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])

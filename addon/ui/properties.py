@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..frame.settings import AUTO, BOUNCES, SAMPLES, SEED, Settings
+from ..frame.settings import AUTO, BOUNCES, SAMPLE_COUNT, SAMPLE_OFFSET, SAMPLES, SEED, Settings
 from ..frame.technique import Param
 from ..techniques import REGISTRY
 from .pass_tree import TREE, order_of
@@ -65,6 +65,8 @@ def _annotations() -> dict:
         "viewport_samples": _property(SAMPLES, name="Viewport Samples", default=32),
         "seed": _property(SEED),
         "bounces": _property(BOUNCES),
+        "sample_offset": _property(SAMPLE_OFFSET),
+        "sample_count": _property(SAMPLE_COUNT),
     }
     out["pass_tree"] = bpy.props.PointerProperty(
         type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE, update=_redraw,
@@ -103,6 +105,8 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None) -> Set
         whole=not viewport,
         seed=group.seed,
         bounces=group.bounces,
+        sample_offset=0 if viewport or preview else group.sample_offset,
+        sample_count=0 if viewport or preview else group.sample_count,
         passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
         values={
