@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,16 +16,17 @@ from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
 from ..frame import ledger as ledgers
 from ..frame.plan import PlanError, make_plan
+from ..frame.settings import SCENE_PARAMS
 from ..gfx import context
 from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
 from ..techniques import REGISTRY, make_registry
 from ..ui.properties import identifier, settings_of
-from . import untrusted
+from . import slices, untrusted
 from .files import output, placed_in, refuse_blend
 from .refused import USAGE, Refused, reason
-from .terminal import progress, quiet
+from .terminal import STDOUT, progress, quiet
 
 # ------------------------------------------------------------------------------------------------------ the open file
 
@@ -53,6 +56,7 @@ class Job:
 
 def open_job(options: argparse.Namespace) -> Job:
     """Check the file, open it and apply the options. Raises Refused."""
+    expect(getattr(options, "expect", None))
     refuse_blend(options.file)
     with quiet(options.verbose):
         why = open_mainfile(options.file, options.run_scripts)
@@ -76,6 +80,13 @@ def open_job(options: argparse.Namespace) -> Job:
     if scene.camera is None:
         raise Refused(f"Scene '{scene.name}' in {options.file} has no camera: add one, or make one active.")
     return Job(options, scene, layer, tuple(held_back))
+
+
+def expect(version: str | None) -> None:
+    """Raise Refused unless this Blender has the version, compared in as many places as are given ("5.2")."""
+    here = ".".join(map(str, bpy.app.version))
+    if version is not None and f"{here}.".find(f"{version}.") != 0:
+        raise Refused(f"This is Blender {here}, and the job was made for {version}: give the node that version.")
 
 
 def open_mainfile(path: Path, run_scripts: bool = False) -> str:
@@ -105,7 +116,8 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
             layer.samples = 0  # its own number of samples would count
     settings = settings_of(scene, viewport=False).override(REGISTRY, given)
     group = scene.candela
-    group.samples, group.seed, group.bounces = settings.samples, settings.seed, settings.bounces
+    for param in SCENE_PARAMS:
+        setattr(group, param.name, getattr(settings, param.name))
     for slot, technique in settings.slots.items():
         setattr(group, f"slot_{slot}", technique)
     for (technique, param), value in settings.values.items():
@@ -116,29 +128,81 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
 
 
 def render(job: Job) -> None:
-    path = output(job.options.output or Path(f"{job.options.file.stem}.png"), folder=False)
+    """One picture, or one for each frame; a slice of it with --slice."""
+    options, scene = job.options, job.scene
+    path = output(options.output or Path(f"{options.file.stem}.png"), folder=False)
     if path.suffix.lower() not in (".png", ".exr"):
         raise Refused(f"The output must end in .png or .exr, and {path.name} does not.", USAGE)
-    untrusted.refuse_inputs([path])
+    frames = getattr(options, "frames", None)
+    if getattr(options, "slice", None):
+        _share_out(job, path)
+    paths = {frame: numbered(path, frame, frames is not None) for frame in frames or [scene.frame_current]}
+    untrusted.refuse_inputs(list(paths.values()))
+    for place, (frame, one) in enumerate(paths.items()):
+        if frame != scene.frame_current:
+            with quiet(options.verbose):
+                scene.frame_set(frame)
+        _render_picture(job, one, place / len(paths), 1 / len(paths))
+
+
+def numbered(path: Path, frame: int, several: bool) -> Path:
+    """The path with the frame's number in place of its last row of #; where it has none but there are several frames,
+    the number is added to the name."""
+    name = path.name
+    if "#" not in name:
+        if not several:
+            return path
+        name = f"{path.stem}_####{path.suffix}"
+    marks = re.findall("#+", name)[-1]
+    head, _, tail = name.rpartition(marks)
+    return path.with_name(f"{head}{frame:0{len(marks)}d}{tail}")
+
+
+def _share_out(job: Job, path: Path) -> None:
+    """Set the samples of the slice that is asked for. Raises Refused."""
+    slices.check_output(path)
+    if any(layer.samples for layer in job.scene.view_layers):
+        raise Refused(
+            "View layers have numbers of samples of their own; with --slice, --samples gives one for all.", USAGE
+        )
+    group = job.scene.candela
+    try:
+        group.sample_offset, group.sample_count = slices.bounds(job.options.slice, group.samples)
+    except ValueError as error:
+        raise Refused(str(error), USAGE) from None
+
+
+def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
+    """Render the scene's frame into a file; `begun` and `share` say which part of the whole work that is."""
+    options, scene = job.options, job.scene
     target = {"layer": job.layer.name} if job.layer else {}
+    sliced = scene.candela.sample_offset > 0 or scene.candela.sample_count > 0
+    about = slices.about_slice(job) if sliced else {}
     with placed_in(path.parent, path.name) as folder:
-        held_back = [*job.held_back, *untrusted.hold_file_outputs(job.scene, path.parent, folder)]
-        with _watched(job):
-            try:
-                bpy.ops.render.render(scene=job.scene.name, **target)
-            except RuntimeError as error:
-                raise Refused(f"{job.options.file} could not be rendered: {reason(error)}.") from None
-        _choose_format(job.scene.render.image_settings, path.suffix.lower(), job.scene.render.film_transparent)
-        with quiet(job.options.verbose):
-            result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
-            result.save_render(str(folder / path.name), scene=job.scene)
+        held_back = [*job.held_back, *untrusted.hold_file_outputs(scene, path.parent, folder)]
+        engine.taken = {} if sliced else None
+        try:
+            with _watched(job, begun=begun, share=share):
+                try:
+                    bpy.ops.render.render(scene=scene.name, **target)
+                except RuntimeError as error:
+                    raise Refused(f"{options.file} could not be rendered: {reason(error)}.") from None
+            if sliced:
+                slices.write(folder / path.name, about | {"device": context.describe()}, engine.taken)
+        finally:
+            engine.taken = None
+        if not sliced:
+            _choose_format(scene.render.image_settings, path.suffix.lower(), scene.render.film_transparent)
+            with quiet(options.verbose):
+                result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
+                result.save_render(str(folder / path.name), scene=scene)
         if not (folder / path.name).is_file():
             raise OSError(None, "Blender wrote no file")
         held_back += untrusted.leave_what_stands(folder, path.parent, path.name)
     print(job.title)
     _print_ledger()
     _print_held_back(held_back)
-    print(path)
+    print(f"Saved: '{path}'" if getattr(options, "progress", False) else path, flush=True)
 
 
 def _choose_format(image, suffix: str, transparent: bool) -> None:
@@ -291,24 +355,35 @@ def _material_notes(snapshot: Snapshot) -> list[Note]:
 
 
 @contextlib.contextmanager
-def _watched(job: Job, then: str = "") -> Iterator[None]:
+def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -> Iterator[None]:
     """Candela renders inside: with progress on a terminal, without Blender's chatter, and to the last sample.
 
-    `then` is said when the last sample is done. Raises Refused when the render ended before it.
+    `then` is said when the last sample is done. With --progress, lines for render farms are printed: of the whole work,
+    `begun` was done before and this is `share` of it. Raises Refused when the render ended before its last sample.
     """
-    with quiet(job.options.verbose) as terminal:
+    lines = os.fdopen(os.dup(STDOUT), "w") if getattr(job.options, "progress", False) else None
+    with contextlib.ExitStack() as stack:
+        if lines is not None:
+            stack.enter_context(lines)
+        terminal = stack.enter_context(quiet(job.options.verbose))
         try:
             context.ensure()
         except RuntimeError as error:
             raise Refused(str(error)) from None
         renderer = engine.session(job.scene, "final").renderer
-        advance, seen, wanted = renderer.advance, 0, job.scene.candela.samples
+        advance, seen, wanted = renderer.advance, 0, 1
 
         def advance_and_tell(frame) -> None:
             nonlocal seen, wanted
             advance(frame)
-            seen, wanted = frame.samples_done, frame.settings.samples
+            seen, wanted = frame.samples_done, frame.settings.samples_to_draw
             progress(terminal, f"Sample {seen} of {wanted}" if seen < wanted else then)
+            if lines is not None:
+                print(
+                    f"Fra:{job.scene.frame_current} | {job.scene.name} | Rendering {seen} / {wanted} samples\n"
+                    f"openjd_progress: {100 * (begun + share * seen / wanted):.1f}",
+                    file=lines, flush=True,
+                )  # fmt: skip
 
         renderer.advance = advance_and_tell
         try:
@@ -316,5 +391,5 @@ def _watched(job: Job, then: str = "") -> Iterator[None]:
         finally:
             del renderer.advance
             progress(terminal, "")
-    if seen < wanted:
+    if seen < wanted and not engine.given:
         raise Refused(f"The render of {job.options.file} ended after {seen} of {wanted} samples.")

@@ -11,6 +11,7 @@ from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, images, library
 from addon.lighting import ray_costs
 from addon.techniques.accumulated_maps import AccumulatedMaps
+from addon.techniques.surfaces import Surfaces
 
 
 @pytest.fixture
@@ -224,8 +225,8 @@ def test_error_leaves_no_half_made_frame(room, monkeypatch):
     def broken(self, frame):
         raise KeyError("half made")
 
-    monkeypatch.setattr(AccumulatedMaps, "prepare", broken, raising=False)
-    monkeypatch.setattr(AccumulatedMaps, "key", lambda *_: object())
+    monkeypatch.setattr(Surfaces, "prepare", broken, raising=False)
+    monkeypatch.setattr(Surfaces, "key", lambda *_: object())
     with pytest.raises(RuntimeError, match="half made"):
         room.render(1)
     monkeypatch.undo()
