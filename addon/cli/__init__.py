@@ -8,8 +8,10 @@ renamed, so that nothing half-written is ever seen. The opened file is changed i
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
+import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -38,6 +40,8 @@ def main(arguments: list[str], program: str = f"blender --command {COMMAND}") ->
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without × shows a question mark
+    with contextlib.suppress(ValueError):  # not the main thread
+        signal.signal(signal.SIGTERM, _interrupt)  # a farm that takes a task back: as Ctrl+C
     try:
         options = _parser(program).parse_args(arguments)
         options.verb(verbs.open_job(options) if options.opens else options)
@@ -54,6 +58,10 @@ def main(arguments: list[str], program: str = f"blender --command {COMMAND}") ->
     except SystemExit as end:  # --help
         return int(end.code or OK)
     return OK
+
+
+def _interrupt(*_) -> None:
+    raise KeyboardInterrupt
 
 
 def _end(sentence: str, code: int) -> int:

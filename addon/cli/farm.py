@@ -107,9 +107,9 @@ def template(name: str, parts: list[str], start: list[str], options) -> dict:
     if split == 1:
         steps = [_step("Render", [chunk], start, [*render, "--output", picture], options.gpu)]
     else:
-        slice_of = f"{FOLDER}/slices/{name}_####_{{}}of{split}.exr"
-        one = slice_of.format("{{Task.Param.Slice}}")
-        every = [slice_of.format(k) for k in range(1, split + 1)]
+        one, *every = (
+            f"{FOLDER}/slices/{name}_####_{k}of{split}.exr" for k in ("{{Task.Param.Slice}}", *range(1, split + 1))
+        )
         slices = {"name": "Slice", "type": "INT", "range": f"1-{split}"}
         shared = [*render, "--slice", f"{{{{Task.Param.Slice}}}}/{split}", "--output", one]
         merged = ["merge", *every, "--file", FILE, *common, "--frames={{Task.Param.Chunk}}", "--output", picture]

@@ -71,9 +71,9 @@ def test_what_is_no_part_is_refused(text):
 
 
 @pytest.mark.parametrize(
-    ("offset", "count", "drawn", "is_slice"), [(0, 0, 16, False), (0, 16, 16, False), (4, 0, 12, True), (12, 8, 4, True),
-                                               (16, 0, 0, True), (3, 5, 5, True)]
-)  # fmt: skip
+    ("offset", "count", "drawn", "is_slice"),
+    [(0, 0, 16, False), (0, 16, 16, False), (4, 0, 12, True), (12, 8, 4, True), (16, 0, 0, True), (3, 5, 5, True)],
+)
 def test_samples_that_are_drawn(offset, count, drawn, is_slice):
     settings = Settings(samples=16, sample_offset=offset, sample_count=count)
     assert (settings.samples_to_draw, settings.is_slice) == (drawn, is_slice)
