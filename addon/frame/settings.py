@@ -23,6 +23,7 @@ SAMPLE_COUNT = Param(
 )
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT)
 AUTO = "AUTO"
+OFF = "OFF"  # a slot that nothing fills
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,8 @@ class Settings:
         table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
         slots: dict[str, list[str]] = {}
         for technique in techniques:
-            if technique.slot:
-                slots.setdefault(f"slot.{technique.slot}", [AUTO]).append(technique.name)
+            for slot in technique.fills:
+                slots.setdefault(f"slot.{slot}", [AUTO, OFF]).append(technique.name)
         for text in assignments:
             name, equals, value = text.partition("=")
             if not equals:
