@@ -265,3 +265,15 @@ def test_passes_that_are_not_written_are_named(room):
         layer.use_pass_uv = layer.use_pass_shadow = False
     (note,) = (note for note in room.ledger.notes if note.subject == f"View layer '{layer.name}'")
     assert "UV, Shadow" in note.text
+
+
+def test_sums_begin_at_zero_in_every_picture(room):
+    """Images come from a pool and hold what another picture left there."""
+    room.world((0.2, 0.3, 0.4))
+    first = room.render(2, seed=1)
+    for image in room.renderer.frame.images.values():
+        images.Target((image,)).clear((7.0, 7.0, 7.0, 7.0)) if image.format == "RGBA32F" else None
+    room.render(2, seed=2)
+    again = room.render(2, seed=1)
+    for name, pixels in first.items():
+        np.testing.assert_array_equal(again[name], pixels, err_msg=name)
