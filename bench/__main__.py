@@ -8,6 +8,7 @@ import sys
 
 from bench import (
     again,
+    ages,
     costs,
     direct,
     everything,
@@ -31,6 +32,7 @@ VERBS = {
     "costs": costs,
     "random": random_scenes,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
     "mutations": mutations,
     "all": everything,

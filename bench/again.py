@@ -86,6 +86,8 @@ def command(options: argparse.Namespace) -> int:
         print("No scene has Candela and Cycles at 16 samples yet: run `python -m bench run` first.")
         return 1
     path = options.results.with_name("again.json")
-    write_whole(path, json.dumps({"rows": rounded(rows)}, indent=1, ensure_ascii=False) + "\n")
+    write_whole(
+        path, json.dumps({"run": results.about.get("run"), "rows": rounded(rows)}, indent=1, ensure_ascii=False) + "\n"
+    )
     print(sentence(rows))
     return 0

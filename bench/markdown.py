@@ -35,11 +35,18 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
 
 
-def put_between(path: Path, command: str, part: str) -> None:
-    """Replace what stands between the mark of `command` and the next end. ValueError when the file has none."""
+def put_between(path: Path, command: str, part: str, stamped: bool = True, made: str = "") -> None:
+    """Replace what stands between the mark of `command` and the next end. ValueError when the file has none.
+
+    Unless it is not to be `stamped`, the part says when and at which commit it was `made` (bench/ages.py); now, if that
+    is empty.
+    """
     mark = begin(command)
     before, found, rest = path.read_text(encoding="utf-8").partition(mark)
     _, end, after = rest.partition(END)
     if not (found and end):
         raise ValueError(f"{path.name} lacks the marks '{mark}' and '{END}'.")
-    write_whole(path, f"{before}{mark}\n\n{part}\n\n{END}{after}")
+    from bench import ages
+
+    said = f"{made or ages.now()}\n\n" if stamped else ""
+    write_whole(path, f"{before}{mark}\n\n{said}{part}\n\n{END}{after}")

@@ -202,7 +202,9 @@ def draw(found: dict[str, list[Result]], about: dict, path: Path) -> None:
             marker = {"CANDELA": "D", "BLENDER_EEVEE": "s"}.get(entrant.engine, "^" if entrant.samples == 4 else "o")
             if entrant.engine == "CYCLES" and not entrant.bounces:
                 marker = "X"
-            label = f"{entrant.label}, {entrant.samples} samples" if row == 0 else None
+            which = "all bounces" if entrant.bounces else "no bounces"
+            named = entrant.label if which in entrant.label else f"{entrant.label}, {which}"
+            label = f"{named}, {entrant.samples} samples" if row == 0 else None
             axes.plot([min(result.times), max(result.times)], [y, y], color=color, linewidth=1.2)
             face = "white" if hollow else color
             axes.plot(result.median, y, marker, color=color, markerfacecolor=face, markersize=7, label=label, zorder=3)

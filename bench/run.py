@@ -21,10 +21,12 @@ import statistics
 import subprocess
 import sys
 import time
+import uuid
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
+from bench import ages
 from bench.cells import (
     DRAFT,
     EXTRA,
@@ -415,6 +417,8 @@ def command(options: argparse.Namespace) -> int:
         done.measure()
     about = done.about | {
         "date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "commit": ages.git("rev-parse", "--short=10", "HEAD") or "",
+        "run": uuid.uuid4().hex,  # what repeats it or is joined to it says so
         "size": list(options.size),
         "reference_samples": options.reference_samples,
         "load": load(),
