@@ -6,7 +6,22 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, glare, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    ages,
+    costs,
+    direct,
+    everything,
+    glare,
+    growth,
+    hashes,
+    indirect,
+    mutations,
+    page,
+    profile,
+    random_scenes,
+    run,
+)
 
 VERBS = {
     "run": run,
@@ -19,7 +34,9 @@ VERBS = {
     "glare": glare,
     "random": random_scenes,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..gfx import context, images
+from ..gfx import context, images, passes
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
@@ -256,6 +256,8 @@ class Renderer:
     def _begin(self, snapshot: Snapshot, settings: Settings, progress) -> Frame:
         if snapshot.camera is None:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
+        if settings.samples_to_draw < 1:
+            raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
         started = time.perf_counter()
         context.ensure()
         ledger = Ledger(samples=0)
@@ -318,28 +320,58 @@ class Renderer:
 
         A sample that is not brought to its end leaves sums that are good for nothing: the next `begin` starts anew.
         """
+        done = frame.samples_done
         try:
             yield from _timed(frame, self._parts_of_sample(frame))
         finally:
-            if self.frame is frame and frame.samples_done == frame.sample:
+            if self.frame is frame and frame.samples_done == done:
                 self._frame_key = None
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
-        frame.sample = frame.samples_done
-        frame.look()
-        frame.shown.clear()
-        samples, profiler = frame.settings.samples if frame.settings.whole else 0, frame.profiler
-        if frame.sample == 0:
-            self._clear_sums(frame)
-            with profiler.once(samples):
-                yield from _stage(frame, "begin")
-        with profiler.measured(frame.sample, samples):
+        settings, profiler = frame.settings, frame.profiler
+        measured = settings.samples_to_draw if settings.whole else 0
+        if frame.samples_done == 0:
+            with profiler.once(measured):
+                yield from self._begin_samples(frame)
+                if settings.sample_offset:
+                    # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
+                    # picture; its light is that of another slice.
+                    yield from _stage(frame, "sample")
+                    self._clear_sums(frame)
+                    for name in frame.shown.values():
+                        frame.target(name).clear()
+        if frame.samples_done or settings.sample_offset:
+            frame.sample = settings.sample_offset + frame.samples_done
+            frame.look()
+            frame.shown.clear()
+        with profiler.measured(frame.samples_done, measured):
             yield from _stage(frame, "sample")
-        if frame.sample + 1 == frame.settings.samples:
-            with profiler.once(samples):
+        if frame.samples_done + 1 == settings.samples:
+            with profiler.once(measured):
                 yield from _stage(frame, "end")
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
+
+    def _begin_samples(self, frame: Frame) -> Iterator[None]:
+        frame.sample = 0
+        frame.look()
+        frame.shown.clear()
+        self._clear_sums(frame)
+        yield from _stage(frame, "begin")
+
+    def merge(self, frame: Frame, sums: dict[str, np.ndarray]) -> None:
+        """Bring a frame to its end with sums over all samples that were drawn elsewhere (frame/slices.py)."""
+        for parts in (self._begin_samples(frame), _stage(frame, "sample")):
+            for _ in parts:
+                pass
+        for name, pixels in sums.items():
+            if name in frame.images:
+                passes.copy(images.upload(pixels, frame.images[name].format), frame.target(name))
+        frame.sample, frame.samples_done = frame.settings.samples - 1, frame.settings.samples
+        frame.look()
+        for _ in _stage(frame, "end"):
+            pass
+        frame.ledger.rows = []
 
     def show(self, frame: Frame) -> images.Image | None:
         """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
@@ -468,6 +500,7 @@ class Renderer:
             lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
+            settings.whole and (settings.sample_offset, settings.samples_to_draw),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
