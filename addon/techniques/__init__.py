@@ -7,6 +7,7 @@ from .accumulated_maps import AccumulatedMaps
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
+from .depth_complexity import DepthComplexity
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
@@ -30,6 +31,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     AccumulatedMaps,
     VarianceSoftShadows,
     ConvolutionSoftShadows,
+    DepthComplexity,
     ShadowsByLight,
     DirectLight,
     EmissiveLight,
