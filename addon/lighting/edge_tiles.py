@@ -40,6 +40,7 @@ EDGE_LIGHT = Struct(
     ("vec4", "axis"),  # of emission
     ("vec4", "size"),  # of the ball around the light; of the disc that faces the receiver; D(eye, c); receivers' offset
     ("vec4", "eye"),  # w = 1: a direction
+    ("float", "reach"),  # m, of shadow quads; 0: to infinity
     ("int", "shape"),  # how a pattern's points become points of the light
     ("int", "edge_count"),
     ("int", "word_count"),
@@ -142,7 +143,7 @@ class EdgeTiles:
         self._kept: dict[str, images.Image] = {}
         self._lists: dict[str, tuple] = {}  # by light: key, silhouettes, records, wedges, quads
         self._blocks: list[Block] = []
-        self._triangles: tuple[object, images.Image, int] | None = None
+        self._triangles: dict[int, tuple] = {}  # by number of light: key, list, count
 
     def found(self, frame: Frame, casters: CasterEdges, extent: Extent, accurate: bool, by_group: bool) -> tuple:
         """Silhouettes of a light with their lists on the GPU, from before if nothing changed."""
@@ -153,9 +154,10 @@ class EdgeTiles:
         )  # fmt: skip
         known = self._lists.get(emitter.light.key)
         if known is None or known[0] != key:
-            made = silhouettes.silhouettes(casters, extent, accurate, by_group)
+            own = casters.without(extent.never_blocks(casters.corners))
+            made = silhouettes.silhouettes(own, extent, accurate, by_group)
             quads = made.records[made.drawn][:, :2].reshape(-1, 4)
-            known = (key, made, *silhouettes.upload(made), images.upload_list(quads), casters)
+            known = (key, made, *silhouettes.upload(made), images.upload_list(quads), own, casters)
             self._lists[emitter.light.key] = known
         return known
 
@@ -165,7 +167,7 @@ class EdgeTiles:
     ) -> Lit:  # fmt: skip
         """Receivers, count and words of one light for this sample's surfaces. `number`: of the light in the sample,
         whose images must not be another's."""
-        _, made, records, wedges, quads, _ = self.found(frame, casters, extent, accurate, by_group)
+        _, made, records, wedges, quads, casters, _ = self.found(frame, casters, extent, accurate, by_group)
         width, height = frame.size
         words = -(-made.count // 32)
         tile = tile_side(frame.size, words)
@@ -176,7 +178,7 @@ class EdgeTiles:
             "centre": (*extent.centre, float(extent.infinite)),
             "axis": (*extent.emitter.axis, 0.0),
             "size": (extent.radius, extent.disc, float(hidden.sum()), frame.offset_size),
-            "eye": tuple(eye), "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
+            "eye": tuple(eye), "reach": reach_of(frame, casters) if eye[3] > 0.5 else 0.0, "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
             "tile_columns": columns, "point_count": 1, "pattern_count": 1, "first_row": 0, "card_count": 0,
             "card_words": 0, "salt": 0,
         }  # fmt: skip
@@ -193,7 +195,8 @@ class EdgeTiles:
         of_tiles = {"low_of_tiles": low, "high_of_tiles": high}
         passes.compute(BOUNDS[tile], (columns, rows), textures={"receivers": receivers}, images=of_tiles)
         count = self.kept("count", width, height, "R16F")
-        self._draw_count(frame, casters, made, quads, receivers, count, blocks, float(hidden.sum()))
+        looked_through = self._looked_through(frame, casters, number)
+        self._draw_count(made, quads, looked_through, receivers, count, blocks, float(hidden.sum()))
         total = max(words * columns * rows, 1)
         list_rows = -(-total // images.LIST_WIDTH)
         tile_words = self.kept("words", images.LIST_WIDTH, list_rows, "R32UI")
@@ -207,14 +210,12 @@ class EdgeTiles:
         frame.count(technique, "words", words * columns * rows)
         return Lit(extent, made, records, receivers, count, tile_words, tile, block, values)
 
-    def _draw_count(self, frame, casters, made, quads, receivers, count, blocks, start: float) -> None:
+    def _draw_count(self, made, quads, looked_through, receivers, count, blocks, start: float) -> None:
         """D(p, c) of every receiver."""
         target = images.Target((count,))
         target.clear((start, 0.0, 0.0, 0.0))
         state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
-        lists = [("quads", quads, len(made.drawn), 6)]
-        triangles, number = self._looked_through(frame, casters)
-        lists.append(("triangles", triangles, number, 3))
+        lists = [("quads", quads, len(made.drawn), 6), ("triangles", *looked_through, 3)]
         with passes.drawing(target, **state):
             for what, records, total, corners in lists:
                 if total:
@@ -222,7 +223,7 @@ class EdgeTiles:
                     shader.bind(textures={f"{what}_records": records, "receivers": receivers}, blocks=blocks)
                     passes.draw(shader, _corners(corners), total)
 
-    def _looked_through(self, frame: Frame, casters: CasterEdges) -> tuple[images.Image | None, int]:
+    def _looked_through(self, frame: Frame, casters: CasterEdges, number: int) -> tuple[images.Image | None, int]:
         """Casters that the way from the eye to what is seen may cross: list of corners and planes, and their number."""
         camera = frame.snapshot.camera
         forward = -camera.matrix[:3, 2]
@@ -231,13 +232,15 @@ class EdgeTiles:
         before = depth.min(axis=1, initial=np.inf) < camera.clip_start * 1.001 + reach + 1e-5 * frame.geometry.size
         far = depth.max(axis=1, initial=-np.inf) > camera.clip_end
         own = np.flatnonzero(casters.unseen | before | far)
-        key = (id(casters), own.tobytes())
-        if self._triangles is None or self._triangles[0] != key:
+        key = (frame.geometry.changes, len(casters.corners), own.tobytes())
+        known = self._triangles.get(number)
+        if known is None or known[0] != key:
             rows = np.zeros((len(own), 4, 4), np.float32)
             rows[:, :3, :3] = casters.corners[own]
             rows[:, 3] = casters.planes[own]
-            self._triangles = (key, images.upload_list(rows.reshape(-1, 4)) if len(own) else None, len(own))
-        return self._triangles[1:]
+            known = (key, images.upload_list(rows.reshape(-1, 4)) if len(own) else None, len(own))
+            self._triangles[number] = known
+        return known[1:]
 
     def kept_bounds(self) -> tuple[images.Image, images.Image]:
         """Boxes around the receivers of tiles, of the light that was asked about last."""
@@ -261,7 +264,7 @@ class EdgeTiles:
     def release(self) -> None:
         for image in self._kept.values():
             images.pool.give(image)
-        self._kept, self._lists, self._blocks, self._triangles = {}, {}, [], None
+        self._kept, self._lists, self._blocks, self._triangles = {}, {}, [], {}
 
 
 def tile_side(size: tuple[int, int], words: int) -> int:
@@ -278,6 +281,15 @@ def eye_of(frame: Frame) -> np.ndarray:
     eye."""
     eye, backward = (frame.view_block.value(name) for name in ("eye", "backward"))
     return np.array([*backward[:3], 1.0]) if eye[3] > 0.5 else np.array([*eye[:3], 0.0])
+
+
+def reach_of(frame: Frame, casters: CasterEdges) -> float:
+    """Longer than the way from any caster to any receiver, m."""
+    receivers = frame.receivers
+    low, high = casters.corners.min(axis=(0, 1), initial=0.0), casters.corners.max(axis=(0, 1), initial=0.0)
+    if receivers is not None and len(receivers.distance):
+        low, high = np.minimum(low, receivers.low.min(axis=0)), np.maximum(high, receivers.high.max(axis=0))
+    return 2.0 * float(np.linalg.norm(high - low)) + 1e-3
 
 
 def nearest_receiver(frame: Frame, emitter: lights.Emitter) -> float:

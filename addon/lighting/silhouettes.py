@@ -71,6 +71,17 @@ class Extent:
             seen = radius / float(np.sqrt(max(1.0 - min(radius / max(nearest, 1e-30), 0.999) ** 2, 1e-6)))
         return cls(emitter, centre, False, seen, none, radius)
 
+    def never_blocks(self, corners: np.ndarray) -> np.ndarray:
+        """(T,) triangles (T, 3, 3) that lie in the light, or behind one that shines to one side. Light does not pass
+        them, and layers could not be counted from a centre that lies on one."""
+        if self.infinite:
+            return np.zeros(len(corners), bool)
+        offset = corners.astype(np.float64) - self.centre
+        if self.emitter.has_span:
+            before = offset @ np.asarray(self.emitter.axis, np.float64)
+            return (before <= 1e-6 * np.linalg.norm(offset, axis=2) + 1e-6 * self.radius).all(axis=1)
+        return (np.linalg.norm(offset, axis=2) <= self.emitter.radius).all(axis=1)
+
     def side(self, planes: np.ndarray) -> np.ndarray:
         """(T,) +1 or -1: the side of planes (T, 4) on which the centre lies; 0 counts as +1."""
         offset = planes[:, :3].astype(np.float64) @ self.centre + (0.0 if self.infinite else planes[:, 3])
@@ -202,10 +213,10 @@ def crossings(corners: np.ndarray, start: np.ndarray, end: np.ndarray, infinite:
     sides = np.stack([ab @ way >= 0, bc @ way >= 0, ca @ way >= 0])
     inside = sides.all(axis=0) | ~sides.any(axis=0)
     normal = ab + bc + ca
-    at_start = np.einsum("ti,ti->t", normal, a)
+    at_start = -np.einsum("ti,ti->t", normal, a)
     along = normal @ way
-    ahead = (at_start >= 0) == (along >= 0)
-    return inside & ahead & (np.ones(len(a), bool) if infinite else np.abs(along) > np.abs(at_start))
+    at_end = np.where(along == 0.0, at_start, along) if infinite else at_start + along
+    return inside & ((at_start >= 0) != (at_end >= 0))
 
 
 def hidden_from_eye(casters: CasterEdges, extent: Extent, eye: np.ndarray) -> np.ndarray:

@@ -61,8 +61,9 @@ def table(positions: np.ndarray, triangles: np.ndarray) -> MeshEdges:
     vertices, welded = positions[first], place.reshape(-1)[triangles].reshape(-1, 3)
     corners = vertices[welded].astype(np.float64)
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    span = np.ptp(vertices, axis=0) if len(vertices) else np.zeros(3)
-    source = np.flatnonzero((doubled > NO_AREA * float(span.astype(np.float64) @ span)) & np.isfinite(doubled))
+    finite = vertices[np.isfinite(vertices).all(axis=1)].astype(np.float64)
+    span = np.ptp(finite, axis=0) if len(finite) else np.zeros(3)
+    source = np.flatnonzero((doubled > NO_AREA * float(span @ span)) & np.isfinite(doubled))
     welded = welded[source]
     count = len(welded)
     start = welded.reshape(-1)
@@ -106,10 +107,24 @@ class CasterEdges:
     group: np.ndarray  # (E,)
     closed: np.ndarray  # (G,) of the groups
 
-    @property
-    def face_count(self) -> np.ndarray:
-        """(E,) 1 or 2."""
-        return (self.faces >= 0).sum(axis=1)
+    def without(self, gone: np.ndarray) -> CasterEdges:
+        """The same without the triangles in the mask `gone`, whose edges to others become borders."""
+        if not gone.any():
+            return self
+        number = np.where(gone, -1, np.cumsum(~gone) - 1)
+        faces = np.where(self.faces >= 0, number[self.faces], -1)
+        orient = np.where(faces >= 0, self.orient, 0).astype(np.int8)
+        second = faces[:, 0] < 0
+        faces[second], orient[second] = faces[second][:, ::-1], orient[second][:, ::-1]
+        kept = faces[:, 0] >= 0
+        return CasterEdges(
+            self.corners[~gone], self.planes[~gone], self.unseen[~gone], self.triangle_group[~gone],
+            self.ends[kept], faces[kept], orient[kept], self.group[kept], self.closed & ~self._opened(gone),
+        )  # fmt: skip
+
+    def _opened(self, gone: np.ndarray) -> np.ndarray:
+        """(G,) groups that lose a triangle."""
+        return np.bincount(self.triangle_group[gone], minlength=len(self.closed)) > 0
 
 
 NO_EDGES = CasterEdges(

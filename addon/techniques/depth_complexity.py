@@ -11,8 +11,8 @@ errs is the number of points. Triangles with alpha are asked by their opacity (l
 | share | as a whole, in closed form | share of the points that are seen, weighted as on a Lambertian surface | few samples |
 | points | by its 16 or 64 points, each lit for itself | a bit for each | many samples, gloss; the mean is exact |
 
-With shares, neighbouring pixels ask 16 different patterns, nets of one sequence that are a net together, and a mean over
-them on the same plane (`smooth`) takes most of the noise out; each sample has other patterns.
+With shares, neighbouring pixels ask 16 different patterns, nets of one sequence that are a net together, and in pictures
+of few samples a mean over them on the same plane (`smooth`) takes most of the noise out; each sample has other patterns.
 
 | cost | per light and sample |
 |---|---|
@@ -67,14 +67,14 @@ NORMAL = ("RGBA32F", "surface_normal")
 @cache
 def gathering(points: int, tile: int, bits: bool, cards: bool, standard: bool = False) -> Program:
     """The dispatch that counts layers."""
-    outputs = (("seen_points", "R32UI", "UINT_2D", "WRITE"),) if bits else (("seen_share", "R32F", "FLOAT_2D", "WRITE"),)
+    seen = ("seen_points", "R32UI", "UINT_2D", "WRITE") if bits else ("seen_share", "R32F", "FLOAT_2D", "WRITE")
     return Program(
         name=f"depth complexity of {points} {'points' if bits else 'shares'}",
         compute="edges/depth_complexity.comp.glsl",
         textures=(
             *LIT_TEXTURES, ("RGBA32F", "light_pattern"), *(() if bits else (NORMAL,)), *(CARD_TEXTURES if cards else ()),
         ),
-        images=outputs,
+        images=(seen,),
         blocks=(LIGHT_BLOCK,),
         constants=(("INT", "first_row"), ("INT", "last_row")),
         defines=(
@@ -94,9 +94,12 @@ SMOOTH = Program(
 DECLARED = tuple(
     gathering(points, tile, bits, cards, standard)
     for points, tile, bits, cards, standard in (
-        (16, 16, False, False, False), (64, 8, False, True, False), (16, 8, True, True, True), (64, 16, True, False, False),
+        (16, 16, False, False, False),
+        (64, 8, False, True, False),
+        (16, 8, True, True, True),
+        (64, 16, True, False, False),
     )
-)  # fmt: skip
+)
 FRONT_END = edge_tiles.programs()
 LIGHTING = tuple(lighting(lookup, False) for lookup in (SHARE_LOOKUP, bits_lookup(16), bits_lookup(64)))
 
@@ -105,7 +108,7 @@ class DepthComplexity(EdgeShadows):
     name = "depth_complexity"
     label = "Depth complexity sampling"
     params = (
-        Param("points", "Points", "16", "Points of each light, between which and a pixel layers are counted", items=COUNTS),
+        Param("points", "Points", "64", "Points of each light to which layers are counted from a pixel", items=COUNTS),
         Param("mode", "Light", AUTO, "How the points that are seen become light", items=MODES),
         Param(
             "accurate", "Accurate edges", True,
@@ -144,7 +147,8 @@ class DepthComplexity(EdgeShadows):
             texels, shape = point_patterns(emitter, [view.sample for view in views])
         else:
             texels, shape = shared_patterns(frame, emitter, points, PATTERNS if several else 1)
-        smooth = several and frame.settings.get(self, "smooth")
+        few = frame.settings.samples < FEW_SAMPLES or frame.settings.draft
+        smooth = several and few and frame.settings.get(self, "smooth")
         cards = self.card_words(frame, lit)
         lit.update(shape=shape, point_count=points, pattern_count=len(texels), salt=self.salt(frame))
         first_row = lit.values["first_row"]
