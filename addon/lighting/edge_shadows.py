@@ -72,7 +72,11 @@ class EdgeShadows(PointMaps):
         return (
             super().skip(snapshot, settings)
             or edges.too_many(snapshot)
-            or (None if any(has_extent(light) for light in snapshot.lights) else "no light that casts shadows has extent")
+            or (
+                None
+                if any(has_extent(light) for light in snapshot.lights)
+                else "no light that casts shadows has extent"
+            )
         )
 
     def run(self, frame: Frame) -> None:

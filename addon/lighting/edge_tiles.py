@@ -51,6 +51,7 @@ EDGE_LIGHT = Struct(
     ("int", "card_count"),
     ("int", "card_words"),
     ("int", "salt"),
+    ("int", "group_count"),
 )
 AS_THEY_ARE, FACING_DISC, FACING_SPHERE, BALL_DISC, BALL_SPHERE = range(5)
 MOST_WORDS = 2048 * 8192
@@ -113,6 +114,10 @@ class Lit:
     records: images.Image
     receivers: images.Image
     count: images.Image
+    hidden: np.ndarray  # (T,) which of `casters` lie between the eye and the light's centre
+    casters: CasterEdges  # that can block this light
+    quads: images.Image
+    looked_through: tuple[images.Image | None, np.ndarray]  # list, and which of `casters`
     words: images.Image
     tile: int
     block: Block
@@ -180,7 +185,7 @@ class EdgeTiles:
             "size": (extent.radius, extent.disc, float(hidden.sum()), frame.offset_size),
             "eye": tuple(eye), "reach": reach_of(frame, casters) if eye[3] > 0.5 else 0.0, "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
             "tile_columns": columns, "point_count": 1, "pattern_count": 1, "first_row": 0, "card_count": 0,
-            "card_words": 0, "salt": 0,
+            "card_words": 0, "salt": 0, "group_count": 0,
         }  # fmt: skip
         while len(self._blocks) <= number:
             self._blocks.append(Block(EDGE_LIGHT, **values))
@@ -188,9 +193,7 @@ class EdgeTiles:
         block.update(**values)
         receivers = self.kept("receivers", width, height, "RGBA32F")
         blocks = {"film_view": frame.view_block, "edge_light": block}
-        passes.fullscreen(
-            RECEIVERS, images.Target((receivers,)), textures=surface_bindings(frame), blocks=blocks
-        )
+        passes.fullscreen(RECEIVERS, images.Target((receivers,)), textures=surface_bindings(frame), blocks=blocks)
         low, high = (self.kept(name, columns, rows, "RGBA32F") for name in ("low", "high"))
         of_tiles = {"low_of_tiles": low, "high_of_tiles": high}
         passes.compute(BOUNDS[tile], (columns, rows), textures={"receivers": receivers}, images=of_tiles)
@@ -208,23 +211,27 @@ class EdgeTiles:
         frame.count(technique, "edges", made.count)
         frame.count(technique, "shadow quads", len(made.drawn))
         frame.count(technique, "words", words * columns * rows)
-        return Lit(extent, made, records, receivers, count, tile_words, tile, block, values)
+        return Lit(
+            extent, made, records, receivers, count, hidden, casters, quads, looked_through, tile_words, tile, block,
+            values,
+        )  # fmt: skip
 
     def _draw_count(self, made, quads, looked_through, receivers, count, blocks, start: float) -> None:
         """D(p, c) of every receiver."""
         target = images.Target((count,))
         target.clear((start, 0.0, 0.0, 0.0))
         state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
-        lists = [("quads", quads, len(made.drawn), 6), ("triangles", *looked_through, 3)]
+        lists = [("quads", quads, len(made.drawn), 6), ("triangles", looked_through[0], len(looked_through[1]), 3)]
         with passes.drawing(target, **state):
             for what, records, total, corners in lists:
                 if total:
                     shader = passes.get(COUNT[what])
                     shader.bind(textures={f"{what}_records": records, "receivers": receivers}, blocks=blocks)
-                    passes.draw(shader, _corners(corners), total)
+                    passes.draw(shader, corner_batch(corners), total)
 
-    def _looked_through(self, frame: Frame, casters: CasterEdges, number: int) -> tuple[images.Image | None, int]:
-        """Casters that the way from the eye to what is seen may cross: list of corners and planes, and their number."""
+    def _looked_through(self, frame: Frame, casters: CasterEdges, number: int) -> tuple:
+        """Casters that the way from the eye to what is seen may cross: list of corners and planes, None without any, and
+        which they are."""
         camera = frame.snapshot.camera
         forward = -camera.matrix[:3, 2]
         depth = (casters.corners.astype(np.float64) - (camera.matrix[:3, 3] - frame.geometry.origin)) @ forward
@@ -238,7 +245,8 @@ class EdgeTiles:
             rows = np.zeros((len(own), 4, 4), np.float32)
             rows[:, :3, :3] = casters.corners[own]
             rows[:, 3] = casters.planes[own]
-            known = (key, images.upload_list(rows.reshape(-1, 4)) if len(own) else None, len(own))
+            rows[:, 0, 3] = casters.triangle_group[own]
+            known = (key, images.upload_list(rows.reshape(-1, 4)) if len(own) else None, own)
             self._triangles[number] = known
         return known[1:]
 
@@ -304,7 +312,7 @@ def nearest_receiver(frame: Frame, emitter: lights.Emitter) -> float:
 _batches: dict[int, geometry.Batch] = {}
 
 
-def _corners(count: int) -> geometry.Batch:
+def corner_batch(count: int) -> geometry.Batch:
     """A batch of so many corners that know nothing but their number."""
     if count not in _batches:
         vertices = geometry.vertex_buffer(number=np.arange(count, dtype=np.int32))

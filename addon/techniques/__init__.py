@@ -18,6 +18,7 @@ from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
+from .penumbra_wedges import PenumbraWedges
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
@@ -32,6 +33,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     VarianceSoftShadows,
     ConvolutionSoftShadows,
     DepthComplexity,
+    PenumbraWedges,
     ShadowsByLight,
     DirectLight,
     EmissiveLight,

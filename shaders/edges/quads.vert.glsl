@@ -31,6 +31,9 @@ void main()
   vec3 away = light_at_infinity() ? -edge_light.centre.xyz : v - edge_light.centre.xyz;
   flat_a = vec4(v0.xyz, v1.w);
   flat_b = vec4(v1.xyz, eye_side(v0.xyz, v1.xyz));
+#ifdef GROUPS
+  flat_group = v0.w;
+#endif
   if (edge_light.reach > 0.0) {
     // An orthographic eye sees a direction along its own as any point of the horizon: quads end beyond all receivers.
     gl_Position = project_flat(far ? v + safe_normalize(away) * edge_light.reach : v, 1.0);
