@@ -49,6 +49,7 @@ from ..lighting.edge_shadows import MOST_EDGES, EdgeShadows, EdgeView, shared_pa
 from ..lighting.edge_tiles import COUNT_INPUTS, LIGHT_BLOCK, LIT_TEXTURES, Lit
 from ..lighting.point_maps import CUTOFF
 from ..lighting.silhouettes import Extent
+from ..scene.edges import CasterEdges
 from ..scene.view import VIEW
 from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
@@ -57,6 +58,7 @@ from .depth_complexity import gathering
 GROUPS = 64  # four images of four channels of four digits
 BIAS = 24
 SQUARE_OF_DISC = np.sqrt(np.pi) / 2  # half a square's side, by the radius of a disc as large
+FEW_BORDERS = 0.15  # share of the edges of a body that may be borders
 CARD_POINTS = 64
 BOXES, PRODUCT, SUM = "BOXES", "PRODUCT", "SUM"
 UNIONS = ((BOXES, "By boxes", 0), (PRODUCT, "Product of shares", 1), (SUM, "Plain sum", 2))
@@ -175,10 +177,11 @@ class PenumbraWedges(EdgeShadows):
         away = -ends @ lit.extent.centre if lit.extent.infinite else np.linalg.norm(ends - lit.extent.centre, axis=2)
         nearest = np.minimum.reduceat(away.min(axis=1), first) if len(first) else first
         order = np.argsort(nearest, kind="stable")
+        layer = triangles_of_a_layer(lit.casters)
         rows = np.zeros((1, GROUPS, 4), np.float32)
         rows[0, :, 2] = 1.0
         for place, k in enumerate(order):
-            rows[0, place, :3] = first[k], first[k] + total[k], 2.0 if lit.casters.closed[names[k]] else 1.0
+            rows[0, place, :3] = first[k], first[k] + total[k], layer[names[k]]
         place_of = np.zeros(len(lit.casters.closed), np.int64)
         place_of[names[order]] = np.arange(len(order))
         quads = lit.found.records[lit.found.drawn][:, :2].copy()
@@ -244,3 +247,12 @@ class PenumbraWedges(EdgeShadows):
     def release(self) -> None:
         super().release()
         self._groups = {}
+
+
+def triangles_of_a_layer(casters: CasterEdges) -> np.ndarray:
+    """(G,) how many triangles a line through a group crosses where it hides something once: 2 of a body, 1 of a sheet. A
+    body with a few holes is no sheet."""
+    count = len(casters.closed)
+    edges = np.bincount(casters.group, minlength=count)
+    borders = np.bincount(casters.group[casters.faces[:, 1] < 0], minlength=count)
+    return np.where(borders <= FEW_BORDERS * edges, 2.0, 1.0)

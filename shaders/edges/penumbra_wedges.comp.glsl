@@ -12,7 +12,7 @@
 #include "edges/samples.glsl"
 #include "edges/penumbra.glsl"
 
-#define LEAST_AREA 0.001953125
+#define LEAST_AREA 1e-4  // of a quarter: rounding of areas is less
 #define NO_BORDER 1e-4
 #define COUNT_BIAS 24.0
 
