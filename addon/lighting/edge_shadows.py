@@ -1,8 +1,8 @@
 """Shadows by edges as a technique of the shadow slot: what depth complexity sampling and penumbra wedges share.
 
-For each light that it serves a technique fills an image before the light is added: either the share of the light that
-every pixel sees, with the light taken as a whole, or a bit for each of some points, with the light taken point by point.
-Lights that edges do not suit have the maps or rays of `fallback`: those without extent, round ones that are large beside
+For each light that it serves a technique fills an image before the light is added: either the share of the light which
+every pixel sees, with the light taken as a whole, or a bit for each of some points, with the light drawn point by
+point. Lights that edges do not suit have the maps or rays of `fallback`: those without extent, round ones that are large beside
 their distance, and those with more silhouette edges than tiles could stream.
 
 Edge light (lighting/repeated_light.py) is left to its guess: what was found belongs to this sample's surfaces.
@@ -79,18 +79,17 @@ class EdgeShadows(PointMaps):
             )
         )
 
-    def run(self, frame: Frame) -> None:
-        self.fallback.run(frame)
-        super().run(frame)
-        if frame.sample == 0:
-            geometry = frame.geometry
-            self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
-            self._served = {}
-            for emitter in frame.emitters:
-                reason, extent = self.suits(frame, emitter)
-                frame.count(self, reason or "lights by edges")
-                if extent is not None:
-                    self._served[emitter.light.key] = extent
+    def begin(self, frame: Frame) -> None:
+        self.fallback.begin(frame)
+        super().begin(frame)
+        geometry = frame.geometry
+        self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
+        self._served = {}
+        for emitter in frame.emitters:
+            reason, extent = self.suits(frame, emitter)
+            frame.count(self, reason or "lights by edges")
+            if extent is not None:
+                self._served[emitter.light.key] = extent
 
     def suits(self, frame: Frame, emitter: lights.Emitter) -> tuple[str, Extent | None]:
         """Why edges do not suit a light, and its extent where they do."""

@@ -50,6 +50,7 @@ from ..lighting.edge_shadows import (
     shared_patterns,
 )
 from ..lighting.edge_tiles import LIGHT_BLOCK, LIT_TEXTURES, Lit
+from ..lighting.light_rates import LightRates
 from ..lighting.loop import lighting
 from ..lighting.point_maps import CUTOFF
 from ..lighting.textured_volumes import CARD_TEXTURES, CARD_WORDS
@@ -107,6 +108,7 @@ LIGHTING = tuple(lighting(lookup, False) for lookup in (SHARE_LOOKUP, bits_looku
 class DepthComplexity(EdgeShadows):
     name = "depth_complexity"
     label = "Depth complexity sampling"
+    requests = (LightRates,)
     params = (
         Param("points", "Points", "64", "Points of each light to which layers are counted from a pixel", items=COUNTS),
         Param("mode", "Light", AUTO, "How the points that are seen become light", items=MODES),
@@ -123,12 +125,13 @@ class DepthComplexity(EdgeShadows):
     def __init__(self):
         super().__init__(AccumulatedMaps())
 
-    def run(self, frame: Frame) -> None:
-        super().run(frame)
+    def begin(self, frame: Frame) -> None:
+        super().begin(frame)
         points = self.points(frame)
-        if points:
-            for key in self._served:
-                frame.rates[key] = Rate(points.bit_length() - 1)
+        if points and self._served:
+            rates = frame.service(LightRates) or LightRates()
+            rates.by_light |= dict.fromkeys(self._served, Rate(points.bit_length() - 1))
+            frame.provide(rates)
 
     def points(self, frame: Frame) -> int:
         mode = frame.settings.get(self, "mode")

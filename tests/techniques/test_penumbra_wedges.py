@@ -300,6 +300,15 @@ def _along(q):
 
 def test_extent_of_a_sun_is_its_cone():
     emitter = lights.Emitter(
-        None, lights.SUN, 0, np.array([0, 0, 1.0]), 0.1, np.ones(3), 1.0, np.array([0, 0, -1.0]), 0.0, *[np.zeros(3)] * 3
+        None,
+        lights.SUN,
+        0,
+        np.array([0, 0, 1.0]),
+        0.1,
+        np.ones(3),
+        1.0,
+        np.array([0, 0, -1.0]),
+        0.0,
+        *[np.zeros(3)] * 3,
     )
     assert silhouettes.Extent.of(emitter).radius == pytest.approx(2 * np.sin(0.05))
