@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import again, costs, direct, edges, everything, growth, hashes, indirect, page, profile, random_scenes, run
 
 VERBS = {
     "run": run,
@@ -16,6 +16,7 @@ VERBS = {
     "indirect": indirect,
     "profile": profile,
     "costs": costs,
+    "edges": edges,
     "random": random_scenes,
     "page": page,
     "hashes": hashes,

@@ -2,8 +2,8 @@
 
 For each light that it serves a technique fills an image before the light is added: either the share of the light which
 every pixel sees, with the light taken as a whole, or a bit for each of some points, with the light drawn point by
-point. Lights that edges do not suit have the maps or rays of `fallback`: those without extent, round ones that are large beside
-their distance, and those with more silhouette edges than tiles could stream.
+point. Lights that edges do not suit have the maps or rays of `fallback`: those without extent, round ones that are
+large beside their distance, and those with more silhouette edges than tiles could stream.
 
 Edge light (lighting/repeated_light.py) is left to its guess: what was found belongs to this sample's surfaces.
 """
@@ -29,7 +29,7 @@ from .edge_tiles import EdgeTiles, Lit
 from .point_maps import PointMaps
 from .silhouettes import Extent
 from .textured_volumes import CARD_WORDS, CardCache
-from .visibility import Lookup, Maps
+from .visibility import Lookup, Maps, VisibilityProvider
 
 NEAR = 0.25  # radius / distance of a round light from which rays take over, as direct_light has it
 PATTERNS = 16  # of neighbouring pixels, four by four
@@ -80,7 +80,6 @@ class EdgeShadows(PointMaps):
         )
 
     def begin(self, frame: Frame) -> None:
-        self.fallback.begin(frame)
         super().begin(frame)
         geometry = frame.geometry
         self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
@@ -90,6 +89,9 @@ class EdgeShadows(PointMaps):
             frame.count(self, reason or "lights by edges")
             if extent is not None:
                 self._served[emitter.light.key] = extent
+        if len(self._served) < len(frame.emitters):
+            self.fallback.begin(frame)
+            frame.provide(self, VisibilityProvider)
 
     def suits(self, frame: Frame, emitter: lights.Emitter) -> tuple[str, Extent | None]:
         """Why edges do not suit a light, and its extent where they do."""
@@ -117,7 +119,7 @@ class EdgeShadows(PointMaps):
         return 0
 
     def serving(self, emitter: lights.Emitter) -> PointMaps:
-        return self if emitter.light.key in self._served else self.fallback
+        return self if emitter.light.key in self._served else self.fallback.serving(emitter)
 
     def cell(self, frame: Frame, number: int, points: float) -> float:
         return 0.0 if self.points(frame) else 1.0

@@ -1,4 +1,4 @@
-"""Edges and tiles on the GPU: receivers, how often each has the light's centre hidden, and which edges matter to a tile.
+"""Edges and tiles on the GPU: receivers, how often each has the light's centre hidden, and which edges a tile needs.
 
 Everything here is done once per light and sample, for techniques that then gather per pixel (shaders/edges/*).
 
@@ -6,7 +6,7 @@ Everything here is done once per light and sample, for techniques that then gath
 |---|---|---|---|
 | receivers | 1 over the screen | 6 per pixel | 16 per pixel |
 | bounds | 1 dispatch | 1 per pixel | 32 per tile |
-| count | 1 additive draw, a quad per silhouette edge, a triangle per caster that the camera looks through | 1 per fragment | 2 per pixel |
+| count | 1 additive draw of shadow quads, and of triangles that the camera looks through | 1 a fragment | 2 a pixel |
 | words | 1 dispatch, a thread per word and tile | 4 per edge and tile | 4 per 32 edges and tile |
 
 Words need no atomic operation and cannot overflow. They are made in runs of at most MOST_WORDS; where edges and tiles
@@ -183,7 +183,8 @@ class EdgeTiles:
             "centre": (*extent.centre, float(extent.infinite)),
             "axis": (*extent.emitter.axis, 0.0),
             "size": (extent.radius, extent.disc, float(hidden.sum()), frame.offset_size),
-            "eye": tuple(eye), "reach": reach_of(frame, casters) if eye[3] > 0.5 else 0.0, "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
+            "eye": tuple(eye), "reach": reach_of(frame, casters) if eye[3] > 0.5 else 0.0,
+            "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
             "tile_columns": columns, "point_count": 1, "pattern_count": 1, "first_row": 0, "card_count": 0,
             "card_words": 0, "salt": 0, "group_count": 0,
         }  # fmt: skip
@@ -230,8 +231,8 @@ class EdgeTiles:
                     passes.draw(shader, corner_batch(corners), total)
 
     def _looked_through(self, frame: Frame, casters: CasterEdges, number: int) -> tuple:
-        """Casters that the way from the eye to what is seen may cross: list of corners and planes, None without any, and
-        which they are."""
+        """Casters that the way from the eye to what is seen may cross: list of corners and planes, None without any,
+        and which they are."""
         camera = frame.snapshot.camera
         forward = -camera.matrix[:3, 2]
         depth = (casters.corners.astype(np.float64) - (camera.matrix[:3, 3] - frame.geometry.origin)) @ forward

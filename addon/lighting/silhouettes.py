@@ -1,8 +1,8 @@
-"""Silhouettes of a light: which edges can hide a part of it, in which wedge of space, and how often its centre is hidden.
+"""Silhouettes of a light: which edges can hide a part of it, in which wedge of space, and what hides its centre.
 
-The number D(p, s) of triangles between a receiver p and a point s of a light is known at every s once it is known at the
-light's centre c: it changes by an edge's weight where the edge lies in the triangle (p, c, s). So each edge is asked
-once by the receivers that it can matter to:
+The number D(p, s) of triangles between a receiver p and a point s of a light is known at every s once it is known at
+the light's centre c: it changes by an edge's weight where the edge lies in the triangle (p, c, s). So each edge is
+asked once by the receivers that it can matter to:
 
 | step | what | where |
 |---|---|---|
@@ -12,13 +12,13 @@ once by the receivers that it can matter to:
 | words | which edges matter to a tile of pixels, 32 to a word | compute (edge_tiles.py) |
 | gather | per pixel, over the words of its tile | compute, by each technique |
 
-The wedge is tangent to the ball around the light (radius r): the shadow quad of the edge, its farther end pulled towards
-the light, turned about the edge until it touches the ball on either side, and about its ends likewise. Where the edge's
-line meets the ball there is no wedge, and the edge is asked everywhere. Testing only that the weight is zero from every
-corner of the light would lose edges; a face's plane must be proven not to cut it.
+The wedge is tangent to the ball around the light (radius r): the shadow quad of the edge, its farther end pulled
+towards the light, turned about the edge until it touches the ball on either side, and about its ends likewise. Where
+the edge's line meets the ball there is no wedge, and the edge is asked everywhere. Testing only that the weight is zero
+from every corner of the light would lose edges; a face's plane must be proven not to cut it.
 
 Sources: Forest, Barthe, Paulin, "Accurate shadows by depth complexity sampling", CGF 27(2), 2008, and Forest's thesis,
-Toulouse 2008; Assarsson, Akenine-Moeller, ToG 22(3), 2003 (wedges); Laine et al., ToG 24, 2005 (silhouettes of an area).
+Toulouse 2008; Assarsson, Akenine-Moeller, ToG 22(3), 2003 (wedges); Laine et al., ToG 24, 2005 (silhouettes).
 Wedges by tangent planes, the predicate on a triangle (p, c, s) and the count from the eye instead of capped volumes are
 ours: the published wedge lets 1.2 % of shadows fall outside.
 """

@@ -1,15 +1,15 @@
 """Soft textured shadow volumes: soft shadows of triangles whose opacity varies, by their opacity maps.
 
 A leaf or a fence on a card is two triangles and a picture, and edges see its outline alone. So each such triangle is
-asked by the receivers that it can hide a part of a light from: every point of the light is projected through it onto its
-plane, and the opacity there decides. The result is a set of points that are hidden, to be joined with what opaque
+asked by the receivers that it can hide a part of a light from: every point of the light is projected through it onto
+its plane, and the opacity there decides. The result is a set of points that are hidden, to be joined with what opaque
 casters hide (depth_complexity.comp.glsl): where triangles overlap nothing counts twice.
 
 Opacity is that of scene/opacity_maps.py, a tile of cells in the triangle's own axes, 256 levels each: no UVs, and any
 material. What is partly opaque hides a point by lot, so that two sheets of one half let a quarter pass.
 
-Which triangles matter to a tile of pixels is told by balls: around the triangle, around the tile's receivers, and around
-the light. This holds for triangles seen edge on, too, where a volume of planes would need a second one.
+Which triangles matter to a tile of pixels is told by balls: around the triangle, around the tile's receivers, and
+around the light. This holds for triangles seen edge on, too, where a volume of planes would need a second one.
 
 | cost | |
 |---|---|

@@ -8,11 +8,11 @@ errs is the number of points. Triangles with alpha are asked by their opacity (l
 
 | mode | light | visibility | for |
 |---|---|---|---|
-| share | as a whole, in closed form | share of the points that are seen, weighted as on a Lambertian surface | few samples |
+| share | as a whole, in closed form | share of the points that are seen, by what each brings | few samples |
 | points | by its 16 or 64 points, each lit for itself | a bit for each | many samples, gloss; the mean is exact |
 
-With shares, neighbouring pixels ask 16 different patterns, nets of one sequence that are a net together, and in pictures
-of few samples a mean over them on the same plane (`smooth`) takes most of the noise out; each sample has other patterns.
+With shares, neighbouring pixels ask 16 different patterns, nets of one sequence that are a net together. In pictures of
+few samples a mean over those on the same plane (`smooth`) takes noise out; each sample has other patterns.
 
 | cost | per light and sample |
 |---|---|
@@ -53,7 +53,7 @@ from ..lighting.edge_tiles import LIGHT_BLOCK, LIT_TEXTURES, Lit
 from ..lighting.light_rates import LightRates
 from ..lighting.loop import lighting
 from ..lighting.point_maps import CUTOFF
-from ..lighting.textured_volumes import CARD_TEXTURES, CARD_WORDS
+from ..lighting.textured_volumes import CARD_TEXTURES
 from ..scene.view import VIEW
 from ..sources.rates import Rate
 from .accumulated_maps import AccumulatedMaps
@@ -73,7 +73,8 @@ def gathering(points: int, tile: int, bits: bool, cards: bool, standard: bool = 
         name=f"depth complexity of {points} {'points' if bits else 'shares'}",
         compute="edges/depth_complexity.comp.glsl",
         textures=(
-            *LIT_TEXTURES, ("RGBA32F", "light_pattern"), *(() if bits else (NORMAL,)), *(CARD_TEXTURES if cards else ()),
+            *LIT_TEXTURES, ("RGBA32F", "light_pattern"), *(() if bits else (NORMAL,)),
+            *(CARD_TEXTURES if cards else ()),
         ),
         images=(seen,),
         blocks=(LIGHT_BLOCK,),

@@ -20,13 +20,13 @@ A hidden areas, B areas of boxes, v what was hidden before, s the group. Disjoin
 | per pixel and edge in its tile | 4 fetches, 60 operations to reject, 300 else |
 | bytes | 90 per pixel; 128 per silhouette edge |
 
-For previews of few casters: a light whose edges belong to more than 64 groups has maps or rays instead. The light is
-taken as a whole (in closed form) and of one colour. Discs and spheres count as squares of their area, turned with the
-receiver. Alpha casters are asked by 64 points (lighting/textured_volumes.py) and their hidden share is added: too dark
-where both overlap.
+For previews of few casters: a light whose edges belong to more than 64 groups has depth complexity sampling instead, as
+have all lights that wedges do not suit. The light is taken as a whole (in closed form) and of one colour. Discs and
+spheres count as squares of their area, turned with the receiver. Alpha casters are asked by 64 points
+(lighting/textured_volumes.py) and their hidden share is added: too dark where both overlap.
 
 Wrong by construction: gloss, whose highlight does not know which part of the light is hidden; textures on the light;
-open curved sheets that fold over themselves, whose layers an area cannot tell apart (depth_complexity.py is exact there).
+open curved sheets that fold over themselves, whose layers an area cannot tell apart (depth_complexity.py can).
 
 Source: Forest, Barthe, Paulin, "Realistic soft shadows by penumbra-wedges blending", Graphics Hardware 2006. Areas in
 closed form instead of a table, boxes that do not depend on the order of edges, and weights as seen from the receiver
@@ -52,8 +52,7 @@ from ..lighting.silhouettes import Extent
 from ..scene.edges import CasterEdges
 from ..scene.view import VIEW
 from ..sources import lights
-from .accumulated_maps import AccumulatedMaps
-from .depth_complexity import gathering
+from .depth_complexity import DepthComplexity, gathering
 
 GROUPS = 64  # four images of four channels of four digits
 BIAS = 24
@@ -121,7 +120,7 @@ class PenumbraWedges(EdgeShadows):
     by_group = True
 
     def __init__(self):
-        super().__init__(AccumulatedMaps())
+        super().__init__(DepthComplexity())
         self._groups: dict[str, tuple] = {}  # by light: silhouettes, groups' numbers, list, quads
 
     def accurate(self, frame: Frame) -> bool:
@@ -133,7 +132,7 @@ class PenumbraWedges(EdgeShadows):
             return reason, None
         known = self.tiles.found(frame, self._casters, extent, self.accurate(frame), True)
         if len(np.unique(known[5].group[known[1].numbers])) > GROUPS:
-            return "lights with too many groups of edges: rays or maps", None
+            return "lights with too many groups of edges: depth complexity", None
         return "", extent
 
     def gather(self, frame: Frame, lit: Lit, views: list[EdgeView], found: images.Image) -> Iterator[None]:
@@ -250,8 +249,8 @@ class PenumbraWedges(EdgeShadows):
 
 
 def triangles_of_a_layer(casters: CasterEdges) -> np.ndarray:
-    """(G,) how many triangles a line through a group crosses where it hides something once: 2 of a body, 1 of a sheet. A
-    body with a few holes is no sheet."""
+    """(G,) how many triangles a line through a group crosses where it hides something once: 2 of a body, 1 of a sheet.
+    A body with a few holes is no sheet."""
     count = len(casters.closed)
     edges = np.bincount(casters.group, minlength=count)
     borders = np.bincount(casters.group[casters.faces[:, 1] < 0], minlength=count)

@@ -59,7 +59,7 @@ def sign(x):
 
 
 def layers_by_edges(scene, found, extent, p, s):
-    """The same by D(p, c) and the edges in the triangle (p, c, s), as shaders/edges/depth_complexity.comp.glsl has it."""
+    """The same by D(p, c) and the edges in the triangle (p, c, s), as depth_complexity.comp.glsl has it."""
     c = extent.centre if extent.infinite else extent.centre - p
     count = layers(scene, p, extent.centre, extent.infinite)
     offset = s - extent.centre

@@ -1,4 +1,4 @@
-"""Depth complexity sampling: numbers of layers against brute force, penumbrae in closed form, alpha, what it leaves alone."""
+"""Depth complexity sampling: layers against brute force, penumbrae in closed form, and what it leaves alone."""
 
 import bpy
 import numpy as np
@@ -89,7 +89,9 @@ def _on_disc(emitter, p, offset):
 def fill(stage):
     """The scene of the specification: an open monkey, a closed cube, an open sheet, a thin ring, over a floor."""
 
-    def add(operator, location, turn, material=stage.diffuse(0.8), **options):
+    material = stage.diffuse(0.8)
+
+    def add(operator, location, turn, **options):
         operator(location=location, rotation=turn, **options)
         thing = bpy.context.object
         thing.data.materials.append(material)
@@ -178,7 +180,7 @@ def test_the_penumbra_of_a_half_plane_is_linear(by_edges, height, width):
 
 @pytest.mark.parametrize("points, error", ((64, 0.0174), (16, 0.049)))
 def test_noise_of_one_edge_is_that_of_a_stratified_pattern(by_edges, points, error):
-    """The specification's figure for jittered points, for edges at any angle; a net has less, never more than 15 % more."""
+    """Jittered points have this error at edges of any angle; a net has less, never more than 15 % more."""
     stage = by_edges
     stage.floor()
     stage.blocker((-20, -20), (0, 20), 2.0, turn=(0, 0, 0.6))
@@ -308,8 +310,8 @@ def test_scenes_that_need_none_say_so(by_edges):
 
 
 def test_odd_casters_are_survived(by_edges):
-    """A caster that meets the light, a triangle without area, three faces at an edge, an edge on a line with the light, an
-    object flattened to nothing, one mirrored: finite light, and shadows where they must be."""
+    """A caster that meets the light, a triangle without area, three faces at an edge, an edge on a line with the light,
+    an object flattened to nothing, one mirrored: finite light, and shadows where they must be."""
     stage = by_edges
     stage.floor()
     stage.light("AREA", (0, 0, 4), size=1.0, shape="SQUARE")

@@ -1,4 +1,4 @@
-"""Penumbra wedge blending: areas in closed form, known values of the union of several casters, and what it leaves alone."""
+"""Penumbra wedge blending: areas in closed form, known values of unions of casters, and what it leaves alone."""
 
 import bpy
 import numpy as np
@@ -221,7 +221,7 @@ def test_alpha_casters_are_added(by_wedges):
     assert np.abs(share(stage, size) - expected).mean() < 0.02
 
 
-def test_lights_with_too_many_groups_have_maps(by_wedges):
+def test_lights_with_too_many_groups_have_depth_complexity(by_wedges):
     stage = by_wedges
     stage.floor()
     for k in range(70):
@@ -229,7 +229,7 @@ def test_lights_with_too_many_groups_have_maps(by_wedges):
     square(stage)
     stage.camera_above()
     stage.render()
-    assert row(stage).counters["lights with too many groups of edges: rays or maps"] == 1
+    assert row(stage).counters["lights with too many groups of edges: depth complexity"] == 1
 
 
 def test_boxes_hold_what_a_group_hides():
