@@ -162,7 +162,7 @@ class EdgeShadows(PointMaps):
             lit = self.tiles.light(
                 frame, self, self._casters, extent, self.accurate(frame), self.by_group, number
             )  # fmt: skip
-            lit.update(first_row=number * frame.size[1])
+            lit.update(picture_row=number * frame.size[1])
             yield from self.gather(frame, lit, views, found)
 
     def card_words(self, frame: Frame, lit: Lit) -> dict[str, images.Image]:
@@ -174,7 +174,7 @@ class EdgeShadows(PointMaps):
         words = -(-cards.count // 32)
         rows = -(-words * low.width * low.height // images.LIST_WIDTH)
         found = self.tiles.kept("card words", images.LIST_WIDTH, rows, "R32UI")
-        lit.update(card_count=cards.count, card_words=words)
+        lit.update(card_count=cards.count, card_word_count=words)
         passes.compute(
             CARD_WORDS, (images.LIST_WIDTH, rows),
             textures={"card_records": cards.records, "low_of_tiles": low, "high_of_tiles": high},
@@ -188,7 +188,7 @@ class EdgeShadows(PointMaps):
         return (frame.sample * 7919 + frame.settings.seed * 104729) % 2**24
 
     def gather(self, frame: Frame, lit: Lit, views: list[EdgeView], found: images.Image) -> Iterator[None]:
-        """Fill the light's part of `found`, from row block.first_row on."""
+        """Fill the light's part of `found`, from row block.picture_row on."""
         raise NotImplementedError
 
     def release(self) -> None:

@@ -47,9 +47,9 @@ EDGE_LIGHT = Struct(
     ("int", "tile_columns"),
     ("int", "point_count"),
     ("int", "pattern_count"),
-    ("int", "first_row"),  # of this light's part of the images that hold several
+    ("int", "picture_row"),  # of this light's part of the images that hold several
     ("int", "card_count"),
-    ("int", "card_words"),
+    ("int", "card_word_count"),
     ("int", "salt"),
     ("int", "group_count"),
 )
@@ -185,8 +185,8 @@ class EdgeTiles:
             "size": (extent.radius, extent.disc, float(hidden.sum()), frame.offset_size),
             "eye": tuple(eye), "reach": reach_of(frame, casters) if eye[3] > 0.5 else 0.0,
             "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
-            "tile_columns": columns, "point_count": 1, "pattern_count": 1, "first_row": 0, "card_count": 0,
-            "card_words": 0, "salt": 0, "group_count": 0,
+            "tile_columns": columns, "point_count": 1, "pattern_count": 1, "picture_row": 0, "card_count": 0,
+            "card_word_count": 0, "salt": 0, "group_count": 0,
         }  # fmt: skip
         while len(self._blocks) <= number:
             self._blocks.append(Block(EDGE_LIGHT, **values))

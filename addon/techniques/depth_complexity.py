@@ -155,10 +155,10 @@ class DepthComplexity(EdgeShadows):
         smooth = several and few and frame.settings.get(self, "smooth")
         cards = self.card_words(frame, lit)
         lit.update(shape=shape, point_count=points, pattern_count=len(texels), salt=self.salt(frame))
-        first_row = lit.values["first_row"]
+        first_row = lit.values["picture_row"]
         into = self.tiles.kept("raw share", *frame.size, "R32F") if smooth else found
         if smooth:
-            lit.update(first_row=0)
+            lit.update(picture_row=0)
         program = gathering(points, lit.tile, bits, bool(cards), not self.accurate(frame))
         textures = {**lit.textures, "light_pattern": images.upload(texels), **cards}
         if not bits:
@@ -171,7 +171,7 @@ class DepthComplexity(EdgeShadows):
             )  # fmt: skip
             yield
         if smooth:
-            lit.update(first_row=first_row)
+            lit.update(picture_row=first_row)
             passes.compute(
                 SMOOTH, frame.size, images={"seen_share": found},
                 textures={

@@ -227,7 +227,7 @@ class PenumbraWedges(EdgeShadows):
         values = dict(lit.values)
         lit.update(
             shape=shape, point_count=CARD_POINTS, pattern_count=len(texels), salt=self.salt(frame), word_count=0,
-            first_row=0,
+            picture_row=0,
         )  # fmt: skip
         none = self.tiles.kept("no layers", *frame.size, "R16F")
         images.Target((none,)).clear()

@@ -8,7 +8,7 @@ void main()
   ivec2 place = ivec2(gl_GlobalInvocationID.xy);
   ivec2 tiles = low_of_tiles_size();
   int index = place.x + 2048 * place.y;
-  int tile = index / edge_light.card_words;
+  int tile = index / edge_light.card_word_count;
   if (place.x >= 2048 || tile >= tiles.x * tiles.y) {
     return;
   }
@@ -20,7 +20,7 @@ void main()
     vec3 middle = 0.5 * (low + high);
     float reach = 0.5 * length(high - low);
     vec3 to_centre = towards_centre(middle);
-    int first = (index % edge_light.card_words) * 32;
+    int first = (index % edge_light.card_word_count) * 32;
     int last = min(first + 32, edge_light.card_count);
     for (int card = first; card < last; card++) {
       int texel = CARD_TEXELS * card + 4;

@@ -114,8 +114,8 @@ void main()
     }
     seen = all & ~hidden;
 #ifdef CARDS
-    int card_base = (tile.x + tile.y * edge_light.tile_columns) * edge_light.card_words;
-    for (int w = 0; w < edge_light.card_words; w++) {
+    int card_base = (tile.x + tile.y * edge_light.tile_columns) * edge_light.card_word_count;
+    for (int w = 0; w < edge_light.card_word_count; w++) {
       uint word = card_words_fetch(ivec2((card_base + w) & 2047, (card_base + w) >> 11)).x;
       while (word != 0u && (seen.x | seen.y) != 0u) {
         int bit = findLSB(word);
@@ -139,7 +139,7 @@ void main()
 #endif
   }
 #ifdef BITS
-  int row = pixel.y + 2 * edge_light.first_row;
+  int row = pixel.y + 2 * edge_light.picture_row;
   imageStore(seen_points, ivec2(pixel.x, row), uvec4(seen.x, 0u, 0u, 0u));
   if (POINTS > 32) {
     imageStore(seen_points, ivec2(pixel.x, row + size.y), uvec4(seen.y, 0u, 0u, 0u));
@@ -162,6 +162,6 @@ void main()
   }
   float plain = float(bitCount(seen.x) + bitCount(seen.y)) / float(POINTS);
   float share = (total > 0.0) ? arriving / total : plain;
-  imageStore(seen_share, pixel + ivec2(0, edge_light.first_row), vec4(share, 0.0, 0.0, 0.0));
+  imageStore(seen_share, pixel + ivec2(0, edge_light.picture_row), vec4(share, 0.0, 0.0, 0.0));
 #endif
 }

@@ -196,5 +196,5 @@ void main()
 #ifdef CARDS
   share = clamp(share + cards_share_fetch(pixel).x - 1.0, 0.0, 1.0);
 #endif
-  imageStore(seen_share, pixel + ivec2(0, edge_light.first_row), vec4(share, 0.0, 0.0, 0.0));
+  imageStore(seen_share, pixel + ivec2(0, edge_light.picture_row), vec4(share, 0.0, 0.0, 0.0));
 }

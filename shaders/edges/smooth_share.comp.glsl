@@ -34,5 +34,5 @@ void main()
     }
   }
   own = (total > 0.0) ? sum / total : own;
-  imageStore(seen_share, pixel + ivec2(0, edge_light.first_row), vec4(own, 0.0, 0.0, 0.0));
+  imageStore(seen_share, pixel + ivec2(0, edge_light.picture_row), vec4(own, 0.0, 0.0, 0.0));
 }

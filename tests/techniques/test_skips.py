@@ -65,6 +65,8 @@ WITHOUT = {
     "accumulated_maps": no_shadow,
     "vssm": no_shadow,
     "cssm": no_shadow,
+    "depth_complexity": no_shadow,
+    "penumbra_wedges": no_shadow,
     "shadows_by_light": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
