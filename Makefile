@@ -1,6 +1,6 @@
 # Every target makes the environment that it needs first; see tools/environment.py.
 
-# 5.2 (the current LTS), 5.0 or 4.5 (the older LTS), each in an environment of its own.
+# 5.2 (the current LTS), 5.3 (the newest, on Vulkan), 5.0 or 4.5 (the older LTS), each in an environment of its own.
 BLENDER ?= 5.2
 PYTHON3 ?= python3
 STRESS ?= 2000
@@ -14,7 +14,7 @@ PYTHON := $(ENVIRONMENT)/bin/python
 .PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
 
 help: ## this list
-	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
+	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1@\2/p' Makefile | column -t -s @
 
 environment: ## the virtual environment, with Blender as a Python module
