@@ -6,6 +6,7 @@
 | costs | processor time of the shadows alone, by points, patterns and modes |
 | fence | the same fence as a card of two triangles with a mask, and as a mesh of wires |
 | equal | casters by light size: time of rays and of maps with as many samples as leave the error of edges at one |
+| cycles | direct light of the scenes of bench/edge_scenes.py against Cycles |
 | growth | time, edges and bytes by casters, lights and pixels |
 
 Only pixels that show the same surface in one sample as in many are compared, as everything else is the film's. Times
@@ -20,14 +21,14 @@ from pathlib import Path
 
 import numpy as np
 
-from . import markdown, soft, soft_scenes
+from . import edge_scenes, markdown, soft, soft_scenes
 from .quick import size_of, table
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "edge_shadows.md"
 COMMAND = "python -m bench edges --page"
 DCS, PWB = "depth_complexity", "penumbra_wedges"
 RAYS_OF_TRUTH = 1024
-PARTS = ("families", "costs", "fence", "equal", "growth")
+PARTS = ("families", "cycles", "costs", "fence", "equal", "growth")
 
 
 def dcs(points: int, **values) -> tuple[tuple[str, object], ...]:
@@ -298,6 +299,50 @@ def samples_for(error: float, errors: list[float]) -> float:
     return np.inf
 
 
+AGAINST_CYCLES = (
+    soft.Entrant("DCS, 64 points one by one, 16 samples", DCS, dcs(64, mode="POINTS"), 16),
+    soft.Entrant("DCS, 64 points share, 1 sample", DCS, dcs(64)),
+    soft.Entrant("DCS, standard edges, 16 samples", DCS, dcs(64, mode="POINTS", accurate=False), 16),
+    soft.Entrant("PWB, boxes", PWB, (("union", "BOXES"),)),
+    soft.Entrant("PWB, plain sum", PWB, (("union", "SUM"),)),
+    soft.Entrant("rays, 256 samples", soft.POINTS, soft.BY_RAYS, 256),
+)
+CYCLES_SAMPLES = 512
+
+
+def against_cycles(options) -> str:
+    """RMS of the direct light, by the 95th percentile of Cycles' own."""
+    from addon.compare.reference import reference, render_passes
+
+    def direct(images) -> np.ndarray:
+        return sum(
+            images[f"{kind}_direct"][..., 0].astype(np.float64) * images[f"{kind}_color"][..., 0]
+            for kind in ("diffuse", "glossy")
+        )
+
+    rows = {entrant.label: [] for entrant in AGAINST_CYCLES} | {"noise of Cycles": []}
+    for name in edge_scenes.SCENES:
+        scene = edge_scenes.build(name)
+        made = reference(scene, CYCLES_SAMPLES, True, options.size)
+        expected = direct(made.images)
+        scale = float(np.percentile(expected, 95))
+        one_seed = direct({key: made.images[key] + made.half.get(key, 0.0) for key in made.images})
+        for entrant in AGAINST_CYCLES:
+            soft.configure(scene, entrant)
+            images = render_passes(scene, "CANDELA", entrant.samples, 1, direct_only=True, size=options.size).images
+            off = (direct(images) - expected) / scale
+            kept = np.abs(off) < np.inf
+            rows[entrant.label].append(f"{np.sqrt((off[kept] ** 2).mean()):.4f} ({off.mean():+.4f})")
+            if options.pictures:
+                path = options.pictures / f"cycles, {name}, {entrant.label}.png".replace(" ", "_").replace(",", "")
+                soft.save(path, direct(images) / scale * 0.8, expected / scale * 0.8)
+        rows["noise of Cycles"].append(f"{np.sqrt(((one_seed - expected) ** 2).mean()) / scale:.4f}")
+        print(f"{name} done", flush=True)
+    head = ("RMS (mean error)", *edge_scenes.SCENES)
+    text = f"### Direct light against Cycles (2 x {CYCLES_SAMPLES} samples), by its 95th percentile"
+    return f"{text}\n\n" + show([head, *((label, *cells) for label, cells in rows.items())])
+
+
 def growth(options) -> str:
     rows = [("casters", "lights", "pixels", "edges", "words", "ms", "MiB kept")]
     own = soft.Entrant("edges", DCS, dcs(64))
@@ -344,7 +389,14 @@ def command(options: argparse.Namespace) -> int:
     addon.register()
     with quiet():
         context.ensure()
-    made = {"families": families, "costs": costs, "fence": fence, "equal": equal, "growth": growth}
+    made = {
+        "families": families,
+        "cycles": against_cycles,
+        "costs": costs,
+        "fence": fence,
+        "equal": equal,
+        "growth": growth,
+    }
     parts = [f"{options.size[0]}x{options.size[1]} pixels, a software GPU."]
     parts += [made[part](options) for part in options.parts]
     if options.page:
