@@ -19,11 +19,13 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..sampling import sequence
 from ..scene import edges
 from ..scene.edges import CasterEdges, EdgeCache
 from ..snapshot.scene import Snapshot
 from ..sources import lights
+from ..surfaces.draw import SURFACES
 from . import edge_tiles, repeated_light
 from .edge_tiles import EdgeTiles, Lit
 from .point_maps import PointMaps
@@ -61,6 +63,8 @@ class EdgeView:
 class EdgeShadows(PointMaps):
     """Base; `gather` is the technique's own."""
 
+    reads = SURFACES
+
     def __init__(self, fallback: PointMaps):
         super().__init__()
         self.fallback = fallback
@@ -78,6 +82,9 @@ class EdgeShadows(PointMaps):
                 else "no light that casts shadows has extent"
             )
         )
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return edge_tiles.programs_for(snapshot.film.border_size)
 
     def begin(self, frame: Frame) -> None:
         super().begin(frame)

@@ -105,6 +105,11 @@ def programs() -> tuple[Program, ...]:
     return (RECEIVERS, *BOUNDS.values(), WORDS, *COUNT.values())
 
 
+def programs_for(size: tuple[int, int]) -> tuple[Program, ...]:
+    """Those that a picture of this size is sure to need."""
+    return RECEIVERS, BOUNDS[tile_side(size, 1)], WORDS, COUNT["quads"]
+
+
 @dataclass
 class Lit:
     """What a technique gathers from: one light's edges, and this sample's receivers, count and tile words."""
