@@ -11,7 +11,7 @@
 
 Only pixels that show the same surface in one sample as in many are compared, as everything else is the film's. Times
 are processor time of whole renders on a software GPU less that of the same render without shadows, the least of some.
-With `--page` the tables become a part of docs/edge_shadows.md; with `--pictures` visibilities are written.
+With `--page` each table becomes a part of docs/edge_shadows.md; with `--pictures` visibilities are written.
 """
 
 from __future__ import annotations
@@ -397,8 +397,8 @@ def command(options: argparse.Namespace) -> int:
         "equal": equal,
         "growth": growth,
     }
-    parts = [f"{options.size[0]}x{options.size[1]} pixels, a software GPU."]
-    parts += [made[part](options) for part in options.parts]
-    if options.page:
-        markdown.put_between(PAGE, COMMAND, "\n\n".join(parts))
+    for part in options.parts:
+        text = f"{made[part](options)}\n\n{options.size[0]}x{options.size[1]} pixels, a software GPU."
+        if options.page:
+            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
     return 0

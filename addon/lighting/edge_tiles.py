@@ -153,7 +153,8 @@ class EdgeTiles:
         self._kept: dict[str, images.Image] = {}
         self._lists: dict[str, tuple] = {}  # by light: key, silhouettes, records, wedges, quads
         self._blocks: list[Block] = []
-        self._triangles: dict[int, tuple] = {}  # by number of light: key, list, count
+        self._triangles: dict[int, tuple] = {}  # by number of light: key, list, which casters
+        self._eyes: dict[str, tuple] = {}  # by light: key, which casters lie before its centre
 
     def found(self, frame: Frame, casters: CasterEdges, extent: Extent, accurate: bool, by_group: bool) -> tuple:
         """Silhouettes of a light with their lists on the GPU, from before if nothing changed."""
@@ -183,7 +184,7 @@ class EdgeTiles:
         tile = tile_side(frame.size, words)
         columns, rows = -(-width // tile), -(-height // tile)
         eye = eye_of(frame)
-        hidden = silhouettes.hidden_from_eye(casters, extent, eye)
+        hidden = self._hidden(frame, casters, extent, eye)
         values = {
             "centre": (*extent.centre, float(extent.infinite)),
             "axis": (*extent.emitter.axis, 0.0),
@@ -222,6 +223,14 @@ class EdgeTiles:
             values,
         )  # fmt: skip
 
+    def _hidden(self, frame: Frame, casters: CasterEdges, extent: Extent, eye: np.ndarray) -> np.ndarray:
+        """(T,) which casters lie between the eye and the light's centre; kept while neither moves."""
+        light = extent.emitter.light.key
+        key = (frame.geometry.changes, id(casters), extent.centre.tobytes(), eye.tobytes())
+        if light not in self._eyes or self._eyes[light][0] != key:
+            self._eyes[light] = (key, silhouettes.hidden_from_eye(casters, extent, eye))
+        return self._eyes[light][1]
+
     def _draw_count(self, made, quads, looked_through, receivers, count, blocks, start: float) -> None:
         """D(p, c) of every receiver."""
         target = images.Target((count,))
@@ -239,22 +248,22 @@ class EdgeTiles:
         """Casters that the way from the eye to what is seen may cross: list of corners and planes, None without any,
         and which they are."""
         camera = frame.snapshot.camera
+        seen_from = (camera.matrix.tobytes(), camera.clip_start, camera.clip_end, camera.aperture)
+        key = (frame.geometry.changes, id(casters), seen_from)
+        known = self._triangles.get(number)
+        if known is not None and known[0] == key:
+            return known[1:]
         forward = -camera.matrix[:3, 2]
         depth = (casters.corners.astype(np.float64) - (camera.matrix[:3, 3] - frame.geometry.origin)) @ forward
         reach = camera.aperture.radius if camera.aperture else 0.0
         before = depth.min(axis=1, initial=np.inf) < camera.clip_start * 1.001 + reach + 1e-5 * frame.geometry.size
         far = depth.max(axis=1, initial=-np.inf) > camera.clip_end
         own = np.flatnonzero(casters.unseen | before | far)
-        key = (frame.geometry.changes, len(casters.corners), own.tobytes())
-        known = self._triangles.get(number)
-        if known is None or known[0] != key:
-            rows = np.zeros((len(own), 4, 4), np.float32)
-            rows[:, :3, :3] = casters.corners[own]
-            rows[:, 3] = casters.planes[own]
-            rows[:, 0, 3] = casters.triangle_group[own]
-            known = (key, images.upload_list(rows.reshape(-1, 4)) if len(own) else None, own)
-            self._triangles[number] = known
-        return known[1:]
+        rows = np.zeros((len(own), 4, 4), np.float32)
+        rows[:, :3, :3] = casters.corners[own]
+        rows[:, 3] = casters.planes[own]
+        self._triangles[number] = (key, images.upload_list(rows.reshape(-1, 4)) if len(own) else None, own)
+        return self._triangles[number][1:]
 
     def kept_bounds(self) -> tuple[images.Image, images.Image]:
         """Boxes around the receivers of tiles, of the light that was asked about last."""
@@ -278,7 +287,7 @@ class EdgeTiles:
     def release(self) -> None:
         for image in self._kept.values():
             images.pool.give(image)
-        self._kept, self._lists, self._blocks, self._triangles = {}, {}, [], {}
+        self._kept, self._lists, self._blocks, self._triangles, self._eyes = {}, {}, [], {}, {}
 
 
 def tile_side(size: tuple[int, int], words: int) -> int:
