@@ -76,6 +76,8 @@ WITHOUT = {
     "accumulated_maps": no_shadow,
     "vssm": no_source_to_shadow,
     "cssm": no_source_to_shadow,
+    "depth_complexity": no_shadow,
+    "penumbra_wedges": no_shadow,
     "shadows_by_light": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
