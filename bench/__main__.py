@@ -22,6 +22,7 @@ from bench import (
     profile,
     random_scenes,
     run,
+    subsurface,
 )
 
 VERBS = {
@@ -35,6 +36,7 @@ VERBS = {
     "glare": glare,
     "edges": edges,
     "random": random_scenes,
+    "subsurface": subsurface,
     "page": page,
     "ages": ages,
     "hashes": hashes,

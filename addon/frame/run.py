@@ -486,6 +486,8 @@ class Renderer:
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
+        if plan.fills("subsurface"):
+            wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:

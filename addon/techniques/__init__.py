@@ -15,6 +15,7 @@ from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .eye import EyeModel
 from .film import Film
+from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
@@ -49,6 +50,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ImageSpaceSubsurface,
     Film,
     Denoise,
     EyeModel,
