@@ -46,6 +46,7 @@ POINTS = Param(
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
 MOST = 8  # points of the film that share a sample's light
 PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in ("diffuse", "glossy", "transmission"))
+VOLUME_PATHS = ("volume_direct", "volume_indirect")  # what media send; only where there are some
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 

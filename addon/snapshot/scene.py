@@ -98,6 +98,34 @@ class Instance:
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
 
 
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """Grids of an OpenVDB object on one lattice of voxels; those outside the arrays are empty."""
+
+    key: str
+    version: int
+    grids: dict[str, np.ndarray]  # name -> (X, Y, Z) or (X, Y, Z, 3) float32
+    low: np.ndarray  # (3,) index of the first voxel
+    to_object: np.ndarray  # (3, 4) float64, from voxel indices (a voxel's centre is a whole number) to object space
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        return next(iter(self.grids.values())).shape[:3]
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeInstance:
+    """One placement of a volume."""
+
+    object_name: str
+    volume: Volume
+    matrix: np.ndarray  # (4, 4) float64
+    material: int  # index into Snapshot.materials
+    visibility: Visibility = Visibility()
+    key: str = ""
+    density: float = 1.0  # factor of all coefficients, so that a scaled object stays as opaque
+
+
 @dataclass(frozen=True)
 class Image:
     """Pixels of an image data-block, bottom row first, exactly as stored: no colour conversion is applied yet.
@@ -192,6 +220,7 @@ class World:
     graph: Graph | None = None  # a tree that is more than that; it then says all, and `color` is white
     visibility: Visibility = Visibility()
     medium: Medium | None = None  # what fills all space
+    volume: Graph | None = None  # the tree that says so
 
     @property
     def even(self) -> bool:
@@ -242,6 +271,7 @@ class Snapshot:
     film: Film
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
+    volumes: tuple[VolumeInstance, ...] = ()
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 
     @cached_property

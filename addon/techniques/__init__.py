@@ -16,6 +16,7 @@ from .film import Film
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
+from .media import MediaAttenuation
 from .multires_radiosity import MultiresRadiosity
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
@@ -25,6 +26,7 @@ from .traced_refraction import TracedRefraction
 from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
+    MediaAttenuation,
     Surfaces,
     LightProbes,
     AccumulatedMaps,

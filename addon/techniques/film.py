@@ -19,13 +19,14 @@ from functools import cache
 from ..film import filter as film_filter
 from ..film import points as film_points
 from ..film.neighbours import shown_sum
-from ..film.points import PATHS
+from ..film.points import PATHS, VOLUME_PATHS
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..lighting import repeated_light
+from ..lighting.media import MEDIA, VOLUME, media_of
 from ..scene.materials import SURFACE_IMAGES, may_be_glossy
 from ..scene.view import VIEW
 from ..sources import lights
@@ -94,13 +95,17 @@ POSITION = passes.fullscreen_program(
     constants=(("VEC3", "render_origin"),),
     outputs=(("VEC4", "out_position"),),
 )
-RESOLVE = passes.fullscreen_program(
-    "film resolve",
-    "film/resolve.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in (*PATHS, "emission", "environment")),
-    constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
-    outputs=(("VEC4", "out_combined"),),
-)  # fmt: skip
+RESOLVE, RESOLVE_VOLUMES = (
+    passes.fullscreen_program(
+        "film resolve",
+        "film/resolve.frag.glsl",
+        textures=tuple(("RGBA32F", name) for name in (*PATHS, "emission", "environment", *volumes)),
+        constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
+        defines=(("VOLUMES", "1"),) if volumes else (),
+        outputs=(("VEC4", "out_combined"),),
+    )
+    for volumes in ((), VOLUME_PATHS)
+)
 
 
 class Film(Technique):
@@ -112,6 +117,7 @@ class Film(Technique):
     )
     reads = SURFACES
     closes = LIGHT
+    uses = (MEDIA, VOLUME)
     writes = (
         *SUMS,
         *(Write(name, "RGBA32F", "Cleared here, so that a scene without such light has it", True) for name in LIGHT),
@@ -147,7 +153,8 @@ class Film(Technique):
         with _borrowed(frame, len(SUMS)) as collected:
             self._collect(frame, surface_bindings(frame), collected)
             light = {path: frame.images[f"radiance.{path}"] for path in self._paths}
-            self._filter(frame, collected, light, frame.sample, 1.0 / count)
+            self._filter(frame, collected, light, surface_bindings(frame), frame.sample, 1.0 / count)
+        self._add_volumes(frame)
         frame.count(self, "points", count)
         if count > 1:
             yield
@@ -200,7 +207,7 @@ class Film(Technique):
                     if repeated:
                         repeated_light.repeat(frame, self._repeated, bindings, direct)
                         frame.count(self, "passes", len(frame.services["lit"]))
-                    self._filter(frame, collected, by_path, point, 1.0 / count)
+                    self._filter(frame, collected, by_path, bindings, point, 1.0 / count)
                     yield
             finally:
                 frame.look()
@@ -230,6 +237,7 @@ class Film(Technique):
         frame: Frame,
         collected: tuple[images.Image, ...],
         light: dict[str, images.Image],
+        surfaces: dict[str, images.Image],
         point: int,
         share: float,
     ) -> None:
@@ -237,7 +245,28 @@ class Film(Technique):
         seen = {write.name: image for write, image in zip(SUMS, collected)}
         seen |= {f"film.{path}": image for path, image in light.items()}
         seen = {name: image for name, image in seen.items() if name in self._shown}
-        frame.count(self, "passes", film_filter.add(frame, seen, frame.film_offset(point), share))
+        media = media_of(frame)
+        offset = frame.film_offset(point)
+        if media is None:
+            frame.count(self, "passes", film_filter.add(frame, seen, offset, share))
+            return
+        with media.passing(frame, surfaces) as through:
+            frame.count(self, "passes", 1 + film_filter.add(frame, seen, offset, share, through))
+
+    def _add_volumes(self, frame: Frame) -> None:
+        """Light that media send to the eye: of the pixels' own points, as it is smooth where surfaces are not."""
+        seen = {f"film.{path}": frame.images[f"radiance.{path}"] for path in VOLUME_PATHS if _has(frame, path)}
+        if seen:
+            _target(frame, *seen)
+            if frame.sample == 0:
+                frame.target(*seen).clear()
+            frame.count(self, "passes", film_filter.add(frame, seen, frame.film_offset(frame.sample), 1.0))
+            frame.target(*(f"radiance.{path}" for path in VOLUME_PATHS if _has(frame, path))).clear()
+            for name in seen:
+                frame.shown[name.replace("film.", "radiance.")] = name
+        if _has(frame, "volume_emission"):
+            shining = {"radiance.emission": frame.images["radiance.volume_emission"]}
+            frame.count(self, "passes", film_filter.add(frame, shining, frame.film_offset(frame.sample), 1.0))
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:
         """Those of SUMS and of the sums of light in which something may be seen."""
@@ -254,6 +283,10 @@ class Film(Technique):
     def release(self) -> None:
         self._sources.release()
         self._repeated.release()
+
+
+def _has(frame: Frame, path: str) -> bool:
+    return f"radiance.{path}" in frame.images
 
 
 def _target(frame: Frame, *names: str) -> images.Target:
@@ -292,9 +325,11 @@ def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
     """
     target = target or frame.target("film.combined")
     with shown_sum(frame, "diffuse_indirect") as indirect:
-        textures = {name: frame.to_show(f"radiance.{name}") for name in (*PATHS, "emission", "environment")}
+        volumes = VOLUME_PATHS if _has(frame, VOLUME_PATHS[0]) else ()
+        names = (*PATHS, "emission", "environment", *volumes)
+        textures = {name: frame.to_show(f"radiance.{name}") for name in names}
         passes.fullscreen(
-            RESOLVE,
+            RESOLVE_VOLUMES if volumes else RESOLVE,
             target,
             textures={**textures, "diffuse_indirect": indirect},
             constants={

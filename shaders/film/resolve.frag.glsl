@@ -8,6 +8,9 @@ void main()
   vec3 indirect = diffuse_indirect_fetch(pixel).rgb + glossy_indirect_fetch(pixel).rgb
                   + transmission_indirect_fetch(pixel).rgb;
   vec3 sum = direct + indirect + emission_fetch(pixel).rgb;
+#ifdef VOLUMES
+  sum += volume_direct_fetch(pixel).rgb + volume_indirect_fetch(pixel).rgb;
+#endif
   if (transparent == 0) {
     sum += world.rgb;
   }
