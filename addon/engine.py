@@ -244,6 +244,9 @@ def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
 def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     resolve(frame)
-    arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
+    names = sorted({"film.combined", *(name for asked in wanted for name in asked.images)})
+    arrays = renderer.finish(frame, [name for name in names if name in frame.images])
+    for name in names:  # of light that this scene has none of
+        arrays.setdefault(name, np.zeros_like(arrays["film.combined"]))
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays["film.combined"], **pixels}

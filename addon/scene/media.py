@@ -38,9 +38,9 @@ MEDIUM_TEXELS = 10  # layout in shaders/media/media.glsl
 LARGEST_COEFFICIENT, LARGEST_EMISSION = 1e10, 1e20  # per metre: what float32 can still multiply by distances
 MOST_CELLS = 2**23  # of all grids
 MEDIA_TEXTURES = tuple(
-    ("RGBA32F", f"media_{name}") for name in ("table", "nodes", "leaves", "extinction", "scattering", "emission")
+    ("RGBA32F", f"media_{name}") for name in ("table", "extinction", "scattering", "emission")
 )
-ATTENUATION_TEXTURES = MEDIA_TEXTURES[:4]  # what asks for transmittance alone reads these
+ATTENUATION_TEXTURES = MEDIA_TEXTURES[:2]  # what asks for transmittance alone reads these
 PLACE = Struct(
     "MediumPlace",
     *(("vec4", f"cell_{axis}") for axis in "xyz"),  # from a cell's coordinates to a place relative to the origin
@@ -280,7 +280,7 @@ class Media:
             return
         self._key = (key, snapshot)  # the snapshot keeps alive what is told apart by identity
         self.found, notes = filled(snapshot, compiled, origin)
-        table = np.zeros((MOST_MEDIA * MEDIUM_TEXELS, 4), np.float32)
+        table = np.zeros((images.LIST_WIDTH, 4), np.float32)
         varying = [k for k, one in enumerate(self.found) if one.varies]
         sizes = {k: _grid_size(self.found[k], resolution) for k in varying}
         total = sum(int(np.prod(size)) for size in sizes.values())
@@ -308,8 +308,10 @@ class Media:
                 rows += -(-int(np.prod(size)) // images.LIST_WIDTH)
                 self.cells += int(np.prod(size))
         notes += self._bake(jobs, rows, snapshot, origin)
-        self._boundaries(first)
-        self.textures["media_table"] = images.upload(table[None])
+        tree = self._boundaries(first)
+        nodes = tree.nodes.reshape(-1, 4)
+        table[-1, 0] = images.LIST_WIDTH + len(nodes)  # where the leaves begin
+        self.textures["media_table"] = images.upload_list(np.concatenate([table, nodes, tree.leaves.reshape(-1, 4)]))
         self.textures["media_table"].defines = (
             *((("MEDIA_WORLD", "1"),) if first == 0 else ()),
             *((("MEDIA_BOUNDED", "1"),) if any(one.corners is not None for one in self.found) else ()),
@@ -317,14 +319,13 @@ class Media:
         )
         self.notes = tuple(notes)
 
-    def _boundaries(self, first: int) -> None:
+    def _boundaries(self, first: int) -> acceleration.Tree:
         bounded = [(k + first, one.corners) for k, one in enumerate(self.found) if one.corners is not None]
         corners = np.concatenate([c for _, c in bounded]) if bounded else np.zeros((0, 3, 3))
         look = np.zeros((len(corners), 8))
         look[:, 0] = 1.0  # any opacity: what is empty would be left out
         look[:, 4] = np.concatenate([np.full(len(c), k) for k, c in bounded]) if bounded else 0.0
-        tree = acceleration.build(corners.astype(np.float32), look)
-        self.textures["media_nodes"], self.textures["media_leaves"] = tree.hierarchy.nodes, tree.hierarchy.leaves
+        return acceleration.build(corners.astype(np.float32), look)
 
     def _bake(self, jobs: list, rows: int, snapshot: Snapshot, origin: np.ndarray) -> list[Note]:
         notes: list[Note] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
+from .airlight import Airlight
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
@@ -40,6 +41,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     DirectionalOcclusion,
     TracedGlossy,
     TracedRefraction,
+    Airlight,
     InstantRadiosity,
     MultiresRadiosity,
     ClusteredVisibility,

@@ -62,6 +62,8 @@ _TABLE = (
     (
         "use_pass_transmission_color", "Transmission Color", "TransCol", "RGB", "COLOR", "color.transmission",
     ),
+    ("cycles.use_pass_volume_direct", "Volume Direct", "VolumeDir", "RGB", "COLOR", "radiance.volume_direct"),
+    ("cycles.use_pass_volume_indirect", "Volume Indirect", "VolumeInd", "RGB", "COLOR", "radiance.volume_indirect"),
     ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
     ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),
     ("use_pass_object_index", "Object Index", "IndexOB", "X", "VALUE", "film.index"),
@@ -76,7 +78,7 @@ PASSES = tuple(
 
 def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     """The passes that a view layer asks for."""
-    return [render_pass for render_pass in PASSES if getattr(layer, render_pass.switch)]
+    return [render_pass for render_pass in PASSES if _ticked(layer, render_pass.switch)]
 
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.

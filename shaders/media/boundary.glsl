@@ -18,14 +18,15 @@ struct Crossings {
 #define MEDIA_LEAF 17
 #define MEDIA_DEEPEST 32
 
+// The first row of the image is the table of media, whose last texel says where the leaves begin.
 vec4 media_node_texel(int index)
 {
-  return media_nodes_fetch(ivec2(index & 2047, index >> 11));
+  return media_table_fetch(ivec2(index & 2047, 1 + (index >> 11)));
 }
 
 vec4 media_leaf_texel(int index)
 {
-  return media_leaves_fetch(ivec2(index & 2047, index >> 11));
+  return media_table_fetch(ivec2(index & 2047, index >> 11));
 }
 
 uint media_boxes_met(int base, vec3 origin, vec3 inverse)
@@ -73,7 +74,7 @@ void crossings_insert(inout Crossings c, float t, int medium)
 
 void media_leaf(int leaf, vec3 origin, vec3 direction, inout Crossings c)
 {
-  int base = leaf * MEDIA_LEAF;
+  int base = int(media_table_fetch(ivec2(2047, 0)).x) + leaf * MEDIA_LEAF;
   vec4 materials = media_leaf_texel(base + 13);
   for (int k = 0; k < 4; k++) {
     vec3 corner = vec3(media_leaf_texel(base)[k], media_leaf_texel(base + 1)[k], media_leaf_texel(base + 2)[k]);
