@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from ..frame.run import Frame
+from ..frame.technique import Service
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..scene.media import ATTENUATION_TEXTURES, Media
 from ..scene.view import VIEW
-
-MEDIA, VOLUME = "media", "volume"  # names under which media, and the light that they scatter, are offered
 
 VIEW_PROGRAM = passes.fullscreen_program(
     "media along the view",
@@ -29,9 +28,10 @@ VIEW_PROGRAM = passes.fullscreen_program(
 
 
 @dataclass
-class MediaService:
+class MediaService(Service):
     """Media of the frame, ready to be asked."""
 
+    name = "media"
     media: Media
 
     @contextmanager
@@ -51,9 +51,12 @@ class MediaService:
         return self.media.attenuation()
 
 
-def media_of(frame: Frame) -> MediaService | None:
-    """Of a frame with media."""
-    return frame.services.get(MEDIA)
+@dataclass(frozen=True)
+class MediaEmission(Service):
+    """What media emit along each pixel's view ray in this sample, to be seen as emission of surfaces is."""
+
+    name = "emission of media"
+    image: str  # name of the frame's image
 
 
 @cache

@@ -37,7 +37,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.emissive_triangles import EmissiveTriangles
-from ..lighting.media import MEDIA, VOLUME, media_of
+from ..lighting.media import MediaEmission, MediaService
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..scene import acceleration
@@ -82,7 +82,7 @@ PROGRAMS = tuple(airlight_program(stride, -1) for stride in (1, COARSE))
 class Airlight(Technique):
     name = "airlight"
     label = "Airlight"
-    slot = "volume"
+    fills = ("volume",)
     params = (
         Param(
             "rays", "Rays", 4,
@@ -91,8 +91,8 @@ class Airlight(Technique):
         ),
     )  # fmt: skip
     reads = ("surface.position",)
-    uses = (MEDIA,)
-    offers = (VOLUME,)
+    provides = (MediaEmission,)
+    requests = (MediaService,)
     writes = (
         Write("radiance.volume_direct", "RGBA32F", "Light that media scatter once towards the eye", True),
         Write("radiance.volume_indirect", "RGBA32F", "Light that media scatter after other bounces", True),
@@ -110,10 +110,8 @@ class Airlight(Technique):
             return "the scene's volumes absorb alone: nothing in them scatters or shines"
         return acceleration.too_many(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
-        if frame.sample == 0:
-            self._begin(frame)
-        media = media_of(frame)
+    def sample(self, frame: Frame) -> Iterator[None]:
+        media = frame.service(MediaService)
         if media is None:
             return
         rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
@@ -160,7 +158,8 @@ class Airlight(Technique):
         frame.count(self, "passes", 1 + coarse)
         frame.count(self, "light samples", len(rows))
 
-    def _begin(self, frame: Frame) -> None:
+    def begin(self, frame: Frame) -> None:
+        """Find what shines into the media."""
         self._emitters = [one for one in frame.emitters if one.light.visibility.volume]
         used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
         self._triangles = None
@@ -169,9 +168,11 @@ class Airlight(Technique):
             self._triangles = triangles if triangles.power > 0 else None
         self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.volume
         # Through fog without an end nothing comes from infinity.
-        self._endless = any(one.corners is None and not one.varies for one in frame.services[MEDIA].media.found) if (
-            MEDIA in frame.services
-        ) else False
+        media = frame.service(MediaService)
+        found = media.media.found if media is not None else []
+        self._endless = any(one.corners is None and not one.varies for one in found)
+        if media is not None:
+            frame.provide(MediaEmission("radiance.volume_emission"))
 
     def _rows(self, frame: Frame) -> tuple[list[np.ndarray], list[lights.Emitter]]:
         """Points of this sample on lamps, shining meshes and the world, and the lamps among them."""

@@ -22,12 +22,11 @@ mirrors, and between surfaces that light each other, take nothing away but what 
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-
+from ..frame.light_paths import IN_MEDIA
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
-from ..lighting.media import MEDIA, MediaService
+from ..lighting.media import MediaService
 from ..scene.media import Media, has_media
 from ..snapshot.scene import Snapshot
 
@@ -41,7 +40,8 @@ class MediaAttenuation(Technique):
             "Cells along the longest side of a volume that varies; OpenVDB objects keep their voxels", 4, 256, draft=48,
         ),
     )  # fmt: skip
-    offers = (MEDIA,)
+    provides = (MediaService,)
+    owns = (IN_MEDIA,)
 
     def __init__(self):
         self.media = Media()
@@ -49,18 +49,13 @@ class MediaAttenuation(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return None if has_media(snapshot) else "the scene has no volume"
 
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return object()  # each frame is told anew; what stands on the GPU is kept by scene/media.py
-
-    def prepare(self, frame: Frame) -> None:
-        """Bring the media to the snapshot, and offer them."""
+    def begin(self, frame: Frame) -> None:
+        """Bring the media to the snapshot, and provide them."""
         resolution = frame.settings.get(self, "resolution")
         self.media.update(frame.snapshot, frame.materials.compiled, frame.geometry.origin, resolution)
         frame.ledger.notes = (*frame.ledger.notes, *(n for n in self.media.notes if n not in frame.ledger.notes))
         if self.media.found:
-            frame.services[MEDIA] = MediaService(self.media)
-
-    def run(self, frame: Frame) -> None:
+            frame.provide(MediaService(self.media))
         frame.counters.setdefault(self.name, {}).update(media=len(self.media.found), cells=self.media.cells)
 
     def release(self) -> None:
