@@ -45,38 +45,76 @@ from ..scene.media import MEDIA_TEXTURES, has_media
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
+from ..sources.environment import WORLD
+from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
+from ..surfaces.reflectance import Reflectance
 
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
 COARSE = 2  # pixels of one known pixel's side then
-WORLD_DIRECTIONS, EMISSIVE_POINTS = 4, 4  # in a sample
+WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
+MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
 MOST_LAMPS = 16  # in a sample
 SENDING = ("ShaderNodeVolumeScatter", "ShaderNodeVolumePrincipled", "ShaderNodeVolumeCoefficients", "ShaderNodeEmission")
 
 
+LIT_TEXTURES = (*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES)
+WORLD_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))
+CONSTANTS = (
+    ("INT", "light_count"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size"), ("FLOAT", "world_rows"),
+)  # fmt: skip
+
+
 @cache
-def airlight_program(stride: int, kinds: int) -> Program:
-    """Finds the light of media at every `stride`-th pixel, for lights of these kinds (bits as in lights.LAMPS)."""
+def airlight_program(stride: int, kinds: int, world: bool) -> Program:
+    """Finds the light of media at every `stride`-th pixel, for lights of these kinds (bits as in lights.LAMPS).
+    `world`: rays by the phase function look for it, too."""
     return passes.fullscreen_program(
         f"airlight, stride {stride}",
         "media/airlight.frag.glsl",
-        textures=(*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES, ("RGBA32F", "surface_position")),
-        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("INT", "places"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size")),
-        defines=(("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds))),
+        textures=(*LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "surface_position")),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
+        constants=(*CONSTANTS, ("INT", "places")),
+        defines=_defines(stride, kinds, world),
         outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
     )
 
 
-SPREAD = passes.fullscreen_program(
-    "airlight spread",
-    "media/spread.frag.glsl",
-    textures=(("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission")),
-    blocks=((VIEW, "film_view"),),
-    constants=(("IVEC2", "shown_pixel"),),
-    defines=(("STRIDE", str(COARSE)),),
-    outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
-)
-PROGRAMS = tuple(airlight_program(stride, -1) for stride in (1, COARSE))
+@cache
+def indirect_program(stride: int, kinds: int, world: bool) -> Program:
+    """Finds the light that media scatter after other bounces, and that they bring to surfaces."""
+    return passes.fullscreen_program(
+        f"airlight after bounces, stride {stride}",
+        "media/indirect.frag.glsl",
+        textures=(
+            *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"), *SURFACE_TEXTURES,
+        ),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
+        constants=(*CONSTANTS, ("INT", "bounces")),
+        defines=_defines(stride, kinds, world),
+        outputs=(("VEC4", "out_indirect"), ("VEC4", "out_surface")),
+    )  # fmt: skip
+
+
+def _defines(stride: int, kinds: int, world: bool) -> tuple[tuple[str, str], ...]:
+    return ("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
+
+
+SPREAD, SPREAD_ON_SURFACES = (
+    passes.fullscreen_program(
+        f"airlight spread{', on surfaces' if on_surfaces else ''}",
+        "media/spread.frag.glsl",
+        textures=(
+            ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
+            *((("RGBA32F", "surface_diffuse"),) if on_surfaces else ()),
+        ),
+        blocks=((VIEW, "film_view"),),
+        constants=(("IVEC2", "shown_pixel"),),
+        defines=(("STRIDE", str(COARSE)), *((("ON_SURFACES", "1"),) if on_surfaces else ())),
+        outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
+    )
+    for on_surfaces in (False, True)
+)  # fmt: skip
+PROGRAMS = tuple(made(stride, -1, True) for made in (airlight_program, indirect_program) for stride in (1, COARSE))
 
 
 class Airlight(Technique):
@@ -89,19 +127,26 @@ class Airlight(Technique):
             "Places on each pixel's ray that are asked what light reaches them, in a sample, shared by all lights",
             1, 64, draft=2,
         ),
+        Param(
+            "bounces", "Volume bounces", 8,
+            "How often light is scattered or reflected before a medium sends it to the eye, at most; 0: lamps and world "
+            "alone", 0, MOST_BOUNCES, draft=2,
+        ),
     )  # fmt: skip
-    reads = ("surface.position",)
+    reads = SURFACES
     provides = (MediaEmission,)
     requests = (MediaService,)
     writes = (
         Write("radiance.volume_direct", "RGBA32F", "Light that media scatter once towards the eye", True),
         Write("radiance.volume_indirect", "RGBA32F", "Light that media scatter after other bounces", True),
         Write("radiance.volume_emission", "RGBA32F", "Light that media emit"),
+        Write("radiance.diffuse_indirect", "RGBA32F", "Light that media scatter onto diffuse surfaces", True),
     )
 
     def __init__(self):
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
+        self._reflectance = Reflectance()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not has_media(snapshot):
@@ -120,43 +165,58 @@ class Airlight(Technique):
         )
         coarse = frame.settings.samples < FEW
         stride = COARSE if coarse else 1
-        rays = frame.settings.get(self, "rays") * stride * stride
-        places = places_of(rays, len(rows))
-        shown = (frame.sample % 2, frame.sample // 2 % 2) if coarse else (0, 0)
-        hierarchy = frame.hierarchy("volume")
-        bindings = {
-            "textures": {
-                **hierarchy.textures, **media.media.textures, "surface_position": frame.images["surface.position"],
-            },
-            "blocks": {"film_view": frame.view_block, "sources": self._sources.set(rows)},
-            "constants": {
-                "light_count": len(rows), "places": places, "shown_pixel": shown, "offset_size": frame.offset_size,
-            },
+        world = self._lit_by_world
+        asked = {
+            "light_count": len(rows), "shown_pixel": (frame.sample % 2, frame.sample // 2 % 2) if coarse else (0, 0),
+            "offset_size": frame.offset_size, "world_rows": float(WORLD_DIRECTIONS),
         }  # fmt: skip
-        program = airlight_program(stride, kinds)
-        target = frame.target("radiance.volume_direct", "radiance.volume_emission")
+        textures = {**frame.hierarchy("volume").textures, **media.media.textures}
+        blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
+        if world:
+            textures |= {
+                "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
+            }
+            blocks["world_light"] = frame.environment.block
         frame.target("radiance.volume_emission").clear()
-        if not coarse:
-            for band in frame.bands(self):
+        rays = frame.settings.get(self, "rays") * stride * stride
+        places = places_of(rays, len(rows) + world)
+        yield from self._add(
+            frame, airlight_program(stride, kinds, world), ("radiance.volume_direct", "radiance.volume_emission"),
+            SPREAD if coarse else None, textures=textures | {"surface_position": frame.images["surface.position"]},
+            blocks=blocks, constants=asked | {"places": places},
+        )  # fmt: skip
+        frame.count(self, "light samples", len(rows))
+        bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
+        if bounces and media.media.scatters:
+            self._reflectance.update(frame)
+            yield from self._add(
+                frame, indirect_program(stride, kinds, world), ("radiance.volume_indirect", "radiance.diffuse_indirect"),
+                SPREAD_ON_SURFACES if coarse else None,
+                textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
+                blocks=blocks, constants=asked | {"bounces": bounces},
+            )  # fmt: skip
+
+    def _add(self, frame: Frame, program: Program, names: tuple[str, str], spread: Program | None, **bindings):
+        """Draw a program's two outputs into sums, where it is asked at few pixels spread over all."""
+        target = frame.target(*names)
+        frame.count(self, "passes", 1 + (spread is not None))
+        if spread is None:
+            for band in frame.bands(self, names[0]):
                 passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
                 yield
-        else:
-            size = tuple(-(-side // stride) for side in frame.size)
-            found = tuple(images.pool.take(*size, "RGBA32F") for _ in range(2))
-            passes.fullscreen(program, images.Target(found), **bindings)
-            yield
-            passes.fullscreen(
-                SPREAD, target, blend="ADDITIVE_PREMULT",
-                textures={
-                    "surface_position": frame.images["surface.position"], "coarse_direct": found[0],
-                    "coarse_emission": found[1],
-                },
-                blocks={"film_view": frame.view_block}, constants={"shown_pixel": shown},
-            )  # fmt: skip
-            for image in found:
-                images.pool.give(image)
-        frame.count(self, "passes", 1 + coarse)
-        frame.count(self, "light samples", len(rows))
+            return
+        size = tuple(-(-side // COARSE) for side in frame.size)
+        found = tuple(images.pool.take(*size, "RGBA32F") for _ in range(2))
+        passes.fullscreen(program, images.Target(found), **bindings)
+        yield
+        read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
+        passes.fullscreen(
+            spread, target, blend="ADDITIVE_PREMULT",
+            textures={**read, "coarse_direct": found[0], "coarse_emission": found[1]},
+            blocks={"film_view": frame.view_block}, constants={"shown_pixel": bindings["constants"]["shown_pixel"]},
+        )  # fmt: skip
+        for image in found:
+            images.pool.give(image)
 
     def begin(self, frame: Frame) -> None:
         """Find what shines into the media."""
@@ -171,6 +231,7 @@ class Airlight(Technique):
         media = frame.service(MediaService)
         found = media.media.found if media is not None else []
         self._endless = any(one.corners is None and not one.varies for one in found)
+        self._lit_by_world = self._world and not self._endless and any(one.scatters for one in found)
         if media is not None:
             frame.provide(MediaEmission("radiance.volume_emission"))
 
@@ -191,7 +252,7 @@ class Airlight(Technique):
                 drawn = frame.random_volume_at(frame.sample * EMISSIVE_POINTS + k, "airlight/emissive")
                 samples = EMISSIVE_POINTS * frame.settings.samples
                 rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG, 1, samples))
-        if self._world and not self._endless:
+        if self._lit_by_world:
             for k in range(WORLD_DIRECTIONS):
                 drawn = frame.random_at(frame.sample * WORLD_DIRECTIONS + k, "airlight/world")
                 direction, radiance, density = frame.environment.draw(*drawn)
@@ -204,6 +265,7 @@ class Airlight(Technique):
 
     def release(self) -> None:
         self._sources.release()
+        self._reflectance.release()
         self._triangles = None
 
 

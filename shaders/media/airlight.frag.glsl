@@ -3,20 +3,9 @@
 // Places are drawn half around the light's point, in equal steps of the angle under which it sees the ray (Kulla & Fajardo
 // 2012), half in proportion to what the medium sends back (media/bins.glsl), both weighted by the balance heuristic. One
 // row of `sources` after the other takes `places` of them, stratified; STRIDE pixels of the picture share one of this.
-#include "trace/rays.glsl"
-#include "media/bins.glsl"
+#include "media/arriving.glsl"
 #include "media/view_ray.glsl"
-#include "light/sources.glsl"
-
-// 0..15 in each block of 4 x 4 pixels, neighbours far apart (Bayer).
-float dither(ivec2 p)
-{
-  int x = p.x & 3;
-  int y = p.y & 3;
-  int v = x ^ y;
-  int order = ((v & 1) << 3) | ((y & 1) << 2) | ((v & 2)) | ((y & 2) >> 1);
-  return (float(order) + 0.5) / 16.0;
-}
+#include "media/dither.glsl"
 
 void main()
 {
@@ -38,16 +27,20 @@ void main()
   float begin = bins.from[0];
   float end = bins.to[bins.count - 1];
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < light_count; i++) {
-    Light light = light_read(i);
+  for (int i = 0; i < ROWS_ASKED; i++) {
     uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i)));
 #if STRIDE > 1
     float own = fract(dither(ivec2(gl_FragCoord.xy)) + 0.618034 * float(film_view.sample_index) + 0.7548777 * float(i));
 #else
     float own = shuffled(film_view.sample_index, salt.xy);
 #endif
-    bool far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
-    vec3 point = (LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE)) ? light.centre : light.point;
+    bool far = true;
+    vec3 point = ray.origin;
+    if (i < light_count) {
+      Light light = light_read(i);
+      far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
+      point = (LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE)) ? light.centre : light.point;
+    }
     float middle = dot(point - ray.origin, ray.direction);
     vec3 missed = ray.origin + middle * ray.direction - point;
     float apart = max(length(missed), 1e-6 * max(abs(middle), 1e-3));
@@ -81,23 +74,12 @@ void main()
         density = 0.5 * density + 0.5 * apart / (opening * (off * off + apart * apart));
       }
       vec3 position = ray.origin + t * ray.direction;
-      vec3 direction;
-      float light_density;
-      vec3 arriving = light_sample(light, position, direction, light_density);
-      vec3 scattered = media_scattered(bins.media[k], position, -direction, -ray.direction, seed + uint(n));
-      vec3 found = bin_passing(bins, k, t) * scattered * arriving / max(density, 1e-30);
-      if (!(max_component(abs(found)) > 0.0)) {
-        continue;
-      }
-      float reach = light_distance(light, position, direction);
-      if ((light.flags & LIGHT_SHADOW) != 0) {
-        uint shadow_salt = roll.y + uint(i * 64 + n);
-        found *= clear_to_light(position, direction, reach * 0.9999, shadow_salt);
-      }
-      if (max_component(abs(found)) > 0.0) {
-        found *= media_transmittance(position, direction, min(reach, FARTHEST_MEDIUM), seed + 7u * uint(n));
-        own_sum += found;
-      }
+      vec3 weight = bin_passing(bins, k, t) / max(density, 1e-30);
+      uint own_salt = seed + uint(i * 64 + n);
+      uvec3 turn = hash3(salt + uint(n) * 3u);
+      vec2 u = vec2(scrambled(film_view.bits_x, turn.x), scrambled(film_view.bits_y, turn.y));
+      Asked asked = ask_scattered(i, bins.media[k], position, -ray.direction, u, own_salt);
+      own_sum += weight * asked_arriving(asked, position, own_salt);
     }
     sum += own_sum / float(places);
   }

@@ -88,6 +88,30 @@ vec3 media_scattered(uint inside, vec3 position, vec3 in_direction, vec3 out_dir
   return sum;
 }
 
+// Anisotropy of the lobe by which a direction is drawn at a place: the mean over what scatters there.
+float media_lobe(uint inside, vec3 position, uint cell_seed)
+{
+  float sum = 0.0;
+  float total = 1e-30;
+  while (inside != 0u) {
+    int medium = findLSB(inside);
+    inside &= inside - 1u;
+    Medium m = medium_read(medium);
+#ifdef MEDIA_GRIDS
+    if (m.grid > 0.5) {
+      uint seed = cell_seed + uint(medium);
+      ivec2 cell = medium_cell(medium, position, seed);
+      m.scattering = media_scattering_fetch(cell).rgb;
+      m.anisotropy = media_extinction_fetch(cell).w;
+    }
+#endif
+    float weight = dot(m.scattering, vec3(1.0));
+    sum += weight * phase_lobe(m.phase, m.anisotropy, m.phase_values);
+    total += weight;
+  }
+  return clamp(sum / total, -0.95, 0.95);
+}
+
 void bins_add(inout Bins bins, uint inside, vec3 origin, vec3 direction, float from, float to, inout uint seed)
 {
   if (inside == 0u || !(to > from) || bins.count >= MOST_BINS) {

@@ -56,6 +56,18 @@ float phase_value(int kind, float g, vec4 values, float mu)
   return phase_henyey_greenstein(g, mu);
 }
 
+// Anisotropy of the lobe of Henyey & Greenstein by which directions of a phase function are drawn.
+float phase_lobe(int kind, float g, vec4 values)
+{
+  if (kind == PHASE_RAYLEIGH) {
+    return 0.0;
+  }
+  if (kind == PHASE_FOURNIER_FORAND) {
+    return 0.8;
+  }
+  return (kind == PHASE_MIE) ? 0.9 * mix(values.x, values.y, values.w) : g;
+}
+
 // Direction in proportion to Henyey & Greenstein's function; `u` uniform.
 vec3 phase_direction(float g, vec3 direction, vec2 u)
 {

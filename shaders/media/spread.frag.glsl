@@ -35,4 +35,7 @@ void main()
   float share = 1.0 / max(total, 1e-30);
   out_direct = vec4(direct.rgb * share, 0.0);
   out_emission = vec4(emission.rgb * share, 0.0);
+#ifdef ON_SURFACES
+  out_emission.rgb *= surface_diffuse_fetch(pixel).rgb;
+#endif
 }
