@@ -24,6 +24,7 @@ from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
 from .traced_glossy import TracedGlossy
 from .traced_refraction import TracedRefraction
+from .volume_caustics import VolumeCaustics
 from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
@@ -42,6 +43,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     TracedGlossy,
     TracedRefraction,
     Airlight,
+    VolumeCaustics,
     InstantRadiosity,
     MultiresRadiosity,
     ClusteredVisibility,

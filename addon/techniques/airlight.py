@@ -31,6 +31,7 @@ from functools import cache
 
 import numpy as np
 
+from ..frame.light_paths import LIGHT_SPECULAR_MEDIUM
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -61,6 +62,7 @@ LIT_TEXTURES = (*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES)
 WORLD_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))
 CONSTANTS = (
     ("INT", "light_count"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size"), ("FLOAT", "world_rows"),
+    ("INT", "glass_blocks"),  # what it bends or mirrors arrives as beams
 )  # fmt: skip
 
 
@@ -169,6 +171,7 @@ class Airlight(Technique):
         asked = {
             "light_count": len(rows), "shown_pixel": (frame.sample % 2, frame.sample // 2 % 2) if coarse else (0, 0),
             "offset_size": frame.offset_size, "world_rows": float(WORLD_DIRECTIONS),
+            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)),
         }  # fmt: skip
         textures = {**frame.hierarchy("volume").textures, **media.media.textures}
         blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}

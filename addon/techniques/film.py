@@ -120,7 +120,9 @@ class Film(Technique):
 
     def begin(self, frame: Frame) -> None:
         self._paths, self._pixel_paths = film_points.lit_paths(frame), film_points.pixel_paths(frame)
-        _target(frame, *(f"film.{path}" for path in (*self._paths, *self._pixel_paths))).clear()
+        for paths in (self._paths, self._pixel_paths):  # apart: a target has at most six images
+            if paths:
+                _target(frame, *(f"film.{path}" for path in paths)).clear()
         emitters = frame.emitters
         seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
         self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])

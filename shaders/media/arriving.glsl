@@ -77,7 +77,9 @@ vec3 asked_arriving(Asked asked, vec3 position, uint salt)
   }
   float clear = 1.0;
   if (asked.shadow) {
-    clear = clear_to_light(position, asked.direction, asked.reach * 0.9999, salt);
+    ivec2 hit;
+    float until = asked.reach * 0.9999;
+    clear = (trace_layers(position, asked.direction, until, until, salt, glass_blocks != 0, true, hit) >= until) ? 1.0 : 0.0;
   }
   if (clear <= 0.0) {
     return vec3(0.0);

@@ -1,5 +1,6 @@
 // Volume shaders: what each adds to the medium at a point. Coefficients per metre, as Cycles' closures have them.
 #include "lib/math.glsl"
+#include "material/curves.glsl"
 
 #define STEFAN_BOLTZMANN 1.8049e-14  // W / (m2 K4) / pi, times 1e-6: Cycles' scale of the glow of volumes
 
