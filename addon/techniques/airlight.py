@@ -42,7 +42,7 @@ from ..lighting.media import MediaEmission, MediaService
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..scene import acceleration
-from ..scene.media import MEDIA_TEXTURES, has_media
+from ..scene.media import ATTENUATION_TEXTURES, MEDIA_TEXTURES, has_media
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -107,6 +107,7 @@ SPREAD, SPREAD_ON_SURFACES = (
         "media/spread.frag.glsl",
         textures=(
             ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
+            *ATTENUATION_TEXTURES,
             *((("RGBA32F", "surface_diffuse"),) if on_surfaces else ()),
         ),
         blocks=((VIEW, "film_view"),),
@@ -215,7 +216,10 @@ class Airlight(Technique):
         read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
         passes.fullscreen(
             spread, target, blend="ADDITIVE_PREMULT",
-            textures={**read, "coarse_direct": found[0], "coarse_emission": found[1]},
+            textures={
+                **read, "coarse_direct": found[0], "coarse_emission": found[1],
+                **{name: bindings["textures"][name] for _, name in ATTENUATION_TEXTURES},
+            },
             blocks={"film_view": frame.view_block}, constants={"shown_pixel": bindings["constants"]["shown_pixel"]},
         )  # fmt: skip
         for image in found:

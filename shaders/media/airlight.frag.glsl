@@ -20,7 +20,10 @@ void main()
 #if STRIDE > 1
   out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around
 #endif
-  out_emission = vec4(bins.emitted, 0.0);
+  out_emission.rgb = bins.emitted;
+#if STRIDE > 1
+  out_emission.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
+#endif
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;
   }

@@ -123,6 +123,7 @@ void main()
   Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
 #if STRIDE > 1
   out_indirect.w = min(ray.limit, 1e18);
+  out_surface.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
 #endif
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   Surface s = SURFACE_READ(pixel);
