@@ -150,7 +150,13 @@ def _profiles(scene, name: str, mean: dict, options, render) -> list[tuple[str, 
         row = ledger.latest().row("volume_caustics")
         error = np.sqrt(((seen - truth) ** 2).mean()) / truth.max()
         found.append(
-            (name, f"{rays}²", f"{100 * error:.1f}", f"{seen.mean() / truth.mean():.3f}", f"{row.milliseconds / 16e3:.4f}")
+            (
+                name,
+                f"{rays}²",
+                f"{100 * error:.1f}",
+                f"{seen.mean() / truth.mean():.3f}",
+                f"{row.milliseconds / 16e3:.4f}",
+            )
         )
     scene.candela.property_unset("volume_caustics_rays")
     return found

@@ -37,9 +37,7 @@ MOST_MEDIA = 30
 MEDIUM_TEXELS = 10  # layout in shaders/media/media.glsl
 LARGEST_COEFFICIENT, LARGEST_EMISSION = 1e10, 1e20  # per metre: what float32 can still multiply by distances
 MOST_CELLS = 2**23  # of all grids
-MEDIA_TEXTURES = tuple(
-    ("RGBA32F", f"media_{name}") for name in ("table", "extinction", "scattering", "emission")
-)
+MEDIA_TEXTURES = tuple(("RGBA32F", f"media_{name}") for name in ("table", "extinction", "scattering", "emission"))
 ATTENUATION_TEXTURES = MEDIA_TEXTURES[:2]  # what asks for transmittance alone reads these
 PLACE = Struct(
     "MediumPlace",
@@ -264,7 +262,9 @@ class Media:
         """Bring the images to this snapshot. `resolution`: cells along the longest side of what varies."""
         world = snapshot.world
         bound = [
-            one for one in snapshot.instances if any(compiled[k].medium and not compiled[k].glass for k in one.materials)
+            one
+            for one in snapshot.instances
+            if any(compiled[k].medium and not compiled[k].glass for k in one.materials)
         ]
         used = {k for one in bound for k in one.materials} | {one.material for one in snapshot.volumes}
         uneven_world = world.medium is not None and not world.medium.even
@@ -342,7 +342,9 @@ class Media:
             grids = tuple(one.volume.grids) if one.volume is not None else ()
             read = {attribute.name for attribute in compiled.attributes}
             grids = tuple(name for name in grids if name in read)
-            textures = {f"material_image{k}": upload_image(snapshot.images[key]) for k, key in enumerate(compiled.images)}
+            textures = {
+                f"material_image{k}": upload_image(snapshot.images[key]) for k, key in enumerate(compiled.images)
+            }
             textures |= {f"volume_grid{k}": _upload_grid(one.volume.grids[name]) for k, name in enumerate(grids)}
             cell = one.to_world.copy()
             cell[:, :3] /= np.asarray(size, float)

@@ -55,7 +55,12 @@ COARSE = 2  # pixels of one known pixel's side then
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
 MOST_LAMPS = 16  # in a sample
-SENDING = ("ShaderNodeVolumeScatter", "ShaderNodeVolumePrincipled", "ShaderNodeVolumeCoefficients", "ShaderNodeEmission")
+SENDING = (
+    "ShaderNodeVolumeScatter",
+    "ShaderNodeVolumePrincipled",
+    "ShaderNodeVolumeCoefficients",
+    "ShaderNodeEmission",
+)
 
 
 LIT_TEXTURES = (*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES)
@@ -178,7 +183,8 @@ class Airlight(Technique):
         blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
         if world:
             textures |= {
-                "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
+                "environment_map": frame.environment.map,
+                "environment_density_map": frame.environment.density_map,
             }
             blocks["world_light"] = frame.environment.block
         frame.target("radiance.volume_emission").clear()

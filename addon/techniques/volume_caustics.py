@@ -114,7 +114,9 @@ class VolumeCaustics(Technique):
 
     def begin(self, frame: Frame) -> None:
         """Find what bends light and the sphere around it, and the lamps that may reach it."""
-        rows = [_row(material, frame.snapshot.materials[k].graph) for k, material in enumerate(frame.materials.compiled)]
+        rows = [
+            _row(material, frame.snapshot.materials[k].graph) for k, material in enumerate(frame.materials.compiled)
+        ]
         table = np.array(rows, np.float32).reshape(-1, 2, 4)
         self._table = images.upload(table)
         bending = set(np.flatnonzero(table[:, 1, 0] > 0))

@@ -2,6 +2,9 @@
 //
 // A program that includes this binds the surface images, `film_view`, `sources`, the hierarchy and `reflectance`, and has
 // the constants `light_count` and `offset_size`.
+#ifdef MEDIA
+#include "media/media.glsl"
+#endif
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "light/sources.glsl"
@@ -186,6 +189,10 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
+#ifdef MEDIA
+      float reach = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
+      chosen_light *= media_transmittance(origin, chosen_direction, reach, salt);
+#endif
       sum += chosen_light * reflection_of(met.reflection, normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);
     }

@@ -54,8 +54,8 @@ void main()
     spread = 0.0;
   }
   else {
-    bool round = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
-    if (round) {
+    bool is_round = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
+    if (is_round) {
       position = light.centre + light.point;
       to_casters = casters.xyz - position;
     }
@@ -72,10 +72,10 @@ void main()
     direction = safe_normalize(cosine * axis + across * (cos(turn) * tangent + sin(turn) * bitangent));
     float solid_angle = 2.0 * PI * (1.0 - least) / rays;
     flux = light.radiance * solid_angle;
-    if (light.radius > 0.0 || !round) {
+    if (light.radius > 0.0 || !is_round) {
       flux *= light.area;
     }
-    if (!round) {
+    if (!is_round) {
       float cos_light = dot(direction, light.axis);
       cos_light = (LIGHT_IS(light, LIGHT_SURFACE) && (light.flags & LIGHT_SIDED) == 0) ? abs(cos_light) : cos_light;
       flux *= (cos_light > 0.0) ? cos_light * spread_attenuation(light.spread, cos_light) : 0.0;

@@ -121,7 +121,9 @@ def airlight(origin, direction, far, light, intensity, scattering, extinction, s
     angle = np.linspace(np.arctan2(-along, apart), np.arctan2(far - along, apart), steps)
     t = along + apart * np.tan(angle)
     away = apart / np.cos(angle)
-    values = scattering / (4 * np.pi) * intensity * np.exp(-extinction * (t + away)) / apart  # dt / away^2 = d angle / apart
+    values = (
+        scattering / (4 * np.pi) * intensity * np.exp(-extinction * (t + away)) / apart
+    )  # dt / away^2 = d angle / apart
     return np.trapezoid(values, angle)
 
 
@@ -140,9 +142,7 @@ def test_airlight_of_a_point_light_is_its_integral(stage):
             far = 16.0 * np.linalg.norm(direction)
             direction /= np.linalg.norm(direction)
             light = np.array([0.3, 0.5, 0.2])
-            expected[y, x] = airlight(
-                np.array([0, -6.0, 0]), direction, far, light, np.pi, 0.15, 0.15
-            )
+            expected[y, x] = airlight(np.array([0, -6.0, 0]), direction, far, light, np.pi, 0.15, 0.15)
     # Volume Scatter absorbs nothing: extinction is scattering.
     assert fog_light.mean() == pytest.approx(expected.mean(), rel=0.01)
     assert np.abs(fog_light / expected - 1).mean() < 0.05
