@@ -175,16 +175,17 @@ def _save(path: Path, ours: np.ndarray, theirs: np.ndarray) -> None:
 
 def page(rows: list[tuple[str, ...]], profiles: list[tuple[str, ...]], options) -> str:
     """The tables as a page of the documentation."""
-    text = [
-        "# Fog, smoke and volume caustics", "",
-        "Written by `python -m bench media --page docs/media.md`; do not edit. Pictures of "
-        f"{options.size[0]} x {options.size[1]} pixels,",
-        f"{options.bounces} bounces in all engines but EEVEE, against two renders of {options.reference} samples by Cycles, "
-        "whose noise is taken off",
-        "the errors (relMSE). Candela and EEVEE draw on a software GPU. EEVEE has no such bounces: its bias is partly that.",
-        "", markdown.table([HEAD, *rows]), "",
-    ]  # fmt: skip
+    width, height = options.size
+    text = f"""# Fog, smoke and volume caustics
+
+Written by `python -m bench media --page docs/media.md`; do not edit. Pictures of {width} x {height} pixels,
+{options.bounces} bounces in all engines but EEVEE, against two renders of {options.reference} samples by Cycles, whose
+noise is taken off the errors (relMSE). Candela and EEVEE draw on a software GPU. EEVEE has no such bounces: its bias
+is partly that.
+
+"""
+    text += markdown.table([HEAD, *rows]) + "\n"
     if profiles:
-        text += ["## Volume caustics", "", "Profile of the light in the medium below the caster, 16 samples.", ""]
-        text += [markdown.table([PROFILE_HEAD, *profiles]), ""]
-    return "\n".join(text)
+        text += "\n## Volume caustics\n\nProfile of the light in the medium below the caster, 16 samples.\n\n"
+        text += markdown.table([PROFILE_HEAD, *profiles]) + "\n"
+    return text

@@ -117,7 +117,10 @@ def add(
             program(len(names), reach(width), dimmed),
             frame.target(*names),
             blend="ADDITIVE_PREMULT",
-            textures={f"seen_{i}": seen[name] for i, name in enumerate(names)} | ({"through": through} if dimmed else {}),
+            textures={
+                **{f"seen_{i}": seen[name] for i, name in enumerate(names)},
+                **({"through": through} if dimmed else {}),
+            },
             constants={
                 "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
                 "last_weights": (across[4], up[4]),

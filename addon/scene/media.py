@@ -180,8 +180,8 @@ def fournier_forand(index: float, backscatter: float) -> tuple[float, float, flo
 
 
 def mie(diameter: float) -> tuple[float, float, float, float]:
-    """Anisotropy of Henyey & Greenstein's lobe, anisotropy and alpha of Draine's, its weight, for droplets of a diameter
-    in micrometres (Jendersie & d'Eon 2023, equations 4 to 16)."""
+    """Anisotropy of Henyey & Greenstein's lobe, anisotropy and alpha of Draine's, its weight, for droplets of a
+    diameter in micrometres (Jendersie & d'Eon 2023, equations 4 to 16)."""
     d = float(np.clip(diameter, 0.0, 50.0))
     if d <= 0.1:
         weight = 0.252977 - 312.983 * d**4.3
@@ -272,7 +272,7 @@ class Media:
             world.medium and world.medium.key, world.volume if uneven_world else None,
             tuple(id(one) for one in (snapshot.instances if uneven_world else bound)),
             tuple((one.volume.key, one.volume.version, one.matrix.tobytes(), one.material) for one in snapshot.volumes),
-            tuple((k, compiled[k].medium and compiled[k].medium.key, snapshot.materials[k].graph) for k in sorted(used)),
+            tuple((k, _key_of(compiled[k]), snapshot.materials[k].graph) for k in sorted(used)),
             tuple((key, image.version) for key, image in snapshot.images.items()),
             tuple((key, mesh.version) for key, mesh in snapshot.meshes.items()), origin.tobytes(), resolution,
         )  # fmt: skip
@@ -374,6 +374,10 @@ class Media:
 
     def release(self) -> None:
         self.__init__()
+
+
+def _key_of(material: CompiledMaterial) -> tuple | None:
+    return material.medium and material.medium.key
 
 
 def _grid_size(one: Filled, resolution: int) -> np.ndarray:

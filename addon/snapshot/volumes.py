@@ -7,7 +7,6 @@ longer than MOST_VOXELS on a side are averaged by whole factors first.
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 from pathlib import Path
@@ -68,9 +67,10 @@ def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume 
         notes.append(Note(subject, f"its volume cannot be read: {error}."))
         return None
     path = bpy.path.abspath(data.grids.frame_filepath or "", library=data.library)
-    file = bool(path) and os.path.isfile(path)
+    file = bool(path) and Path(path).is_file()
     key = f"volume {path}" if file else f"volume {name} {(data.original or data).session_uid}"
-    state = (path, os.stat(path).st_mtime_ns, os.stat(path).st_size) if file else (data.session_uid,)
+    stat = Path(path).stat() if file else None
+    state = (path, stat.st_mtime_ns, stat.st_size) if file else (data.session_uid,)
     known = cache.volumes.get(key)
     if known is not None and known[0] == state:
         return known[1]

@@ -1,6 +1,6 @@
 """Airlight: light of every lamp, the world and shining meshes that media scatter once towards the eye, with shadows.
 
-    L(v) = integral over the view ray of  T(eye, x) sum over lights of  sigma_s(x) p(x, w, v) T(x, y) V(x, y) L(y, -w) dw
+    L(v) = integral over the view ray of  T(eye, x) sum over lights of  sigma_s(x) p(x, w, v) T(x, y) V(x, y) L(y) dw
 
 A row of lights is a point of this sample on each of them, shared by all pixels; each row takes some places x on each
 pixel's ray. Half of the places are drawn around the point, in equal steps of the angle under which it sees the ray
@@ -9,7 +9,8 @@ balance heuristic: the first ends the singularity at a lamp in fog, the second s
 hierarchy, T is that of media.py. What media emit is integrated in closed form over the same bins.
 
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
-spread their mean over pixels whose rays end equally far away. Others take a quarter as many at every pixel, and converge.
+spread their light over opacity to pixels whose rays end equally far away. Others take a quarter as many at every pixel,
+and converge.
 
 | cost | per sample |
 |---|---|
@@ -137,8 +138,8 @@ class Airlight(Technique):
         ),
         Param(
             "bounces", "Volume bounces", 8,
-            "How often light is scattered or reflected before a medium sends it to the eye, at most; 0: lamps and world "
-            "alone", 0, MOST_BOUNCES, draft=2,
+            "How often light is scattered or reflected before a medium sends it to the eye, at most; 0: none but "
+            "that of lamps and world", 0, MOST_BOUNCES, draft=2,
         ),
     )  # fmt: skip
     reads = SURFACES
@@ -199,8 +200,9 @@ class Airlight(Technique):
         bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
         if bounces and media.media.scatters:
             self._reflectance.update(frame)
+            names = "radiance.volume_indirect", "radiance.diffuse_indirect"
             yield from self._add(
-                frame, indirect_program(stride, kinds, world), ("radiance.volume_indirect", "radiance.diffuse_indirect"),
+                frame, indirect_program(stride, kinds, world), names,
                 SPREAD_ON_SURFACES if coarse else None,
                 textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
                 blocks=blocks, constants=asked | {"bounces": bounces},

@@ -1,7 +1,7 @@
 """Volume caustics: light that glass and mirrors focus into media, as beams.
 
-Rays leave a point of each lamp in the cone around all specular objects, are bent and mirrored by the hierarchy, and each
-stretch that then lies in a medium is drawn as a quad on the screen. At a pixel it leaves the radiance
+Rays leave a point of each lamp in the cone around all specular objects, are bent and mirrored by the hierarchy, and
+each stretch that then lies in a medium is drawn as a quad on the screen. At a pixel it leaves the radiance
 
     L = flux * sigma_s(x) p(x) T(start, x) T(x, eye) * k(u) / sin(gamma)
 
@@ -22,9 +22,9 @@ Jarosz, Nowrouzezahrai, Sadeghi, Jensen, "A Comprehensive Theory of Volumetric R
 and Beams", TOG 2011 (weight). Changed: rays by the hierarchy instead of depth maps, so that several bounces and concave
 objects are right; quads with the normalised weight instead of lines.
 
-Bias: the kernel's width; a beam seen nearly end-on is bounded (sine of 1/20). Rough glass and mirrors are taken as smooth up
-to SMOOTH and left out beyond. Materials count by their mean colour. The world and shining meshes throw no beams. A
-beam behind glass is not seen.
+Bias: the kernel's width; a beam seen nearly end-on is bounded (sine of 1/20). Rough glass and mirrors are taken as
+smooth up to SMOOTH and left out beyond. Materials count by their mean colour. The world and shining meshes throw no
+beams. A beam behind glass is not seen.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class VolumeCaustics(Technique):
     params = (
         Param(
             "rays", "Rays", 192,
-            "Side of the square of light rays that each lamp sends towards glass and mirrors in a sample", 8, 1024, draft=64,
+            "Side of the square of light rays that each lamp sends towards glass and mirrors in a sample",
+            8, 1024, draft=64,
         ),
     )  # fmt: skip
     reads = ("surface.position",)
