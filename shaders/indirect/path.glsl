@@ -2,14 +2,14 @@
 //
 // A program that includes this binds the surface images, `film_view`, `sources`, the hierarchy and `reflectance`, and has
 // the constants `light_count` and `offset_size`.
-#ifdef MEDIA
-#include "media/media.glsl"
-#endif
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
+#ifdef MEDIA  // last: what it includes, too, would be missing where this is left out
+#include "media/media.glsl"
+#endif
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 
