@@ -412,7 +412,8 @@ class Renderer:
         return self._environment[1]
 
     def _programs(self, plan: Plan, snapshot: Snapshot, settings: Settings) -> list:
-        shown = sorted({draw.material for draw in self.geometry.draws})
+        drawn = {draw.material for draw in self.geometry.draws}
+        shown = sorted(k for k in drawn if not self.materials.compiled[k].bounds_alone)
         wanted = [self.materials.surface_program(material) for material in shown]
         wanted += [program for t in plan.techniques for program in t.programs(snapshot, settings)]
         wanted += [
