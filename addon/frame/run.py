@@ -19,6 +19,7 @@ from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
+from ..scene.media import volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
@@ -436,7 +437,7 @@ class Renderer:
         )  # fmt: skip
         camera = snapshot.camera
         return (
-            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            lights, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),

@@ -92,6 +92,17 @@ def has_media(snapshot: Snapshot) -> bool:
     return any(snapshot.materials[k].graph.volume is not None for k in used)
 
 
+def volumes_key(snapshot: Snapshot) -> tuple:
+    """Equal in two snapshots if their volumes are alike, but for the places of meshes and what materials say of media
+    that are the same everywhere."""
+    world = snapshot.world
+    return (
+        world.medium and world.medium.key, world.volume,
+        tuple(material.graph for material in snapshot.materials if material.graph.volume is not None),
+        tuple((one.volume.version, one.matrix.tobytes(), one.material, one.density) for one in snapshot.volumes),
+    )  # fmt: skip
+
+
 def filled(snapshot: Snapshot, compiled: list[CompiledMaterial], origin: np.ndarray) -> tuple[list[Filled], list[Note]]:
     """All media of the scene, the world's first, and what is left out."""
     found, notes = [], []

@@ -355,3 +355,27 @@ def test_voxels_absorb_what_stands_in_them(stage, tmp_path):
     seen = stage.render(4, size=(16, 16))["combined"]
     assert seen[8, 8, 0] == pytest.approx(2 * np.exp(-0.8), rel=0.01)
     assert seen[8, 3, 0] == pytest.approx(2.0 * (np.exp(-0.8) if abs(3.5 - 8) / 4 < 1.0 else 1.0), rel=0.01)
+
+
+def test_a_change_of_fog_alone_begins_the_picture_anew(stage):
+    stage.camera_above()
+    glowing_floor(stage)
+    made = box(stage, absorber(stage, (0.8, 0.8, 0.8)))
+    seen = []
+    for density in (1.0, 2.0):
+        node = next(n for n in made.data.materials[0].node_tree.nodes if n.type == "VOLUME_ABSORPTION")
+        node.inputs["Density"].default_value = density
+        seen.append(stage.render(size=(8, 8))["combined"][4, 4, 0])
+    assert seen == pytest.approx([2 * np.exp(-0.8), 2 * np.exp(-1.6)], rel=1e-3)
+    fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=0.1)
+    thin = stage.render(size=(8, 8))["combined"][0, 0, 0]
+    node = next(n for n in stage.scene.world.node_tree.nodes if n.type == "VOLUME_ABSORPTION")
+    node.inputs["Density"].default_value = 0.2
+    assert stage.render(size=(8, 8))["combined"][0, 0, 0] == pytest.approx(thin * np.exp(-1.2), rel=1e-2)
+
+
+def test_fog_in_a_scene_without_any_mesh(stage):
+    stage.camera((0, -6, 0), (np.pi / 2, 0, 0))
+    stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.0)
+    fog(stage, Density=0.2)
+    assert stage.render(2, size=(8, 8))["volume_direct"].min() > 0
