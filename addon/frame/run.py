@@ -19,6 +19,7 @@ from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
+from ..scene.media import volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
@@ -474,7 +475,8 @@ class Renderer:
         return self._environment[1]
 
     def _programs(self, plan: Plan, snapshot: Snapshot, settings: Settings) -> list:
-        shown = sorted({draw.material for draw in self.geometry.draws})
+        drawn = {draw.material for draw in self.geometry.draws}
+        shown = sorted(k for k in drawn if not self.materials.compiled[k].bounds_alone)
         wanted = [self.materials.surface_program(material) for material in shown]
         wanted += [program for t in plan.techniques for program in t.programs(snapshot, settings)]
         wanted += [
@@ -499,7 +501,7 @@ class Renderer:
         )  # fmt: skip
         camera = snapshot.camera
         return (
-            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            lights, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw),

@@ -221,6 +221,7 @@ class Tree:
     high: np.ndarray | None
     tiles: np.ndarray  # (N, 4) texels of OpacityMaps, before the leaves: a whole number of leaves
     refitted: bool = False
+    nodes: np.ndarray | None = None  # (N, NODE_TEXELS, 4)
 
 
 def build(corners: np.ndarray, look: np.ndarray, tiles: np.ndarray = NO_TILES) -> Tree:
@@ -272,7 +273,7 @@ def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarra
     leaves = np.concatenate([tree.tiles, tree.leaves.reshape(-1, 4)]) if len(tree.tiles) else tree.leaves
     nodes, leaves = (images.upload_list(texels.reshape(-1, 4)) for texels in (rows, leaves))
     leaves.defines = TILED if len(tree.tiles) else ()
-    return replace(tree, hierarchy=Hierarchy(nodes, leaves, tree.hierarchy.triangles))
+    return replace(tree, hierarchy=Hierarchy(nodes, leaves, tree.hierarchy.triangles), nodes=rows)
 
 
 def _pack_boxes(rows: np.ndarray, low: np.ndarray, high: np.ndarray, least: float) -> None:
@@ -330,7 +331,7 @@ class HierarchyCache:
             triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps)
             tree = build(*triangles, maps.texels)
             if tree.hierarchy.triangles > MOST_REFITTED:
-                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = None
+                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = tree.nodes = None
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}

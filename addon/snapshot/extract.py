@@ -19,6 +19,7 @@ from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
 from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
+from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
 
 
@@ -69,6 +70,7 @@ def take(
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, notes)
+    volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]
@@ -86,6 +88,7 @@ def take(
         notes=tuple(dict.fromkeys(notes)),
         scene_name=scene.name,
         moment=Moment(scene.frame_current_final, scene.render.fps / scene.render.fps_base),
+        volumes=volumes,
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start

@@ -25,7 +25,6 @@ from .scene import Note, Visibility
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
 # Object types that Cycles draws and we do not, as an artist calls them.
 _NOT_DRAWN = {
-    "VOLUME": "volume",
     "GREASEPENCIL": "grease pencil",
     "GPENCIL": "grease pencil",
 }
@@ -180,6 +179,11 @@ def _is_holdout(owner, parent, view_layer) -> bool:
     if view_layer is None:
         return owner.is_holdout or (parent is not None and parent.is_holdout)
     return any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None)
+
+
+def visibility_of(owner) -> Visibility:
+    """Ray visibility of an object by itself."""
+    return _visibility_of(_flags(owner, None))
 
 
 def _visibility(owner, parent, view_layer) -> Visibility:

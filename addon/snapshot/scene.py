@@ -99,6 +99,34 @@ class Instance:
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
 
 
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """Grids of an OpenVDB object on one lattice of voxels; those outside the arrays are empty."""
+
+    key: str
+    version: int
+    grids: dict[str, np.ndarray]  # name -> (X, Y, Z) or (X, Y, Z, 3) float32
+    low: np.ndarray  # (3,) index of the first voxel
+    to_object: np.ndarray  # (3, 4) float64, from voxel indices (a voxel's centre is a whole number) to object space
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        return next(iter(self.grids.values())).shape[:3]
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeInstance:
+    """One placement of a volume."""
+
+    object_name: str
+    volume: Volume
+    matrix: np.ndarray  # (4, 4) float64
+    material: int  # index into Snapshot.materials
+    visibility: Visibility = Visibility()
+    key: str = ""
+    density: float = 1.0  # factor of all coefficients, so that a scaled object stays as opaque
+
+
 @dataclass(frozen=True)
 class Image:
     """Pixels of an image data-block, bottom row first, exactly as stored: no colour conversion is applied yet.
@@ -195,6 +223,7 @@ class World:
     graph: Graph | None = None  # a tree that is more than that; it then says all, and `color` is white
     visibility: Visibility = Visibility()
     medium: Medium | None = None  # what fills all space
+    volume: Graph | None = None  # the tree that says so
 
     @property
     def even(self) -> bool:
@@ -258,6 +287,7 @@ class Snapshot:
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
     moment: Moment = Moment()
+    volumes: tuple[VolumeInstance, ...] = ()
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 
     @cached_property

@@ -98,8 +98,9 @@ def _submit(
     what is shown instead of where surfaces lie."""
     seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
     material = None
+    unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
     for call in calls(frame.geometry.draws, seen):
-        if materials is not None and call.draw.material not in materials:
+        if call.draw.material in unseen or (materials is not None and call.draw.material not in materials):
             continue
         if call.draw.material != material:
             material = call.draw.material

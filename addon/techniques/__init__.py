@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
+from .airlight import Airlight
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
@@ -19,6 +20,7 @@ from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
+from .media import MediaAttenuation
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
 from .shadows_by_light import ShadowsByLight
@@ -27,9 +29,11 @@ from .surfaces import Surfaces
 from .temporal_glare import TemporalGlare
 from .traced_glossy import TracedGlossy
 from .traced_refraction import TracedRefraction
+from .volume_caustics import VolumeCaustics
 from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
+    MediaAttenuation,
     Surfaces,
     LightProbes,
     AccumulatedMaps,
@@ -45,6 +49,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     DirectionalOcclusion,
     TracedGlossy,
     TracedRefraction,
+    Airlight,
+    VolumeCaustics,
     InstantRadiosity,
     MultiresRadiosity,
     ClusteredVisibility,

@@ -69,6 +69,7 @@ from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
+from ..lighting.media import MediaService, attenuated
 from ..lighting.virtual_lights import (
     PATH_BLOCKS,
     PATH_CONSTANTS,
@@ -229,7 +230,10 @@ class InstantRadiosity(Technique):
         bindings["constants"] |= self._reach(frame, -(-len(lights) // SUBSETS))
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
-        program = gather_program(self.virtual_lights.kinds, *lobes_of(frame))
+        program, media = gather_program(self.virtual_lights.kinds, *lobes_of(frame)), frame.service(MediaService)
+        if media is not None:
+            program = attenuated(program)
+            bindings["textures"] = bindings["textures"] | media.bindings
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

@@ -35,6 +35,7 @@ from ..gfx import passes
 from ..lighting import repeated_light
 from ..lighting.light_rates import EmissivePoints, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
+from ..lighting.media import MediaService, attenuated
 from ..lighting.repeated_light import Lit
 from ..lighting.visibility import TracedLobes
 from ..materials.compiler import may_emit
@@ -127,7 +128,11 @@ class TracedGlossy(Technique):
                 "emissive_power": emissive.power, "emissive_points": emissive.count,
             },
         }  # fmt: skip
-        yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings, self._rows))
+        program, media = TRACED, frame.service(MediaService)
+        if media is not None:
+            program = attenuated(program)
+            bindings["textures"] |= media.bindings
+        yield from repeated_light.add(frame, self, self._sources, Lit(program, NARROW_LOBE, bindings, self._rows))
         frame.count(self, "passes")
 
     def release(self) -> None:

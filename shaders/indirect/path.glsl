@@ -7,6 +7,9 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
+#ifdef MEDIA  // last: what it includes, too, would be missing where this is left out
+#include "media/media.glsl"
+#endif
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 
@@ -186,6 +189,10 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
+#ifdef MEDIA
+      float reach = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
+      chosen_light *= media_transmittance(origin, chosen_direction, reach, salt);
+#endif
       sum += chosen_light * reflection_of(met.reflection, normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);
     }

@@ -20,6 +20,9 @@
 #ifdef KNOWN_IRRADIANCE
 #include "lib/known_irradiance.glsl"
 #endif
+#ifdef MEDIA
+#include "media/light.glsl"
+#endif
 
 // Irradiance in closed form times the closure towards the light's middle: exact for Lambert's.
 vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
@@ -148,6 +151,11 @@ void main()
         vec3 start = light_start(s.position, side * s.normal, facing, lift, towards, facing);
         visibility = light_visibility(light, pixel, start, facing);
       }
+#ifdef MEDIA
+      vec3 passing = light_through_media(light, pixel, s.position, towards);
+      from_diffuse *= passing;
+      from_glossy *= passing;
+#endif
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;
 #ifdef KNOWN_IRRADIANCE

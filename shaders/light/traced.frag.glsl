@@ -7,6 +7,10 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 
+#ifdef MEDIA
+#include "media/media.glsl"
+#endif
+
 // Share of the lobe's samples against `light_samples` of density `light_density` (power heuristic, beta = 2).
 float lobe_share(float lobe_density, float light_density, float light_samples)
 {
@@ -104,6 +108,10 @@ void main()
       float limit = (blocked < kept_span.y) ? blocked : 1e29;
       vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
       out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
+#ifdef MEDIA
+      float reach = (kept_span.x < 1e28) ? kept_span.x : FARTHEST_MEDIUM;
+      out_glossy.rgb *= media_transmittance(origin, kept_direction, reach, salt.x);
+#endif
     }
   }
   if (emissive_power > 0.0) {
@@ -126,6 +134,9 @@ void main()
         float ratio = emissive_points * light_density / max(lobe_density, 1e-30);
         share = 1.0 / (1.0 + ratio * ratio);
       }
+#ifdef MEDIA
+      weight *= media_transmittance(origin, direction, t, salt.y);
+#endif
       out_glossy.rgb += weight * emission * share;
     }
   }
