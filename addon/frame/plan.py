@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..snapshot.scene import Snapshot
 from . import costs
 from .ledger import SKIPPED, Row
-from .settings import AUTO, Settings
+from .settings import AUTO, OFF, Settings
 from .technique import Technique
 
 
@@ -49,6 +49,8 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
         if tree is not None and technique.name not in tree:
             reason = "it is not in the pass tree"
         wish = wishes.get(technique.slot, AUTO)
+        if not reason and wish == OFF:
+            reason = f"the {technique.slot} slot is off"
         if not reason and wish not in (AUTO, technique.name):
             asked = settings.slots.get(technique.slot, AUTO) != AUTO
             reason = f"the {technique.slot} slot is {'set to' if asked else 'filled by'} {labels.get(wish, wish)}"

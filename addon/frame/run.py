@@ -370,7 +370,7 @@ class Renderer:
         lights = tuple(
             (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
              light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.bounces, light.visibility)
+             light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility)
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera

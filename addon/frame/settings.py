@@ -15,7 +15,7 @@ BOUNCES = Param(
 )  # fmt: skip
 DRAFT_BOUNCES = 4
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES)
-AUTO = "AUTO"
+AUTO, OFF = "AUTO", "OFF"  # of a slot: chosen by scene; left empty
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Settings:
         slots: dict[str, list[str]] = {}
         for technique in techniques:
             if technique.slot:
-                slots.setdefault(f"slot.{technique.slot}", [AUTO]).append(technique.name)
+                slots.setdefault(f"slot.{technique.slot}", [AUTO, OFF]).append(technique.name)
         for text in assignments:
             name, equals, value = text.partition("=")
             if not equals:

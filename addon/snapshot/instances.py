@@ -69,6 +69,7 @@ class ObjectFacts:
     random: float
     color: tuple[float, float, float, float]
     terminator: float
+    caustics_caster: bool
     notes: tuple[Note, ...]
 
 
@@ -132,6 +133,7 @@ def walk(
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
+                        caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:

@@ -34,6 +34,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..lighting import shared_visibility
+from ..lighting.caustic_casters import answered
 from ..lighting.loop import DIRECT_WRITES, lighting, shade
 from ..lighting.point_maps import PointMaps
 from ..lighting.visibility import (
@@ -122,6 +123,7 @@ class DirectLight(Technique):
                     sample = emitter.sample(*frame.random_volume_at(number, "light"))
                     row = emitter.row(sample, 0, 1, weight, rate.per_sample, points)
                     row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
+                    row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
                     traced.append(row)
                 continue
             for number in rate.points(frame.sample):
@@ -137,6 +139,7 @@ class DirectLight(Technique):
                 row[0, 1] += lights.WHOLE_FLAG * whole
                 kinds |= whole << lights.WHOLE
                 row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced) + lights.NEAR_FLAG * near
+                row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
                 items.setdefault(shadow, []).append((row, views))
         for first in range(0, len(traced), lights.MOST_LIGHTS):
             rows = traced[first : first + lights.MOST_LIGHTS]

@@ -45,6 +45,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..lighting.emissive_triangles import EmissiveTriangles
+from ..lighting.interfaces import interface_table
 from ..materials.compiler import may_emit, may_refract
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -120,16 +121,7 @@ class TracedRefraction(Technique):
     def prepare(self, frame: Frame) -> None:
         """Tell the shader how the materials behind the first interface bend light, and what their insides absorb: three
         texels for each."""
-        table = np.zeros((len(frame.materials.compiled), 3, 4), np.float32)
-        for row, material in zip(table, frame.materials.compiled):
-            if material.glass:
-                glass = material.glass
-                row[0] = *glass.color, glass.ior
-                losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
-                row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
-            if material.medium:
-                row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
-        self._interfaces = images.upload(table)
+        self._interfaces = images.upload(interface_table(frame.materials.compiled))
 
     def run(self, frame: Frame) -> None:
         if frame.sample == 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..frame.settings import AUTO, BOUNCES, SAMPLES, SEED, Settings
+from ..frame.settings import OFF, AUTO, BOUNCES, SAMPLES, SEED, Settings
 from ..frame.technique import Param
 from ..techniques import REGISTRY
 from .pass_tree import TREE, order_of
@@ -51,6 +51,7 @@ def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
     for number, technique in enumerate((t for t in REGISTRY if t.slot == slot), 1):
         summary = (technique.__module__ and __import__(technique.__module__, fromlist=["_"]).__doc__) or ""
         items.append((technique.name, technique.label, summary.strip().splitlines()[0], number))
+    items.append((OFF, "Off", "Leave out what techniques of this slot draw", 255))
     return items
 
 

@@ -1,0 +1,213 @@
+"""Photons of caustics: bundles of light that specular surfaces send to diffuse ones, as records in images.
+
+The texels of a light's view of the casters (light_views.py) are photons of the flux
+
+    Phi = E(P) * A,   E irradiance across the light's direction at P,  A = d_omega |P - light|^2, or a texel's area
+
+which meet a material's own lobe at P: refracted or mirrored, one grid for each. From there a ray goes on through the
+hierarchy of all triangles, from interface to interface with the means of their materials (interfaces.py), until it
+meets a surface that is no caster. There each photon stands for an ellipse, by its neighbours of the same path (photon
+differentials on a grid, Kim, Ray Tracing Gems 2019):
+
+    Sigma = k^2 / 2 * sum over neighbours (x' - x)(x' - x)^T  +  (blur^2 + least^2) I
+    E(x)  = Phi * 2 max(0, 1 - q) / (pi sqrt(det Sigma)),   q = x^T Sigma^-1 x
+
+All photons of a sample share the point of the light, the numbers that a rough lobe draws from, and those that choose
+between mirrored and bent at later interfaces (in proportion to Fresnel's reflectance). So the photons of a sample are
+one smooth map, which needs few of them, and the mean over the samples is the integral over light, lobes and paths. The
+grid is shifted below a texel in each sample and k falls with their number, so that the mean converges. `blur` is what
+the light's extent and the lobe's width, which the samples share out, leave to each: at one sample all of it.
+
+| cost | per sample, view and lobe |
+|---|---|
+| draws | the surfaces that the view sees, into six images |
+| rays | per photon 1 for each interface on its way, and 1 |
+| passes | 2 of the grid's side squared; bytes 10 x 16 per texel |
+
+Bias: footprints blur by about their size, and none of it remains as samples grow. Interfaces behind the first have
+their material's mean colour, index and roughness, and none of its bumps. Light of one interaction with a diffuse
+surface between is left to indirect light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import images, passes
+from ..gfx.struct import Block, Struct
+from ..scene import acceleration
+from ..scene.view import VIEW
+from ..sources import lights
+from ..surfaces.draw import SURFACE_TEXTURES
+from ..surfaces.reflectance import Reflectance
+from . import caustic_casters
+from .interfaces import interface_table
+from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
+
+FOUND = ("photon_points", "photon_normals", "photon_fluxes")
+EMISSION = Struct(
+    "Emission",
+    ("vec4", "box_low"),  # of the casters that the view is about
+    ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
+    ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
+    ("vec4", "spread"),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample
+    ("int", "interfaces"),  # at most, after the first
+    ("int", "bends"),  # 1: photons of the refracted lobe
+)
+PHOTONS = passes.fullscreen_program(
+    "photons",
+    "caustics/photon.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES,
+        *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table")),
+    ),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "emission")),
+    constants=(("FLOAT", "offset_size"), ("INT", "sample_number")),
+    outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
+)  # fmt: skip
+FOOTPRINTS = passes.fullscreen_program(
+    "photon footprints",
+    "caustics/footprint.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in FOUND),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "widening"), ("FLOAT", "least_pixels"), ("FLOAT", "longest")),
+    outputs=(("VEC4", "out_centre"), ("VEC4", "out_first"), ("VEC4", "out_second"), ("VEC4", "out_value")),
+)
+WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
+FALL_KNOWN, FALL_GROWING = -1.0 / 3.0, -1.0 / 4.0  # exponents of the footprints' fall with samples
+LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Photons of one view and lobe: images of FOUND and how many samples share the light among them."""
+
+    found: tuple[images.Image, ...]
+    view: LightView
+    emitter: lights.Emitter
+
+
+class Photons:
+    """Finds the photons of each sample. A technique owns one."""
+
+    def __init__(self):
+        self.buffers = LightBuffers()
+        self._reflectance = Reflectance()
+        self._sources = lights.Sources()
+        self._interfaces: images.Image | None = None
+        self._emission: Block | None = None
+        self._found: images.Target | None = None
+        self._footprints: images.Target | None = None
+
+    def begin(self, frame: Frame, casters: caustic_casters.Casters) -> None:
+        """Before the first sample of a frame."""
+        self._reflectance.update(frame)
+        self._interfaces = images.upload(interface_table(frame.materials.compiled, casters.mirrors))
+
+    def bundles(
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, side: int, interfaces: int,
+        index: int, count: int,
+    ) -> Iterator[Bundle]:  # fmt: skip
+        """Photons of the sample number `index` (of `count` that a picture has, or has so far), one grid after the other;
+        each is valid until the next."""
+        for emitter, view, lobes in self.views(frame, casters, side, index):
+            share = float(count) ** -0.5
+            wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
+            u, later = frame.random_at(index, "caustics/lobe"), frame.random_at(index, "caustics/interface")
+            if count == 1:
+                u, later = (0.5, 0.5), (0.5, 0.5)
+            row = emitter.row(self._sample(frame, emitter, index), 0, 0)
+            sources = self._sources.set([row])
+            choice = frame.random_volume_at(index, "caustics/interface")[2]
+            for lobe, block, surfaces in self.buffers.draw(frame, technique, view, casters.materials, lobes, choice):
+                values = {
+                    "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
+                    "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), 0.0),
+                    "interfaces": interfaces, "bends": int(lobe == REFRACTED),
+                }  # fmt: skip
+                if self._emission is None:
+                    self._emission = Block(EMISSION, **values)
+                else:
+                    self._emission.update(**values)
+                target = self._target("_found", view.side, len(FOUND))
+                passes.fullscreen(
+                    PHOTONS,
+                    target,
+                    textures={
+                        **frame.hierarchy("transmission").textures, **surfaces,
+                        "energy_table": frame.materials.energy_table, "reflectance": self._reflectance.image,
+                        "interface_table": self._interfaces,
+                    },
+                    blocks={"film_view": block, "sources": sources, "emission": self._emission},
+                    constants={"offset_size": 1e-6 * frame.geometry.size, "sample_number": index},
+                )  # fmt: skip
+                frame.count(technique, "passes")
+                frame.count(technique, "photons", view.side**2)
+                yield Bundle(target.colors, view, emitter)
+
+    def views(
+        self, frame: Frame, casters: caustic_casters.Casters, side: int, index: int
+    ) -> Iterator[tuple[lights.Emitter, LightView, tuple[int, ...]]]:
+        """Views of all lights that are answered for, and the lobes that photons may take there."""
+        lobes = ()
+        if casters.refracting:
+            lobes += (REFRACTED,)
+        if frame.snapshot.film.caustics_reflective:
+            lobes += (REFLECTED,)
+        for emitter in frame.emitters:
+            if emitter.light.key not in casters.lights:
+                continue
+            sample = self._sample(frame, emitter, index)
+            shift = frame.random_at(index, "caustics/grid")
+            for low, high in caustic_casters.boxes_of(frame, casters):
+                for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
+                    yield emitter, view, lobes
+
+    @staticmethod
+    def _sample(frame: Frame, emitter: lights.Emitter, index: int) -> np.ndarray:
+        return emitter.sample(*frame.random_volume_at(index, "light"))
+
+    def footprints(
+        self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, count: int, least_pixels: float
+    ) -> tuple[images.Image, ...]:
+        """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
+        fall = FALL_KNOWN if frame.settings.whole else FALL_GROWING
+        target = self._target("_footprints", bundle.view.side, 4)
+        passes.fullscreen(
+            FOOTPRINTS,
+            target,
+            textures=dict(zip(FOUND, bundle.found)),
+            blocks={"film_view": onto},
+            constants={
+                "widening": WIDENING * float(max(count, 1)) ** fall, "least_pixels": least_pixels,
+                "longest": LONGEST,
+            },
+        )  # fmt: skip
+        frame.count(technique, "passes")
+        return target.colors
+
+    def _target(self, name: str, side: int, count: int) -> images.Target:
+        target = getattr(self, name)
+        if target is None or target.size != (side, side):
+            self._give(target)
+            target = images.Target(tuple(images.pool.take(side, side, "RGBA32F") for _ in range(count)))
+            setattr(self, name, target)
+        return target
+
+    @staticmethod
+    def _give(target: images.Target | None) -> None:
+        for image in target.colors if target is not None else ():
+            images.pool.give(image)
+
+    def release(self) -> None:
+        self._give(self._found)
+        self._give(self._footprints)
+        self._found = self._footprints = self._interfaces = self._emission = None
+        self.buffers.release()
+        self._reflectance.release()
+        self._sources.release()

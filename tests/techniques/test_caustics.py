@@ -1,0 +1,96 @@
+"""Caustics on surfaces: closed forms, energy, and what may not happen."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.frame.ledger import RAN, SKIPPED
+from tests.techniques.conftest import places
+
+PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
+SIZE = (128, 128)
+
+
+def ball(stage, material, radius=0.5, place=(0, 0, 1), segments=96):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=radius, location=place)
+    made = bpy.context.object
+    made.data.materials.append(material)
+    for polygon in made.data.polygons:
+        polygon.use_smooth = True
+    made.visible_camera = False
+    return made
+
+
+def glass(stage, ior=1.5, **inputs):
+    return stage.material("ShaderNodeBsdfGlass", IOR=ior, **{"Roughness": 0.0, **inputs})
+
+
+def irradiance(stage, technique, samples=16, size=SIZE, path="diffuse_indirect", **settings):
+    """W/m2 on white surfaces that caustics bring, (H, W)."""
+    stage.scene.candela.slot_indirect = "OFF"
+    stage.scene.candela.slot_caustics = technique
+    for name, value in settings.items():
+        setattr(stage.scene.candela, f"{technique}_{name}", value)
+    images = stage.render(samples=samples, size=size, bounces=2)
+    assert technique == "OFF" or stage.ledger.row(technique).state == RAN, stage.ledger.text()
+    return images[path][..., 0] * np.pi
+
+
+def within(energy, radius, span, disc):
+    """Share of the light of a disc of radius `disc` that falls within `radius` of the middle; a pixel counts by the
+    part of it that lies there."""
+    size = energy.shape[::-1]
+    fine = 8
+    x, y = places((size[0] * fine, size[1] * fine), span)
+    part = (np.hypot(x, y) < radius).reshape(size[1], fine, size[0], fine).mean(axis=(1, 3))
+    return float((energy * part).sum() * (span / max(size)) ** 2 / (np.pi * disc**2))
+
+
+@pytest.fixture(params=[PHOTONS, MAPPING])
+def technique(request):
+    return request.param
+
+
+# The specification's table: unit glass ball of index 1.5 in parallel light, share of the light of its disc within the
+# radius r on a plane at X from the middle, two refractions with Fresnel's losses.
+BALL_LENS = {
+    1.25: {0.1: 0.651, 0.2: 0.723, 0.3: 0.763, 0.5: 0.802},
+    1.5: {0.1: 0.373, 0.2: 0.518, 0.3: 0.607, 0.5: 0.708},
+    2.0: {0.1: 0.068, 0.2: 0.190, 0.3: 0.302, 0.5: 0.468},
+    2.5: {0.1: 0.020, 0.2: 0.072, 0.3: 0.140, 0.5: 0.280},
+}
+
+
+@pytest.mark.parametrize("distance", BALL_LENS)
+def test_ball_lens_has_the_light_of_the_table_in_each_ring(stage, technique, distance):
+    stage.floor()
+    ball(stage, glass(stage), place=(0, 0, 0.5 * distance), segments=192)
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(0.6)
+    energy = irradiance(stage, technique, samples=16)
+    for radius, share in BALL_LENS[distance].items():
+        found = within(energy, 0.5 * radius, 0.6, 0.5)
+        print(distance, radius, share, round(found, 4))
+        assert found == pytest.approx(share, abs=0.02, rel=0.04)
+
+
+def test_plane_mirror_is_a_second_light(stage, technique):
+    """Mirror of 1 m at z = 0, spot of 100 W at (-1, 0, 1): the wall at x = 1.5 is lit from (-1, 0, -1)."""
+    wall = stage.rectangle((-4, -4), (4, 4), material=stage.diffuse(), turn=(0, -np.pi / 2, 0), location=(1.5, 0, 0))
+    wall.name = "Wall"
+    stage.rectangle((-0.5, -0.5), (0.5, 0.5), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0))
+    lamp = stage.light("SPOT", location=(-1, 0, 1), energy=100.0, shadow_soft_size=0.0, spot_size=2.4, spot_blend=0.0)
+    lamp.rotation_euler = (0, -np.pi / 4, 0)
+    camera = stage.camera_above(5.0)
+    camera.location, camera.rotation_euler = (-5, 0, 2), (np.pi / 2, 0, -np.pi / 2)
+    energy = irradiance(stage, technique, samples=16, size=(64, 64))
+    y, z = places((64, 64), 5.0)
+    y, z = -y, z + 2.0
+    expected = 7.9577 * 2.5 / (2.5**2 + y**2 + (z + 1) ** 2) ** 1.5
+    inside = (z > 0.8) & (z < 3.6) & (np.abs(y) < 0.46 * (z + 1))
+    outside = (z < 0.5) | (z > 4.3) | (np.abs(y) > 0.56 * (z + 1) + 0.1)
+    ratio = energy[inside] / expected[inside]
+    print(ratio.mean(), ratio.std(), energy[outside].max())
+    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
+    assert ratio.std() < 0.05
+    assert energy[outside].max() < 0.02
