@@ -39,6 +39,7 @@ from ..sources import lights
 from ..surfaces.draw import OPAQUE, STOCHASTIC, draw_view
 
 WIDEST = 1.4  # tangent of half the angle of one view
+FARTHEST = 4.0  # the same of what light may reach that casters bend
 MOST_GROUPS = 4
 MARGIN = 0.02  # of the box, for what its float32 bounds miss
 REFRACTED, REFLECTED = 1, 2  # wanted_lobe of the program of one lobe
@@ -235,6 +236,34 @@ def _view(orthographic: bool, eye, u, v, backward, window, side: int, far: float
     return LightView(values, rows, low, high)
 
 
+def widened(view: LightView, factor: float, receivers: np.ndarray, side: int, shift) -> LightView:
+    """The same view over a rectangle `factor` times as wide, but no wider than what holds the corners (N, 8, 3) of
+    receivers: of what light may reach that casters have bent."""
+    values = view.values
+    left, right, bottom, top = values["frame"]
+    middle, half = np.array([left + right, bottom + top]) / 2, np.array([right - left, top - bottom]) / 2 * factor
+    low, high = middle - half, middle + half
+    eye, u, v, backward = (np.array(values[name][:3]) for name in ("eye", "right", "up", "backward"))
+    orthographic = bool(values["eye"][3])
+    if not orthographic:
+        low, high = np.maximum(low, -FARTHEST), np.minimum(high, FARTHEST)
+    far = float(np.linalg.norm(receivers.reshape(-1, 3) - eye, axis=1).max()) if len(receivers) else 1.0
+    if len(receivers):
+        offsets = receivers.reshape(-1, 3) - eye
+        depth = offsets @ -backward
+        place = np.stack([offsets @ u, offsets @ v], axis=1)
+        if not orthographic:
+            place = np.where((depth > 1e-4 * far)[:, None], place / np.maximum(depth, 1e-30)[:, None], np.nan)
+        if np.isfinite(place).all():
+            within_low, within_high = np.maximum(low, place.min(axis=0)), np.minimum(high, place.max(axis=0))
+            if (within_low < within_high).all():
+                low, high = within_low, within_high
+    half = max(float((high - low).max()) / 2, 1e-12)
+    middle = (low + high) / 2
+    window = _shifted(middle - half, middle + half, side, shift)
+    return _view(orthographic, eye, u, v, backward, window, side, far, view.low, view.high)
+
+
 class LightBuffers:
     """The images of one size that views are drawn into, kept from view to view."""
 
@@ -249,11 +278,7 @@ class LightBuffers:
         """Draw `materials` as they reflect or refract the light, once for each of `lobes`; all other surfaces hide
         them. Yields the lobe, the view's block and the surface images by name (surface_*), valid until the next."""
         target = self._of(view.side)
-        values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
-        if self._block is None:
-            self._block = Block(VIEW, **values)
-        else:
-            self._block.update(**values)
+        self._viewed(frame, view)
         everything = frozenset(range(len(frame.materials.compiled)))
         bound = {f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, target.colors)}
         for lobe in lobes:
@@ -274,16 +299,37 @@ class LightBuffers:
             frame.count(technique, "light views")
             yield lobe, self._block, bound
 
-    def receivers(
-        self, frame: Frame, technique: Technique, view: LightView, casters: frozenset[int]
-    ) -> tuple[Block, dict[str, images.Image]]:
-        """Draw all surfaces but `casters` that the view sees first."""
+    def farthest(
+        self, frame: Frame, technique: Technique, view: LightView, materials: frozenset[int]
+    ) -> dict[str, images.Image]:
+        """Draw where light leaves `materials`, if it went straight: of all that the view sees of them the farthest, by
+        what they refract there."""
         target = self._of(view.side)
+        target.clear((0.0, 0.0, 0.0, 0.0), 0.0)
+        constants = {
+            "transparent_mode": OPAQUE, "glass_bends": 1, "index_shown": -1, "wanted_lobe": REFRACTED,
+            "lobe_choice": 0.5,
+        }  # fmt: skip
+        draw_view(
+            frame, technique, target, self._viewed(frame, view), view.rows, frame.materials.lobe_program, materials,
+            constants, depth_test="GREATER",
+        )  # fmt: skip
+        return {f"behind_{name}": image for name, image in zip(SURFACE_IMAGES, target.colors)}
+
+    def _viewed(self, frame: Frame, view: LightView) -> Block:
         values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
         if self._block is None:
             self._block = Block(VIEW, **values)
         else:
             self._block.update(**values)
+        return self._block
+
+    def receivers(
+        self, frame: Frame, technique: Technique, view: LightView, casters: frozenset[int]
+    ) -> tuple[Block, dict[str, images.Image]]:
+        """Draw all surfaces but `casters` that the view sees first."""
+        target = self._of(view.side)
+        self._viewed(frame, view)
         target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
         everything = frozenset(range(len(frame.materials.compiled)))
         constants = {"transparent_mode": OPAQUE, "glass_bends": 1, "index_shown": -1}

@@ -55,7 +55,8 @@ EMISSION = Struct(
     ("vec4", "box_low"),  # of the casters that the view is about
     ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
     ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
-    ("vec4", "spread"),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample
+    ("vec4", "spread"),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, or 0
+    ("vec4", "absorbed"),  # by insides, 1/m, in the mean; w: how far light may go, m
     ("int", "interfaces"),  # at most, after the first
     ("int", "bends"),  # 1: photons of the refracted lobe
 )
@@ -70,6 +71,15 @@ PHOTONS = passes.fullscreen_program(
     constants=(("FLOAT", "offset_size"), ("INT", "sample_number")),
     outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
 )  # fmt: skip
+MAP = (("RGBA32F", "receiver_position"), ("RGBA32F", "receiver_normal"))
+BEHIND = tuple(("RGBA32F", f"behind_{name}") for name in ("position", "normal", "tint", "lobe", "emission"))
+LOOKUPS = passes.fullscreen_program(
+    "photons by look-ups",
+    "caustics/lookup.frag.glsl",
+    textures=(*SURFACE_TEXTURES, *BEHIND, *MAP, ("RGBA32F", "energy_table")),
+    blocks=((VIEW, "film_view"), (VIEW, "map_view"), (lights.SOURCES, "sources"), (EMISSION, "emission")),
+    outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
+)
 FOOTPRINTS = passes.fullscreen_program(
     "photon footprints",
     "caustics/footprint.frag.glsl",
@@ -84,19 +94,29 @@ LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: bey
 
 
 @dataclass(frozen=True)
+class LitView:
+    """A light's view of casters in one sample."""
+
+    emitter: lights.Emitter
+    sample: np.ndarray  # the point of the light that it looks from
+    view: LightView
+    lobes: tuple[int, ...]  # that photons may take there
+    index: int  # of the sample
+
+
+@dataclass(frozen=True)
 class Bundle:
-    """Photons of one view and lobe: images of FOUND and how many samples share the light among them."""
+    """Photons of one view and lobe: images of FOUND, `side` along both sides."""
 
     found: tuple[images.Image, ...]
-    view: LightView
-    emitter: lights.Emitter
+    side: int
 
 
 class Photons:
     """Finds the photons of each sample. A technique owns one."""
 
     def __init__(self):
-        self.buffers = LightBuffers()
+        self.buffers, self._behind = LightBuffers(), LightBuffers()
         self._reflectance = Reflectance()
         self._sources = lights.Sources()
         self._interfaces: images.Image | None = None
@@ -108,52 +128,14 @@ class Photons:
         """Before the first sample of a frame."""
         self._reflectance.update(frame)
         self._interfaces = images.upload(interface_table(frame.materials.compiled, casters.mirrors))
-
-    def bundles(
-        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, side: int, interfaces: int,
-        index: int, count: int,
-    ) -> Iterator[Bundle]:  # fmt: skip
-        """Photons of the sample number `index` (of `count` that a picture has, or has so far), one grid after the other;
-        each is valid until the next."""
-        for emitter, view, lobes in self.views(frame, casters, side, index):
-            share = float(count) ** -0.5
-            wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
-            u, later = frame.random_at(index, "caustics/lobe"), frame.random_at(index, "caustics/interface")
-            if count == 1:
-                u, later = (0.5, 0.5), (0.5, 0.5)
-            row = emitter.row(self._sample(frame, emitter, index), 0, 0)
-            sources = self._sources.set([row])
-            choice = frame.random_volume_at(index, "caustics/interface")[2]
-            for lobe, block, surfaces in self.buffers.draw(frame, technique, view, casters.materials, lobes, choice):
-                values = {
-                    "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
-                    "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), 0.0),
-                    "interfaces": interfaces, "bends": int(lobe == REFRACTED),
-                }  # fmt: skip
-                if self._emission is None:
-                    self._emission = Block(EMISSION, **values)
-                else:
-                    self._emission.update(**values)
-                target = self._target("_found", view.side, len(FOUND))
-                passes.fullscreen(
-                    PHOTONS,
-                    target,
-                    textures={
-                        **frame.hierarchy("transmission").textures, **surfaces,
-                        "energy_table": frame.materials.energy_table, "reflectance": self._reflectance.image,
-                        "interface_table": self._interfaces,
-                    },
-                    blocks={"film_view": block, "sources": sources, "emission": self._emission},
-                    constants={"offset_size": 1e-6 * frame.geometry.size, "sample_number": index},
-                )  # fmt: skip
-                frame.count(technique, "passes")
-                frame.count(technique, "photons", view.side**2)
-                yield Bundle(target.colors, view, emitter)
+        inner = [frame.materials.compiled[k].medium for k in casters.refracting]
+        absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
+        self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
 
     def views(
         self, frame: Frame, casters: caustic_casters.Casters, side: int, index: int
-    ) -> Iterator[tuple[lights.Emitter, LightView, tuple[int, ...]]]:
-        """Views of all lights that are answered for, and the lobes that photons may take there."""
+    ) -> Iterator[LitView]:
+        """Views of all lights that are answered for, `side` photons along each side, in the sample number `index`."""
         lobes = ()
         if casters.refracting:
             lobes += (REFRACTED,)
@@ -162,22 +144,88 @@ class Photons:
         for emitter in frame.emitters:
             if emitter.light.key not in casters.lights:
                 continue
-            sample = self._sample(frame, emitter, index)
+            sample = emitter.sample(*frame.random_volume_at(index, "light"))
             shift = frame.random_at(index, "caustics/grid")
             for low, high in caustic_casters.boxes_of(frame, casters):
                 for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
-                    yield emitter, view, lobes
+                    yield LitView(emitter, sample, view, lobes, index)
 
-    @staticmethod
-    def _sample(frame: Frame, emitter: lights.Emitter, index: int) -> np.ndarray:
-        return emitter.sample(*frame.random_volume_at(index, "light"))
+    def traced(
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
+        count: int,
+    ) -> Iterator[Bundle]:  # fmt: skip
+        """Photons of a view by rays, over up to `interfaces` after the first; `count` samples share the light, or have
+        up to now. Each bundle is valid until the next."""
+        target = self._target("_found", light.view.side, len(FOUND))
+        for block, bound in self._drawn(frame, technique, casters, light, count, interfaces):
+            passes.fullscreen(
+                PHOTONS,
+                target,
+                textures={
+                    **frame.hierarchy("transmission").textures, **bound["textures"],
+                    "reflectance": self._reflectance.image, "interface_table": self._interfaces,
+                },
+                blocks={"film_view": block, **bound["blocks"]},
+                constants={"offset_size": 1e-6 * frame.geometry.size, "sample_number": light.index},
+            )  # fmt: skip
+            yield self._bundle(frame, technique, target)
+
+    def looked_up(
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, map_block: Block,
+        receivers: dict[str, images.Image], count: int,
+    ) -> Iterator[Bundle]:  # fmt: skip
+        """The same by look-ups in what the light's views show: the casters' nearest and farthest surfaces, and
+        `receivers`, images of MAP in the view `map_block`."""
+        target = self._target("_found", light.view.side, len(FOUND))
+        behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
+        for block, bound in self._drawn(frame, technique, casters, light, count, 1):
+            passes.fullscreen(
+                LOOKUPS,
+                target,
+                textures={
+                    **bound["textures"], **{name: behind[name] for _, name in BEHIND}, **receivers,
+                },
+                blocks={"film_view": block, "map_view": map_block, **bound["blocks"]},
+            )  # fmt: skip
+            yield self._bundle(frame, technique, target)
+
+    def _drawn(self, frame, technique, casters, light: LitView, count: int, interfaces: int):
+        """Draws the casters' nearest surfaces by each lobe, and yields what programs that find photons bind."""
+        emitter, view = light.emitter, light.view
+        share = float(count) ** -0.5
+        wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
+        u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
+        strata = float(count) if frame.settings.whole and count > 1 else 0.0
+        if count == 1:
+            u, later = (0.5, 0.5), (0.5, 0.5)
+        sources = self._sources.set([emitter.row(light.sample, 0, 0)])
+        choice = frame.random_volume_at(light.index, "caustics/interface")[2]
+        drawn = self.buffers.draw(frame, technique, view, casters.materials, light.lobes, choice)
+        for lobe, block, surfaces in drawn:
+            values = {
+                "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
+                "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), strata),
+                "absorbed": (*self._absorbed, 2.0 * frame.geometry.size),
+                "interfaces": interfaces, "bends": int(lobe == REFRACTED),
+            }  # fmt: skip
+            if self._emission is None:
+                self._emission = Block(EMISSION, **values)
+            else:
+                self._emission.update(**values)
+            textures = {**surfaces, "energy_table": frame.materials.energy_table}
+            yield block, {"textures": textures, "blocks": {"sources": sources, "emission": self._emission}}
+
+    def _bundle(self, frame: Frame, technique: Technique, target: images.Target) -> Bundle:
+        frame.count(technique, "passes")
+        frame.count(technique, "photons", target.size[0] ** 2)
+        return Bundle(target.colors, target.size[0])
 
     def footprints(
         self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, count: int, least_pixels: float
     ) -> tuple[images.Image, ...]:
         """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
         fall = FALL_KNOWN if frame.settings.whole else FALL_GROWING
-        target = self._target("_footprints", bundle.view.side, 4)
+        target = self._target("_footprints", bundle.side, 4)
         passes.fullscreen(
             FOOTPRINTS,
             target,
@@ -209,5 +257,6 @@ class Photons:
         self._give(self._footprints)
         self._found = self._footprints = self._interfaces = self._emission = None
         self.buffers.release()
+        self._behind.release()
         self._reflectance.release()
         self._sources.release()

@@ -82,11 +82,11 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
 
 def draw_view(
     frame: Frame, technique: Technique, target: images.Target, view: Block, rows: np.ndarray, program_of,
-    materials: Collection[int], constants: dict,
+    materials: Collection[int], constants: dict, depth_test: str = "LESS_EQUAL",
 ) -> None:  # fmt: skip
     """Draw `materials`, each with the program that `program_of` says, as any view sees them: its fields in a block of
     VIEW, and its `rows` x, y, w, q. The target, with a depth buffer, is not cleared."""
-    with passes.drawing(target):
+    with passes.drawing(target, depth_test=depth_test):
         _submit(frame, technique, program_of, materials, constants, view=view, rows=rows)
     frame.count(technique, "passes")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
+from .caustics_mapping import CausticsMapping
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
@@ -44,6 +45,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    CausticsMapping,
     ScreenSpacePhotons,
     Film,
     Denoise,

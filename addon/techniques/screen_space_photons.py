@@ -91,18 +91,18 @@ class ScreenSpacePhotons(Technique):
         settings = frame.settings
         side, interfaces = settings.get(self, "grid"), settings.get(self, "interfaces")
         count = settings.samples if settings.whole else frame.sample + 1
-        bundles = self._photons.bundles(frame, self, self._casters, side, interfaces, frame.sample, count)
-        for bundle in bundles:
-            records = self._photons.footprints(frame, self, bundle, frame.view_block, count, LEAST_PIXELS)
-            seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
-            splats.draw(
-                SPLAT,
-                frame.target("radiance.diffuse_indirect"),
-                records,
-                textures={**seen, "energy_table": frame.materials.energy_table},
-                blocks={"film_view": frame.view_block},
-            )
-            frame.count(self, "passes")
+        seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
+        for light in self._photons.views(frame, self._casters, side, frame.sample):
+            for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, count):
+                records = self._photons.footprints(frame, self, bundle, frame.view_block, count, LEAST_PIXELS)
+                splats.draw(
+                    SPLAT,
+                    frame.target("radiance.diffuse_indirect"),
+                    records,
+                    textures={**seen, "energy_table": frame.materials.energy_table},
+                    blocks={"film_view": frame.view_block},
+                )
+                frame.count(self, "passes")
             yield
 
     def release(self) -> None:

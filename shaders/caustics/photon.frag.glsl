@@ -10,6 +10,7 @@
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
+#include "caustics/emission.glsl"
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 #define PATHS 8192.0
@@ -19,12 +20,6 @@
 vec2 numbers_of(vec2 first, int interface_number)
 {
   return fract(first + float(interface_number) * emission.spread.z * vec2(0.754877666, 0.569840291));
-}
-
-// Half width of a lobe of microfacets as a tangent, about its mirrored or bent direction.
-float lobe_width(float alpha, bool bent, float ior)
-{
-  return alpha * (bent ? abs(1.0 - 1.0 / max(ior, 1e-3)) : 2.0);
 }
 
 // What a smooth mirror behind the first interface reflects, by the means of its material.
@@ -56,20 +51,11 @@ void main()
     return;
   }
 
-  // Flux: what arrives across the light's direction, times the texel's area there.
   bool parallel = film_view.eye.w > 0.5;
-  vec3 way = s.position - film_view.eye.xyz;
-  float away = parallel ? dot(way, -film_view.backward.xyz) : length(way);
-  vec3 direction = parallel ? -film_view.backward.xyz : way / max(away, 1e-30);
-  float area = (film_view.frame.y - film_view.frame.x) * (film_view.frame.w - film_view.frame.z)
-               / (film_view.film.x * film_view.film.y);
-  if (!parallel) {
-    float ahead = dot(direction, -film_view.backward.xyz);
-    area *= ahead * ahead * ahead * away * away;
-  }
-  vec3 towards;
-  float density;
-  vec3 flux = light_sample(light_read(0), s.position, towards, density) * area;
+  float away;
+  float area;
+  vec3 direction;
+  vec3 flux = texel_flux(s.position, direction, away, area);
   if (!(max_component(abs(flux)) > 0.0)) {
     return;
   }
@@ -147,7 +133,7 @@ void main()
       }
       Interface surface = interface_begin(smooth_normal, -onward, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
                                           scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
-      onward = interface_sample(surface, drawn, numbers.y, weight);
+      onward = interface_sample_strata(surface, drawn, numbers.y, emission.spread.w, weight);
       passes = dot(onward, smooth_normal) < 0.0;
       lobe_spread = max(lobe_spread, interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, passes, ior));
     }
