@@ -56,7 +56,7 @@ EMISSION = Struct(
     ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
     ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
     ("vec4", "spread"),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, or 0
-    ("vec4", "absorbed"),  # by insides, 1/m, in the mean; w: how far light may go, m
+    ("vec4", "absorbed"),  # by insides, 1/m, in the mean
     ("int", "interfaces"),  # at most, after the first
     ("int", "bends"),  # 1: photons of the refracted lobe
 )
@@ -205,7 +205,7 @@ class Photons:
             values = {
                 "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
                 "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), strata),
-                "absorbed": (*self._absorbed, 2.0 * frame.geometry.size),
+                "absorbed": (*self._absorbed, 0.0),
                 "interfaces": interfaces, "bends": int(lobe == REFRACTED),
             }  # fmt: skip
             if self._emission is None:

@@ -10,6 +10,9 @@
 
 #define STEPS 14
 #define REFINED 3
+#define RECEIVER_STEPS 30
+#define FIRST_STEP 0.2  // of the way to the receivers
+#define STEP_GROWTH 1.22
 
 // Distance along a view's axis, and the texel of an image of `size` that a place projects to.
 float view_depth(View view, vec3 place)
@@ -34,6 +37,27 @@ float behind_caster(vec3 place, float start, out ivec2 texel)
   }
   vec4 there = behind_position_fetch(texel);
   return (there.w == 0.0) ? start : view_depth(film_view, place) - view_depth(film_view, there.xyz);
+}
+
+// Normal of the caster's last surface at a place, between the four texels around it that are alike.
+vec3 normal_behind(vec3 place, vec3 nearest)
+{
+  vec4 p = vec4(place, 1.0);
+  ivec2 size = behind_position_size();
+  float w = max(dot(film_view.row_w, p), 1e-30);
+  vec2 at = (vec2(dot(film_view.row_x, p), dot(film_view.row_y, p)) / w * 0.5 + 0.5) * vec2(size) - 0.5;
+  vec2 corner = floor(at);
+  vec2 share = at - corner;
+  vec3 sum = vec3(0.0);
+  for (int k = 0; k < 4; k++) {
+    vec2 step = vec2(float(k & 1), float(k >> 1));
+    ivec2 other = clamp(ivec2(corner + step), ivec2(0), size - 1);
+    vec3 normal = octahedral_decode(behind_lobe_fetch(other).xy);
+    vec2 tent = mix(vec2(1.0) - share, share, step);
+    bool alike = behind_position_fetch(other).w != 0.0 && dot(normal, nearest) > 0.9;
+    sum += (alike ? tent.x * tent.y : 0.0) * normal;
+  }
+  return (dot(sum, sum) > 1e-6) ? safe_normalize(sum) : nearest;
 }
 
 // How far behind the receivers that the light sees; -1e30 where it sees none.
@@ -130,7 +154,8 @@ void main()
     from += t * onward;
     travelled += t;
     flux *= exp(-emission.absorbed.rgb * t);
-    vec3 facing = (dot(leaving.glossy_normal, onward) > 0.0) ? -leaving.glossy_normal : leaving.glossy_normal;
+    vec3 facing = normal_behind(from, leaving.glossy_normal);
+    facing = (dot(facing, onward) > 0.0) ? -facing : facing;
     Interface surface = interface_begin(facing, -onward, leaving.glossy_roughness, leaving.glossy_ior,
                                         leaving.glossy_tint, leaving.glossy_edge.x > 0.5, leaving.glossy_weight, vec3(0.0));
     onward = interface_sample(surface, fract(emission.lobe.xy + vec2(0.754877666, 0.569840291)), 1.0, weight);
@@ -140,26 +165,22 @@ void main()
     flux *= weight;
   }
 
-  float reach = emission.absorbed.w;
-  float low = 0.0;
-  float high = 0.0;
-  bool found = false;
-  bool in_front = false;
+  // Steps grow along the ray, from a part of the way to the receivers straight ahead.
   ivec2 met = ivec2(0);
-  for (int k = 1; k <= 2 * STEPS && !found; k++) {
-    // Steps grow along the ray: what stands near is small beside what is far.
-    float share = float(k) / float(2 * STEPS);
-    high = reach * share * share;
+  float gap = -behind_receiver(from, met);
+  float low = 0.0;
+  float high = FIRST_STEP * ((gap > 0.0 && gap < 1e29) ? gap : extent);
+  bool found = false;
+  for (int k = 0; k < RECEIVER_STEPS && !found; k++) {
     ivec2 there;
-    float behind = behind_receiver(from + high * onward, there);
-    found = behind >= 0.0;
+    found = behind_receiver(from + high * onward, there) >= 0.0;
     low = found ? low : high;
-    in_front = in_front || (behind < 0.0 && behind > -1e29);
+    high *= found ? 1.0 : STEP_GROWTH;
   }
   if (!found) {
     return;
   }
-  for (int k = 0; k < 3 * REFINED; k++) {
+  for (int k = 0; k < 4 * REFINED; k++) {
     float middle = 0.5 * (low + high);
     ivec2 there;
     bool behind = behind_receiver(from + middle * onward, there) >= 0.0;
@@ -174,7 +195,7 @@ void main()
     return;
   }
   float t = dot(normal, receiver.xyz - from) / slope;
-  if (abs(t - high) > 0.1 * high + 2.0 * emission.spread.z) {
+  if (abs(t - high) > 0.1 * high) {
     return;
   }
   travelled += t;
