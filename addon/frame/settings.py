@@ -15,7 +15,8 @@ BOUNCES = Param(
 )  # fmt: skip
 DRAFT_BOUNCES = 4
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES)
-AUTO, OFF = "AUTO", "OFF"  # of a slot: chosen by scene; left empty
+AUTO = "AUTO"
+OFF = "OFF"  # a slot that nothing fills
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,8 @@ class Settings:
         table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
         slots: dict[str, list[str]] = {}
         for technique in techniques:
-            if technique.slot:
-                slots.setdefault(f"slot.{technique.slot}", [AUTO, OFF]).append(technique.name)
+            for slot in technique.fills:
+                slots.setdefault(f"slot.{slot}", [AUTO, OFF]).append(technique.name)
         for text in assignments:
             name, equals, value = text.partition("=")
             if not equals:

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.run import Frame
 from ..materials.compiler import may_refract
 from ..materials.graph import Graph, Node
@@ -113,14 +114,21 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     return Casters(frozenset(glass), mirrors, low, high, frozenset(light.key for light in answered))
 
 
+class Answered:
+    """The casters of a picture that a technique answers for; None where none does."""
+
+    def __init__(self):
+        self.casters: Casters | None = None
+        self.known = False
+
+
 def of(frame: Frame) -> Casters | None:
-    """The casters that a technique of this frame answers for; None where the slot is empty."""
-    if not frame.plan.fills(SLOT):
-        return None
-    if "casters" not in frame.services:
-        found = casters_of(frame.snapshot)
-        frame.services["casters"] = None if isinstance(found, str) else found
-    return frame.services["casters"]
+    """The casters that a technique of this picture answers for; None where the slot is empty."""
+    shared = frame.shared(Answered)
+    if not shared.known:
+        found = casters_of(frame.snapshot) if frame.owned(LIGHT_SPECULAR_DIFFUSE) else None
+        shared.casters, shared.known = found if isinstance(found, Casters) else None, True
+    return shared.casters
 
 
 def answered(frame: Frame, emitter: lights.Emitter) -> bool:

@@ -117,7 +117,6 @@ class Photons:
 
     def __init__(self):
         self.buffers, self._behind = LightBuffers(), LightBuffers()
-        self._reflectance = Reflectance()
         self._sources = lights.Sources()
         self._interfaces: images.Image | None = None
         self._emission: Block | None = None
@@ -126,7 +125,7 @@ class Photons:
 
     def begin(self, frame: Frame, casters: caustic_casters.Casters) -> None:
         """Before the first sample of a frame."""
-        self._reflectance.update(frame)
+        frame.kept(Reflectance).update(frame)
         self._interfaces = images.upload(interface_table(frame.materials.compiled, casters.mirrors))
         inner = [frame.materials.compiled[k].medium for k in casters.refracting]
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
@@ -163,7 +162,7 @@ class Photons:
                 target,
                 textures={
                     **frame.hierarchy("transmission").textures, **bound["textures"],
-                    "reflectance": self._reflectance.image, "interface_table": self._interfaces,
+                    "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
                 },
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={"offset_size": 1e-6 * frame.geometry.size, "sample_number": light.index},
@@ -258,5 +257,4 @@ class Photons:
         self._found = self._footprints = self._interfaces = self._emission = None
         self.buffers.release()
         self._behind.release()
-        self._reflectance.release()
         self._sources.release()

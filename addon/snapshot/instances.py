@@ -19,6 +19,7 @@ import numpy as np
 
 from .cache import SnapshotCache
 from .hair import HairSystem, hair_systems
+from .own_settings import Own, own_settings
 from .scene import Note, Visibility
 
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
@@ -69,6 +70,7 @@ class ObjectFacts:
     random: float
     color: tuple[float, float, float, float]
     terminator: float
+    own: Own
     caustics_caster: bool
     notes: tuple[Note, ...]
 
@@ -133,6 +135,7 @@ def walk(
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
+                        own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         notes=_object_notes(owner, kind, original.name),
                     )

@@ -34,6 +34,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -70,8 +71,8 @@ LOOKUPS, RAYS = "LOOKUPS", "RAYS"
 class CausticsMapping(Technique):
     name = "caustics_mapping"
     label = "Caustics mapping"
-    slot = caustic_casters.SLOT
-    owns = ("light-specular-diffuse",)
+    fills = (caustic_casters.SLOT,)
+    owns = (LIGHT_SPECULAR_DIFFUSE,)
     params = (
         Param(
             "grid", "Photon grid", 128,
@@ -105,11 +106,12 @@ class CausticsMapping(Technique):
             return found
         return acceleration.too_many(snapshot) if settings.get(self, "by") == RAYS else None
 
-    def run(self, frame: Frame) -> Iterator[None]:
-        if frame.sample == 0:
-            self._casters = caustic_casters.of(frame)
-            if self._casters is not None:
-                self._photons.begin(frame, self._casters)
+    def begin(self, frame: Frame) -> None:
+        self._casters = caustic_casters.of(frame)
+        if self._casters is not None:
+            self._photons.begin(frame, self._casters)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         if self._casters is None or frame.receivers is None or not len(frame.receivers.distance):
             return
         settings = frame.settings

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -58,8 +59,8 @@ INTERFACES = Param(
 class ScreenSpacePhotons(Technique):
     name = "screen_space_photons"
     label = "Screen-space photons"
-    slot = caustic_casters.SLOT
-    owns = ("light-specular-diffuse",)
+    fills = (caustic_casters.SLOT,)
+    owns = (LIGHT_SPECULAR_DIFFUSE,)
     params = (
         Param(
             "grid", "Photon grid", 160,
@@ -81,11 +82,12 @@ class ScreenSpacePhotons(Technique):
         found = caustic_casters.casters_of(snapshot)
         return found if isinstance(found, str) else acceleration.too_many(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
-        if frame.sample == 0:
-            self._casters = caustic_casters.of(frame)
-            if self._casters is not None:
-                self._photons.begin(frame, self._casters)
+    def begin(self, frame: Frame) -> None:
+        self._casters = caustic_casters.of(frame)
+        if self._casters is not None:
+            self._photons.begin(frame, self._casters)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         if self._casters is None:
             return
         settings = frame.settings
