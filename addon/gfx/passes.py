@@ -10,14 +10,17 @@ import gpu
 import numpy as np
 
 from .context import on_release, overtakes_draws
-from .geometry import Batch
+from .geometry import Batch, vertex_buffer
 from .images import Image, Target, finish
 from .library import FULLSCREEN_VERTEX, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
 FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
 
+QUAD_INPUTS = FULLSCREEN_INPUTS
+
 _triangle: list[gpu.types.GPUBatch] = []
+_quad: list[gpu.types.GPUBatch] = []
 
 
 def fullscreen_program(name: str, fragment: str, **declared) -> Program:
@@ -81,6 +84,14 @@ def draw_points(shader: Shader, batch: gpu.types.GPUBatch, instances: int = 1) -
     gpu.state.program_point_size_set(False)
 
 
+def draw_quads(shader: Shader, instances: int) -> None:
+    """Draw instances of a square of two triangles whose attribute `corner` runs from -1 to 1. Only inside `drawing`."""
+    if not _quad:
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
+        _quad.append(gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(corner=corners)))
+    _quad[0].draw_instanced(shader.handle, instance_start=0, instance_count=instances)
+
+
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
     shader = _for_images(program, bindings)
@@ -140,3 +151,4 @@ def _fullscreen_batch() -> gpu.types.GPUBatch:
 @on_release
 def _release() -> None:
     _triangle.clear()
+    _quad.clear()

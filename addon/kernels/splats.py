@@ -22,18 +22,11 @@ last bits only.
 
 from __future__ import annotations
 
-import gpu
-import numpy as np
-
 from ..gfx import images, passes
-from ..gfx.context import on_release
-from ..gfx.geometry import vertex_buffer
 from ..gfx.library import Program
 
 RECORD = ("splat_centres", "splat_firsts", "splat_seconds", "splat_values")
 VARYINGS = ("splat_centre", "splat_first", "splat_second", "splat_value")
-_CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
-_quad: list[gpu.types.GPUBatch] = []
 
 
 def splat_program(name: str, fragment: str, projection: str, **declared) -> Program:
@@ -43,7 +36,7 @@ def splat_program(name: str, fragment: str, projection: str, **declared) -> Prog
         name=name,
         vertex="splat/quad.vert.glsl",
         fragment=fragment,
-        inputs=(("VEC2", "corner"),),
+        inputs=passes.QUAD_INPUTS,
         varyings=tuple(("flat", "VEC4", varying) for varying in VARYINGS),
         textures=(*(("RGBA32F", texture) for texture in RECORD), *declared.pop("textures", ())),
         constants=(("INT", "splat_columns"), *declared.pop("constants", ())),
@@ -53,7 +46,12 @@ def splat_program(name: str, fragment: str, projection: str, **declared) -> Prog
 
 
 def draw(
-    program: Program, target: images.Target, records: tuple[images.Image, ...], textures=None, constants=None, **bindings
+    program: Program,
+    target: images.Target,
+    records: tuple[images.Image, ...],
+    textures=None,
+    constants=None,
+    **bindings,
 ) -> None:
     """Add all records (four images of one size, in the order of RECORD) to the target's sums."""
     width, height = records[0].size
@@ -64,15 +62,4 @@ def draw(
             constants={"splat_columns": width, **(constants or {})},
             **bindings,
         )
-        _batch().draw_instanced(shader.handle, instance_start=0, instance_count=width * height)
-
-
-def _batch() -> gpu.types.GPUBatch:
-    if not _quad:
-        _quad.append(gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(corner=_CORNERS)))
-    return _quad[0]
-
-
-@on_release
-def _release() -> None:
-    _quad.clear()
+        passes.draw_quads(shader, width * height)

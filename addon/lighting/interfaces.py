@@ -1,9 +1,9 @@
 """How materials bend and mirror what meets them where no shader of theirs can run: means, three texels a material.
 
-    0  colour of what passes glass, once; index of refraction
-    1  roughness; share of the material that is glass; losses at the interface (0 none but total reflection, 1
-       Fresnel's, 2 with multiple scattering given back); whether what is mirrored has the colour, too
-    2  what the inside absorbs, 1/m; whether the material is a mirror that passes photons on
+0  colour of what passes glass, once; index of refraction
+1  roughness; share of the material that is glass; losses at the interface (0 none but total reflection, 1
+   Fresnel's, 2 with multiple scattering given back); whether what is mirrored has the colour, too
+2  what the inside absorbs, 1/m; whether the material is a mirror that passes photons on
 """
 
 from __future__ import annotations

@@ -55,7 +55,10 @@ EMISSION = Struct(
     ("vec4", "box_low"),  # of the casters that the view is about
     ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
     ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
-    ("vec4", "spread"),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, or 0
+    (
+        "vec4",
+        "spread",
+    ),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, or 0
     ("vec4", "absorbed"),  # by insides, 1/m, in the mean
     ("int", "interfaces"),  # at most, after the first
     ("int", "bends"),  # 1: photons of the refracted lobe
@@ -131,9 +134,7 @@ class Photons:
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
 
-    def views(
-        self, frame: Frame, casters: caustic_casters.Casters, side: int, index: int
-    ) -> Iterator[LitView]:
+    def views(self, frame: Frame, casters: caustic_casters.Casters, side: int, index: int) -> Iterator[LitView]:
         """Views of all lights that are answered for, `side` photons along each side, in the sample number `index`."""
         lobes = ()
         if casters.refracting:

@@ -120,9 +120,7 @@ class CausticsMapping(Technique):
         count = settings.samples if settings.whole else frame.sample + 1
         shift = np.array(frame.random_at(frame.sample, "caustics/map"))
         for light in self._photons.views(frame, self._casters, side, frame.sample):
-            view = widened(
-                light.view, settings.get(self, "extent"), frame.receivers.corners, map_side, shift
-            )
+            view = widened(light.view, settings.get(self, "extent"), frame.receivers.corners, map_side, shift)
             block, seen = self._receivers.receivers(frame, self, view, self._casters.materials)
             receivers = {name.replace("surface", "receiver"): image for name, image in seen.items()}
             caught = {name: receivers[name] for _, name in MAP}

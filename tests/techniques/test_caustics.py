@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.frame.ledger import RAN, SKIPPED
+from addon.frame.ledger import RAN
 from tests.techniques.conftest import places
 
 PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
@@ -94,7 +94,9 @@ def test_plane_mirror_is_a_second_light(stage):
     """Mirror of 1 m at z = 0, spot of 100 W at (-1, 0, 1): the wall at x = 1.5 is lit from (-1, 0, -1)."""
     wall = stage.rectangle((-4, -4), (4, 4), material=stage.diffuse(), turn=(0, -np.pi / 2, 0), location=(1.5, 0, 0))
     wall.name = "Wall"
-    stage.rectangle((-0.5, -0.5), (0.5, 0.5), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1)))
+    stage.rectangle(
+        (-0.5, -0.5), (0.5, 0.5), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    )
     lamp = stage.light("SPOT", location=(-1, 0, 1), energy=100.0, shadow_soft_size=0.0, spot_size=2.4, spot_blend=0.0)
     lamp.rotation_euler = (0, -np.pi / 4, 0)
     camera = stage.camera_above(5.0)
