@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import again, caustics, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
 
 VERBS = {
     "run": run,
@@ -14,6 +14,7 @@ VERBS = {
     "growth": growth,
     "direct": direct,
     "indirect": indirect,
+    "caustics": caustics,
     "profile": profile,
     "costs": costs,
     "random": random_scenes,

@@ -1,0 +1,141 @@
+"""Light tracing of caustics with Mitsuba 3's rays and BSDFs, for `python -m bench caustics`.
+
+Photons leave the lamps towards the casters and are followed over specular surfaces alone; those that end on a diffuse one
+after at least one of them, where the camera above sees it, are counted by pixel. Run as a program by an interpreter that
+has Mitsuba (dependency group `truth`): `caustic_truth.py SCENE.npz RESULT.npz PHOTONS`.
+
+SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K, `kinds` (0 diffuse, 1 glass, 2 mirror) and `iors` by mesh,
+`hidden` ones that the camera does not see, `lamps` (N, 16), `centre`, `span`, `size`.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+DEPTH = 24
+CHUNK = 1 << 21
+
+
+def trace(scene_file: str, result_file: str, photons: int) -> None:
+    import drjit as dr
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    data = np.load(scene_file)
+    shapes = {"type": "scene"}
+    for number, kind in enumerate(data["kinds"]):
+        vertices, faces = data[f"vertices_{number}"], data[f"faces_{number}"]
+        mesh = mi.Mesh(f"mesh{number}", len(vertices), len(faces), has_vertex_normals=bool(data["smooth"][number]))
+        values = mi.traverse(mesh)
+        values["vertex_positions"] = vertices.astype(np.float32).ravel()
+        values["faces"] = faces.astype(np.uint32).ravel()
+        if data["smooth"][number]:
+            values["vertex_normals"] = data[f"normals_{number}"].astype(np.float32).ravel()
+        values.update()
+        bsdf = (
+            {"type": "diffuse"},
+            {"type": "dielectric", "int_ior": float(data["iors"][number]), "ext_ior": 1.0},
+            {"type": "conductor", "material": "none"},
+        )[kind]
+        if kind == 2:
+            bsdf = {"type": "twosided", "nested": bsdf}
+        mesh.set_bsdf(mi.load_dict(bsdf))
+        shapes[f"mesh{number}"] = mesh
+    scene = mi.load_dict(shapes)
+    opaque = mi.load_dict(
+        {"type": "scene", **{k: v for (k, v), kind in zip(list(shapes.items())[1:], data["kinds"]) if kind == 0}}
+    )
+    size, span, centre = int(data["size"]), float(data["span"]), data["centre"]
+    casters = [data[f"vertices_{k}"] for k, kind in enumerate(data["kinds"]) if kind]
+    low, high = np.min([v.min(0) for v in casters], axis=0), np.max([v.max(0) for v in casters], axis=0)
+    middle, radius = (low + high) / 2, np.linalg.norm(high - low) / 2 * 1.001
+    image = np.zeros((size, size, 3))
+    rng = np.random.default_rng(1)
+    started = time.time()
+    for lamp in data["lamps"]:
+        done = 0
+        while done < photons:
+            count = min(CHUNK, photons - done)
+            origin, direction, flux = emit(lamp, middle, radius, rng, count)
+            origin, direction = (mi.Vector3f(np.ascontiguousarray(v.T, np.float32)) for v in (origin, direction))
+            ray = mi.Ray3f(mi.Point3f(origin), direction)
+            weight, alive, met = mi.Float(1.0), mi.Bool(True), mi.Bool(False)
+            sampler = mi.PCG32(size=count, initstate=int(rng.integers(1 << 30)))
+            landed, place = mi.Bool(False), mi.Point3f(0.0)
+            for _ in range(DEPTH):
+                si = scene.ray_intersect(ray, alive)
+                alive &= si.is_valid()
+                bsdf = si.bsdf(ray)
+                smooth = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta)
+                ends = alive & ~smooth
+                place = dr.select(ends & met, si.p, place)
+                landed |= ends & met
+                alive &= smooth
+                ctx = mi.BSDFContext(mi.TransportMode.Importance)
+                sample, value = bsdf.sample(
+                    ctx, si, sampler.next_float32(), mi.Point2f(sampler.next_float32(), sampler.next_float32()), alive
+                )
+                weight *= dr.select(alive, value.x, 1.0)
+                met |= alive
+                ray = si.spawn_ray(si.to_world(sample.wo))
+                dr.eval(ray, weight, alive, met, landed, place)
+            up = mi.Ray3f(place + mi.Vector3f(0, 0, 1e-4), mi.Vector3f(0, 0, 1))
+            landed &= ~opaque.ray_test(up, landed)
+            p, kept, w = np.array(place), np.array(landed), np.array(weight)
+            p = p if p.shape[0] == 3 else p.T
+            x = ((p[0] - centre[0]) / span + 0.5) * size
+            y = ((p[1] - centre[1]) / span + 0.5) * size
+            inside = kept & (x >= 0) & (x < size) & (y >= 0) & (y < size)
+            share = w[inside, None] * flux[inside] / photons
+            np.add.at(image, (y[inside].astype(int), x[inside].astype(int)), share)
+            done += count
+    image /= (span / size) ** 2
+    np.savez_compressed(result_file, irradiance=image.astype(np.float32), seconds=time.time() - started)
+
+
+def emit(lamp: np.ndarray, middle, radius: float, rng, count: int):
+    """Origins, directions (count, 3) and fluxes: (count, 3), W times the number of photons. `lamp`: kind (0 sun, 1 spot),
+    place, direction of emission, strength (W/m2; W/sr), half angle or radius, cosine of the cone."""
+    kind, place, axis, strength, extent, cone = lamp[0], lamp[1:4], lamp[4:7], lamp[7:10], lamp[10], lamp[11]
+    u, v = frame(axis if kind == 0 else unit(middle - place))
+    turn, share = 2 * np.pi * rng.random(count), rng.random(count)
+    if kind == 0:
+        across = radius * np.sqrt(share)
+        cosine = 1.0 - rng.random(count) * (1.0 - np.cos(extent))
+        other = 2 * np.pi * rng.random(count)
+        sine = np.sqrt(1 - cosine**2)
+        direction = cosine[:, None] * axis + sine[:, None] * (np.cos(other)[:, None] * u + np.sin(other)[:, None] * v)
+        start = middle + (across * np.cos(turn))[:, None] * u + (across * np.sin(turn))[:, None] * v
+        # The disc across the mean direction: light at an angle crosses it by its cosine, as the sun's irradiance counts.
+        flux = np.broadcast_to(strength * np.pi * radius**2, (count, 3)) * cosine[:, None]
+        return start - 4 * radius * direction, direction, flux
+    forward = unit(middle - place)
+    least = np.sqrt(max(1.0 - ((radius + extent) / np.linalg.norm(middle - place)) ** 2, 0.0))
+    cosine = 1.0 - share * (1.0 - least)
+    sine = np.sqrt(1 - cosine**2)
+    direction = cosine[:, None] * forward + sine[:, None] * (np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v)
+    inside = direction @ axis >= cone
+    a = np.cross(direction, u)
+    a /= np.linalg.norm(a, axis=1, keepdims=True)
+    b = np.cross(direction, a)
+    disc, spin = extent * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
+    start = place + (disc * np.cos(spin))[:, None] * a + (disc * np.sin(spin))[:, None] * b
+    flux = inside[:, None] * strength * (2 * np.pi * (1.0 - least))
+    return start, direction, flux
+
+
+def unit(v):
+    return v / np.linalg.norm(v)
+
+
+def frame(n):
+    helper = np.array([1.0, 0, 0]) if abs(n[0]) < 0.9 else np.array([0, 1.0, 0])
+    u = unit(np.cross(helper, n))
+    return u, np.cross(n, u)
+
+
+if __name__ == "__main__":
+    trace(sys.argv[1], sys.argv[2], int(sys.argv[3]))
