@@ -6,7 +6,20 @@ import argparse
 import os
 import sys
 
-from bench import again, caustics, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    caustics,
+    costs,
+    direct,
+    everything,
+    growth,
+    hashes,
+    indirect,
+    page,
+    profile,
+    random_scenes,
+    run,
+)
 
 VERBS = {
     "run": run,

@@ -1,4 +1,4 @@
-"""Light tracing of caustics with Mitsuba 3's rays and BSDFs, for `python -m bench caustics`.
+"""Light tracing of caustics with Mitsuba 3's rays, for `python -m bench caustics`.
 
 Photons leave the lamps towards the casters and are followed over specular surfaces alone; those that end on a diffuse one
 after at least one of them, where the camera above sees it, are counted by pixel. Run as a program by an interpreter that
@@ -16,7 +16,7 @@ import time
 import numpy as np
 
 DEPTH = 24
-CHUNK = 1 << 21
+CHUNK = 1 << 20
 
 
 def trace(scene_file: str, result_file: str, photons: int) -> None:
@@ -35,19 +35,17 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
         if data["smooth"][number]:
             values["vertex_normals"] = data[f"normals_{number}"].astype(np.float32).ravel()
         values.update()
-        bsdf = (
-            {"type": "diffuse"},
-            {"type": "dielectric", "int_ior": float(data["iors"][number]), "ext_ior": 1.0},
-            {"type": "conductor", "material": "none"},
-        )[kind]
-        if kind == 2:
-            bsdf = {"type": "twosided", "nested": bsdf}
-        mesh.set_bsdf(mi.load_dict(bsdf))
         shapes[f"mesh{number}"] = mesh
     scene = mi.load_dict(shapes)
     opaque = mi.load_dict(
         {"type": "scene", **{k: v for (k, v), kind in zip(list(shapes.items())[1:], data["kinds"]) if kind == 0}}
     )
+    # What a hit shape is, by its number in Dr.Jit's registry.
+    numbers = {int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shapes[f"mesh{k}"])))[0]): k
+               for k in range(len(data["kinds"]))}  # fmt: skip
+    kind_of, ior_of = np.full(max(numbers) + 1, -1), np.ones(max(numbers) + 1)
+    for number, k in numbers.items():
+        kind_of[number], ior_of[number] = data["kinds"][k], data["iors"][k]
     size, span, centre = int(data["size"]), float(data["span"]), data["centre"]
     casters = [data[f"vertices_{k}"] for k, kind in enumerate(data["kinds"]) if kind]
     low, high = np.min([v.min(0) for v in casters], axis=0), np.max([v.max(0) for v in casters], axis=0)
@@ -60,32 +58,9 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
         while done < photons:
             count = min(CHUNK, photons - done)
             origin, direction, flux = emit(lamp, middle, radius, rng, count)
-            origin, direction = (mi.Vector3f(np.ascontiguousarray(v.T, np.float32)) for v in (origin, direction))
-            ray = mi.Ray3f(mi.Point3f(origin), direction)
-            weight, alive, met = mi.Float(1.0), mi.Bool(True), mi.Bool(False)
-            sampler = mi.PCG32(size=count, initstate=int(rng.integers(1 << 30)))
-            landed, place = mi.Bool(False), mi.Point3f(0.0)
-            for _ in range(DEPTH):
-                si = scene.ray_intersect(ray, alive)
-                alive &= si.is_valid()
-                bsdf = si.bsdf(ray)
-                smooth = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta)
-                ends = alive & ~smooth
-                place = dr.select(ends & met, si.p, place)
-                landed |= ends & met
-                alive &= smooth
-                ctx = mi.BSDFContext(mi.TransportMode.Importance)
-                sample, value = bsdf.sample(
-                    ctx, si, sampler.next_float32(), mi.Point2f(sampler.next_float32(), sampler.next_float32()), alive
-                )
-                weight *= dr.select(alive, value.x, 1.0)
-                met |= alive
-                ray = si.spawn_ray(si.to_world(sample.wo))
-                dr.eval(ray, weight, alive, met, landed, place)
-            up = mi.Ray3f(place + mi.Vector3f(0, 0, 1e-4), mi.Vector3f(0, 0, 1))
-            landed &= ~opaque.ray_test(up, landed)
-            p, kept, w = np.array(place), np.array(landed), np.array(weight)
-            p = p if p.shape[0] == 3 else p.T
+            p, kept, w = follow(mi, scene, kind_of, ior_of, origin, direction, rng)
+            up = mi.Ray3f(mi.Point3f(*np.float32(p + [[0], [0], [1e-4]])), mi.Vector3f(0, 0, 1))
+            kept &= ~np.array(opaque.ray_test(up))
             x = ((p[0] - centre[0]) / span + 0.5) * size
             y = ((p[1] - centre[1]) / span + 0.5) * size
             inside = kept & (x >= 0) & (x < size) & (y >= 0) & (y < size)
@@ -94,6 +69,55 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
             done += count
     image /= (span / size) ** 2
     np.savez_compressed(result_file, irradiance=image.astype(np.float32), seconds=time.time() - started)
+
+
+def follow(mi, scene, kind_of, ior_of, origin, direction, rng):
+    """Where photons end, (3, N), whether on a diffuse surface after specular ones, and what of each is left: mirrors keep
+    all, and glass mirrors or bends in proportion to Fresnel's reflectance."""
+    import drjit as dr
+
+    count = len(origin)
+    origin, direction = np.ascontiguousarray(origin.T), np.ascontiguousarray(direction.T)
+    alive, met, landed = np.ones(count, bool), np.zeros(count, bool), np.zeros(count, bool)
+    place = np.zeros((3, count))
+    for _ in range(DEPTH):
+        some = np.flatnonzero(alive)
+        if not len(some):
+            break
+        o, d = origin[:, some], direction[:, some]
+        ray = mi.Ray3f(mi.Point3f(*np.float32(o)), mi.Vector3f(*np.float32(d)))
+        si = scene.ray_intersect(ray)
+        valid = np.array(si.is_valid())
+        t = np.where(valid, np.array(si.t), 0.0)
+        shape = np.where(valid, np.array(dr.reinterpret_array(mi.UInt32, si.shape)), 0)
+        outward, shading = np.array(si.n).reshape(3, -1), np.array(si.sh_frame.n).reshape(3, -1)
+        p = o + t * d
+        kind = np.where(valid, kind_of[shape], -1)
+        ends = kind == 0
+        place[:, some[ends]] = p[:, ends]
+        landed[some[ends]] = met[some[ends]]
+        alive[some[kind <= 0]] = False
+        on = np.flatnonzero(kind > 0)
+        p, d, n, ng = p[:, on], d[:, on], shading[:, on], outward[:, on]
+        kind, ior = kind[on], ior_of[shape[on]]
+        enters = (d * ng).sum(0) < 0
+        n, ng = np.where(enters, n, -n), np.where(enters, ng, -ng)
+        cosine = np.clip(-(d * n).sum(0), 1e-6, 1.0)
+        eta = np.where(enters, 1.0 / ior, ior)
+        squared = 1.0 - eta**2 * (1.0 - cosine**2)
+        other = np.sqrt(np.maximum(squared, 0.0))
+        s, q = (eta * cosine - other) / (eta * cosine + other), (eta * other - cosine) / (eta * other + cosine)
+        mirrored = np.where((squared <= 0) | (kind == 2), 1.0, 0.5 * (s**2 + q**2))
+        bends = rng.random(len(on)) >= mirrored
+        onward = np.where(bends, eta * d + (eta * cosine - other) * n, d + 2 * cosine * n)
+        onward /= np.linalg.norm(onward, axis=0)
+        lost = ((onward * ng).sum(0) > 0) == bends
+        index = some[on]
+        origin[:, index] = p + 1e-4 * np.where(bends, -ng, ng)
+        direction[:, index] = onward
+        met[index] = True
+        alive[index[lost]] = False
+    return place, landed, np.ones(count)
 
 
 def emit(lamp: np.ndarray, middle, radius: float, rng, count: int):

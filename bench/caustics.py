@@ -29,7 +29,7 @@ TRUTH = ROOT / "bench" / "results" / "caustics_truth.npz"
 PAGE = ROOT / "docs" / "caustics.md"
 COMMAND = "python -m bench caustics --page"
 SIZE = 128
-PHOTONS = 20_000_000
+PHOTONS = 6_000_000
 BLUR = 2.0  # pixels
 
 
@@ -211,9 +211,11 @@ def make_truth(names, python: str, photons: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
             given, found = Path(folder) / "scene.npz", Path(folder) / "found.npz"
             np.savez(given, **exported(name))
-            subprocess.run([python, Path(__file__).with_name("caustic_truth.py"), given, found, str(photons)], check=True)
+            subprocess.run(
+                [python, Path(__file__).with_name("caustic_truth.py"), given, found, str(photons)], check=True
+            )
             result = np.load(found)
-            known[name] = result["irradiance"]
+            known[name] = result["irradiance"].astype(np.float16)
             print(f"{name}: {photons} photons a lamp in {float(result['seconds']):.0f} s", flush=True)
     TRUTH.parent.mkdir(exist_ok=True)
     np.savez_compressed(TRUTH, **known)

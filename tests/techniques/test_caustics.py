@@ -148,3 +148,187 @@ def test_mirror_ring_has_the_nephroid(stage, technique):
         print(technique, distance, nephroid(distance), found)
         assert found == pytest.approx(nephroid(distance), rel=0.08)
     assert np.interp(radius - 0.46, places_x, axis) < 0.1
+
+
+def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
+    """A sheet of index 1.33 under a sun at 30 degrees from its normal: E cos T on the floor below, evenly."""
+    stage.floor()
+    stage.rectangle((-4, -4), (4, 4), 0.5, material=glass(stage, 1.33)).visible_camera = False
+    stage.light("SUN", turn=(0, np.pi / 6, 0), angle=0.0)
+    stage.camera_above(1.0)
+    energy = irradiance(stage, PHOTONS, samples=4, size=(32, 32))
+    cosine, bent = np.cos(np.pi / 6), np.sqrt(1 - (0.5 / 1.33) ** 2)
+    s = (cosine - 1.33 * bent) / (cosine + 1.33 * bent)
+    p = (1.33 * cosine - bent) / (1.33 * cosine + bent)
+    expected = cosine * (1 - 0.5 * (s * s + p * p))
+    assert energy == pytest.approx(expected, rel=0.01)
+
+
+def test_nothing_bent_puts_light_straight_behind_its_caster(stage, technique_name):
+    """Index 1: caustic and shadow together are the light without the ball."""
+    stage.floor()
+    ball(stage, glass(stage, 1.0))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(2.0)
+    images = both(stage, technique_name)
+    x, y = places((64, 64), 2.0)
+    away = np.abs(np.hypot(x, y) - 0.5) > 0.06
+    whole = images[away]
+    assert whole.mean() == pytest.approx(1.0, abs=0.01)
+    assert np.abs(whole - 1.0).max() < 0.06
+
+
+@pytest.fixture(params=(PHOTONS, MAPPING))
+def technique_name(request):
+    return request.param
+
+
+def both(stage, technique, samples=4, size=(64, 64)):
+    """Direct and caustic irradiance together."""
+    stage.scene.candela.slot_indirect = "OFF"
+    stage.scene.candela.slot_caustics = technique
+    images = stage.render(samples=samples, size=size, bounces=2)
+    return (images["diffuse_direct"] + images["diffuse_indirect"])[..., 0] * np.pi
+
+
+def test_total_is_the_same_for_coarse_and_fine_grids(stage, technique_name):
+    stage.floor()
+    ball(stage, glass(stage))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(4.0)
+    totals = [irradiance(stage, technique_name, samples=4, size=(64, 64), grid=side).sum() for side in (48, 96, 192)]
+    assert totals == pytest.approx(totals[-1], rel=0.015)
+
+
+def test_twice_the_power_is_twice_the_caustic(stage, technique_name):
+    stage.floor()
+    ball(stage, glass(stage))
+    lamp = stage.light("SUN", angle=0.0)
+    stage.camera_above(3.0)
+    once = irradiance(stage, technique_name, samples=1, size=(32, 32))
+    lamp.data.energy = 2.0
+    assert irradiance(stage, technique_name, samples=1, size=(32, 32)) == pytest.approx(2 * once, rel=1e-4, abs=1e-6)
+
+
+def test_glass_casts_a_full_shadow_where_its_light_arrives_as_photons(stage):
+    """And the grey one where the slot is off: nothing is counted twice, nothing is missing."""
+    stage.floor()
+    ball(stage, glass(stage))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(1.0)
+    dark = irradiance(stage, PHOTONS, samples=4, size=(16, 16), path="diffuse_direct")
+    assert dark.max() == pytest.approx(0.0, abs=1e-6)
+    grey = irradiance(stage, "OFF", samples=4, size=(16, 16), path="diffuse_direct")
+    assert 0.5 < grey[6:10, 6:10].mean() < 1.0
+    assert "the caustics slot is off" in stage.ledger.row(PHOTONS).reason
+
+
+def test_larger_lamps_make_softer_caustics(stage):
+    """A mirror shows the floor a disc of .2 m from 2 m away: edges are .2 m wide, in the mean of samples and in one."""
+    stage.floor()
+    mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    made = stage.rectangle((-0.4, -0.4), (0.4, 0.4), material=mirror, location=(-1, 0, 1), turn=(0, np.pi / 4, 0))
+    made.visible_camera = False
+    stage.light("SUN", turn=(0, np.pi / 2, 0), angle=0.2)
+    stage.camera_above(3.0)
+    many = irradiance(stage, PHOTONS, samples=64, size=(64, 64))
+    one = irradiance(stage, PHOTONS, samples=1, size=(64, 64))
+    assert one.sum() == pytest.approx(many.sum(), rel=0.03)
+    assert np.abs(one - many).mean() < 0.15 * many.mean()
+
+
+# What they are skipped for ---------------------------------------------------------------------------------------------
+
+
+def reason(stage, name=PHOTONS):
+    stage.render(samples=1, size=(8, 8), bounces=2)
+    row = stage.ledger.row(name)
+    assert row.state == SKIPPED
+    return row.reason
+
+
+def test_scenes_without_casters_lamps_or_room_for_them_say_so(stage):
+    stage.floor()
+    lamp = stage.light("SUN", angle=0.0)
+    stage.camera_above(1.0)
+    assert "no material is glass or a smooth mirror" in reason(stage)
+    pane = stage.mesh(
+        [(x, y, z) for z in (0.5, 0.52) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))],
+        [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+        material=glass(stage),
+    )
+    assert "flat panes" in reason(stage)
+    stage.remove(pane)
+    ball(stage, glass(stage))
+    lamp.data.use_shadow = False
+    assert "no lamp that casts shadows" in reason(stage)
+    lamp.data.use_shadow = True
+    lamp.data.angle = 2.0
+    assert "so wide" in reason(stage)
+    lamp.data.angle = 0.0
+    stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = False
+    try:
+        assert "switched off" in reason(stage)
+    finally:
+        stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = True
+
+
+# Stress ----------------------------------------------------------------------------------------------------------------
+
+
+def touching(stage):
+    ball(stage, glass(stage), place=(0, 0, 0.5), segments=32)
+
+
+def sheets(stage):
+    for k in range(64):
+        stage.rectangle((-0.5, -0.5), (0.5, 0.5), 0.3 + 0.01 * k, material=glass(stage, 1.2))
+
+
+def around_the_lamp(stage):
+    ball(stage, glass(stage), place=(0, 0, 2), segments=32)
+
+
+def around_the_camera(stage):
+    ball(stage, glass(stage), radius=2.0, place=(0, 0, 10), segments=32)
+
+
+def rough(stage):
+    ball(stage, glass(stage, Roughness=1.0), segments=32)
+
+
+def thin(stage):
+    stage.mesh([(-1, 0, 0.5), (1, 0, 0.5), (0, 1e-6, 0.5)], [(0, 1, 2)], material=glass(stage))
+
+
+def broken(stage):
+    nan = float("nan")
+    stage.mesh([(-1, 0, 0.5), (1, 0, 0.5), (0, 1, nan), (0, -1, 0.5)], [(0, 1, 2), (0, 3, 1)], material=glass(stage))
+
+
+def extreme_index(stage):
+    ball(stage, glass(stage, 1000.0), segments=16)
+    ball(stage, glass(stage, 0.3), place=(1, 0, 1), segments=16)
+
+
+def tiny(stage):
+    ball(stage, glass(stage), radius=1e-4, place=(0, 0, 1e-3), segments=16)
+
+
+@pytest.mark.parametrize(
+    "build", (touching, sheets, around_the_lamp, around_the_camera, rough, thin, broken, extreme_index, tiny)
+)
+def test_odd_casters_leave_finite_light(stage, technique_name, build):
+    stage.floor()
+    build(stage)
+    stage.light("POINT", location=(0.1, 0, 2), shadow_soft_size=0.0)
+    stage.light("SUN", turn=(0, 1.4, 0), angle=0.01)
+    stage.camera_above(3.0)
+    images = []
+    for _ in range(2):
+        stage.scene.candela.slot_caustics = technique_name
+        images.append(stage.render(samples=2, size=(16, 16), bounces=2)["diffuse_indirect"])
+        stage.scene.candela.slot_caustics = "AUTO"
+        stage.render(samples=1, size=(8, 8), bounces=2)  # so that the next one is drawn anew
+    assert (images[0] >= 0).all()
+    assert images[0] == pytest.approx(images[1], rel=1e-3, abs=1e-5)  # sums in another order
