@@ -1,7 +1,7 @@
 """Six scenes of caustics on what an orthographic camera sees from above, built from numbers in an empty Blender.
 
-Casters are hidden from the camera, so that all of their light on the floor is seen, and receivers are diffuse, .8. Lamps
-have a size, so that Cycles can find them.
+Casters are hidden from the camera, so that all of their light on the floor is seen, and receivers are diffuse, .8.
+Lamps have a size, so that Cycles can find them.
 """
 
 from __future__ import annotations
@@ -89,13 +89,12 @@ def ball(radius: float, place, surface, segments: int = 96):
     return made
 
 
-def ring(radius: float, height: float, bottom: float, surface, segments: int = 192, thickness: float = 0.02):
-    """A shell without its flat rims."""
+def ring(radius: float, height: float, bottom: float, surface, segments: int = 192):
+    """A band without thickness, which mirrors on both sides."""
     turns = np.linspace(0, 2 * np.pi, segments, endpoint=False)
-    for name, wide, inwards in (("Inner", radius, True), ("Outer", radius + thickness, False)):
-        rim = [(wide * np.cos(t), wide * np.sin(t), bottom + z) for z in (0.0, height) for t in turns]
-        faces = [(k, (k + 1) % segments, segments + (k + 1) % segments, segments + k) for k in range(segments)]
-        solid(name, rim, [face[::-1] if inwards else face for face in faces], surface, True, seen=False)
+    rim = [(radius * np.cos(t), radius * np.sin(t), bottom + z) for z in (0.0, height) for t in turns]
+    faces = [(k, (k + 1) % segments, segments + (k + 1) % segments, segments + k) for k in range(segments)]
+    solid("Ring", rim, faces, surface, True, seen=False)
 
 
 def lamp(kind: str, place, target=(0, 0, 0), **settings):

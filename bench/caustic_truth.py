@@ -1,11 +1,11 @@
 """Light tracing of caustics with Mitsuba 3's rays, for `python -m bench caustics`.
 
-Photons leave the lamps towards the casters and are followed over specular surfaces alone; those that end on a diffuse one
-after at least one of them, where the camera above sees it, are counted by pixel. Run as a program by an interpreter that
-has Mitsuba (dependency group `truth`): `caustic_truth.py SCENE.npz RESULT.npz PHOTONS`.
+Photons leave the lamps towards the casters and are followed over specular surfaces alone; those that end on a diffuse
+one after at least one of them, where the camera above sees it, are counted by pixel. Run as a program by an
+interpreter that has Mitsuba (dependency group `truth`): `caustic_truth.py SCENE.npz RESULT.npz PHOTONS`.
 
-SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K, `kinds` (0 diffuse, 1 glass, 2 mirror) and `iors` by mesh,
-`hidden` ones that the camera does not see, `lamps` (N, 16), `centre`, `span`, `size`.
+SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K; by mesh `kinds` (0 diffuse, 1 glass, 2 mirror), `iors`
+and `smooth`; `lamps` (N, 12), see `emit`; `centre`, `span`, `size` of the picture.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
     mi.set_variant("llvm_ad_rgb")
     data = np.load(scene_file)
     shapes = {"type": "scene"}
-    for number, kind in enumerate(data["kinds"]):
+    for number, smooth in enumerate(data["smooth"]):
         vertices, faces = data[f"vertices_{number}"], data[f"faces_{number}"]
-        mesh = mi.Mesh(f"mesh{number}", len(vertices), len(faces), has_vertex_normals=bool(data["smooth"][number]))
+        mesh = mi.Mesh(f"mesh{number}", len(vertices), len(faces), has_vertex_normals=bool(smooth))
         values = mi.traverse(mesh)
         values["vertex_positions"] = vertices.astype(np.float32).ravel()
         values["faces"] = faces.astype(np.uint32).ravel()
-        if data["smooth"][number]:
+        if smooth:
             values["vertex_normals"] = data[f"normals_{number}"].astype(np.float32).ravel()
         values.update()
         shapes[f"mesh{number}"] = mesh
@@ -72,8 +72,8 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
 
 
 def follow(mi, scene, kind_of, ior_of, origin, direction, rng):
-    """Where photons end, (3, N), whether on a diffuse surface after specular ones, and what of each is left: mirrors keep
-    all, and glass mirrors or bends in proportion to Fresnel's reflectance."""
+    """Where photons end, (3, N), whether on a diffuse surface after specular ones, and what of each is left:
+    mirrors keep all, and glass mirrors or bends in proportion to Fresnel's reflectance."""
     import drjit as dr
 
     count = len(origin)
@@ -121,8 +121,8 @@ def follow(mi, scene, kind_of, ior_of, origin, direction, rng):
 
 
 def emit(lamp: np.ndarray, middle, radius: float, rng, count: int):
-    """Origins, directions (count, 3) and fluxes: (count, 3), W times the number of photons. `lamp`: kind (0 sun, 1 spot),
-    place, direction of emission, strength (W/m2; W/sr), half angle or radius, cosine of the cone."""
+    """Origins, directions (count, 3) and fluxes: (count, 3), W times the number of photons. `lamp`: kind (0 sun,
+    1 spot), place, direction of emission, strength (W/m2; W/sr), half angle or radius, cosine of the cone."""
     kind, place, axis, strength, extent, cone = lamp[0], lamp[1:4], lamp[4:7], lamp[7:10], lamp[10], lamp[11]
     u, v = frame(axis if kind == 0 else unit(middle - place))
     turn, share = 2 * np.pi * rng.random(count), rng.random(count)

@@ -64,8 +64,8 @@ def render_passes(
     a render border the pictures hold the bordered rectangle only. `bounces` limits how often light is reflected on
     its way to the surface that is seen; None leaves it to Candela's own setting, and Cycles goes on until nothing is
     left. `direct_only` means none: the direct passes stay what they are in a full render, and Combined shows direct
-    light, emission and world. EEVEE knows no such limit. `diffuse_bounces` limits Cycles' diffuse ones further. Compositor and sequencer stay out of it. Blender's Render
-    Result shows this render afterwards.
+    light, emission and world. EEVEE knows no such limit. `diffuse_bounces` limits Cycles' diffuse ones further.
+    Compositor and sequencer stay out of it. Blender's Render Result shows this render afterwards.
     Raises `RenderFailed`.
     """
     engine = engine_identifier(scene, engine)

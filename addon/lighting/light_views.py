@@ -7,7 +7,7 @@ that reads surfaces or traces rays takes it in place of the camera.
 | light | view |
 |---|---|
 | sun | orthographic |
-| point, spot, area from outside of the box, up to WIDEST from the middle | one perspective, clipped to the spot's cone |
+| point, spot, area from outside, up to WIDEST from the middle | one perspective, clipped to the spot's cone |
 | the same from within or close by | faces of a cube that see the box |
 
 A texel at the tangents (x, y) stands for the solid angle  a / (1 + x^2 + y^2)^(3/2),  a its area one unit before the
@@ -147,7 +147,7 @@ def views_of(
 
 
 def _face_sees(offsets: np.ndarray, forward, u, v) -> bool:
-    """Whether the box of corners `offsets` may meet a cube face's pyramid: none of its planes has all corners outside."""
+    """Whether a box of corners `offsets` may meet a cube face's pyramid: no plane has all corners outside."""
     planes = (forward, forward - u, forward + u, forward - v, forward + v)
     return all((offsets @ plane > 0).any() for plane in planes)
 

@@ -55,10 +55,9 @@ EMISSION = Struct(
     ("vec4", "box_low"),  # of the casters that the view is about
     ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
     ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
-    (
-        "vec4",
-        "spread",
-    ),  # what a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, or 0
+    # What a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, 0
+    # unknown, -1 one.
+    ("vec4", "spread"),
     ("vec4", "absorbed"),  # by insides, 1/m, in the mean
     ("int", "interfaces"),  # at most, after the first
     ("int", "bends"),  # 1: photons of the refracted lobe
@@ -144,7 +143,8 @@ class Photons:
         for emitter in frame.emitters:
             if emitter.light.key not in casters.lights:
                 continue
-            sample = emitter.sample(*frame.random_volume_at(index, "light"))
+            alone = frame.settings.whole and frame.settings.samples == 1
+            sample = emitter.middle() if alone else emitter.sample(*frame.random_volume_at(index, "light"))
             shift = frame.random_at(index, "caustics/grid")
             for low, high in caustic_casters.boxes_of(frame, casters):
                 for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
@@ -197,7 +197,7 @@ class Photons:
         u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
         strata = float(count) if frame.settings.whole and count > 1 else 0.0
         if count == 1:
-            u, later = (0.5, 0.5), (0.5, 0.5)
+            u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
         sources = self._sources.set([emitter.row(light.sample, 0, 0)])
         choice = frame.random_volume_at(light.index, "caustics/interface")[2]
         drawn = self.buffers.draw(frame, technique, view, casters.materials, light.lobes, choice)

