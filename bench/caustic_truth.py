@@ -4,8 +4,8 @@ Photons leave the lamps towards the casters and are followed over specular surfa
 one after at least one of them, where the camera above sees it, are counted by pixel. Run as a program by an
 interpreter that has Mitsuba (dependency group `truth`): `caustic_truth.py SCENE.npz RESULT.npz PHOTONS`.
 
-SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K; by mesh `kinds` (0 diffuse, 1 glass, 2 mirror), `iors`
-and `smooth`; `lamps` (N, 12), see `emit`; `centre`, `span`, `size` of the picture.
+SCENE.npz: arrays `vertices_K`, `normals_K`, `faces_K` for mesh K; by mesh `kinds` (0 diffuse, 1 glass, 2 mirror),
+`iors` and `smooth`; `lamps` (N, 12), see `emit`; `centre`, `span`, `size` of the picture.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def emit(lamp: np.ndarray, middle, radius: float, rng, count: int):
         sine = np.sqrt(1 - cosine**2)
         direction = cosine[:, None] * axis + sine[:, None] * (np.cos(other)[:, None] * u + np.sin(other)[:, None] * v)
         start = middle + (across * np.cos(turn))[:, None] * u + (across * np.sin(turn))[:, None] * v
-        # The disc across the mean direction: light at an angle crosses it by its cosine, as the sun's irradiance counts.
+        # The disc lies across the mean direction: light at an angle crosses it by its cosine.
         flux = np.broadcast_to(strength * np.pi * radius**2, (count, 3)) * cosine[:, None]
         return start - 4 * radius * direction, direction, flux
     forward = unit(middle - place)

@@ -1,13 +1,13 @@
 """Caustics beside light tracing, Cycles and EEVEE, on six scenes: `python -m bench caustics`.
 
 The truth is light tracing with Mitsuba 3 (caustic_truth.py), kept in results/caustics_truth.npz and made anew by
-`--truth PYTHON`, an interpreter that has the packages of the dependency group `truth`. It holds the caustic's own light:
-irradiance that lamps bring over specular surfaces, by pixel of an orthographic view from above.
+`--truth PYTHON`, an interpreter that has the packages of the dependency group `truth`. It holds the caustic's own
+light: irradiance that lamps bring over specular surfaces, by pixel of an orthographic view from above.
 
-Error is relMSE of that light, after both were blurred by a Gaussian of 2 pixels; `energy` the ratio of the sums. Cycles'
-figure is its diffuse indirect light with one diffuse bounce, which is the same light. EEVEE has none of it, and what
-light it lets through glass stands in its direct light; so a second error is that of all light of the floor, with Cycles'
-direct light as the rest of the truth. Times are those of whole renders, the second one of each.
+Error is relMSE of that light, after both were blurred by a Gaussian of 2 pixels; `energy` the ratio of the sums.
+Cycles' figure is its diffuse indirect light with one diffuse bounce, which is the same light. EEVEE has none of it, and
+what light it lets through glass stands in its direct light; so a second error is that of all light of the floor, with
+Cycles' direct light as the rest of the truth. Times are those of whole renders, the quicker of two.
 """
 
 from __future__ import annotations
@@ -81,9 +81,7 @@ def command(options: argparse.Namespace) -> int:
             print(f"{name:10} {one.label:22} " + "  ".join(cell(f) for f in figures), flush=True)
     shown = [name for name in options.scenes if name in known]
     parts = []
-    titles = (
-        "relMSE of the caustic's own light", "Its energy over the truth's", "relMSE of all light on the floor", "Seconds"
-    )  # fmt: skip
+    titles = ("relMSE of the caustic's own light", "Its energy", "relMSE of all light on the floor", "Seconds")
     for number, title in enumerate(titles):
         table = [["", *(SCENES[name].label for name in shown)]]
         table += [[one.label, *(cell(figures[number]) for figures in found)] for one, found in rows.items() if found]

@@ -55,8 +55,8 @@ EMISSION = Struct(
     ("vec4", "box_low"),  # of the casters that the view is about
     ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
     ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
-    # What a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in all, 0
-    # unknown, -1 one.
+    # What a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in
+    # all, 0 unknown, -1 one.
     ("vec4", "spread"),
     ("vec4", "absorbed"),  # by insides, 1/m, in the mean
     ("int", "interfaces"),  # at most, after the first

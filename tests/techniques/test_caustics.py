@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.frame.ledger import RAN
+from addon.frame.ledger import RAN, SKIPPED
 from tests.techniques.conftest import places
 
 PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
@@ -125,8 +125,8 @@ def nephroid(distance, radius=0.5, height=0.25, elevation=np.pi / 6):
 
 @pytest.mark.parametrize("technique", (PHOTONS, MAPPING))
 def test_mirror_ring_has_the_nephroid(stage, technique):
-    """Ring of radius .5 and height .25 under a sun of 30 degrees that travels along +x, beside the specification's values
-    on its axis: 1.25 to 4.58 where one sheet and two meet, 5.0 to 1.67 beyond the cusp."""
+    """Ring of radius .5 and height .25 under a sun of 30 degrees that travels along +x, beside the closed
+    form on its axis: 1.25 to 4.58 where one sheet and two meet, 5.0 to 1.67 beyond the cusp."""
     stage.floor()
     count, radius, height = 512, 0.5, 0.25
     turns = np.linspace(0, 2 * np.pi, count, endpoint=False)
@@ -161,7 +161,8 @@ def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
     s = (cosine - 1.33 * bent) / (cosine + 1.33 * bent)
     p = (1.33 * cosine - bent) / (1.33 * cosine + bent)
     expected = cosine * (1 - 0.5 * (s * s + p * p))
-    assert energy == pytest.approx(expected, rel=0.01)
+    assert energy.mean() == pytest.approx(expected, rel=0.005)
+    assert energy == pytest.approx(expected, rel=0.03)
 
 
 def test_nothing_bent_puts_light_straight_behind_its_caster(stage, technique_name):
@@ -227,7 +228,7 @@ def test_larger_lamps_make_softer_caustics(stage):
     """A mirror shows the floor a disc of .2 m from 2 m away: edges are .2 m wide, in the mean of samples and in one."""
     stage.floor()
     mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
-    made = stage.rectangle((-0.4, -0.4), (0.4, 0.4), material=mirror, location=(-1, 0, 1), turn=(0, np.pi / 4, 0))
+    made = stage.rectangle((-0.4, -0.4), (0.4, 0.4), material=mirror, location=(0, 0, 2), turn=(0, -np.pi / 4, 0))
     made.visible_camera = False
     stage.light("SUN", turn=(0, np.pi / 2, 0), angle=0.2)
     stage.camera_above(3.0)
@@ -237,7 +238,7 @@ def test_larger_lamps_make_softer_caustics(stage):
     assert np.abs(one - many).mean() < 0.15 * many.mean()
 
 
-# What they are skipped for ---------------------------------------------------------------------------------------------
+# What they are skipped for -------------------------------------------------------------------------------------------
 
 
 def reason(stage, name=PHOTONS):
@@ -273,7 +274,7 @@ def test_scenes_without_casters_lamps_or_room_for_them_say_so(stage):
         stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = True
 
 
-# Stress ----------------------------------------------------------------------------------------------------------------
+# Stress --------------------------------------------------------------------------------------------------------------
 
 
 def touching(stage):

@@ -1,4 +1,4 @@
-"""Splats: a record's value is spread over its footprint, all of it, whatever its shape; views of lights fit their box."""
+"""Splats spread all of a record's value over its footprint, whatever its shape; views of lights fit their box."""
 
 import numpy as np
 import pytest
