@@ -29,7 +29,7 @@ Fails: above 4 million triangles nothing is traced, and glass lets light pass st
 Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
 its bumps. Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo
 where they stand behind glass in the picture, too, and else by their material's mean (the boards of that room shine: 5 %
-too dark). Light falls through glass in straight lines, so glass casts grey shadows and no caustics. Against Cycles:
+too dark). Surfaces behind glass have straight grey shadows, and no caustics. Against Cycles:
 within 2 % for a rough ball below a world of which Cycles draws no light samples; where it does, its own result for
 rough glass rises by up to 11 % (a world symmetric in x shows it).
 """
