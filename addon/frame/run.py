@@ -434,8 +434,10 @@ class Renderer:
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera
+        # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
+        casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            lights, casters, self._environment[0], self.materials.fingerprint(), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),

@@ -69,8 +69,8 @@ PHOTONS = passes.fullscreen_program(
         *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES,
         *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table")),
     ),
-    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "emission")),
-    constants=(("FLOAT", "offset_size"), ("INT", "sample_number")),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
+    constants=(("FLOAT", "offset_size"), ("INT", "photon_roll")),
     outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
 )  # fmt: skip
 MAP = (("RGBA32F", "receiver_position"), ("RGBA32F", "receiver_normal"))
@@ -79,7 +79,7 @@ LOOKUPS = passes.fullscreen_program(
     "photons by look-ups",
     "caustics/lookup.frag.glsl",
     textures=(*SURFACE_TEXTURES, *BEHIND, *MAP, ("RGBA32F", "energy_table")),
-    blocks=((VIEW, "film_view"), (VIEW, "map_view"), (lights.SOURCES, "sources"), (EMISSION, "emission")),
+    blocks=((VIEW, "film_view"), (VIEW, "map_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
     outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
 )
 FOOTPRINTS = passes.fullscreen_program(
@@ -166,7 +166,7 @@ class Photons:
                     "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
                 },
                 blocks={"film_view": block, **bound["blocks"]},
-                constants={"offset_size": 1e-6 * frame.geometry.size, "sample_number": light.index},
+                constants={"offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index},
             )  # fmt: skip
             yield self._bundle(frame, technique, target)
 
@@ -213,7 +213,7 @@ class Photons:
             else:
                 self._emission.update(**values)
             textures = {**surfaces, "energy_table": frame.materials.energy_table}
-            yield block, {"textures": textures, "blocks": {"sources": sources, "emission": self._emission}}
+            yield block, {"textures": textures, "blocks": {"sources": sources, "photon_light": self._emission}}
 
     def _bundle(self, frame: Frame, technique: Technique, target: images.Target) -> Bundle:
         frame.count(technique, "passes")

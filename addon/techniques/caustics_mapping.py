@@ -39,8 +39,9 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..kernels import splats
-from ..lighting import caustic_casters
+from ..lighting import caustic_casters, photons
 from ..lighting.light_views import LightBuffers, widened
 from ..lighting.photons import MAP, Photons
 from ..scene import acceleration
@@ -105,6 +106,10 @@ class CausticsMapping(Technique):
         if isinstance(found, str):
             return found
         return acceleration.too_many(snapshot) if settings.get(self, "by") == RAYS else None
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        found = photons.PHOTONS if settings.get(self, "by") == RAYS else photons.LOOKUPS
+        return found, photons.FOOTPRINTS, INTO_MAP, APPLY
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)

@@ -32,9 +32,10 @@ from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
+from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters
-from ..lighting.photons import Photons
+from ..lighting.photons import FOOTPRINTS, PHOTONS, Photons
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -85,6 +86,9 @@ class ScreenSpacePhotons(Technique):
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         """Wherever it can trace: its error is below that of look-ups in every scene of docs/caustics.md."""
         return True
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return PHOTONS, FOOTPRINTS, SPLAT
 
     def begin(self, frame: Frame) -> None:
         self._casters = caustic_casters.of(frame)

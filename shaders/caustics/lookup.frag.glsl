@@ -77,14 +77,14 @@ void main()
   out_flux = vec4(0.0);
   ivec2 texel = ivec2(gl_FragCoord.xy);
   vec4 place = surface_position_fetch(texel);
-  bool inside = all(greaterThanEqual(place.xyz, emission.box_low.xyz)) && all(lessThanEqual(place.xyz, emission.box_high.xyz));
+  bool inside = all(greaterThanEqual(place.xyz, photon_light.box_low.xyz)) && all(lessThanEqual(place.xyz, photon_light.box_high.xyz));
   if (place.w == 0.0 || !inside || max_component(surface_tint_fetch(texel).rgb) <= 0.0) {
     return;
   }
   Surface s = SURFACE_READ(texel);
-  bool bends = emission.bends != 0;
+  bool bends = photon_light.bends != 0;
   bool wanted = bends ? s.kind == LOBE_REFRACTION : s.kind < LOBE_REFRACTION;
-  if (!wanted || (!bends && s.glossy_roughness > emission.box_high.w)) {
+  if (!wanted || (!bends && s.glossy_roughness > photon_light.box_high.w)) {
     return;
   }
   float away;
@@ -101,12 +101,12 @@ void main()
   if (bends) {
     Interface surface = interface_begin(s.glossy_normal, -direction, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
                                         s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
-    onward = interface_sample(surface, emission.lobe.xy, 1.0, weight);
+    onward = interface_sample(surface, photon_light.lobe.xy, 1.0, weight);
     lobe_spread = interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, true, s.glossy_ior);
   }
   else {
     Lobe lobe = lobe_begin(s, -direction);
-    onward = lobe_sample(lobe, emission.lobe.xy, weight);
+    onward = lobe_sample(lobe, photon_light.lobe.xy, weight);
     lobe_spread = lobe_is_mirror(lobe) ? 0.0 : lobe_width(sqrt(lobe.alpha.x * lobe.alpha.y), false, 1.0);
   }
   if (bends != (dot(onward, s.geometric_normal) < 0.0)) {
@@ -115,7 +115,7 @@ void main()
   flux *= weight;
   vec3 from = s.position;
   float travelled = 0.0;
-  float extent = length(emission.box_high.xyz - emission.box_low.xyz);
+  float extent = length(photon_light.box_high.xyz - photon_light.box_low.xyz);
 
   ivec2 own;
   vec4 last = vec4(0.0);
@@ -153,12 +153,12 @@ void main()
     t = clamp(t, max(low - 0.1 * extent, 0.0), low + 0.1 * extent);
     from += t * onward;
     travelled += t;
-    flux *= exp(-emission.absorbed.rgb * t);
+    flux *= exp(-photon_light.absorbed.rgb * t);
     vec3 facing = normal_behind(from, leaving.glossy_normal);
     facing = (dot(facing, onward) > 0.0) ? -facing : facing;
     Interface surface = interface_begin(facing, -onward, leaving.glossy_roughness, leaving.glossy_ior,
                                         leaving.glossy_tint, leaving.glossy_edge.x > 0.5, leaving.glossy_weight, vec3(0.0));
-    onward = interface_sample(surface, fract(emission.lobe.xy + vec2(0.754877666, 0.569840291)), 1.0, weight);
+    onward = interface_sample(surface, fract(photon_light.lobe.xy + vec2(0.754877666, 0.569840291)), 1.0, weight);
     if (max_component(weight) <= 0.0) {
       return;
     }
@@ -199,8 +199,8 @@ void main()
     return;
   }
   travelled += t;
-  float light_spread = emission.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
-  float lobes = emission.spread.y * lobe_spread * travelled;
+  float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
+  float lobes = photon_light.spread.y * lobe_spread * travelled;
   out_point = vec4(from + t * onward, bends ? 1.0 : 2.0);
   out_normal = vec4(normal, sqrt(light_spread * light_spread + lobes * lobes));
   out_flux = vec4(flux, sqrt(area) * (parallel ? 1.0 : (away + travelled) / away));

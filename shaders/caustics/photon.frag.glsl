@@ -19,7 +19,7 @@
 // a picture of one sample they are the same, too: each photon takes the likelier way.
 vec2 numbers_of(vec2 first, int interface_number)
 {
-  return fract(first + float(interface_number) * emission.spread.z * vec2(0.754877666, 0.569840291));
+  return fract(first + float(interface_number) * photon_light.spread.z * vec2(0.754877666, 0.569840291));
 }
 
 // What a smooth mirror behind the first interface reflects, by the means of its material.
@@ -39,15 +39,15 @@ void main()
   out_flux = vec4(0.0);
   ivec2 texel = ivec2(gl_FragCoord.xy);
   vec4 place = surface_position_fetch(texel);
-  bool inside = all(greaterThanEqual(place.xyz, emission.box_low.xyz)) && all(lessThanEqual(place.xyz, emission.box_high.xyz));
+  bool inside = all(greaterThanEqual(place.xyz, photon_light.box_low.xyz)) && all(lessThanEqual(place.xyz, photon_light.box_high.xyz));
   if (place.w == 0.0 || !inside || max_component(surface_tint_fetch(texel).rgb) <= 0.0) {
     return;
   }
   Surface s = SURFACE_READ(texel);
-  bool bends = emission.bends != 0;
+  bool bends = photon_light.bends != 0;
   // A smooth mirror, or the face of glass; what a diffuse surface mirrors beside its own light stays with others.
   bool wanted = bends ? s.kind == LOBE_REFRACTION : s.kind < LOBE_REFRACTION;
-  if (!wanted || (!bends && s.glossy_roughness > emission.box_high.w)) {
+  if (!wanted || (!bends && s.glossy_roughness > photon_light.box_high.w)) {
     return;
   }
 
@@ -62,7 +62,7 @@ void main()
   float width = sqrt(area);
 
   // The first interface, with its material's own lobe.
-  vec2 u = emission.lobe.xy;
+  vec2 u = photon_light.lobe.xy;
   vec3 weight;
   vec3 onward;
   vec3 geometric_normal = s.geometric_normal;
@@ -87,8 +87,8 @@ void main()
   vec3 position = s.position;
   float travelled = 0.0;
   float blur_squared = 0.0;
-  uint salt = uint(sample_number);
-  for (int step = 0; step <= emission.interfaces; step++) {
+  uint salt = uint(photon_roll);
+  for (int step = 0; step <= photon_light.interfaces; step++) {
     ivec2 hit;
     vec3 origin = ray_origin(position, passes ? -geometric_normal : geometric_normal);
     float t = trace_layers(origin, onward, 1e29, 0.0, salt + uint(step), true, false, hit);
@@ -106,13 +106,13 @@ void main()
     vec3 smooth_normal = triangle_shading_normal(hit, position);
     normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
     bool leaves = dot(normal, onward) > 0.0;
-    vec2 numbers = numbers_of(emission.lobe.zw, step);
+    vec2 numbers = numbers_of(photon_light.lobe.zw, step);
     bool is_glass = shape.y > 0.0 && numbers.x <= shape.y;
     bool mirrors = !is_glass && body.w > 0.5;
     if (!is_glass && !mirrors) {
       // The end. Light spreads by the light's extent as by its distance; parallel light by its angle.
-      float light_spread = emission.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
-      float lobes = emission.spread.y * emission.spread.y * blur_squared;
+      float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
+      float lobes = photon_light.spread.y * photon_light.spread.y * blur_squared;
       out_point = vec4(position, 1.0 + mod(path * 37.0 + float(material), PATHS));
       out_normal = vec4((dot(normal, onward) > 0.0) ? -normal : normal, sqrt(light_spread * light_spread + lobes));
       out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
@@ -124,7 +124,7 @@ void main()
     geometric_normal = leaves ? -normal : normal;
     smooth_normal = leaves ? -smooth_normal : smooth_normal;
     smooth_normal = (dot(smooth_normal, onward) < 0.0) ? smooth_normal : geometric_normal;
-    vec2 drawn = numbers_of(emission.lobe.xy, step + 1);
+    vec2 drawn = numbers_of(photon_light.lobe.xy, step + 1);
     if (is_glass) {
       float ior = leaves ? 1.0 / glass.w : glass.w;
       vec3 scale = vec3(1.0);
@@ -133,7 +133,7 @@ void main()
       }
       Interface surface = interface_begin(smooth_normal, -onward, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
                                           scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
-      onward = interface_sample_strata(surface, drawn, numbers.y, emission.spread.w, weight);
+      onward = interface_sample_strata(surface, drawn, numbers.y, photon_light.spread.w, weight);
       passes = dot(onward, smooth_normal) < 0.0;
       lobe_spread = max(lobe_spread, interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, passes, ior));
     }

@@ -198,7 +198,8 @@ def test_total_is_the_same_for_coarse_and_fine_grids(stage, technique_name):
     stage.light("SUN", angle=0.0)
     stage.camera_above(4.0)
     totals = [irradiance(stage, technique_name, samples=4, size=(64, 64), grid=side).sum() for side in (48, 96, 192)]
-    assert totals == pytest.approx(totals[-1], rel=0.015)
+    for total in totals:
+        assert float(total) == pytest.approx(float(totals[-1]), rel=0.015)
 
 
 def test_twice_the_power_is_twice_the_caustic(stage, technique_name):
@@ -216,7 +217,7 @@ def test_glass_casts_a_full_shadow_where_its_light_arrives_as_photons(stage):
     stage.floor()
     ball(stage, glass(stage))
     stage.light("SUN", angle=0.0)
-    stage.camera_above(1.0)
+    stage.camera_above(0.6)
     dark = irradiance(stage, PHOTONS, samples=4, size=(16, 16), path="diffuse_direct")
     assert dark.max() == pytest.approx(0.0, abs=1e-6)
     grey = irradiance(stage, "OFF", samples=4, size=(16, 16), path="diffuse_direct")
