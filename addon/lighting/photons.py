@@ -91,7 +91,7 @@ FOOTPRINTS = passes.fullscreen_program(
     outputs=(("VEC4", "out_centre"), ("VEC4", "out_first"), ("VEC4", "out_second"), ("VEC4", "out_value")),
 )
 WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
-FALL_KNOWN, FALL_GROWING = -1.0 / 3.0, -1.0 / 4.0  # exponents of the footprints' fall with samples
+FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
 LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
 
 
