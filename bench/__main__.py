@@ -9,6 +9,7 @@ import sys
 from bench import (
     again,
     ages,
+    caustics,
     costs,
     direct,
     edges,
@@ -33,6 +34,7 @@ VERBS = {
     "direct": direct,
     "indirect": indirect,
     "media": media,
+    "caustics": caustics,
     "profile": profile,
     "costs": costs,
     "glare": glare,

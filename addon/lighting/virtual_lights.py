@@ -68,6 +68,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
+from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
 from .media import MediaService, attenuated
 
@@ -282,7 +283,9 @@ class VirtualLights:
                 sample = emitter.sample(*frame.random_volume_at(frame.sample * points + k, "virtual lights/light"))
                 total = points * frame.settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
-                rows.append(emitter.row(sample, 0, shadowed, weight / points, points=total))
+                row = emitter.row(sample, 0, shadowed, weight / points, points=total)
+                row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
+                rows.append(row)
         return rows
 
     def _probing(self, frame: Frame, grid: Grid) -> dict:

@@ -173,6 +173,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random, of_object.pass_index,
                 of_object.holdout, of_object.color, place.generated, place.uv, place.key, of_object.terminator,
                 of_object.own,
+                of_object.caustics_caster,
             )
         )  # fmt: skip
     groups: dict[tuple, list[Instance]] = {}
@@ -288,6 +289,8 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         filter_width=scene.render.filter_size,
         transparent=scene.render.film_transparent,
         exposure=getattr(cycles, "film_exposure", 1.0),
+        caustics_reflective=getattr(cycles, "caustics_reflective", True),
+        caustics_refractive=getattr(cycles, "caustics_refractive", True),
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,

@@ -70,6 +70,7 @@ class ObjectFacts:
     color: tuple[float, float, float, float]
     terminator: float
     own: Own
+    caustics_caster: bool
     notes: tuple[Note, ...]
 
 
@@ -134,6 +135,7 @@ def walk(
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
+                        caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:

@@ -97,6 +97,7 @@ class Instance:
     key: str = ""  # stable identity across frames (object and persistent id)
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
+    caustics_caster: bool = False  # set to cast shadow caustics
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +177,7 @@ class Light:
     spot_angle: float = np.pi  # SPOT: full cone angle, radians
     spot_blend: float = 0.0  # SPOT
     cast_shadow: bool = True
+    caustics: bool = False  # set to give shadow caustics
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
@@ -241,6 +243,8 @@ class Film:
     filter_width: float = 1.5  # pixels, Blackman-Harris
     transparent: bool = False
     exposure: float = 1.0
+    caustics_reflective: bool = True  # switches of the scene: whether light that mirrors or glass throw is wanted
+    caustics_refractive: bool = True
     mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
     position: bool = False
     indices: bool = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
 from .airlight import Airlight
+from .caustics_mapping import CausticsMapping
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
@@ -23,6 +24,7 @@ from .light_probes import LightProbes
 from .media import MediaAttenuation
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
+from .screen_space_photons import ScreenSpacePhotons
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
@@ -57,6 +59,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     ImperfectShadowMaps,
     ScreenSpaceBounce,
     ImageSpaceSubsurface,
+    CausticsMapping,
+    ScreenSpacePhotons,
     Film,
     Denoise,
     EyeModel,

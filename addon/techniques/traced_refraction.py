@@ -29,7 +29,7 @@ Fails: above 4 million triangles nothing is traced, and glass lets light pass st
 Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
 its bumps. Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo
 where they stand behind glass in the picture, too, and else by their material's mean (the boards of that room shine: 5 %
-too dark). Light falls through glass in straight lines, so glass casts grey shadows and no caustics. Against Cycles:
+too dark). Surfaces behind glass have straight grey shadows, and no caustics. Against Cycles:
 within 2 % for a rough ball below a world of which Cycles draws no light samples; where it does, its own result for
 rough glass rises by up to 11 % (a world symmetric in x shows it).
 """
@@ -45,6 +45,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..lighting.emissive_triangles import EmissiveTriangles
+from ..lighting.interfaces import interface_table
 from ..materials.compiler import may_emit, may_refract
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -119,16 +120,7 @@ class TracedRefraction(Technique):
     def prepare(self, frame: Frame) -> None:
         """Tell the shader how the materials behind the first interface bend light, and what their insides absorb: three
         texels for each."""
-        table = np.zeros((len(frame.materials.compiled), 3, 4), np.float32)
-        for row, material in zip(table, frame.materials.compiled):
-            if material.glass:
-                glass = material.glass
-                row[0] = *glass.color, glass.ior
-                losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
-                row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
-            if material.medium:
-                row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
-        self._interfaces = images.upload(table)
+        self._interfaces = images.upload(interface_table(frame.materials.compiled))
 
     def sample(self, frame: Frame) -> None:
         rows = self._source_rows(frame)

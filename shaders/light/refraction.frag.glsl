@@ -180,6 +180,9 @@ void main()
       rest.met.reflection.straight = vec3(0.0);
       rest.met.reflection.grazing = vec3(0.0);
       rest.met.reflection.alpha = 1.0;
+#ifdef MIRRORS_OWNED
+      rest.met.photons = false;
+#endif
       out_indirect.rgb += throughput * radiance_along(rest, glossy_radius, roll);
       break;
     }

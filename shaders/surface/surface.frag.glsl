@@ -26,7 +26,11 @@ void main()
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
+#ifdef ONE_LOBE
+  Closures c = closures_begin(point.normal, lobe_choice, 0.0);
+#else
   Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z), even_share);
+#endif
   evaluate_material(point, c);
   closures_end(c);
 

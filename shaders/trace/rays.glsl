@@ -22,9 +22,9 @@ float clear_path(vec3 origin, vec3 direction, float reach, uint salt)
   return (trace_until(origin, direction, reach, reach, salt, hit) >= reach) ? 1.0 : 0.0;
 }
 
-// The same for a ray that looks for a light.
-float clear_to_light(vec3 origin, vec3 direction, float reach, uint salt)
+// The same for a ray that looks for a light; `glass_stops` it, or lets it pass at random.
+float clear_to_light(vec3 origin, vec3 direction, float reach, uint salt, bool glass_stops)
 {
   ivec2 hit;
-  return (trace_shadow(origin, direction, reach, salt, hit) >= reach) ? 1.0 : 0.0;
+  return (trace_layers(origin, direction, reach, reach, salt, glass_stops, true, hit) >= reach) ? 1.0 : 0.0;
 }
