@@ -17,6 +17,7 @@ from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
+from .shaded_reflections import ShadedReflections
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
@@ -43,6 +44,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ShadedReflections,
     Film,
     Denoise,
 )

@@ -95,7 +95,11 @@ NEAR_CONSTANTS = (
     ("INT", "bounces"), ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "glossy_radius"),
     ("FLOAT", "deeper"),
 )  # fmt: skip
-GATHER_CONSTANTS = (*dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)), ("INT", "lobe_rays"))
+GATHER_CONSTANTS = (
+    *dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)),
+    ("INT", "lobe_rays"),
+    ("FLOAT", "shaded_roughness"),
+)
 OFFERED = "virtual_lights"  # what others may gather, too: bindings with that texture and NEAR_CONSTANTS
 
 
@@ -167,6 +171,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     near = near_radius(frame, len(lights))
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
     bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
+    bindings["constants"]["shaded_roughness"] = frame.services.get("shaded_roughness", -1.0)
     frame.services[OFFERED] = bindings
     return bindings
 

@@ -57,6 +57,7 @@ TRACED = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
+        ("FLOAT", "shaded_roughness"),
     ),
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
@@ -127,6 +128,7 @@ class TracedGlossy(Technique):
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive_power, "emissive_points": emissive_points,
+                "shaded_roughness": frame.services.get("shaded_roughness", -1.0),
             },
         }  # fmt: skip
         yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings, self._rows))

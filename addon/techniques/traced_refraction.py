@@ -44,8 +44,8 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
-from ..lighting.emissive_triangles import EmissiveTriangles
-from ..materials.compiler import may_emit, may_refract
+from ..lighting.path_sources import PathSources
+from ..materials.compiler import may_refract
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -57,7 +57,6 @@ from .instant_radiosity import NEAR_CONSTANTS, OFFERED
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
-MOST_LAMPS = lights.MOST_LIGHTS - WORLD_DIRECTIONS - EMISSIVE_POINTS
 REFRACTION = passes.fullscreen_program(
     "traced refraction",
     "light/refraction.frag.glsl",
@@ -103,10 +102,10 @@ class TracedRefraction(Technique):
     )
 
     def __init__(self):
-        self._sources = lights.Sources()
+        # By glass, and by surfaces behind it.
+        self._sources = PathSources(("transmission", "diffuse"), "refraction", WORLD_DIRECTIONS, EMISSIVE_POINTS)
         self._reflectance = Reflectance()
         self._interfaces: images.Image | None = None
-        self._triangles: EmissiveTriangles | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         used = {slot for instance in snapshot.instances for slot in instance.materials}
@@ -133,9 +132,11 @@ class TracedRefraction(Technique):
 
     def run(self, frame: Frame) -> None:
         if frame.sample == 0:
-            self._begin(frame)
-        rows = self._source_rows(frame)
-        behind = self._draw_behind(frame)
+            self._reflectance.update(frame)
+            self._sources.begin(frame)
+        rows = self._sources.rows(frame)
+        walks = "shaded_roughness" not in frame.services  # else what is behind the first interface is shaded there
+        behind = self._draw_behind(frame) if walks else None
         virtual_lights, near = self._indirect_light(frame)
         hierarchy = frame.hierarchy("transmission")
         passes.fullscreen(
@@ -147,23 +148,24 @@ class TracedRefraction(Technique):
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
                 "reflectance": self._reflectance.image, "interface_table": self._interfaces,
-                "behind_position": behind.colors[0], "behind_albedo": behind.colors[1],
+                "behind_position": behind.colors[0] if walks else self._interfaces,
+                "behind_albedo": behind.colors[1] if walks else self._interfaces,
                 "virtual_lights": virtual_lights,
             },
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block,
-                "sources": self._sources.set(rows),
+                "sources": self._sources.block(rows),
             },
             constants={
                 "light_count": len(rows), "offset_size": frame.offset_size,
-                "interfaces": frame.settings.get(self, "interfaces"),
-                "world_transmission": int(bool(self._world_flags & lights.TRANSMISSION_FLAG)),
+                "interfaces": frame.settings.get(self, "interfaces") if walks else -1,
+                "world_transmission": int(bool(self._sources.world_flags & lights.TRANSMISSION_FLAG)),
                 "world_samples": float(WORLD_DIRECTIONS),
-                "emissive_power": self._triangles.power if self._triangles else 0.0,
+                "emissive_power": self._sources.emissive_power,
                 "emissive_points": float(EMISSIVE_POINTS), **near,
             },
         )  # fmt: skip
-        for image in behind.colors:
+        for image in behind.colors if walks else ():
             images.pool.give(image)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
@@ -195,48 +197,7 @@ class TracedRefraction(Technique):
         constants = {name: offered["constants"][name] for _, name in NEAR_CONSTANTS}
         return offered["textures"]["virtual_lights"], constants
 
-    def _begin(self, frame: Frame) -> None:
-        self._reflectance.update(frame)
-        wanted = lights.TRANSMISSION_FLAG + lights.DIFFUSE_FLAG  # by glass, and by surfaces behind it
-        self._emitters = [emitter for emitter in frame.emitters if emitter.flags & wanted]
-        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
-        self._triangles = None
-        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
-            triangles = EmissiveTriangles(frame, ("diffuse", "transmission"))
-            self._triangles = triangles if triangles.power > 0 else None
-        seen = frame.snapshot.world.visibility
-        self._world_flags = lights.TRANSMISSION_FLAG * seen.transmission + lights.DIFFUSE_FLAG * seen.diffuse
-        if frame.environment.power <= 0:
-            self._world_flags = 0
-
-    def _source_rows(self, frame: Frame) -> list[np.ndarray]:
-        """Points of this sample on lights, emissive surfaces and the world. More lamps than fit are drawn by lot, and
-        count more: both as points and where a ray meets them."""
-        rows = []
-        count = len(self._emitters)
-        chosen = np.arange(count)
-        if count > MOST_LAMPS:
-            chosen = (np.arange(MOST_LAMPS) + frame.lot("refraction/choose")) * count / MOST_LAMPS
-            chosen = chosen.astype(int)
-        for number in chosen:
-            emitter = self._emitters[number]
-            sample = emitter.sample(*frame.random_volume("refraction/light"))
-            row = emitter.row(sample, 0, int(emitter.light.cast_shadow), max(count / MOST_LAMPS, 1.0))
-            rows.append(row)
-        if self._triangles is not None:
-            for k in range(EMISSIVE_POINTS):
-                index = frame.sample * EMISSIVE_POINTS + k
-                drawn = frame.random_volume_at(index, "refraction/emissive")
-                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG))
-        if self._world_flags:
-            seen = lights.SHADOW_FLAG + self._world_flags
-            for k in range(WORLD_DIRECTIONS):
-                index = frame.sample * WORLD_DIRECTIONS + k
-                direction, radiance, density = frame.environment.draw(*frame.random_at(index, "refraction/world"))
-                rows.append(lights.direction_row(direction, radiance / density, density, seen, 0, 1, WORLD_DIRECTIONS))
-        return rows
-
     def release(self) -> None:
         self._sources.release()
         self._reflectance.release()
-        self._interfaces = self._triangles = None
+        self._interfaces = None

@@ -1,5 +1,6 @@
 // Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out
-// (near.glsl). With SHARED, regions of pixels have gathered the virtual lights (region_gather.comp.glsl).
+// (near.glsl). With SHARED, regions of pixels have gathered the virtual lights (region_gather.comp.glsl). Lobes up to
+// `shaded_roughness` see what rays meet with its own materials (hits/).
 #include "indirect/near.glsl"
 #ifndef SHARED
 #include "indirect/traced_gather.glsl"
@@ -37,7 +38,7 @@ void main()
     }
   }
 #ifdef GLOSSY
-  if (s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0) {
+  if (s.kind <= FRESNEL_F82 && s.glossy_roughness > shaded_roughness && max_component(s.glossy_weight) > 0.0) {
     Lobe lobe = lobe_begin(s, to_viewer);
     // Where the lobe is most of what is seen, on metal, it has the noise that is seen.
     int count = (luminance(s.glossy_weight * s.glossy_tint) > luminance(s.diffuse)) ? lobe_rays : 1;

@@ -2,6 +2,9 @@
 // a light, the world or a surface. At each interface the lights of this sample are asked directly (one traced), and the
 // walk goes on by the interface's lobe; what both can find is weighted by the power heuristic.
 //
+// Where rays that meet surfaces are followed by themselves (hits/), `interfaces` is -1: what light of lamps and the world the
+// first interface lets arrive is all that is left to do here.
+//
 // What the first interface lets arrive is direct; all else is indirect, as in Cycles' passes.
 #include "lib/refraction.glsl"
 #define PART 256  // virtual lights that a surface behind glass looks at: no filter spreads their noise
@@ -118,7 +121,7 @@ void main()
   vec3 position = s.position;
   vec3 geometric_normal = s.geometric_normal;
   vec3 throughput = vec3(1.0);
-  for (int step = 0; step <= interfaces; step++) {
+  for (int step = 0; step <= max(interfaces, 0); step++) {
     vec3 gained = throughput * light_through(surface, position, geometric_normal, choice, roll.x);
     vec3 weight;
     vec3 direction = interface_sample(surface, u, (step == 0) ? 1.0 : choice, weight);
@@ -136,7 +139,7 @@ void main()
     if (goes_on) {
       t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, false, hit);
       gained += throughput * light_found(origin, direction, lobe_density, t);
-      goes_on = t < 1e29;
+      goes_on = t < 1e29 && interfaces >= 0;
     }
     if (goes_on) {
       vec3 emission = triangle_emission(hit, direction, normal);

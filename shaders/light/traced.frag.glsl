@@ -106,7 +106,7 @@ void main()
       out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
     }
   }
-  if (emissive_power > 0.0) {
+  if (emissive_power > 0.0 && s.glossy_roughness > shaded_roughness) {
     // Emissive triangles are only known once a ray meets them, so they cannot be weighed beforehand: a ray of their own.
     vec3 weight;
     vec3 direction = lobe_sample(lobe, u, weight);
