@@ -2,20 +2,36 @@
 
 Each sample draws one point on each lamp (where there are many, on some of them by chance), some on emissive
 triangles and some directions of the world, the same ones for all pixels; who lights surfaces by them traces what stands
-between. A ray of a lobe may find the same light: shaders weigh both by the power heuristic, with the rates that the rows
-and the constants tell.
+between. A ray of a lobe may find the same light: shaders weigh both by the power heuristic, with the rates that the
+rows and the constants tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..frame.run import Frame
+from ..frame.technique import Service
 from ..materials.compiler import may_emit
 from ..sources import lights
 from .emissive_triangles import PATHS, EmissiveTriangles
+
+
+@dataclass(frozen=True)
+class ShadedLobes(Service):
+    """Lobes up to `roughness`, and glass, show surfaces with their own materials: others leave them out."""
+
+    name = "shaded_lobes"
+    roughness: float
+
+
+def shaded_roughness(frame: Frame) -> float:
+    """Up to where lobes are shaded so; -1 where none are."""
+    lobes = frame.service(ShadedLobes)
+    return lobes.roughness if lobes else -1.0
 
 
 class PathSources:

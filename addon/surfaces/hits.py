@@ -3,12 +3,12 @@
 A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record of
 some numbers per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates,
 normals. For each material among them one pass over the screen runs *its own* program at its records (textures,
-procedurals, bumps, vertex colours, emission, alpha) into six images as those of surfaces/draw.py, masked by depth:
-the trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
+procedurals, bumps, vertex colours, emission, alpha) into six images as those of surfaces/draw.py, masked by depth: the
+trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
 reads surface images (lighting, indirect light) then reads hits.
 
-Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle of
-the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
+Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
+of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
 attributes by that number, made when it is first met. Derivatives are those of the ray's footprint, for bumps.
 
     rays (origin, direction)  --trace-->  Records  --shade-->  closures
@@ -30,19 +30,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
-from ..gfx.context import on_release
 from ..gfx.library import Program
 from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..scene.acceleration import Hierarchy
-from ..scene.geometry import SceneGeometry, corner_attribute
+from ..scene.geometry import corner_attribute
 from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, values_struct
 from ..scene.view import VIEW
 from ..snapshot.scene import Mesh
@@ -185,7 +183,7 @@ class _Kind:
 
 
 class Hits:
-    """The triangles of a scene as its rays find them. One for each renderer: `Hits.of(frame)`."""
+    """The triangles of a scene as its rays find them. One for each renderer: `frame.kept(Hits)`."""
 
     def __init__(self):
         self._owners: dict[object, images.Image] = {}  # by hierarchy and instances
@@ -194,12 +192,6 @@ class Hits:
         self._numbers_key: object = None
         self._attributes: dict[int, tuple[object, images.Image]] = {}
         self._absorption: tuple[object, images.Image] | None = None
-        self._reflectance: Reflectance | None = None
-
-    @staticmethod
-    def of(frame: Frame) -> Hits:
-        """That of the frame's renderer."""
-        return _known.setdefault(frame.geometry, Hits())
 
     def trace(
         self, frame: Frame, technique: Technique, rays: tuple[images.Image, images.Image], records: Records,
@@ -326,10 +318,14 @@ class Hits:
             self._absorption = (key, images.upload(table.reshape(-1, ROW, 4)))
         return self._absorption[1]
 
-    def _mean_reflectance(self, frame: Frame) -> images.Image:
-        self._reflectance = self._reflectance or Reflectance()
-        self._reflectance.update(frame)
-        return self._reflectance.image
+    @staticmethod
+    def _mean_reflectance(frame: Frame) -> images.Image:
+        frame.kept(Reflectance).update(frame)
+        return frame.kept(Reflectance).image
+
+    def release(self) -> None:
+        """Drop GPU resources."""
+        self.__init__()
 
     @staticmethod
     def _met(frame: Frame, records: Records) -> set[int]:
@@ -350,10 +346,3 @@ def pixel_spread(frame: Frame) -> float:
 
 
 _programs: dict[str, Program] = {}  # by topology
-_known: WeakKeyDictionary[SceneGeometry, Hits] = WeakKeyDictionary()
-
-
-@on_release
-def _release() -> None:
-    _known.clear()
-    _programs.clear()

@@ -27,7 +27,7 @@ width of a lobe, but by the samples that a picture takes of it.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from functools import cache
 
 from ..frame.run import Frame
@@ -35,8 +35,10 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.path_sources import PathSources
+from ..lighting.light_rates import EmissivePoints
+from ..lighting.path_sources import PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
+from ..lighting.visibility import TracedLobes, traced_roughness
 from ..materials.compiler import may_refract
 from ..scene import acceleration
 from ..scene.materials import may_be_glossy
@@ -54,12 +56,11 @@ from ..surfaces.draw import (
     surface_bindings,
 )
 from ..surfaces.hits import ANY_RAY, MET, Hits, Records, closure_bindings, take_closures
-from .instant_radiosity import NEAR_CONSTANTS, OFFERED
+from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
-ROUGHNESS = "shaded_roughness"  # service: of lobes up to which this technique follows rays
 STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
 REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "number"))
 ORDERS = ("direct", "indirect")
@@ -142,10 +143,17 @@ class ShadedReflections(Technique):
     )  # fmt: skip
     reads = LIT_SURFACES
     writes = (
-        Write("radiance.glossy_direct", "RGBA32F", "Light that glossy surfaces receive straight from sources", True),
-        Write("radiance.glossy_indirect", "RGBA32F", "Light that glossy surfaces receive from other surfaces", True),
+        *(
+            Write(f"radiance.glossy_{order}", "RGBA32F", f"Light that glossy surfaces receive, {order}", True)
+            for order in ORDERS
+        ),
+        *(
+            Write(f"radiance.transmission_{order}", "RGBA32F", f"Light through glass, {order}", True, by_need=True)
+            for order in ORDERS
+        ),
     )
-    uses = (OFFERED, "emissive")
+    provides = (ShadedLobes,)
+    requests = (GatherBindings, EmissivePoints, TracedLobes)
 
     def __init__(self):
         self._sources = PathSources(
@@ -165,28 +173,24 @@ class ShadedReflections(Technique):
             return "drafts show mean colours in reflections" if settings.draft else "its bounces are set to 0"
         return acceleration.too_many(snapshot)
 
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return object()  # what `prepare` leaves with the frame is needed anew in every frame
-
-    def prepare(self, frame: Frame) -> None:
+    def begin(self, frame: Frame) -> None:
         """Tell the techniques that gather indirect light and walk through glass what this one takes over."""
-        offered = any(OFFERED in technique.offered() for technique in frame.plan.techniques)
-        self._active = offered or not frame.plan.fills("indirect")
+        gathers = any(GatherBindings in technique.provides for technique in frame.plan.techniques)
+        self._active = gathers or not frame.plan.fills("indirect")
         if self._active:
-            frame.services[ROUGHNESS] = frame.settings.get(self, "roughness")
+            frame.provide(ShadedLobes(frame.settings.get(self, "roughness")))
+            self._sources.begin(frame)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def sample(self, frame: Frame) -> Iterator[None]:
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
             return
-        if frame.sample == 0:
-            self._sources.begin(frame)
-        hits, transmission = Hits.of(frame), refracts(frame)
+        hits, transmission = frame.kept(Hits), refracts(frame)
         rows = self._sources.rows(frame)
         sources = self._sources.block(rows)
         mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)
-        glass = next((t for t in frame.plan.techniques if t.slot == "transmission"), None)
+        glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
         interfaces = frame.settings.get(glass, "interfaces") if glass else 0
-        reach = {"mirrors": mirrors, "interfaces": interfaces, ROUGHNESS: frame.services[ROUGHNESS]}
+        reach = {"mirrors": mirrors, "interfaces": interfaces, "shaded_roughness": shaded_roughness(frame)}
         rounds = max(mirrors, interfaces + 1 if transmission else 0)
 
         rays, onward = self._take(frame), self._take(frame)
@@ -233,14 +237,14 @@ class ShadedReflections(Technique):
             blocks={"film_view": frame.view_block},
             constants={
                 **reach, "number": number, "offset_size": frame.offset_size,
-                "traced_roughness": frame.services.get("traced_roughness", -1.0),
+                "traced_roughness": traced_roughness(frame),
             },
         )  # fmt: skip
         frame.count(self, "passes")
 
     def _add_found(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         world = self._sources.world_flags
-        power, points = frame.services.get("emissive", (0.0, 1.0))
+        emissive = frame.service(EmissivePoints) or EmissivePoints()
         bound = closure_bindings(closures)
         passes.fullscreen(
             found_program(transmission),
@@ -257,7 +261,7 @@ class ShadedReflections(Technique):
                 "light_count": count, "world_samples": float(WORLD_DIRECTIONS),
                 "world_glossy": int(bool(world & lights.GLOSSY_FLAG)),
                 "world_transmission": int(bool(world & lights.TRANSMISSION_FLAG)),
-                "emissive": self._emissive(power, points, reach["number"]), "number": reach["number"],
+                "emissive": self._emissive(emissive.power, emissive.count, reach["number"]), "number": reach["number"],
             },
         )  # fmt: skip
         frame.count(self, "passes")
@@ -270,13 +274,13 @@ class ShadedReflections(Technique):
 
     def _add_received(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         hierarchy = frame.hierarchy("diffuse")
-        offered = frame.services.get(OFFERED)
+        provided = frame.service(GatherBindings)
         near = {name: 0 for _, name in NEAR_CONSTANTS}
         nothing = frame.materials.energy_table
         textures = {"virtual_lights": nothing, "reflectance": nothing}
-        if offered is not None:
-            near = {name: offered["constants"][name] for name in near}
-            textures = {name: offered["textures"][name] for name in textures}
+        if provided is not None:
+            near = {name: provided.bindings["constants"][name] for name in near}
+            textures = {name: provided.bindings["textures"][name] for name in textures}
         passes.fullscreen(
             received_program(transmission, frame.materials.soft),
             _target(frame, transmission, ("indirect",), records.target.depth),

@@ -44,7 +44,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
-from ..lighting.path_sources import PathSources
+from ..lighting.path_sources import PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -53,7 +53,7 @@ from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
 from ..surfaces.reflectance import Reflectance
-from .instant_radiosity import NEAR_CONSTANTS, OFFERED
+from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
@@ -87,7 +87,7 @@ ALBEDO = passes.fullscreen_program(
 class TracedRefraction(Technique):
     name = "traced_refraction"
     label = "Traced refraction"
-    slot = "transmission"
+    fills = ("transmission",)
     params = (
         Param(
             "interfaces", "Interfaces", 8,
@@ -95,7 +95,7 @@ class TracedRefraction(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
-    uses = (OFFERED,)
+    requests = (GatherBindings,)
     writes = (
         Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
         Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
@@ -104,7 +104,6 @@ class TracedRefraction(Technique):
     def __init__(self):
         # By glass, and by surfaces behind it.
         self._sources = PathSources(("transmission", "diffuse"), "refraction", WORLD_DIRECTIONS, EMISSIVE_POINTS)
-        self._reflectance = Reflectance()
         self._interfaces: images.Image | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -130,12 +129,13 @@ class TracedRefraction(Technique):
                 row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
         self._interfaces = images.upload(table)
 
-    def run(self, frame: Frame) -> None:
-        if frame.sample == 0:
-            self._reflectance.update(frame)
-            self._sources.begin(frame)
+    def begin(self, frame: Frame) -> None:
+        frame.kept(Reflectance).update(frame)
+        self._sources.begin(frame)
+
+    def sample(self, frame: Frame) -> None:
         rows = self._sources.rows(frame)
-        walks = "shaded_roughness" not in frame.services  # else what is behind the first interface is shaded there
+        walks = frame.service(ShadedLobes) is None  # else what is behind the first interface is shaded there
         behind = self._draw_behind(frame) if walks else None
         virtual_lights, near = self._indirect_light(frame)
         hierarchy = frame.hierarchy("transmission")
@@ -147,7 +147,7 @@ class TracedRefraction(Technique):
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
-                "reflectance": self._reflectance.image, "interface_table": self._interfaces,
+                "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
                 "behind_position": behind.colors[0] if walks else self._interfaces,
                 "behind_albedo": behind.colors[1] if walks else self._interfaces,
                 "virtual_lights": virtual_lights,
@@ -190,14 +190,13 @@ class TracedRefraction(Technique):
         return behind
 
     def _indirect_light(self, frame: Frame) -> tuple[images.Image, dict[str, object]]:
-        """Virtual lights and NEAR_CONSTANTS; where nothing offers them, of none and no bounces."""
-        offered = frame.services.get(OFFERED)
-        if offered is None:
+        """Virtual lights and NEAR_CONSTANTS; where nothing provides them, of none and no bounces."""
+        provided = frame.service(GatherBindings)
+        if provided is None:
             return self._interfaces, {name: 0 for _, name in NEAR_CONSTANTS}
-        constants = {name: offered["constants"][name] for _, name in NEAR_CONSTANTS}
-        return offered["textures"]["virtual_lights"], constants
+        constants = {name: provided.bindings["constants"][name] for _, name in NEAR_CONSTANTS}
+        return provided.bindings["textures"]["virtual_lights"], constants
 
     def release(self) -> None:
         self._sources.release()
-        self._reflectance.release()
         self._interfaces = None
