@@ -19,6 +19,8 @@ from ..materials.compiler import may_emit
 from ..sources import lights
 from .emissive_triangles import PATHS, EmissiveTriangles
 
+SHOWN = "reflection.shown"  # image: how much surfaces reflect that reflections show, summed up over samples
+
 
 @dataclass(frozen=True)
 class ShadedLobes(Service):

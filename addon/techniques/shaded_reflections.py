@@ -36,7 +36,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.light_rates import EmissivePoints
-from ..lighting.path_sources import PathSources, ShadedLobes, shaded_roughness
+from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
 from ..materials.compiler import may_refract
@@ -63,6 +63,8 @@ EMISSIVE_POINTS = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
 STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
 REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "number"))
+MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
+ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 ORDERS = ("direct", "indirect")
 
 
@@ -114,12 +116,19 @@ def received_program(transmission: bool, soft_lobes: bool) -> Program:
             ("RGBA32F", "hit_passed"),
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
-        constants=(("INT", "light_count"), ("FLOAT", "offset_size"), *REACH, *NEAR_CONSTANTS),
+        constants=(("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "repeats"), *REACH, *NEAR_CONSTANTS),
         defines=((("TRANSMISSION", "1"),) if transmission else ()) + SOFT_DEFINES[soft_lobes],
         outputs=_outputs(transmission, ("indirect",)),
     )  # fmt: skip
 
 
+GUIDE = passes.fullscreen_program(
+    "what reflections show",
+    "hits/guide.frag.glsl",
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "met_path")),
+    constants=(("FLOAT", "shaded_roughness"),),
+    outputs=(("VEC4", "out_shown"),),
+)
 PROGRAMS = (
     *(scatter_program(onward) for onward in (False, True)),
     *(found_program(transmission) for transmission in (False, True)),
@@ -147,6 +156,7 @@ class ShadedReflections(Technique):
             Write(f"radiance.glossy_{order}", "RGBA32F", f"Light that glossy surfaces receive, {order}", True)
             for order in ORDERS
         ),
+        Write(SHOWN, "RGBA32F", "How much surfaces reflect that reflections show; its luminance squared", True),
         *(
             Write(f"radiance.transmission_{order}", "RGBA32F", f"Light through glass, {order}", True, by_need=True)
             for order in ORDERS
@@ -191,6 +201,7 @@ class ShadedReflections(Technique):
         glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
         interfaces = frame.settings.get(glass, "interfaces") if glass else 0
         reach = {"mirrors": mirrors, "interfaces": interfaces, "shaded_roughness": shaded_roughness(frame)}
+        onward_roughness = min(reach["shaded_roughness"], ONWARD_ROUGHNESS)
         rounds = max(mirrors, interfaces + 1 if transmission else 0)
 
         rays, onward = self._take(frame), self._take(frame)
@@ -199,7 +210,7 @@ class ShadedReflections(Technique):
         self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
         yield
         for number in range(rounds):
-            round_ = {**reach, "number": number}
+            round_ = {**reach, "number": number, "shaded_roughness": onward_roughness}
             met = hits.trace(frame, self, rays.colors[:2], records, number=number)
             yield
             hits.shade(frame, self, rays.colors[1], records, met, closures, number)
@@ -207,6 +218,7 @@ class ShadedReflections(Technique):
             self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
             if not met:
                 break
+            self._add_guide(frame, rays, records, closures, round_)
             self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
             yield
             if number + 1 < rounds:
@@ -215,7 +227,7 @@ class ShadedReflections(Technique):
                     "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
                 }  # fmt: skip
                 bound = closure_bindings(closures)
-                self._scatter(frame, onward, reach, number + 1, records.target.depth, bound, before)
+                self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
                 rays, onward = onward, rays
         for image in (*rays.colors, *onward.colors, *closures.colors):
             images.pool.give(image)
@@ -272,8 +284,21 @@ class ShadedReflections(Technique):
         others = float(EMISSIVE_POINTS) if number else GLASS_POINTS
         return power, points, self._sources.emissive_power, others
 
+    def _add_guide(self, frame, rays, records, closures, reach) -> None:
+        if frame.settings.samples > 1:
+            passes.fullscreen(
+                GUIDE,
+                images.Target((frame.images[SHOWN],), records.target.depth),
+                blend="ADDITIVE_PREMULT",
+                where=MET,
+                textures={**closure_bindings(closures), "met_path": rays.colors[2]},
+                constants={"shaded_roughness": reach["shaded_roughness"]},
+            )
+            frame.count(self, "passes")
+
     def _add_received(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         hierarchy = frame.hierarchy("diffuse")
+        repeats = max(-(-MORE_RAYS // frame.settings.samples), 1) if reach["number"] < 2 else 1
         provided = frame.service(GatherBindings)
         near = {name: 0 for _, name in NEAR_CONSTANTS}
         nothing = frame.materials.energy_table
@@ -292,7 +317,7 @@ class ShadedReflections(Technique):
                 "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
             },
             blocks={"film_view": frame.view_block, "sources": sources},
-            constants={**near, **reach, "light_count": count, "offset_size": frame.offset_size},
+            constants={**near, **reach, "light_count": count, "offset_size": frame.offset_size, "repeats": repeats},
         )  # fmt: skip
         frame.count(self, "passes")
 

@@ -146,10 +146,15 @@ void main()
   r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
                             r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + number);
-  vec3 sum = direct_light(r, roll.x);
-  if (glossy_radius > 0.0 && number + 1 < bounces) {
-    sum += indirect_light(r, hash3(roll));
+  vec3 sum = vec3(0.0);
+  for (int k = 0; k < repeats; k++) {
+    sum += direct_light(r, roll.x);
+    roll = hash3(roll);
+    if (glossy_radius > 0.0 && number + 1 < bounces) {
+      sum += indirect_light(r, roll);
+    }
   }
+  sum /= float(repeats);
   vec4 light = vec4(path.rgb * hit_passed_fetch(pixel).rgb * sum, 0.0);
   light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
   if (path_is_glossy(code)) {
