@@ -17,6 +17,7 @@ from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
+from .reflection_editing import ReflectionEditing
 from .shaded_reflections import ShadedReflections
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
@@ -27,6 +28,7 @@ from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
     Surfaces,
+    ReflectionEditing,
     LightProbes,
     AccumulatedMaps,
     VarianceSoftShadows,

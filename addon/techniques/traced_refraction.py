@@ -37,6 +37,7 @@ rough glass rises by up to 11 % (a world symmetric in x shows it).
 from __future__ import annotations
 
 from collections.abc import Hashable
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,6 +45,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..lighting.path_sources import PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
@@ -57,6 +59,8 @@ from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
+BEHIND = ("reflectance", "interface_table", "behind_position", "behind_albedo", "virtual_lights")
+EMISSIVE = ("emissive_power", "emissive_points")
 REFRACTION = passes.fullscreen_program(
     "traced refraction",
     "light/refraction.frag.glsl",
@@ -75,6 +79,14 @@ REFRACTION = passes.fullscreen_program(
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
 )  # fmt: skip
+# Where shaded_reflections.py follows what the first interface lets pass, lamps and the world are left:
+FIRST_ALONE = replace(
+    REFRACTION,
+    name="light through the first interface",
+    textures=tuple(one for one in REFRACTION.textures if one[1] not in BEHIND),
+    constants=tuple(one for one in REFRACTION.constants if one not in NEAR_CONSTANTS and one[1] not in EMISSIVE),
+    defines=(("FIRST_ALONE", "1"),),
+)
 ALBEDO = passes.fullscreen_program(
     "surface albedo",
     "surface/albedo.frag.glsl",
@@ -135,40 +147,50 @@ class TracedRefraction(Technique):
 
     def sample(self, frame: Frame) -> None:
         rows = self._sources.rows(frame)
-        walks = frame.service(ShadedLobes) is None  # else what is behind the first interface is shaded there
-        behind = self._draw_behind(frame) if walks else None
-        virtual_lights, near = self._indirect_light(frame)
         hierarchy = frame.hierarchy("transmission")
-        passes.fullscreen(
-            REFRACTION,
-            frame.target("radiance.transmission_direct", "radiance.transmission_indirect"),
-            blend="ADDITIVE_PREMULT",
-            textures={
+        bindings = {
+            "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
-                "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
-                "behind_position": behind.colors[0] if walks else self._interfaces,
-                "behind_albedo": behind.colors[1] if walks else self._interfaces,
-                "virtual_lights": virtual_lights,
             },
-            blocks={
+            "blocks": {
                 "film_view": frame.view_block, "world_light": frame.environment.block,
                 "sources": self._sources.block(rows),
             },
-            constants={
-                "light_count": len(rows), "offset_size": frame.offset_size,
-                "interfaces": frame.settings.get(self, "interfaces") if walks else -1,
+            "constants": {
+                "light_count": len(rows), "offset_size": frame.offset_size, "interfaces": 0,
                 "world_transmission": int(bool(self._sources.world_flags & lights.TRANSMISSION_FLAG)),
                 "world_samples": float(WORLD_DIRECTIONS),
-                "emissive_power": self._sources.emissive_power,
-                "emissive_points": float(EMISSIVE_POINTS), **near,
             },
-        )  # fmt: skip
-        for image in behind.colors if walks else ():
-            images.pool.give(image)
+        }  # fmt: skip
+        if frame.service(ShadedLobes) is None:
+            self._walk(frame, bindings)
+        else:
+            self._draw(frame, FIRST_ALONE, bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
+
+    @staticmethod
+    def _draw(frame: Frame, program: Program, bindings: dict[str, dict]) -> None:
+        target = frame.target("radiance.transmission_direct", "radiance.transmission_indirect")
+        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", **bindings)
+
+    def _walk(self, frame: Frame, bindings: dict[str, dict]) -> None:
+        """Follow what passes the first interface by walks among means."""
+        behind = self._draw_behind(frame)
+        virtual_lights, near = self._indirect_light(frame)
+        bindings["textures"] |= {
+            "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
+            "behind_position": behind.colors[0], "behind_albedo": behind.colors[1], "virtual_lights": virtual_lights,
+        }  # fmt: skip
+        bindings["constants"] |= {
+            "interfaces": frame.settings.get(self, "interfaces"), "emissive_power": self._sources.emissive_power,
+            "emissive_points": float(EMISSIVE_POINTS), **near,
+        }  # fmt: skip
+        self._draw(frame, REFRACTION, bindings)
+        for image in behind.colors:
+            images.pool.give(image)
 
     def _draw_behind(self, frame: Frame) -> images.Target:
         """Places and reflectances of what stands behind glass in the picture. Its images go back to the pool."""

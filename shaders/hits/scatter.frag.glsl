@@ -42,16 +42,17 @@ void main()
   if (s.kind == LOBE_REFRACTION && number <= interfaces) {
     Interface surface = interface_begin(s.glossy_normal, viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
                                         s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
+    surface = interface_edited(surface, s);
     direction = interface_sample(surface, u, 1.0, weight);
     interface_value(surface, direction, density);
-    weight *= (dot(direction, s.geometric_normal) < 0.0) ? 1.0 : 0.0;
+    weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
     code += PATH_BENT;
   }
   else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && number < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);
     direction = lobe_sample(lobe, u, weight);
     lobe_reflection(lobe, direction, density);
-    weight *= (dot(direction, s.geometric_normal) > 0.0) ? 1.0 : 0.0;
+    weight *= may_mirror(s, direction) ? 1.0 : 0.0;
 #ifndef ONWARD
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
 #endif
@@ -61,7 +62,8 @@ void main()
   if (!(most > 1e-4) || !is_finite(most)) {
     return;
   }
-  vec3 side = ((code & PATH_BENT) != 0) ? -s.geometric_normal : s.geometric_normal;
+  vec3 side = ((code & PATH_BENT) != 0) ? -s.geometric_normal : side_of_ray(s, direction);
+  side = (dot(side, direction) < 0.0 && surface_is_edited(s)) ? -side : side;
   out_origin = vec4(ray_origin(s.position, side), width);
   out_direction = vec4(direction, density);
   out_path = vec4(throughput, float(code));

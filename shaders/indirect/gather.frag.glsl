@@ -49,7 +49,8 @@ void main()
       vec3 weight;
       roll = hash3(roll);
       vec3 direction = lobe_sample(lobe, vec2(u.x / float(count) + part, fract(u.y + 2.5 * part)), weight);
-      if (max_component(weight) > 0.0 && dot(direction, s.geometric_normal) > 0.0) {
+      if (max_component(weight) > 0.0 && may_mirror(s, direction)) {
+        origin = ray_origin(s.position, side_of_ray(s, direction));
         out_glossy.rgb += weight * near_radiance(origin, direction, true, roll) / float(count);
       }
     }
