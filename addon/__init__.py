@@ -26,11 +26,12 @@ def _parts() -> tuple:
         pass_tree,
         properties,
         quality,
+        reflection_operators,
         scoped_panels,
         tuning,
     )
 
     return (
-        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, tuning,
-        pass_operators, compare_editor, cli,
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels,
+        reflection_operators, tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip

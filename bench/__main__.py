@@ -6,7 +6,20 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    costs,
+    direct,
+    everything,
+    growth,
+    hashes,
+    indirect,
+    page,
+    profile,
+    random_scenes,
+    reflections,
+    run,
+)
 
 VERBS = {
     "run": run,
@@ -17,6 +30,7 @@ VERBS = {
     "profile": profile,
     "costs": costs,
     "random": random_scenes,
+    "reflections": reflections,
     "page": page,
     "hashes": hashes,
     "all": everything,
