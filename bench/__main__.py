@@ -8,17 +8,22 @@ import sys
 
 from bench import (
     again,
+    ages,
     costs,
     direct,
+    edges,
     everything,
+    glare,
     growth,
     hashes,
     indirect,
+    mutations,
     page,
     profile,
     random_scenes,
     reflections,
     run,
+    subsurface,
 )
 
 VERBS = {
@@ -29,10 +34,15 @@ VERBS = {
     "indirect": indirect,
     "profile": profile,
     "costs": costs,
+    "glare": glare,
+    "edges": edges,
     "random": random_scenes,
     "reflections": reflections,
+    "subsurface": subsurface,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 
