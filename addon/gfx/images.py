@@ -40,7 +40,7 @@ _CHANNELS = {
 class Image:
     """A two-dimensional GPU image. Row 0 is the bottom row. Passes that read it are compiled with its `defines`, so
     that what only some content needs costs others nothing; so they are with the images `beside` it, by the names under
-    which they are bound, too, and with HAS_NAME for each."""
+    which they are bound, too, and with HAS_NAME for each, unless the program has 16 textures already."""
 
     width: int
     height: int

@@ -12,7 +12,7 @@ import numpy as np
 from .context import on_release, overtakes_draws
 from .geometry import Batch
 from .images import Image, Target, finish
-from .library import FULLSCREEN_VERTEX, Program, Shader, get
+from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
 FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
@@ -93,9 +93,11 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 
 
 def _for_images(program: Program, bindings: dict) -> Shader:
-    """The shader of a program, with what the images that it reads define and bring along."""
+    """The shader of a program, with what the images that it reads define and bring along, if it has room for that."""
     read = bindings.get("textures") or {}
     beside = {name: image for one in read.values() for name, image in one.beside.items() if name not in read}
+    if len(program.textures) + len(beside) > MOST_TEXTURES:
+        beside = {}
     if beside:
         bindings["textures"] = {**read, **beside}
     defines = tuple(one for image in read.values() for one in image.defines)

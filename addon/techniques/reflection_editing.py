@@ -16,7 +16,7 @@ never change, and pixels outside of all regions are what they are without this t
 Bias: directions are exact for the view in which a constraint was made; in other views they turn along with what the
 surface mirrors there. Surfaces that are seen in a mirror or through glass are shown without their edits. An edited
 direction that points into a solid shows its inside. Edits of more than 120 degrees fold over: the ledger tells the
-largest one.
+largest one. Drafts show glass without its edits.
 """
 
 from __future__ import annotations

@@ -207,31 +207,33 @@ class ShadedReflections(Technique):
         rays, onward = self._take(frame), self._take(frame)
         records = Records.take(frame.size)
         closures = take_closures(frame.size, records.target.depth)
-        self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
-        yield
-        for number in range(rounds):
-            round_ = {**reach, "number": number, "shaded_roughness": onward_roughness}
-            met = hits.trace(frame, self, rays.colors[:2], records, number=number)
+        try:
+            self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
             yield
-            hits.shade(frame, self, rays.colors[1], records, met, closures, number)
-            yield
-            self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
-            if not met:
-                break
-            self._add_guide(frame, rays, records, closures, round_)
-            self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
-            yield
-            if number + 1 < rounds:
-                before = {
-                    "met_direction": rays.colors[1], "met_path": rays.colors[2],
-                    "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
-                }  # fmt: skip
-                bound = closure_bindings(closures)
-                self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
-                rays, onward = onward, rays
-        for image in (*rays.colors, *onward.colors, *closures.colors):
-            images.pool.give(image)
-        records.give()
+            for number in range(rounds):
+                round_ = {**reach, "number": number, "shaded_roughness": onward_roughness}
+                met = hits.trace(frame, self, rays.colors[:2], records, number=number)
+                yield
+                hits.shade(frame, self, rays.colors[1], records, met, closures, number)
+                yield
+                self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                if not met:
+                    break
+                self._add_guide(frame, rays, records, closures, round_)
+                self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                yield
+                if number + 1 < rounds:
+                    before = {
+                        "met_direction": rays.colors[1], "met_path": rays.colors[2],
+                        "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
+                    }  # fmt: skip
+                    bound = closure_bindings(closures)
+                    self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
+                    rays, onward = onward, rays
+        finally:  # also where a viewport drops the sample
+            for image in (*rays.colors, *onward.colors, *closures.colors):
+                images.pool.give(image)
+            records.give()
         frame.count(self, "light samples", len(rows))
 
     @staticmethod
