@@ -1,7 +1,7 @@
 """Distances along a mesh from a point on it: shortest paths over edges, and across pairs of triangles.
 
 Paths over edges alone are up to 41 % too long on a grid; with the segment between the far corners of each two
-neighbouring triangles, unfolded into a plane, at most 2.7 %. Vertices are settled in steps of a mean edge's length (U.
+neighbouring triangles, unfolded into a plane, at most 8.2 %. Vertices are settled in steps of a mean edge's length (U.
 Meyer & P. Sanders, "Delta-stepping", 1998), all of a step at once: a few numpy calls for each of some hundred steps.
 """
 

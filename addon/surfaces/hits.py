@@ -60,7 +60,7 @@ TRACE = passes.fullscreen_program(
     "hits/trace.frag.glsl",
     textures=(*acceleration.HIERARCHY_TEXTURES, *RAYS, ("RG32F", "trace_owners"), ("RGBA32F", "absorption")),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "number"), ("INT", "glass_bends"), ("INT", "first_leaf"), ("FLOAT", "spread")),
+    constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("INT", "first_leaf"), ("FLOAT", "spread")),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
     writes_depth=True,
 )
@@ -109,7 +109,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
         ),
         blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(("INT", "number"), ("INT", "glass_bends"), ("FLOAT", "material_depth")),
+        constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth")),
         snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
         **MASKED,
     )  # fmt: skip
@@ -210,7 +210,7 @@ class Hits:
             },
             blocks={"film_view": frame.view_block},
             constants={
-                "number": number, "glass_bends": int(refracts(frame)), "first_leaf": hierarchy.first_leaf,
+                "ray_number": number, "glass_bends": int(refracts(frame)), "first_leaf": hierarchy.first_leaf,
                 "spread": pixel_spread(frame),
             },
         )  # fmt: skip
@@ -238,7 +238,7 @@ class Hits:
                 textures, blocks = shared | bound["textures"], bound["blocks"]
                 if compiled.attributes:
                     textures["hit_attributes"] = self._attributes_of(material, compiled)
-                constants |= {"number": number, "glass_bends": int(refracts(frame))}
+                constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}
             passes.fullscreen(
                 program, closures, where="EQUAL", textures=textures,
                 blocks={**blocks, "film_view": frame.view_block}, constants=constants,

@@ -62,7 +62,7 @@ WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
 STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
-REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "number"))
+REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "ray_number"))
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 ORDERS = ("direct", "indirect")
@@ -99,7 +99,7 @@ def found_program(transmission: bool) -> Program:
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
         constants=(
             ("INT", "light_count"), ("INT", "world_glossy"), ("INT", "world_transmission"), ("FLOAT", "world_samples"),
-            ("VEC4", "emissive"), ("INT", "number"),
+            ("VEC4", "emissive"), ("INT", "ray_number"),
         ),
         defines=(("TRANSMISSION", "1"),) if transmission else (),
         outputs=_outputs(transmission, ORDERS),
@@ -211,7 +211,7 @@ class ShadedReflections(Technique):
             self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
             yield
             for number in range(rounds):
-                round_ = {**reach, "number": number, "shaded_roughness": onward_roughness}
+                round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
                 met = hits.trace(frame, self, rays.colors[:2], records, number=number)
                 yield
                 hits.shade(frame, self, rays.colors[1], records, met, closures, number)
@@ -250,7 +250,7 @@ class ShadedReflections(Technique):
             textures={**surfaces, "energy_table": frame.materials.energy_table, **before},
             blocks={"film_view": frame.view_block},
             constants={
-                **reach, "number": number, "offset_size": frame.offset_size,
+                **reach, "ray_number": number, "offset_size": frame.offset_size,
                 "traced_roughness": traced_roughness(frame),
             },
         )  # fmt: skip
@@ -275,7 +275,7 @@ class ShadedReflections(Technique):
                 "light_count": count, "world_samples": float(WORLD_DIRECTIONS),
                 "world_glossy": int(bool(world & lights.GLOSSY_FLAG)),
                 "world_transmission": int(bool(world & lights.TRANSMISSION_FLAG)),
-                "emissive": self._emissive(emissive.power, emissive.count, reach["number"]), "number": reach["number"],
+                "emissive": self._emissive(emissive.power, emissive.count, reach["ray_number"]), "ray_number": reach["ray_number"],
             },
         )  # fmt: skip
         frame.count(self, "passes")
@@ -300,7 +300,7 @@ class ShadedReflections(Technique):
 
     def _add_received(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         hierarchy = frame.hierarchy("diffuse")
-        repeats = max(-(-MORE_RAYS // frame.settings.samples), 1) if reach["number"] < 2 else 1
+        repeats = max(-(-MORE_RAYS // frame.settings.samples), 1) if reach["ray_number"] < 2 else 1
         provided = frame.service(GatherBindings)
         near = {name: 0 for _, name in NEAR_CONSTANTS}
         nothing = frame.materials.energy_table

@@ -49,11 +49,11 @@ void main()
   float limit = (met.w != 0.0) ? dot(met.xyz - start, along.xyz) : 1e29;
   bool glossy = path_is_glossy(code);
   vec3 sum = vec3(0.0);
-  if (number > 0) {
+  if (ray_number > 0) {
     sum += light_found(start, along.xyz, path_is_bent(code), along.w, limit);
   }
   if (met.w != 0.0 && along.w >= 0.0) {
-    vec2 others = (number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample
+    vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample
     vec3 emission = surface_emission_fetch(pixel).rgb;
     float share = (along.w > 0.0 && others.x > 0.0) ? power_share(along.w, others.y * passed.w / others.x) : 1.0;
     sum += emission * share;
@@ -61,13 +61,13 @@ void main()
   vec4 light = vec4(path.rgb * passed.rgb * sum, 0.0);
   light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
   if (glossy) {
-    out_glossy_direct = (number > 0) ? vec4(0.0) : light;
-    out_glossy_indirect = (number > 0) ? light : vec4(0.0);
+    out_glossy_direct = (ray_number > 0) ? vec4(0.0) : light;
+    out_glossy_indirect = (ray_number > 0) ? light : vec4(0.0);
   }
 #ifdef TRANSMISSION
   else {
-    out_transmission_direct = (number > 0) ? vec4(0.0) : light;
-    out_transmission_indirect = (number > 0) ? light : vec4(0.0);
+    out_transmission_direct = (ray_number > 0) ? vec4(0.0) : light;
+    out_transmission_indirect = (ray_number > 0) ? light : vec4(0.0);
   }
 #endif
 }

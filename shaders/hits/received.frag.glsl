@@ -12,7 +12,7 @@
 struct Receiver {
   Surface surface;
   vec3 viewer;
-  bool mirrors;    // has a lobe of microfacets that light samples can find
+  bool shines;     // has a lobe of microfacets that light samples can find
   bool bends;
   bool followed;   // by a ray
   Lobe lobe;
@@ -28,7 +28,7 @@ vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, flo
   }
   float lobe_density = 0.0;
   vec3 of_lobe = vec3(0.0);
-  if (r.mirrors && (light.flags & LIGHT_GLOSSY) != 0 && dot(direction, r.surface.geometric_normal) > 0.0) {
+  if (r.shines && (light.flags & LIGHT_GLOSSY) != 0 && dot(direction, r.surface.geometric_normal) > 0.0) {
     of_lobe = lobe_reflection(r.lobe, direction, lobe_density);
   }
   if (r.bends && (light.flags & LIGHT_TRANSMISSION) != 0) {
@@ -138,19 +138,19 @@ void main()
   r.viewer = -ray_direction_fetch(pixel).xyz;
   bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
   r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
-  r.mirrors = has_lobe && r.surface.kind <= FRESNEL_F82;
-  r.followed = has_lobe && (r.bends ? number < interfaces :
-                                      r.surface.glossy_roughness <= shaded_roughness && number + 1 < mirrors);
+  r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
+  r.followed = has_lobe && (r.bends ? ray_number < interfaces :
+                                      r.surface.glossy_roughness <= shaded_roughness && ray_number + 1 < mirrors);
   r.lobe = lobe_begin(r.surface, r.viewer);
-  r.mirrors = r.mirrors && !lobe_is_mirror(r.lobe);
+  r.shines = r.shines && !lobe_is_mirror(r.lobe);
   r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
                             r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
-  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + number);
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
   vec3 sum = vec3(0.0);
   for (int k = 0; k < repeats; k++) {
     sum += direct_light(r, roll.x);
     roll = hash3(roll);
-    if (glossy_radius > 0.0 && number + 1 < bounces) {
+    if (glossy_radius > 0.0 && ray_number + 1 < bounces) {
       sum += indirect_light(r, roll);
     }
   }

@@ -34,12 +34,12 @@ void main()
   vec3 throughput = vec3(1.0);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
 #endif
-  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(number)));
+  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
   vec3 weight = vec3(0.0);
   vec3 direction = vec3(0.0);
   float density = 0.0;
-  if (s.kind == LOBE_REFRACTION && number <= interfaces) {
+  if (s.kind == LOBE_REFRACTION && ray_number <= interfaces) {
     Interface surface = interface_begin(s.glossy_normal, viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
                                         s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
     surface = interface_edited(surface, s);
@@ -48,7 +48,7 @@ void main()
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
     code += PATH_BENT;
   }
-  else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && number < mirrors) {
+  else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && ray_number < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);
     direction = lobe_sample(lobe, u, weight);
     lobe_reflection(lobe, direction, density);

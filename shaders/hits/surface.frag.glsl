@@ -19,7 +19,7 @@ void main()
   int id = int(hit_triangle_fetch(pixel).x);
   SurfacePoint point = hit_point(pixel, instance_read(id), id);
   point.refracts = glass_bends != 0;
-  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 81 + number);
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 81 + ray_number);
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
   Closures c = closures_begin(point.normal, to_unit(roll.x), even_share);
   evaluate_material(point, c);

@@ -31,7 +31,7 @@ void main()
     return;
   }
   gl_FragDepth = 0.5;
-  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 61 + number);
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 61 + ray_number);
   ivec2 hit;
   float t = trace_layers(start.xyz, direction, 1e29, 0.0, roll.x, glass_bends != 0, false, hit);
   if (t >= 1e29) {
