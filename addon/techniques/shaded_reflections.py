@@ -275,7 +275,8 @@ class ShadedReflections(Technique):
                 "light_count": count, "world_samples": float(WORLD_DIRECTIONS),
                 "world_glossy": int(bool(world & lights.GLOSSY_FLAG)),
                 "world_transmission": int(bool(world & lights.TRANSMISSION_FLAG)),
-                "emissive": self._emissive(emissive.power, emissive.count, reach["ray_number"]), "ray_number": reach["ray_number"],
+                "emissive": self._emissive(emissive.power, emissive.count, reach["ray_number"]),
+                "ray_number": reach["ray_number"],
             },
         )  # fmt: skip
         frame.count(self, "passes")
