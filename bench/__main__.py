@@ -23,6 +23,7 @@ from bench import (
     page,
     profile,
     random_scenes,
+    reflections,
     run,
     subsurface,
 )
@@ -40,6 +41,7 @@ VERBS = {
     "glare": glare,
     "edges": edges,
     "random": random_scenes,
+    "reflections": reflections,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -64,8 +64,23 @@ def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> N
         _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
 
 
+class SurfaceStages:
+    """What techniques do to surfaces once they are drawn (frame.shared): called with six surface images at each point
+    of the film. The sample's own point, at which techniques run in order, is theirs."""
+
+    def __init__(self):
+        self.apply: list[Callable[[Frame, images.Target], None]] = []
+
+
 def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     """Draw what the camera sees in one sample into six surface images with a depth buffer."""
+    _draw_sample(frame, technique, target)
+    if target.colors[0] is not frame.images.get(SURFACES[0]):
+        for apply in frame.shared(SurfaceStages).apply:
+            apply(frame, target)
+
+
+def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     glass = refracts(frame)
     draw_surfaces(frame, technique, target, STOCHASTIC, glass)
     tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}

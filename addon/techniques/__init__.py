@@ -24,7 +24,9 @@ from .light_probes import LightProbes
 from .media import MediaAttenuation
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
+from .reflection_editing import ReflectionEditing
 from .screen_space_photons import ScreenSpacePhotons
+from .shaded_reflections import ShadedReflections
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
@@ -37,6 +39,7 @@ from .vssm import VarianceSoftShadows
 REGISTRY: tuple[type[Technique], ...] = (
     MediaAttenuation,
     Surfaces,
+    ReflectionEditing,
     LightProbes,
     AccumulatedMaps,
     VarianceSoftShadows,
@@ -58,6 +61,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ShadedReflections,
     ImageSpaceSubsurface,
     CausticsMapping,
     ScreenSpacePhotons,

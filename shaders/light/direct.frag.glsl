@@ -123,8 +123,8 @@ void main()
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       towards = whole ? towards : direction;
       // None between a surface and the mirror's normal that was bent up from it (reflecting_normal).
-      bool in_front = s.bump > 0.0 || dot(direction, s.normal) > 0.0;
-      if (on_glossy && in_front && (s.lift > 0.0 || dot(direction, s.geometric_normal) > 0.0)) {
+      bool in_front = s.bump > 0.0 || dot(direction, s.normal) > 0.0 || surface_is_edited(s);
+      if (on_glossy && in_front && (s.lift > 0.0 || may_mirror(s, direction))) {
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
         if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {

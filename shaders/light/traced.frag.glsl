@@ -79,7 +79,7 @@ void main()
   for (int k = 0; k < count; k++) {
     vec3 weight;
     vec3 direction = lobe_sample(lobe, vec2((u.x + float(k)) / float(count), u.y), weight);
-    if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
+    if (max_component(weight) <= 0.0 || !may_mirror(s, direction)) {
       continue;
     }
     float density = 0.0;
@@ -101,6 +101,7 @@ void main()
   uint layers = salt.z + uint(film_view.sample_index);
   ivec2 hit;
   if (kept_importance > 0.0) {
+    origin = ray_origin(s.position, side_of_ray(s, kept_direction));
     // Whatever stands before the nearest source blocks all of them.
     float blocked = trace_until(origin, kept_direction, kept_span.y, kept_span.x, layers, hit);
     if (blocked >= kept_span.x) {
@@ -114,11 +115,11 @@ void main()
 #endif
     }
   }
-  if (emissive_power > 0.0) {
+  if (emissive_power > 0.0 && s.glossy_roughness > shaded_roughness) {
     // Emissive triangles are only known once a ray meets them, so they cannot be weighed beforehand: a ray of their own.
     vec3 weight;
     vec3 direction = lobe_sample(lobe, u, weight);
-    if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
+    if (max_component(weight) <= 0.0 || !may_mirror(s, direction)) {
       return;
     }
     float t = trace_nearest(origin, direction, 1e29, layers, hit);
