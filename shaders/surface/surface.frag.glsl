@@ -38,7 +38,8 @@ void main()
   }
   float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
   float holdout = clamp(c.holdout * covered, 0.0, 1.0);
-  if ((instance.flags & FLAG_HOLDOUT) != 0) {
+  // It cuts its hole in what the camera sees; other views ask for what the object reflects, which lights others.
+  if ((instance.flags & FLAG_HOLDOUT) != 0 && film_view.visibility == FLAG_CAMERA) {
     holdout = 1.0;
     covered = 0.0;
   }
