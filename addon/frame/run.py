@@ -363,7 +363,12 @@ class Renderer:
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
-        wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
+        wanted += [
+            self.materials.tint_program(k)
+            for k in shown
+            if self.materials.compiled[k].tinted or self.materials.compiled[k].added
+        ]
+        wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:

@@ -47,6 +47,8 @@ class CompiledMaterial:
     glossy: bool  # has a glossy closure
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon
     tinted: bool  # what passes straight through may be coloured
+    glows: bool  # emits where rays may pass: layers add what they emit to what lies behind them
+    added: bool  # a lobe is added to what lets light pass, so that both together may be more than 1
     glass: Interface | None  # how it bends light, on average
     medium: Medium | None  # what its inside does with light
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated

@@ -125,6 +125,10 @@ class MaterialSet:
         """Multiplies what lies behind material `index`, which has coloured transparency, by its colour."""
         return _tint_program(self.compiled[index])
 
+    def glow_program(self, index: int) -> Program:
+        """Adds what layers of material `index` emit that this sample passes."""
+        return _glow_program(self.compiled[index])
+
     def caster_program(self, index: int) -> Program:
         """Draws material `index`, which has alpha, into a depth map."""
         return _caster_program(self.compiled[index])
@@ -232,9 +236,14 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             ("INT", "glass_bends"),
             ("INT", "index_shown"),
         ),
-        defines=CAMERA_DEFINES,
+        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
         **_shared(compiled),
     )
+
+
+def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
+    """How layers of a material are drawn, see surface.frag.glsl."""
+    return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added
 
 
 def _tint_program(compiled: CompiledMaterial) -> Program:
@@ -250,8 +259,18 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
             (MATERIAL_SCENE, "material_scene"),
         ),
         constants=(("INT", "first_instance"), ("INT", "glass_bends")),
-        defines=CAMERA_DEFINES,
+        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
         **{**shared, "textures": (*shared["textures"], ("RGBA32F", "surface_position"))},
+    )
+
+
+def _glow_program(compiled: CompiledMaterial) -> Program:
+    return replace(
+        _tint_program(compiled),
+        name=f"glow {compiled.program_key[:8]}",
+        fragment="surface/glow.frag.glsl",
+        outputs=(("VEC4", "out_emission"),),
+        defines=CAMERA_DEFINES,
     )
 
 

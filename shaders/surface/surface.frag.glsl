@@ -30,7 +30,7 @@ void main()
   evaluate_material(point, c);
   closures_end(c);
 
-  float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+  float through = layer_chance(c);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
   bool passes = (transparent_mode == 0) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
   if (transparent_mode != 1 && passes) {
@@ -62,6 +62,10 @@ void main()
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
   out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
                   ior_encode(c.glossy_ior, c.distribution));
+#ifdef GLOWS
+  // What a layer emits is there whether this sample passes it (surface/glow.frag.glsl) or not.
+  covered = min(covered, 1.0);
+#endif
   out_emission = vec4(c.emission * covered, (c.kind == LOBE_TRANSLUCENT) ? lift.y : c.glossy_roughness);
   if (index_shown >= 0) {
     out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);

@@ -1,7 +1,7 @@
 """Holdouts cut a hole in what the camera sees, and light others as they would without it, in each layer and frame."""
 
-import os
 import tempfile
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -84,7 +84,7 @@ def test_a_holdout_of_one_layer_lights_that_layer_and_the_next(stage, corner):
         for engine in ("CANDELA", "CYCLES"):
             scene.render.engine = engine
             scene.candela.samples, scene.cycles.samples = 16, 64
-            scene.render.filepath = os.path.join(tempfile.mkdtemp(), "layers.exr")
+            scene.render.filepath = str(Path(tempfile.mkdtemp()) / "layers.exr")
             bpy.ops.render.render(write_still=True, scene=scene.name)
             found = read_exr(scene.render.filepath)
             cells[engine] = [found[f"{one.name}.Combined"][26:38, 24:30, :3].mean((0, 1)) for one in (first, second)]

@@ -18,7 +18,7 @@ def sided(stage):
     colors[0].default_value, colors[1].default_value = (1, 0.1, 0, 1), (0, 0.1, 1, 1)
     facing = tree.nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"]
     tree.links.new(facing, mix.inputs[0])
-    tree.links.new([socket for socket in mix.outputs if socket.type == "RGBA"][0], tree.nodes["Emission"].inputs[0])
+    tree.links.new(next(socket for socket in mix.outputs if socket.type == "RGBA"), tree.nodes["Emission"].inputs[0])
     return made
 
 
