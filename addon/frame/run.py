@@ -16,6 +16,7 @@ from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
+from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
 from ..scene.opacity_maps import OpacityMaps
@@ -56,6 +57,7 @@ class Frame:
     hierarchies: HierarchyCache
     surface_means: SurfaceMeans
     measured_opacity: OpacityMaps
+    measured_emission: EmissionMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -144,6 +146,12 @@ class Frame:
         self.measured_opacity.update(self.materials, self.geometry)
         return self.measured_opacity
 
+    @cached_property
+    def emission_maps(self) -> EmissionMaps:
+        """What triangles emit, place by place, where that varies."""
+        self.measured_emission.update(self.materials, self.geometry)
+        return self.measured_emission
+
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
@@ -188,6 +196,7 @@ class Renderer:
         self.materials = MaterialSet()
         self.frame: Frame | None = None
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
+        self._glow = EmissionMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._frame_key: object = None
@@ -241,7 +250,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means, self._opacity,
+            self._surface_means, self._opacity, self._glow,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -363,6 +372,7 @@ class Renderer:
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
+        wanted += [self.materials.emission_map_program(k) for k in varied]
         wanted += [
             self.materials.tint_program(k)
             for k in shown

@@ -43,6 +43,7 @@ class CompiledMaterial:
     # Opacity, emission vary: what they are depends on the surfaces (scene/opacity_maps.py, scene/surface_means.py).
     uneven: bool
     uneven_emission: bool
+    reads: frozenset[str]  # of what is around it: INSTANCE, CAMERA of attributes.py
     diffuse: bool  # has a diffuse closure
     glossy: bool  # has a glossy closure
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon

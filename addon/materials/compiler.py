@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import nodes
+from .attributes import surroundings_of
 from .bounds import Bounds
 from .compiled import CompiledMaterial
 from .estimate import Estimate, Summary, constant
@@ -87,6 +88,7 @@ class _Compilation:
             opacity=opacity,
             uneven=transparent and not passes.constant,
             uneven_emission=not emission.constant,
+            reads=surroundings_of(self.graph),
             diffuse=summary.diffuse,
             glossy=summary.glossy,
             soft=summary.soft,

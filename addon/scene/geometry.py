@@ -125,6 +125,11 @@ class SceneGeometry:
         self._draw_key = key
         return True
 
+    def rows_showing(self, material: int) -> bytes:
+        """What the instance image holds of the instances that show a material."""
+        shown = [k for k, instance in enumerate(self.placed[0]) if material in instance.materials]
+        return self.instance_rows[shown].tobytes()
+
     def resting_casters(self, make: bool = True) -> list[casters.Clusters] | None:
         """Opaque casters in world space; None where there are too many. They are made when first asked for; without
         `make` None where they have not been."""

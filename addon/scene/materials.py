@@ -10,10 +10,12 @@ from ..gfx import images, library
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
+from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..snapshot.scene import Image, Note, Snapshot
+from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
 from .view import VIEW, View
 
@@ -43,6 +45,7 @@ class MaterialSet:
         self.notes: tuple[Note, ...] = ()
         self.energy_table: images.Image | None = None
         self._scene: Block | None = None
+        self._view: tuple = ()
         self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int], images.Image] = {}
@@ -96,6 +99,7 @@ class MaterialSet:
             "camera_backward": (*camera.matrix[:3, 2], 0.0),
             "window": (left, bottom, right - left, top - bottom),
         }
+        self._view = tuple(np.asarray(value, float).tobytes() for value in values.values())
         if self._scene is None:
             self._scene = Block(MATERIAL_SCENE, **values)
         else:
@@ -117,6 +121,13 @@ class MaterialSet:
             (c.program_key, c.values.tobytes(), c.images, c.medium and c.medium.key) for c in self.compiled
         ) + tuple(self._images)
 
+    def around(self, index: int, geometry: SceneGeometry) -> tuple:
+        """Equal in two frames if what material `index` reads of the instances that show it, and of the camera, is."""
+        reads = self.compiled[index].reads
+        rows = geometry.rows_showing(index) if INSTANCE in reads else b""
+        origin = tuple(geometry.origin) if reads else ()
+        return rows, origin, self._view if CAMERA in reads else ()
+
     def surface_program(self, index: int) -> Program:
         """Draws material `index` into the surface images."""
         return _surface_program(self.compiled[index])
@@ -136,6 +147,10 @@ class MaterialSet:
     def opacity_program(self, index: int) -> Program:
         """Adds up how much of their tiles triangles of material `index` cover, for both sides."""
         return _opacity_program(self.compiled[index])
+
+    def emission_map_program(self, index: int) -> Program:
+        """Adds up what places of triangles of material `index` emit, for both sides."""
+        return _emission_map_program(self.compiled[index])
 
     def emission_program(self, index: int) -> Program:
         """Adds up what material `index` emits."""
@@ -314,6 +329,18 @@ def _opacity_program(compiled: CompiledMaterial) -> Program:
         outputs=(("VEC4", "out_opacity"),),
         constants=(("INT", "first_instance"), ("VEC2", "tile_scale")),
         defines=EVERY_DEFINES,
+    )
+
+
+def _emission_map_program(compiled: CompiledMaterial) -> Program:
+    """See emission_maps.py."""
+    return replace(
+        _opacity_program(compiled),
+        name=f"emission map {compiled.program_key[:8]}",
+        vertex="surface/emission_map.vert.glsl",
+        fragment="surface/emission_map.frag.glsl",
+        outputs=(("VEC4", "out_emission"),),
+        constants=(("INT", "first_instance"), ("VEC2", "tile_scale"), ("VEC2", "shift"), ("FLOAT", "other_side")),
     )
 
 
