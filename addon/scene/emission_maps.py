@@ -164,10 +164,8 @@ def _pieces(sums: np.ndarray, sides: np.ndarray, corners: np.ndarray) -> tuple[n
         if cut.any():
             # Each cell within the triangle is one triangle, and the other half of it where it does not cross the edge.
             u, v = grid[..., 0].reshape(-1), grid[..., 1].reshape(-1)
-            for half, corner in (
-                (u + v < side, ((0, 0), (1, 0), (0, 1))),
-                (u + v < side - 1, ((1, 0), (1, 1), (0, 1))),
-            ):
+            halves = (u + v < side, ((0, 0), (1, 0), (0, 1))), (u + v < side - 1, ((1, 0), (1, 1), (0, 1)))
+            for half, corner in halves:
                 place = (np.stack([u, v], -1)[half][:, None] + np.array(corner)) / side
                 found = cells[cut].reshape(cut.sum(), side * side, 2, 3)[:, half]
                 pieces.append(np.repeat(own[cut], half.sum()))
