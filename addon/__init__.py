@@ -26,10 +26,11 @@ def _parts() -> tuple:
         pass_tree,
         properties,
         quality,
+        scoped_panels,
         tuning,
     )
 
     return (
-        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, tuning, pass_operators,
-        compare_editor, cli,
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, tuning,
+        pass_operators, compare_editor, cli,
     )  # fmt: skip

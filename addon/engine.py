@@ -24,7 +24,7 @@ from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
 from .snapshot.errors import unforeseen
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
-from .techniques.film import check_tree, resolve
+from .techniques.film import check_tree
 from .ui import ENGINE
 from .ui.passes import RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
@@ -140,7 +140,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
         shared = session(scene, "preview" if self.is_preview else "final")
-        settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer)
+        settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer, depsgraph=depsgraph)
         try:
             check_tree(settings.passes)
             snapshot = self._seen(depsgraph, snapshot, eye)
@@ -243,7 +243,7 @@ def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
 
 def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
-    resolve(frame)
+    renderer.show(frame)
     arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays["film.combined"], **pixels}

@@ -30,12 +30,12 @@ from .frame.bands import Bands
 from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import context as gpu_context
-from .gfx import images, library
+from .gfx import images, library, passes
 from .gfx.context import turn
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, camera_of_view, take
 from .snapshot.errors import unforeseen
 from .snapshot.scene import Camera, Snapshot
-from .techniques.film import check_tree, resolve
+from .techniques.film import check_tree
 from .ui.properties import settings_of
 
 STEP_S = 0.08  # what a step may take while the picture changes, to stay below 0.1 s: coarser pixels are drawn for it
@@ -200,7 +200,7 @@ class Viewport:
         if self._target is None or self._target.size != frame.size:
             self._drop_picture()
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
-        resolve(frame, self._target)
+        passes.copy(self.renderer.show(frame), self._target)
         film = frame.snapshot.film
         x, y = self._size[0] / film.width, self._size[1] / film.height
         x0, y0, x1, y1 = film.border
@@ -353,7 +353,9 @@ def _refine(viewport: Viewport, engine, context, depsgraph, size: tuple[int, int
     try:
         camera = camera_of_view(region_data, space, looks_through)
         border = render_border(depsgraph, space, camera, looks_through, size)
-        viewport.draw_frame(source, camera, size, settings_of(depsgraph.scene, viewport=True), border=border)
+        viewport.draw_frame(
+            source, camera, size, settings_of(depsgraph.scene, viewport=True, depsgraph=depsgraph), border=border
+        )
     except (UnsupportedScene, ValueError, RuntimeError) as error:
         _fail(viewport, engine, str(error))
     except Exception as error:

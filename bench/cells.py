@@ -81,8 +81,8 @@ def choices(registry: Iterable) -> dict[str, list]:
     """Techniques by slot, in the registry's order, of slots that have several."""
     found: dict[str, list] = {}
     for technique in registry:
-        if technique.slot:
-            found.setdefault(technique.slot, []).append(technique)
+        for slot in technique.fills:
+            found.setdefault(slot, []).append(technique)
     return {slot: techniques for slot, techniques in found.items() if len(techniques) > 1}
 
 

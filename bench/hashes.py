@@ -79,7 +79,7 @@ def pictures(only: str = "") -> Iterator[tuple[str, np.ndarray]]:
                 (f"{slot} by {technique.name}", 1, {slot: technique.name}, False)
                 for slot in slots()
                 for technique in REGISTRY
-                if technique.slot == slot
+                if slot in technique.fills
             ]
         kinds = [kind for kind in kinds if only in f"{file.stem}, {kind[0]}"]
         if not kinds:
@@ -110,12 +110,7 @@ def picture(scene, samples: int, chosen: dict[str, str], draft: bool) -> np.ndar
     frame = renderer.begin(snapshot, settings.as_draft() if draft else settings)
     for _ in range(samples):
         renderer.advance(frame)
-    try:
-        from addon.techniques.film import resolve
-
-        resolve(frame)
-    except ImportError:  # the picture is resolved inside the plan
-        pass
-    arrays = renderer.finish(frame, [name for name in IMAGES if name in frame.images])
+    renderer.show(frame)
+    arrays = renderer.finish(frame, IMAGES)
     renderer.release()
-    return np.concatenate([arrays[name] for name in IMAGES if name in arrays], axis=-1)
+    return np.concatenate([arrays[name] for name in IMAGES], axis=-1)

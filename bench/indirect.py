@@ -28,7 +28,7 @@ TURN, SHIFT = (
 def techniques() -> list[str]:
     from addon.techniques import REGISTRY
 
-    return [technique.name for technique in REGISTRY if technique.slot == "indirect"]
+    return [technique.name for technique in REGISTRY if "indirect" in technique.fills]
 
 
 def render(scene, engine: str, samples: int, seed: int, size: tuple[int, int]) -> np.ndarray:

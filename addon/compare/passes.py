@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS, SEEN
+
 
 @dataclass(frozen=True)
 class PassName:
@@ -25,19 +27,10 @@ PASS_NAMES = (
     PassName("combined", "Combined", "Combined", "use_pass_combined"),
     PassName("depth", "Depth", "Depth", "use_pass_z"),
     PassName("normal", "Normal", "Normal", "use_pass_normal"),
-    PassName("diffuse_direct", "Diffuse Direct", "DiffDir", "use_pass_diffuse_direct"),
-    PassName("diffuse_indirect", "Diffuse Indirect", "DiffInd", "use_pass_diffuse_indirect"),
     PassName("diffuse_color", "Diffuse Color", "DiffCol", "use_pass_diffuse_color"),
-    PassName("glossy_direct", "Glossy Direct", "GlossDir", "use_pass_glossy_direct"),
-    PassName("glossy_indirect", "Glossy Indirect", "GlossInd", "use_pass_glossy_indirect"),
     PassName("glossy_color", "Glossy Color", "GlossCol", "use_pass_glossy_color"),
-    PassName("transmission_direct", "Transmission Direct", "TransDir", "use_pass_transmission_direct"),
-    PassName("transmission_indirect", "Transmission Indirect", "TransInd", "use_pass_transmission_indirect"),
     PassName("transmission_color", "Transmission Color", "TransCol", "use_pass_transmission_color"),
-    PassName("volume_direct", "Volume Direct", "VolumeDir", "cycles.use_pass_volume_direct"),
-    PassName("volume_indirect", "Volume Indirect", "VolumeInd", "cycles.use_pass_volume_indirect"),
-    PassName("emission", "Emission", "Emit", "use_pass_emit"),
-    PassName("environment", "Environment", "Env", "use_pass_environment"),
+    *(PassName(path.name, path.label, path.before_5, path.switch) for path in LIGHT_PATHS),
 )
 # Named where a view layer asks for them; no comparison switches them on.
 OTHER_NAMES = (
@@ -47,8 +40,6 @@ OTHER_NAMES = (
     PassName("material_index", "Material Index", "IndexMA", "use_pass_material_index"),
 )
 IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES + OTHER_NAMES for name in (row.blender, row.before_5)}
-
-DIVIDED_BY_COLOR = ("diffuse", "glossy", "transmission")  # these light passes are stored divided by their colour
 
 
 @dataclass(frozen=True)
@@ -65,19 +56,18 @@ class Row:
     what: str = ""
 
 
+ALWAYS_SHOWN = ("diffuse_direct", "glossy_direct", "emission", "environment")
 ROWS = (
     Row("Combined", "image", "combined", True, "the picture as it is rendered"),
     Row("Direct light", "path", "direct_light", True, "all direct paths, emission and world: a render without bounces"),
-    Row("Diffuse direct", "path", "diffuse_direct", True, "light × colour"),
-    Row("Glossy direct", "path", "glossy_direct", True, "light × colour"),
-    Row("Transmission direct", "path", "transmission_direct", False, "light × colour"),
-    Row("Volume direct", "path", "volume_direct"),
-    Row("Diffuse indirect", "path", "diffuse_indirect", False, "light × colour"),
-    Row("Glossy indirect", "path", "glossy_indirect", False, "light × colour"),
-    Row("Transmission indirect", "path", "transmission_indirect", False, "light × colour"),
-    Row("Volume indirect", "path", "volume_indirect"),
-    Row("Emission", "path", "emission", True),
-    Row("Environment", "path", "environment", True),
+    *(
+        Row(
+            path.label.capitalize(), "path", path.name, path.name in ALWAYS_SHOWN, "light × colour" if path.lobe else ""
+        )
+        for order in (DIRECT, INDIRECT, "")
+        for path in LIGHT_PATHS
+        if (path.order if path.origin != SEEN else "") == order
+    ),
     Row("Diffuse direct pass", "image", "diffuse_direct", True, "as in the file, divided by the colour"),
     Row("Glossy direct pass", "image", "glossy_direct", True, "as in the file, divided by the colour"),
     Row("Diffuse color", "image", "diffuse_color", True),
@@ -120,19 +110,17 @@ def light_paths(images: dict[str, np.ndarray], film_transparent: bool = False) -
     of the sum.
     """
     paths: dict[str, np.ndarray] = {}
-    for lobe in DIVIDED_BY_COLOR:
-        color = images.get(f"{lobe}_color")
-        for order in ("direct", "indirect"):
-            light = images.get(f"{lobe}_{order}")
-            if light is not None and color is not None:
-                paths[f"{lobe}_{order}"] = light[..., :3] * color[..., :3]
-    for name in ("volume_direct", "volume_indirect", "emission", "environment"):
-        if name in images:
-            paths[name] = images[name][..., :3]
+    for path in LIGHT_PATHS:
+        if path.name not in images:
+            continue
+        if not path.lobe:
+            paths[path.name] = images[path.name][..., :3]
+        elif f"{path.lobe}_color" in images:
+            paths[path.name] = images[path.name][..., :3] * images[f"{path.lobe}_color"][..., :3]
     direct = [
-        paths[name]
-        for name in ("diffuse_direct", "glossy_direct", "transmission_direct", "volume_direct", "emission")
-        if name in paths
+        paths[path.name]
+        for path in LIGHT_PATHS
+        if path.name in paths and path.order == DIRECT and path.name != "environment"
     ]
     if "environment" in paths and not film_transparent:
         direct.append(paths["environment"])

@@ -69,7 +69,7 @@ REFLECT = passes.fullscreen_program(
 
 def shown_alone(frame: Frame) -> bool:
     """Whether this sample is a picture by itself, so that neighbours have to make up for missing samples."""
-    return frame.sample == 0 and (frame.settings.samples == 1 or frame.settings.draft)
+    return frame.is_first and (frame.settings.samples == 1 or frame.settings.draft)
 
 
 def reflect(frame: Frame, technique: Technique, arriving: images.Image, path: str, noisy: bool = False) -> None:

@@ -30,6 +30,7 @@ the next pixel on the surface; light's own edges are half a pixel wider. It ends
 
 from __future__ import annotations
 
+from ..frame.light_paths import MEDIUM, SURFACE, named
 from ..frame.run import Frame
 from ..frame.technique import Param
 from ..gfx import images, passes
@@ -45,7 +46,7 @@ POINTS = Param(
 )  # fmt: skip
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
 MOST = 8  # points of the film that share a sample's light
-PATHS = tuple(f"{lobe}_{order}" for order in ("direct", "indirect") for lobe in ("diffuse", "glossy", "transmission"))
+PATHS = named(SURFACE)
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 
@@ -70,12 +71,18 @@ def lit_paths(frame: Frame) -> tuple[str, ...]:
     return PATHS if refracts(frame) else REFLECTED
 
 
+def pixel_paths(frame: Frame) -> tuple[str, ...]:
+    """Light paths of the picture that are a pixel's own, whatever surface a point of the film shows."""
+    return tuple(name for name in named(MEDIUM) if f"radiance.{name}" in frame.images)
+
+
 def shown_paths(frame: Frame) -> set[str]:
     """Light paths that techniques of the plan add to and some material may show; Film only clears them."""
     writers = [technique for technique in frame.plan.techniques if technique.name != "film"]
     written = {write.name for technique in writers for write in technique.writes}
     glossy = may_be_glossy(frame.snapshot)
-    return {path for path in PATHS if f"radiance.{path}" in written and (glossy or not path.startswith("glossy"))}
+    paths = (*PATHS, *pixel_paths(frame))
+    return {path for path in paths if f"radiance.{path}" in written and (glossy or not path.startswith("glossy"))}
 
 
 def _programs(repeated: bool) -> tuple[Program, Program]:

@@ -6,7 +6,7 @@ The sockets of a pass are not written down anywhere: they follow from what the t
   images of a family, since passes hand them on together.
 - A sum that several techniques add to (Write.accumulates) runs through all of them: each has it coming in, optional,
   and going out. The last one in the row holds the whole sum.
-- What one technique offers to others while it runs (Technique.offers and uses) goes by a link of its own.
+- What one technique offers to others while it runs (Technique.provides and requests) goes by a link of its own.
 - What nobody reads is a result, with one socket for each image.
 
 A tree may be wrong in any way: circles, missing links, links between things that do not fit. Nothing here raises;
@@ -100,13 +100,13 @@ def sockets(technique: type[Technique], registry: tuple[type[Technique], ...]):
     added = {write.name for other in others for write in other.writes if write.accumulates}
     inputs: dict[str, Socket] = {}
     outputs: dict[str, Socket] = {}
-    for name in technique.uses:
-        inputs[name] = Socket(name, SERVICE, description=f"What a technique that offers '{name}' brings; optional")
+    for name in (service.name for service in technique.requests):
+        inputs[name] = Socket(name, SERVICE, description=f"What a technique that provides '{name}' brings; optional")
     for name in technique.reads:
         family = name.partition(".")[0]
         known = inputs[family].images if family in inputs else ()
         inputs[family] = Socket(family, FAMILY, (*known, name), True, f"Images that the pass reads: {family}.…")
-    for name in technique.offered():
+    for name in (service.name for service in technique.provides):
         outputs[name] = Socket(name, SERVICE, description="What other techniques may ask for while they run")
     for write in technique.writes:
         family = write.name.partition(".")[0]
@@ -159,11 +159,10 @@ def check(graph: PassGraph, registry: Sequence[type[Technique]], root: str = "")
         if technique.name in seen:
             say(node.name, f"{technique.label} stands in the tree already as '{seen[technique.name]}'; it runs once.")
         seen.setdefault(technique.name, node.name)
-        if technique.slot:
-            rival = next((other for other in seen if other != technique.name and by_name[other].slot == technique.slot),
-                         None)  # fmt: skip
+        for slot in technique.fills:
+            rival = next((other for other in seen if other != technique.name and slot in by_name[other].fills), None)
             if rival:
-                say(node.name, f"The {technique.slot} slot is filled by {by_name[rival].label}; mute one of the two.")
+                say(node.name, f"The {slot} slot is filled by {by_name[rival].label}; mute one of the two.")
         for socket in sockets(technique, registry)[0]:
             if socket.required and not any(link.target == node.name and link.input == socket.name for link in good):
                 say(node.name, f"'{socket.label}' has no link: it comes from {_writers(socket, registry)}.")
@@ -177,7 +176,7 @@ def check(graph: PassGraph, registry: Sequence[type[Technique]], root: str = "")
     read = {image for node in graph.nodes if node.name in names and node.technique in by_name
             for image in by_name[node.technique].reads}  # fmt: skip
     names |= {
-        node.name for node in graph.nodes if node.technique in by_name and read & {*by_name[node.technique].closes}
+        node.name for node in graph.nodes if node.technique in by_name and read & {*by_name[node.technique].finishes}
     }
     ordered = [graph.node(name) for name in _sorted(graph, good) if name in names]
     running = [node.technique for node in ordered if node.technique in by_name and not node.muted]

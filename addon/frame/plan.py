@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..snapshot.scene import Snapshot
 from . import costs
 from .ledger import SKIPPED, Row
-from .settings import AUTO, Settings
+from .light_paths import TRANSPORTS
+from .settings import AUTO, OFF, Settings
 from .technique import Technique
 
 
@@ -22,14 +23,33 @@ class Plan:
 
     techniques: tuple[Technique, ...]
     skipped: tuple[Row, ...]
+    filled: dict[str, str] = field(default_factory=dict)  # name of the technique that fills a slot
 
     def fills(self, slot: str) -> bool:
         """Whether a technique that runs stands in the slot."""
-        return any(technique.slot == slot for technique in self.techniques)
+        return slot in self.filled
+
+    def runs(self, name: str) -> bool:
+        """Whether the technique of this name is part of the plan."""
+        return any(technique.name == name for technique in self.techniques)
+
+    def owner(self, transport: str) -> Technique | None:
+        """The technique that owns a kind of transport (light_paths.TRANSPORTS), if one does."""
+        return next((technique for technique in self.techniques if transport in technique.owns), None)
+
+    def last_writer(self, image: str) -> Technique | None:
+        """The technique that writes an image after all others."""
+        writers = [t for t in self.techniques if any(write.name == image for write in t.writes)]
+        return writers[-1] if writers else None
+
+    def slots_of(self, technique: Technique) -> list[str]:
+        """The slots that a technique of the plan fills."""
+        return [slot for slot, name in self.filled.items() if name == technique.name]
 
     def text(self) -> str:
         """As a list for the terminal."""
-        lines = [f"  {t.label:<28} runs" + (f" (slot {t.slot})" if t.slot else "") for t in self.techniques]
+        slots = {t: f" (slot {', '.join(self.slots_of(t))})" if t.fills else "" for t in self.techniques}
+        lines = [f"  {t.label:<28} runs{slots[t]}" for t in self.techniques]
         lines += [f"  {row.label:<28} skipped: {row.reason}" for row in self.skipped]
         return "\n".join(lines)
 
@@ -39,7 +59,7 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
     chosen, skipped = [], []
     filled: dict[str, str] = {}
     tree = settings.passes
-    if tree is not None:  # its techniques first, in its order; of those that fill a slot the first one does
+    if tree is not None:  # its techniques come first, in its order; the first one listed wins its slot
         place = {name: number for number, name in enumerate(tree)}
         registry = sorted(registry, key=lambda technique: place.get(technique.name, len(place)))
     reasons = {technique: technique.skip(snapshot, settings) for technique in registry}
@@ -48,19 +68,45 @@ def make_plan(registry: Sequence[Technique], snapshot: Snapshot, settings: Setti
     for technique, reason in reasons.items():
         if tree is not None and technique.name not in tree:
             reason = "it is not in the pass tree"
-        wish = wishes.get(technique.slot, AUTO)
-        if not reason and wish not in (AUTO, technique.name):
-            asked = settings.slots.get(technique.slot, AUTO) != AUTO
-            reason = f"the {technique.slot} slot is {'set to' if asked else 'filled by'} {labels.get(wish, wish)}"
-        if not reason and technique.slot in filled:
-            reason = f"the {technique.slot} slot is filled by {labels[filled[technique.slot]]}"
+        taken = [] if reason else [slot for slot in technique.fills if _is_free(slot, technique, wishes, filled)]
+        if not reason and technique.fills and not taken:
+            reason = _taken_by(technique.fills[0], wishes, filled, settings, labels)
         if reason:
-            skipped.append(Row(technique.name, technique.label, SKIPPED, reason, slot=technique.slot))
+            skipped.append(Row(technique.name, technique.label, SKIPPED, reason, slot=", ".join(technique.fills)))
             continue
-        if technique.slot:
-            filled[technique.slot] = technique.name
+        filled |= dict.fromkeys(taken, technique.name)
         chosen.append(technique)
-    return Plan(_ordered(chosen, skipped), tuple(skipped))
+    _check_owners(chosen)
+    return Plan(_ordered(chosen, skipped), tuple(skipped), filled)
+
+
+def _is_free(slot: str, technique: Technique, wishes: dict[str, str], filled: dict[str, str]) -> bool:
+    """Whether a technique may take a slot: nobody has it yet, and nobody else is wished for."""
+    return slot not in filled and wishes.get(slot, AUTO) in (AUTO, technique.name)
+
+
+def _taken_by(slot: str, wishes: dict[str, str], filled: dict[str, str], settings: Settings, labels) -> str:
+    """Why a slot is not to be had, as a sentence."""
+    wish = wishes.get(slot, AUTO)
+    if wish == OFF:
+        return f"the {slot} slot is off"
+    if wish != AUTO:
+        asked = settings.slots.get(slot, AUTO) != AUTO
+        return f"the {slot} slot is {'set to' if asked else 'filled by'} {labels.get(wish, wish)}"
+    return f"the {slot} slot is filled by {labels[filled[slot]]}"
+
+
+def _check_owners(techniques: list[Technique]) -> None:
+    """PlanError where two techniques own the same light, or one owns what is no kind of transport."""
+    owners: dict[str, Technique] = {}
+    for technique in techniques:
+        for transport in technique.owns:
+            if transport not in TRANSPORTS:
+                raise PlanError(f"{technique.label} owns '{transport}', which is not in light_paths.TRANSPORTS.")
+            if transport in owners:
+                both = f"{owners[transport].label} and {technique.label}"
+                raise PlanError(f"{both} both bring {TRANSPORTS[transport]}: turn one of them off.")
+            owners[transport] = technique
 
 
 def _wishes(reasons: dict[Technique, str | None], snapshot: Snapshot, settings: Settings) -> dict[str, str]:
@@ -69,8 +115,8 @@ def _wishes(reasons: dict[Technique, str | None], snapshot: Snapshot, settings: 
     """
     able: dict[str, list[Technique]] = {}
     for technique, reason in reasons.items():
-        if technique.slot and not reason:
-            able.setdefault(technique.slot, []).append(technique)
+        if technique.fills and not reason:  # Auto takes it for its first slot; for others it is chosen by hand
+            able.setdefault(technique.fills[0], []).append(technique)
     found = {}
     for slot, techniques in able.items():
         names = [technique.name for technique in techniques]
@@ -93,9 +139,9 @@ def _ordered(techniques: list[Technique], skipped: list[Row]) -> tuple[Technique
                 raise PlanError(f"{technique.label} reads {name}, which nothing writes (skipped: {without}).")
     while left:
         for technique in left:
-            asked = (*technique.reads, *technique.closes)
-            needed = {w for name in asked for w in writers[name] if w is not technique and name not in w.closes}
-            needed |= {other for other in techniques if set(other.offered()) & set(technique.uses)}
+            asked = (*technique.reads, *technique.finishes)
+            needed = {w for name in asked for w in writers[name] if w is not technique and name not in w.finishes}
+            needed |= {other for other in techniques if set(other.provides) & set(technique.requests)} - {technique}
             if needed.issubset(done):
                 done.append(technique)
                 left.remove(technique)

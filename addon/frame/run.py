@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,13 +28,15 @@ from ..scene.world_tree import WorldTree
 from ..snapshot.scene import Snapshot
 from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
-from ..sources.rates import Rate
 from . import ledger as ledger_module
 from .bands import Bands
 from .ledger import RAN, REUSED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
-from .technique import Technique
+from .technique import Service, Technique
+
+ServiceT = TypeVar("ServiceT", bound=Service)
+SharedT = TypeVar("SharedT")
 
 FAR_BEYOND = 300.0  # by the typical distance of what is seen
 ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
@@ -62,16 +65,24 @@ class Frame:
     sample: int = 0  # the sample that is running
     samples_done: int = 0
     receivers: Receivers | None = None
-    services: dict[str, object] = field(default_factory=dict)  # what one technique offers to others, by slot
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
-    rates: dict[str, Rate] = field(default_factory=dict)  # of lights by key, where not one point per sample
+    picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
+    lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
+    _services: dict[type[Service], Service] = field(default_factory=dict)
+    _shared: dict[type, object] = field(default_factory=dict)
+    _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
     _hierarchies: dict[str, Hierarchy | None] = field(default_factory=dict)  # by path, of this frame
 
     @property
     def size(self) -> tuple[int, int]:
         return self.view.size
+
+    @property
+    def is_first(self) -> bool:
+        """Whether the first sample is running: for counters that are the same in each sample, read once."""
+        return self.sample == 0
 
     @cached_property
     def emitters(self) -> list[Emitter]:
@@ -159,6 +170,30 @@ class Frame:
             self._hierarchies[path] = self.hierarchies.get(self, path)
         return self._hierarchies[path]
 
+    def provide(self, service: Service, kind: type[Service] | None = None) -> None:
+        """Hand a service to the other techniques of this picture, as one of its class, or of the base `kind`."""
+        self._services[kind or type(service)] = service
+
+    def service(self, kind: type[ServiceT]) -> ServiceT | None:
+        """The service of this class; None where no technique has provided one."""
+        return self._services.get(kind)
+
+    def shared(self, kind: type[SharedT]) -> SharedT:
+        """The one object of a class that all techniques share in this picture, made by `kind()` when first asked."""
+        if kind not in self._shared:
+            self._shared[kind] = kind()
+        return self._shared[kind]
+
+    def kept(self, kind: type[SharedT]) -> SharedT:
+        """The same, kept from picture to picture. Where it has `release`, that is called with the renderer's."""
+        if kind not in self.lasting:
+            self.lasting[kind] = kind()
+        return self.lasting[kind]
+
+    def owned(self, transport: str) -> bool:
+        """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
+        return self.plan.owner(transport) is not None
+
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
@@ -179,12 +214,11 @@ class Frame:
     def target(self, *names: str, depth: str = "") -> images.Target:
         """A render target over named images; kept with the frame."""
         key = (*names, "depth:" + depth)
-        targets = self.services.setdefault("targets", {})
-        if key not in targets:
-            targets[key] = images.Target(
+        if key not in self._targets:
+            self._targets[key] = images.Target(
                 tuple(self.images[name] for name in names), self.images[depth] if depth else None
             )
-        return targets[key]
+        return self._targets[key]
 
 
 class Renderer:
@@ -199,6 +233,7 @@ class Renderer:
         self._glow = EmissionMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
+        self._lasting: dict[type, object] = {}  # what frames share, by class
         self._frame_key: object = None
         self._view_block: Block | None = None
         context.on_release(self.release)
@@ -229,13 +264,16 @@ class Renderer:
         plan = make_plan(self.techniques, snapshot, settings)
         compile_started = time.perf_counter()
         ledger.times["upload"] = compile_started - started
-        compile_programs(self._programs(plan), progress)
+        compile_programs(self._programs(plan, snapshot, settings), progress)
         ledger.times["compile"] = time.perf_counter() - compile_started
         ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes)))
 
         key = self._content_key(snapshot, settings, plan)
         if self.frame is not None and not geometry_changed and key == self._frame_key:
-            ledger.rows = [Row(t.name, t.label, REUSED, "nothing changed", slot=t.slot) for t in plan.techniques]
+            ledger.rows = [
+                Row(t.name, t.label, REUSED, "nothing changed", slot=", ".join(plan.slots_of(t)))
+                for t in plan.techniques
+            ]
             ledger.rows += plan.skipped
             self.frame.ledger = ledger
             self.frame.profiler = Profiler(settings.profile)
@@ -250,13 +288,13 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means, self._opacity, self._glow,
+            self._surface_means, self._opacity, self._glow, lasting=self._lasting,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
         for technique in plan.techniques:
             for write in technique.writes:
-                if write.name not in frame.images:
+                if write.name not in frame.images and not write.by_need:
                     frame.images[write.name] = images.pool.take(*frame.size, write.format)
         for technique in plan.techniques:
             wanted = technique.key(snapshot, settings)
@@ -288,13 +326,19 @@ class Renderer:
         frame.shown.clear()
         if frame.sample == 0:
             self._clear_sums(frame)
-        for technique in frame.plan.techniques:
-            with frame.profiler.step(technique.name):
-                parts = iter(technique.run(frame) or ())
-            for _ in frame.profiler.steps(technique.name, parts):
-                yield
+            yield from _stage(frame, "begin")
+        yield from _stage(frame, "sample")
+        if frame.sample + 1 == frame.settings.samples:
+            yield from _stage(frame, "end")
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
+
+    def show(self, frame: Frame) -> images.Image | None:
+        """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
+        where no technique of the plan makes it. It changes with the next call. No sample may be half drawn."""
+        for _ in _stage(frame, "show"):
+            pass
+        return frame.images.get(frame.picture)
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -307,6 +351,9 @@ class Renderer:
         sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
         out, bad = {}, 0
         for name in names:
+            if name not in frame.images:  # no technique of the plan brings such light
+                out[name] = np.zeros((*frame.size[::-1], 4), np.float32)
+                continue
             pixels = images.read(frame.to_show(name))
             finite = np.isfinite(pixels)
             if not finite.all():
@@ -319,7 +366,15 @@ class Renderer:
         if not ledger.rows:
             seconds = frame.profiler.seconds
             ledger.rows = [
-                Row(t.name, t.label, RAN, "", 1000 * seconds.get(t.name, 0.0), t.slot, frame.counters.get(t.name, {}))
+                Row(
+                    t.name,
+                    t.label,
+                    RAN,
+                    "",
+                    1000 * seconds.get(t.name, 0.0),
+                    ", ".join(frame.plan.slots_of(t)),
+                    frame.counters.get(t.name, {}),
+                )
                 for t in frame.plan.techniques
             ] + list(frame.plan.skipped)
             drawn = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques)
@@ -340,6 +395,10 @@ class Renderer:
         self._hierarchies.release()
         self._environment = self._view_block = self._frame_key = None
         self._keys.clear()
+        for kept in self._lasting.values():
+            if hasattr(kept, "release"):
+                kept.release()
+        self._lasting.clear()
 
     def _drop_frame(self) -> None:
         if self.frame is not None:
@@ -361,9 +420,10 @@ class Renderer:
             self._environment = (key, Environment(world, snapshot.film.transparent, compiled))
         return self._environment[1]
 
-    def _programs(self, plan: Plan) -> list:
+    def _programs(self, plan: Plan, snapshot: Snapshot, settings: Settings) -> list:
         shown = sorted({draw.material for draw in self.geometry.draws})
         wanted = [self.materials.surface_program(material) for material in shown]
+        wanted += [program for t in plan.techniques for program in t.programs(snapshot, settings)]
         wanted += [
             self.materials.caster_program(material)
             for material in shown
@@ -385,7 +445,7 @@ class Renderer:
         lights = tuple(
             (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
              light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.bounces, light.visibility)
+             light.spot_blend, light.cast_shadow, light.bounces, light.visibility, light.own)
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera
@@ -395,10 +455,23 @@ class Renderer:
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
             tuple(t.name for t in plan.techniques),
+            tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
 
     def _clear_sums(self, frame: Frame) -> None:
         for technique in frame.plan.techniques:
             for write in technique.writes:
-                if write.accumulates:
+                if write.accumulates and write.name in frame.images:
                     frame.target(write.name).clear()
+
+
+def _stage(frame: Frame, stage: str) -> Iterator[None]:
+    """Run a stage of all techniques in the plan's order, in parts, and take the time of each."""
+    for technique in frame.plan.techniques:
+        run = getattr(technique, stage)
+        if getattr(run, "__func__", run) is getattr(Technique, stage):
+            continue
+        with frame.profiler.step(technique.name):
+            parts = iter(run(frame) or ())
+        for _ in frame.profiler.steps(technique.name, parts):
+            yield

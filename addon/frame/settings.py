@@ -16,6 +16,7 @@ BOUNCES = Param(
 DRAFT_BOUNCES = 4
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES)
 AUTO = "AUTO"
+OFF = "OFF"  # a slot that nothing fills
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,8 @@ class Settings:
         table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
         slots: dict[str, list[str]] = {}
         for technique in techniques:
-            if technique.slot:
-                slots.setdefault(f"slot.{technique.slot}", [AUTO]).append(technique.name)
+            for slot in technique.fills:
+                slots.setdefault(f"slot.{slot}", [AUTO, OFF]).append(technique.name)
         for text in assignments:
             name, equals, value = text.partition("=")
             if not equals:

@@ -1,12 +1,13 @@
-"""What a technique is: data about itself, and the passes it runs for one sample."""
+"""The contract of a technique: data about itself, and the stages in which it works on a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ..gfx.library import Program
     from ..snapshot.scene import Snapshot
     from .run import Frame
     from .settings import Settings
@@ -15,27 +16,42 @@ if TYPE_CHECKING:
 NEEDED = {bool: "on or off", int: "a whole number", float: "a number", str: "a word"}  # for messages, by type
 
 
+SCENE, CAMERA, WORLD, LIGHT, MATERIAL, OBJECT = "SCENE", "CAMERA", "WORLD", "LIGHT", "MATERIAL", "OBJECT"
+OF_A_PICTURE = (SCENE, CAMERA, WORLD)  # scopes of which a picture has one data-block: their values are its settings
+POINT, DIRECTION = "POINT", "DIRECTION"
+
+
 @dataclass(frozen=True)
 class Param:
     """One parameter, declared once. Blender property, command-line override, benchmark axis and manual derive from it.
 
-    `default` fixes the type: bool, int, float, or str for a choice among `items` (identifier, label, number).
+    `default` fixes the type: bool, int, float, str for a choice among `items` (identifier, label, number), or a tuple
+    of three floats. `scope` is the kind of data-block that has it: the scene, the picture's camera or world, or each
+    lamp, material or object (whose values come with the snapshot; see `own_value`).
+
+    With `many` it is a list of groups of those parameters, a tuple of {name: value}. A vector with a `handle` (POINT or
+    DIRECTION, in the object's space) can be dragged in the 3D viewport. `image`: a name of an image data-block.
     """
 
     name: str
     label: str
-    default: bool | int | float | str
+    default: bool | int | float | str | tuple
     description: str
     minimum: float | None = None
     maximum: float | None = None
     unit: str = ""  # Blender property unit: PIXEL, FACTOR, …
     items: tuple[tuple[str, str, int], ...] = ()
-    subtype: str = field(default="NONE")
+    scope: str = SCENE
+    many: tuple[Param, ...] = ()
+    handle: str = ""
+    image: bool = False
     draft: bool | int | float | None = None  # its most in a draft: a picture of a moment, as of a view that moves
 
     def check(self, value):
         """`value` in this parameter's type and range, or ValueError with a sentence."""
         kind = type(self.default)
+        if kind is tuple:
+            raise ValueError(f"'{self.name}' is set on data-blocks in Blender, not by a text.")
         try:
             value = _as_bool(value) if kind is bool else kind(value)
         except (TypeError, ValueError):
@@ -48,6 +64,21 @@ class Param:
             if self.maximum is not None and value > self.maximum:
                 raise ValueError(f"'{self.name}' must be at most {self.maximum}, not {value}.")
         return value
+
+
+def own_value(own: tuple[tuple[str, object], ...], technique: Technique | type[Technique], name: str):
+    """Value of a technique's parameter of a lamp, material or object, from what its data-block has set (`own` of the
+    snapshot's Light, Material or Instance). KeyError if no such parameter is declared."""
+    param = next((param for param in technique.params if param.name == name), None)
+    if param is None:
+        raise KeyError(f"Technique {technique.name} declares no parameter '{name}'.")
+    value = dict(own).get(identifier(technique.name, name), param.default)
+    return tuple(dict(entry) for entry in value) if param.many else value
+
+
+def identifier(technique: str, param: str) -> str:
+    """Name of the Blender property that holds a technique's parameter."""
+    return f"{technique}_{param}"
 
 
 def _as_bool(value) -> bool:
@@ -72,35 +103,45 @@ def _refuse(value):
 
 @dataclass(frozen=True)
 class Write:
-    """An image that a technique writes: its format, what it holds, and whether what is drawn there adds up: of all
-    samples, or of all techniques in one sample where a technique closes it."""
+    """An image that a technique writes. `accumulates`: what techniques draw there adds up, over all samples, or over
+    one where a technique finishes it. `by_need`: it is made only where another technique of the plan writes it, too."""
 
     name: str
     format: str
     description: str
     accumulates: bool = False
+    by_need: bool = False
+
+
+class Service:
+    """What one technique provides to others while a picture is made. Asked for by its class (Frame.service)."""
+
+    name = ""  # of its socket in a pass tree
 
 
 class Technique:
     """Base of all techniques. Instances live as long as a Renderer and may keep GPU resources of their own.
 
-    `reads` and `writes` are checked by the plan; `slot` names the exclusive place a technique fills, if any.
+    A picture is made in stages: `begin` of all techniques in the plan's order, `sample` of all for each sample, `end`
+    of all after the last sample, and `show` of all whenever the mean of the samples so far is shown. A stage that takes
+    long is a generator: at each `yield` a viewport may pause to answer its user.
     """
 
     name = ""
     label = ""
-    slot = ""
+    fills: tuple[str, ...] = ()  # slots: of the techniques that fill one, one runs
     params: tuple[Param, ...] = ()
     reads: tuple[str, ...] = ()
     writes: tuple[Write, ...] = ()
-    closes: tuple[str, ...] = ()  # of what it writes, sums that are taken up by it after all others have added to them
-    offers: tuple[str, ...] = ()  # what others may ask for in frame.services or frame.rates, apart from its slot
-    uses: tuple[str, ...] = ()  # what it asks for there, if a technique of the plan offers it
+    finishes: tuple[str, ...] = ()  # images that it takes up after all other techniques that write them
+    provides: tuple[type[Service], ...] = ()
+    requests: tuple[type[Service], ...] = ()  # services whose providers run before it in each stage
+    owns: tuple[str, ...] = ()  # kinds of transport that it takes over (light_paths.TRANSPORTS)
 
     @classmethod
-    def offered(cls) -> tuple[str, ...]:
-        """All that it offers to others: a technique without images that fills a slot offers that."""
-        return (cls.slot, *cls.offers) if cls.slot and not cls.writes else cls.offers
+    def params_of(cls, *scopes: str) -> tuple[Param, ...]:
+        """The parameters of these scopes, in order."""
+        return tuple(param for param in cls.params if param.scope in scopes)
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         """Why this scene does not need the technique, as a sentence; None if it does. Cheap, no GPU."""
@@ -115,14 +156,23 @@ class Technique:
         return None
 
     def prepare(self, frame: Frame) -> None:
-        """Work that does not depend on the sample. Runs when the key has changed."""
+        """Work that outlives the picture. Runs when the key has changed."""
 
-    def run(self, frame: Frame) -> Iterator[None] | None:
-        """The passes of sample `frame.sample`.
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        """Programs that the picture will need, to be compiled ahead; any that are missing compile when first used."""
+        return ()
 
-        Where that takes long, as a generator: at each `yield` a viewport may pause to answer its user.
-        """
-        raise NotImplementedError
+    def begin(self, frame: Frame) -> Iterator[None] | None:
+        """Once for each picture, before its first sample."""
+
+    def sample(self, frame: Frame) -> Iterator[None] | None:
+        """The passes of sample number `frame.sample`."""
+
+    def end(self, frame: Frame) -> Iterator[None] | None:
+        """Once for each picture, after its last sample."""
+
+    def show(self, frame: Frame) -> Iterator[None] | None:
+        """Work on the mean of the samples so far, each time when it is shown."""
 
     def release(self) -> None:
         """Drop GPU resources."""

@@ -16,7 +16,7 @@ from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import repeated_light, shared_visibility
 from .repeated_light import Lit
-from .visibility import Lookup, Maps
+from .visibility import Lookup, Maps, traced_roughness
 
 CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
@@ -64,7 +64,7 @@ def shade(
         "textures": {**drawn, "energy_table": frame.materials.energy_table, **maps.textures},
         "blocks": maps.blocks,
         "constants": {
-            "light_count": len(rows), "traced_roughness": frame.services.get("traced_roughness", -1.0),
+            "light_count": len(rows), "traced_roughness": traced_roughness(frame),
             **maps.constants,
         },
     }  # fmt: skip

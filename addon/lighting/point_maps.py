@@ -20,6 +20,7 @@ from .visibility import (
     FINER_FROM,
     DepthMapService,
     Maps,
+    VisibilityProvider,
     by_rays,
     drawn_by_lot,
     map_resolution,
@@ -38,8 +39,9 @@ EDGE_RAYS = Param(
 )  # fmt: skip
 
 
-class PointMaps(Technique):
-    slot = "shadow"
+class PointMaps(Technique, VisibilityProvider):
+    fills = ("shadow",)
+    provides = (VisibilityProvider,)
     atlas_texels = ATLAS_TEXELS
 
     def __init__(self):
@@ -53,10 +55,9 @@ class PointMaps(Technique):
             return "no object casts a shadow"
         return None
 
-    def run(self, frame: Frame) -> None:
-        frame.services["shadow"] = self
-        if frame.sample == 0:
-            self._find_reached(frame)
+    def begin(self, frame: Frame) -> None:
+        frame.provide(self, VisibilityProvider)
+        self._find_reached(frame)
 
     def serving(self, emitter: lights.Emitter) -> PointMaps:
         """The kind of maps that this light has."""

@@ -24,12 +24,13 @@ The glossy light of outlines has its mean again: garden .963 to .996, product 1.
 
 Direct light is added by `add`, which keeps what it needs to be repeated. Who adds such light in another way, or draws
 maps over maps of the same sample, says `forbid`: then the guess stays. Indirect light is smooth, and always guessed.
+What is kept is the frame's one `KeptLight`, for all techniques.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -81,30 +82,38 @@ def add(frame: Frame, technique: Technique, sources: lights.Sources, lit: Lit, k
         keep(frame, lit)
 
 
+@dataclass
+class KeptLight:
+    """The direct light of the sample that is running, to be repeated; `complete`: there is none that cannot be."""
+
+    passes: list[Lit] = field(default_factory=list)
+    complete: bool = True
+
+
 def keep(frame: Frame, lit: Lit) -> None:
     """This light, which was added to the sample's radiance, may be repeated."""
-    frame.services.setdefault("lit", []).append(lit)
+    frame.shared(KeptLight).passes.append(lit)
 
 
 def forbid(frame: Frame) -> None:
     """Of this sample there is direct light that cannot be repeated."""
-    frame.services["lit forbidden"] = True
+    frame.shared(KeptLight).complete = False
 
 
 def possible(frame: Frame) -> bool:
     """Whether this sample's direct light can be repeated, and is worth it, after all techniques have added theirs."""
-    allowed = frame.settings.samples >= FEWEST and "lit forbidden" not in frame.services
-    return allowed and bool(frame.services.get("lit"))
+    kept = frame.shared(KeptLight)
+    return frame.settings.samples >= FEWEST and kept.complete and bool(kept.passes)
 
 
 def repeat(frame: Frame, sources: lights.Sources, surfaces: dict[str, images.Image], target: images.Target) -> None:
     """Add the sample's direct light on `surfaces` where the depth of `target` marks it."""
-    for lit in frame.services["lit"]:
+    for lit in frame.shared(KeptLight).passes:
         bindings = lit.bound(frame, sources, surfaces)
         passes.fullscreen(lit.program, target, blend="ADDITIVE_PREMULT", where=MARKED, **bindings)
 
 
 def forget(frame: Frame) -> None:
     """The sample ends."""
-    frame.services.pop("lit", None)
-    frame.services.pop("lit forbidden", None)
+    kept = frame.shared(KeptLight)
+    kept.passes, kept.complete = [], True

@@ -175,10 +175,10 @@ class VirtualLightSet:
 
 
 class VirtualLights:
-    """Finds the virtual lights of each sample. A technique owns one, calls `make` and binds `path_bindings`."""
+    """Finds the virtual lights of each sample. A technique owns one, calls `begin`, then `make` in each sample,
+    and binds `path_bindings`."""
 
     def __init__(self):
-        self.reflectance = Reflectance()
         self._sources = lights.Sources()
         self._source_block: Block | None = None
         self._source_count = 0
@@ -213,9 +213,6 @@ class VirtualLights:
 
     def draw_sources(self, frame: Frame) -> None:
         """Points on light sources for this sample's paths, and what materials reflect: what `path_bindings` needs."""
-        if frame.sample == 0:
-            self.reflectance.update(frame)
-            self._begin(frame)
         rows = self._source_rows(frame)
         self._source_block, self._source_count = self._sources.set(rows), len(rows)
 
@@ -225,7 +222,7 @@ class VirtualLights:
         return {
             "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
-                **hierarchy.textures, "reflectance": self.reflectance.image,
+                **hierarchy.textures, "reflectance": frame.kept(Reflectance).image,
             },
             "blocks": {"film_view": frame.view_block, "sources": self._source_block},
             "constants": {
@@ -234,7 +231,9 @@ class VirtualLights:
             },
         }  # fmt: skip
 
-    def _begin(self, frame: Frame) -> None:
+    def begin(self, frame: Frame) -> None:
+        """Find the light sources of this picture and what its materials reflect. Called in the stage of that name."""
+        frame.kept(Reflectance).update(frame)
         emitters = frame.emitters
         self._emitters = [e for e in emitters if e.light.bounces and e.light.visibility.diffuse]
         self._emissive = None
@@ -354,7 +353,6 @@ class VirtualLights:
             return images.read(target.colors[0])[..., 0].astype(np.float64).sum(axis=0)
 
     def release(self) -> None:
-        self.reflectance.release()
         self._sources.release()
         self._source_block = self._emissive = None
 

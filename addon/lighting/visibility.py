@@ -9,7 +9,7 @@ import numpy as np
 
 from ..film import points as film_points
 from ..frame.run import Frame
-from ..frame.technique import Param, Technique
+from ..frame.technique import Param, Service, Technique
 from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..scene import acceleration
@@ -44,6 +44,26 @@ def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     """Side of a depth map in texels."""
     wished = max(frame.size) * texels_per_pixel
     return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
+
+
+class VisibilityProvider(Service):
+    """What tells the visibility of lights, light by light: fills the shadow slot (point_maps.PointMaps)."""
+
+    name = "shadow"
+
+
+@dataclass(frozen=True)
+class TracedLobes(Service):
+    """Lobes up to `roughness` find lights by rays of their own; points of lights leave that share to them."""
+
+    name = "traced_lobes"
+    roughness: float
+
+
+def traced_roughness(frame: Frame) -> float:
+    """Up to where lobes are traced; -1 where none are."""
+    lobes = frame.service(TracedLobes)
+    return -1.0 if lobes is None else lobes.roughness
 
 
 @dataclass(frozen=True)

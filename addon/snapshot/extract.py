@@ -168,6 +168,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
             Instance(
                 of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random, of_object.pass_index,
                 of_object.holdout, of_object.color, place.generated, place.uv, place.key, of_object.terminator,
+                of_object.own,
             )
         )  # fmt: skip
     groups: dict[tuple, list[Instance]] = {}

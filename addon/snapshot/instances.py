@@ -19,6 +19,7 @@ import numpy as np
 
 from .cache import SnapshotCache
 from .hair import HairSystem, hair_systems
+from .own_settings import Own, own_settings
 from .scene import Note, Visibility
 
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
@@ -69,6 +70,7 @@ class ObjectFacts:
     random: float
     color: tuple[float, float, float, float]
     terminator: float
+    own: Own
     notes: tuple[Note, ...]
 
 
@@ -132,6 +134,7 @@ def walk(
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
+                        own=own_settings(owner),
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..materials.graph import Graph
 from .constants import constant_color, constant_number
+from .own_settings import own_settings
 from .scene import Light, Note, Visibility
 
 
@@ -46,6 +47,7 @@ def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibi
         cast_shadow=data.use_shadow,
         bounces=getattr(cycles, "max_bounces", 1) > 0,  # other limits of single lights are not followed
         visibility=visibility,
+        own=own_settings(data),
         **own,
     )
 

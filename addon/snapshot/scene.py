@@ -96,6 +96,7 @@ class Instance:
     uv: tuple[float, float] = (0.0, 0.0)
     key: str = ""  # stable identity across frames (object and persistent id)
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
+    own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,7 @@ class Material:
     name: str
     graph: Graph
     pass_index: int = 0
+    own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the material
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,7 @@ class Light:
     cast_shadow: bool = True
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
+    own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from ..materials.sky import Sky
 from .cache import GraphEntry, SnapshotCache
 from .images import ImageTable
 from .meshes import Wanted
+from .own_settings import own_settings
 from .scene import Material, Note
 
 GREY = (0.8, 0.8, 0.8)
@@ -69,7 +70,7 @@ class ShadingTable:
     def _add(self, material) -> int:
         key = f"material {(material.original or material).session_uid}"
         graph = self.graph_of(material, key, f"Material '{material.name}'")
-        self.materials.append(Material(key, material.name, graph, material.pass_index))
+        self.materials.append(Material(key, material.name, graph, material.pass_index, own_settings(material)))
         self.wanted.append(wanted_by(graph))
         return len(self.materials) - 1
 

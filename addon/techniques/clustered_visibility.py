@@ -180,6 +180,10 @@ class ClusteredVisibility(MultiresRadiosity):
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return pixels_shown_alone(snapshot, settings) >= MANY_PIXELS
 
+    def begin(self, frame: Frame) -> None:
+        super().begin(frame)
+        self._standing = None
+
     def visibility(self, frame: Frame, found: VirtualLightSet) -> BoundGather:
         side, filtered = frame.settings.get(self, "map_size"), frame.settings.get(self, "shadows") == CONVOLUTION
         if filtered:
@@ -232,8 +236,6 @@ class ClusteredVisibility(MultiresRadiosity):
     def _areas(self, frame: Frame, found: VirtualLightSet) -> tuple[np.ndarray, np.ndarray]:
         """Cluster of each virtual light, (N,), and the clusters' rows for the shaders, (K, AREA_ROWS, 4), without
         members and place in the atlas."""
-        if frame.sample == 0:
-            self._standing = None
         if not len(found):
             return np.zeros(0, int), np.zeros((0, AREA_ROWS, 4))
         refine = frame.settings.get(self, "refine")

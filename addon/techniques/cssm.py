@@ -103,7 +103,7 @@ BASIS_VALUES = tables.values_program(_basis(8, TABLE).source)
 class ConvolutionSoftShadows(SoftMaps):
     name = "cssm"
     label = "Convolution soft shadow maps"
-    slot = "shadow"
+    fills = ("shadow",)
     params = (
         RESOLUTION,
         CUTOFF,

@@ -62,6 +62,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..film.points import shown_paths
+from ..film.resolve import COMBINED, resolve
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
@@ -151,20 +152,26 @@ class Denoise(Technique):
             return "the scene has no surface"
         return no_diffuse_light(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def begin(self, frame: Frame) -> None:
+        for write in self.writes:
+            if write.name.startswith("denoise."):  # a pass tree may show what no light path needs
+                frame.target(write.name).clear()
+
+    def sample(self, frame: Frame) -> None:
         done = frame.sample + 1
-        if frame.sample == 0:
-            for write in self.writes:
-                if write.name.startswith("denoise."):  # a pass tree may show what no light path needs
-                    frame.target(write.name).clear()
         if done == frame.settings.samples // 2:
             for path in self._paths(frame):
                 passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
             self._half_count = done
-        if done == frame.settings.samples:
-            for path in self._paths(frame):
-                yield from self._filter(frame, path, done)
-                frame.shown[f"radiance.{path}"] = f"denoise.{path}"
+
+    def end(self, frame: Frame) -> Iterator[None]:
+        for path in self._paths(frame):
+            yield from self._filter(frame, path, frame.settings.samples)
+            frame.shown[f"radiance.{path}"] = f"denoise.{path}"
+
+    def show(self, frame: Frame) -> None:
+        if frame.plan.last_writer(COMBINED) is self:
+            resolve(frame)
 
     def _paths(self, frame: Frame) -> list[str]:
         shown = shown_paths(frame)

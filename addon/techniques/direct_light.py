@@ -34,6 +34,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..lighting import shared_visibility
+from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, lighting, shade
 from ..lighting.point_maps import PointMaps
 from ..lighting.visibility import (
@@ -45,6 +46,7 @@ from ..lighting.visibility import (
     DepthMapService,
     Lookup,
     Maps,
+    VisibilityProvider,
     ray_bindings,
     rounds,
     traced_shadows,
@@ -54,7 +56,6 @@ from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.rates import Rate
 from ..surfaces.draw import LIT_SURFACES
-from .light_probes import rate_of
 
 # A point of a round light is drawn in its ball; the light arrives from the ball's projection towards the receiver.
 # A map from the point shows what blocks the light as long as the ball is small beside its distance.
@@ -85,7 +86,8 @@ class DirectLight(Technique):
     )  # fmt: skip
     reads = LIT_SURFACES
     writes = DIRECT_WRITES
-    uses = ("shadow", "rates")
+    provides = (PointsDrawn,)
+    requests = (VisibilityProvider, LightRates)
 
     def __init__(self):
         self._emitters: list[lights.Emitter] = []
@@ -100,22 +102,27 @@ class DirectLight(Technique):
             return "the scene has no surface"
         return None
 
-    def run(self, frame: Frame) -> Iterator[None]:
-        if frame.sample == 0:
-            self._emitters = frame.emitters
-            self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
-            self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
-            self._by_rays = {}
+    def begin(self, frame: Frame) -> None:
+        self._emitters = frame.emitters
+        self._traced = {emitter.light.key for emitter in lights.traceable(self._emitters)}
+        self._near = {emitter.light.key for emitter in self._emitters if _is_near(frame, emitter)}
+        self._by_rays = {}
+        drawn, provider = PointsDrawn(), frame.service(VisibilityProvider)
+        for emitter, weight in zip(self._emitters, 1.0 / self._chances(frame)):
+            rate = self._rate(frame, emitter, weight, provider.serving(emitter) if provider else None)
+            drawn.per_sample[emitter.light.key] = rate.per_sample
+        frame.provide(drawn)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
-        service = frame.services.get("shadow")
+        service = frame.service(VisibilityProvider)
         items: dict[PointMaps | None, list] = {}
         traced: list[np.ndarray] = []
         kinds = lights.kinds_of(self._emitters)
         for emitter, weight in self._chosen(frame):
             shadow = service.serving(emitter) if service else None
             rate = self._rate(frame, emitter, weight, shadow)
-            frame.services.setdefault("light rates", {})[emitter.light.key] = rate.per_sample
             points = rate.per_sample * frame.settings.samples / weight
             if shadow and self._has_rays(frame, emitter, shadow):
                 for number in rate.points(frame.sample):
@@ -176,14 +183,20 @@ class DirectLight(Technique):
         constants["near_share"] = NEAR
         return replace(maps, lookup=RAYS_WHERE_NEAR, textures=textures, constants=constants)
 
-    def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
-        """Lights of this sample with the inverse of their chance."""
+    def _chances(self, frame: Frame) -> np.ndarray:
+        """Chance of each light to be drawn in a sample: in proportion to power where there are many."""
         most = frame.settings.get(self, "lights_per_sample")
         if len(self._emitters) <= most:
-            return [(emitter, 1.0) for emitter in self._emitters]
+            return np.ones(len(self._emitters))
         power = np.array([emitter.power for emitter in self._emitters])
         share = 0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)
-        chance = np.minimum(share * most, 1.0)
+        return np.minimum(share * most, 1.0)
+
+    def _chosen(self, frame: Frame) -> list[tuple[lights.Emitter, float]]:
+        """Lights of this sample with the inverse of their chance."""
+        chance = self._chances(frame)
+        if (chance >= 1.0).all():
+            return [(emitter, 1.0) for emitter in self._emitters]
         edges = np.concatenate([[0.0], np.cumsum(chance)])
         marks = np.arange(int(np.ceil(edges[-1]))) + frame.lot("choose lights")
         picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)

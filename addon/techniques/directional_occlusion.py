@@ -88,7 +88,7 @@ OCCLUSION_BITS, OCCLUSION_POINTS, OCCLUSION_RAYS = (
 class DirectionalOcclusion(Technique):
     name = "directional_occlusion"
     label = "Directional occlusion"
-    slot = "environment"
+    fills = ("environment",)
     params = (
         *fan_params(radius=1.0, thickness=0.02),
         Param("rays", "Rays", True, "One ray per fan for what the screen does not show"),
@@ -103,7 +103,7 @@ class DirectionalOcclusion(Technique):
         reason = no_environment_light(snapshot)
         return reason or (None if snapshot.world.visibility.diffuse else "the world is hidden from diffuse surfaces")
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         if self._blurred is None or self._blurred[0] is not frame.environment:

@@ -30,6 +30,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..lighting import depth_maps
 from ..lighting.emissive_triangles import EmissiveTriangles
+from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import DIRECT_WRITES, shade
 from ..lighting.visibility import RESOLUTION, DepthMapService, by_rays, map_resolution, rounds, traced_shadows
 from ..materials.compiler import may_emit
@@ -49,7 +50,7 @@ class EmissiveLight(Technique):
     )
     reads = LIT_SURFACES
     writes = DIRECT_WRITES
-    offers = ("emissive",)
+    provides = (EmissivePoints,)
 
     def __init__(self):
         self.service = DepthMapService()
@@ -63,13 +64,16 @@ class EmissiveLight(Technique):
             return "no material emits light"
         return None
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def begin(self, frame: Frame) -> None:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
-        if frame.sample == 0:
-            self._triangles = EmissiveTriangles(frame, ("diffuse", "glossy"))
+        self._triangles = EmissiveTriangles(frame, ("diffuse", "glossy"))
+        frame.provide(EmissivePoints(self._triangles.power, float(self._count(frame.settings))))
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
         count = self._count(frame.settings)
-        frame.services["emissive"] = (self._triangles.power, float(count))
         if not self._triangles.power > 0:
             return
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))

@@ -62,7 +62,7 @@ NO_SHARE = 1e-9  # of traced lobes: rays bring all of the world's light to them
 class EnvironmentAreaLights(Technique):
     name = "environment_area_lights"
     label = "Environment area lights"
-    slot = "environment"
+    fills = ("environment",)
     params = (
         Param("lights", "Lights", 45, "Area lights that the world is split into, at most", 24, 64),
         Param(
@@ -83,12 +83,12 @@ class EnvironmentAreaLights(Technique):
         self._fitted: tuple[weakref.ref, int, list[area_fit.AreaLight]] | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        chosen = settings.passes is not None or settings.slots.get(self.slot, AUTO) == self.name
+        chosen = settings.passes is not None or settings.slots.get(self.fills[0], AUTO) == self.name
         if not chosen:
             return "unless it is chosen, directions are drawn from the world, which leak nothing into rooms"
         return EnvironmentLight().skip(snapshot, settings)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         seen = frame.snapshot.world.visibility

@@ -57,6 +57,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..lighting import depth_maps
+from ..lighting.light_rates import LightRates, world_rate
 from ..lighting.loop import DIRECT_WRITES, lighting, shade
 from ..lighting.visibility import (
     HARD,
@@ -78,7 +79,6 @@ from ..snapshot.scene import Snapshot
 from ..sources import environment, lights, world_tiles
 from ..sources.rates import Rate
 from ..surfaces.draw import LIT_SURFACES
-from .light_probes import WORLD
 
 WORLD_RAYS = Lookup(
     "world rays",
@@ -127,8 +127,9 @@ FRAGMENTED = 3.0  # variance of a single shared direction below which a low-disc
 def directions_rate(frame: Frame) -> Rate:
     """How many directions of the world a sample draws. Auto asks the probes, or shares six maps with the lights."""
     asked = frame.settings.values.get((EnvironmentLight.name, "directions"), 0)
-    if not asked and WORLD in frame.rates:
-        return frame.rates[WORLD]
+    probed = world_rate(frame)
+    if not asked and probed is not None:
+        return probed
     return Rate(int(np.log2(asked or max(2, 6 - len(frame.snapshot.lights)))))
 
 
@@ -147,7 +148,7 @@ def no_environment_light(snapshot: Snapshot) -> str | None:
 class EnvironmentLight(Technique):
     name = "environment_light"
     label = "Environment light"
-    slot = "environment"
+    fills = ("environment",)
     params = (
         Param(
             "directions",
@@ -162,7 +163,7 @@ class EnvironmentLight(Technique):
     )
     reads = LIT_SURFACES
     writes = DIRECT_WRITES
-    uses = ("rates",)
+    requests = (LightRates,)
 
     def __init__(self):
         self.service = DepthMapService()
@@ -174,7 +175,15 @@ class EnvironmentLight(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_environment_light(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def begin(self, frame: Frame) -> None:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        self._give_openness()
+        self._edges = self._tables(frame, directions_rate(frame))
+        resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+        self._traced = self._edges is None and _cast_shadows(frame) and self._traces(frame, resolution)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         seen = frame.snapshot.world.visibility
@@ -187,8 +196,6 @@ class EnvironmentLight(Technique):
         )
         resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
         rate = directions_rate(frame)
-        if frame.sample == 0:
-            self._edges = self._tables(frame, rate)
         if self._edges is not None:
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
@@ -196,9 +203,7 @@ class EnvironmentLight(Technique):
             yield from shade(frame, self, [row] * rays, 1 << lights.DIRECTION, self._sources, self._rays(frame))
             frame.count(self, "rays per pixel", rays)
             return
-        shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
-        if frame.sample == 0:
-            self._traced = shadows and self._traces(frame, resolution)
+        shadows = _cast_shadows(frame)
         items = []
         for number in rate.points(frame.sample):
             direction, radiance, density = frame.environment.draw(*frame.random_at(number, "environment"))
@@ -234,8 +239,7 @@ class EnvironmentLight(Technique):
 
     def _known(self, frame: Frame, maps: Maps, share: float) -> Maps:
         """The same maps, asked for what is missing of `share` of the world's irradiance, too."""
-        if frame.sample == 0 or not self._openness:
-            self._give_openness()
+        if not self._openness:
             self._openness = [images.Target((images.pool.take(*frame.size, "RG32F"),)) for _ in range(2)]
             self._openness[0].clear()
         table, bright = frame.environment.known_irradiance()
@@ -258,9 +262,10 @@ class EnvironmentLight(Technique):
 
     def _tables(self, frame: Frame, rate: Rate) -> images.Image | None:
         """Tables of directions by tile, where rays by them leave less noise than `rate` shared directions."""
-        useful = frame.services.get("world_seen")
+        rates = frame.service(LightRates)
+        useful = None if rates is None else rates.world_seen
         asked = frame.settings.values.get((self.name, "directions"), 0)
-        denoised = any(technique.name == "denoise" for technique in frame.plan.techniques)
+        denoised = frame.plan.runs("denoise")
         # Maps ask the material of a layer itself; rays know it by cells.
         layered = any(material.transparent for material in frame.materials.compiled)
         if useful is None or asked or layered or not denoised or not frame.settings.whole:
@@ -295,3 +300,7 @@ class EnvironmentLight(Technique):
         self._give_openness()
         self.service.release()
         self._sources.release()
+
+
+def _cast_shadows(frame: Frame) -> bool:
+    return any(instance.visibility.shadow for instance in frame.snapshot.instances)

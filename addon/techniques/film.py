@@ -18,8 +18,8 @@ from functools import cache
 
 from ..film import filter as film_filter
 from ..film import points as film_points
-from ..film.neighbours import shown_sum
-from ..film.points import PATHS
+from ..film.resolve import COMBINED, resolve
+from ..frame.light_paths import LIGHT_PATHS, SEEN
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
@@ -49,7 +49,7 @@ SUMS = (
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
 EMISSION_SUM, WORLD_SUM = 0, 1  # in SUMS
-LIGHT = tuple(f"radiance.{path}" for path in PATHS)
+LIGHT = tuple(path for path in LIGHT_PATHS if path.origin != SEEN)  # what techniques add to in each sample
 
 
 @dataclass(frozen=True)
@@ -102,13 +102,6 @@ POSITION = passes.fullscreen_program(
     constants=(("VEC3", "render_origin"),),
     outputs=(("VEC4", "out_position"),),
 )
-RESOLVE = passes.fullscreen_program(
-    "film resolve",
-    "film/resolve.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in (*PATHS, "emission", "environment")),
-    constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
-    outputs=(("VEC4", "out_combined"),),
-)  # fmt: skip
 
 
 class Film(Technique):
@@ -119,10 +112,10 @@ class Film(Technique):
         repeated_light.EDGES,
     )
     reads = SURFACES
-    closes = LIGHT
+    finishes = tuple(path.image for path in LIGHT)
     writes = (
         *SUMS,
-        *(Write(name, "RGBA32F", "Cleared here, so that a scene without such light has it", True) for name in LIGHT),
+        *(Write(path.image, "RGBA32F", path.description, True, path.by_need) for path in LIGHT),
         Write("film.depth", "RGBA32F", "Depth along the camera axis at the pixel's centre, m; 1e10 for nothing"),
         Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
     )
@@ -131,39 +124,46 @@ class Film(Technique):
         self._sources = lights.Sources()
         self._repeated = lights.Sources()
 
-    def run(self, frame: Frame) -> Iterator[None]:
-        if frame.sample == 0:
-            self._paths = film_points.lit_paths(frame)
-            _target(frame, *(f"film.{path}" for path in self._paths)).clear()
-            emitters = frame.emitters
-            seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
-            self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
-            self._light_count = len(seen)
-            self._shown = self._not_black(frame, bool(seen))
-            shown = frame.snapshot.world.visibility.camera and frame.environment.power > 0
-            world = frame.environment.tree is None and shown
-            glossy, world = to_hold((frame.materials.glossy, world), (True, True))
-            self._collecting = collect_program(Seen(frame.materials.soft, glossy, world, lights.kinds_of(seen)))
-            passes.fullscreen(
-                DEPTH,
-                frame.target("film.depth"),
-                textures={"surface_position": frame.images["surface.position"]},
-                blocks={"film_view": frame.view_block},
-            )
-            self._first_seen(frame)
+    def begin(self, frame: Frame) -> None:
+        self._paths, self._pixel_paths = film_points.lit_paths(frame), film_points.pixel_paths(frame)
+        _target(frame, *(f"film.{path}" for path in (*self._paths, *self._pixel_paths))).clear()
+        emitters = frame.emitters
+        seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
+        self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
+        self._light_count = len(seen)
+        self._shown = self._not_black(frame, bool(seen))
+        shown = frame.snapshot.world.visibility.camera and frame.environment.power > 0
+        world = frame.environment.tree is None and shown
+        glossy, world = to_hold((frame.materials.glossy, world), (True, True))
+        self._collecting = collect_program(Seen(frame.materials.soft, glossy, world, lights.kinds_of(seen)))
+        passes.fullscreen(
+            DEPTH,
+            frame.target("film.depth"),
+            textures={"surface_position": frame.images["surface.position"]},
+            blocks={"film_view": frame.view_block},
+        )
+        self._first_seen(frame)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         count = film_points.points_of_sample(frame, frame.settings.get(self, film_points.POINTS.name))
         with _borrowed(frame, len(SUMS)) as collected:
             self._collect(frame, surface_bindings(frame), collected)
-            light = {path: frame.images[f"radiance.{path}"] for path in self._paths}
+            light = {path: frame.images[f"radiance.{path}"] for path in (*self._paths, *self._pixel_paths)}
             self._filter(frame, collected, light, frame.sample, 1.0 / count)
         frame.count(self, "points", count)
         if count > 1:
             yield
             yield from self._between(frame, count)
-        frame.target(*(f"radiance.{path}" for path in self._paths)).clear()
+        for paths in (self._paths, self._pixel_paths):
+            if paths:
+                frame.target(*(f"radiance.{path}" for path in paths)).clear()
         repeated_light.forget(frame)
-        for path in self._paths:
+        for path in (*self._paths, *self._pixel_paths):
             frame.shown[f"radiance.{path}"] = f"film.{path}"
+
+    def show(self, frame: Frame) -> None:
+        if frame.plan.last_writer(COMBINED) is self:
+            resolve(frame)
 
     def _first_seen(self, frame: Frame) -> None:
         """What passes ask for of the surfaces in the first sample, as Cycles has it: positions and indices."""
@@ -207,8 +207,9 @@ class Film(Technique):
                     frame.count(self, "passes")
                     if repeated:
                         repeated_light.repeat(frame, self._repeated, bindings, direct)
-                        frame.count(self, "passes", len(frame.services["lit"]))
-                    self._filter(frame, collected, by_path, point, 1.0 / count)
+                        frame.count(self, "passes", len(frame.shared(repeated_light.KeptLight).passes))
+                    own = {path: frame.images[f"radiance.{path}"] for path in self._pixel_paths}
+                    self._filter(frame, collected, by_path | own, point, 1.0 / count)
                     yield
             finally:
                 frame.look()
@@ -292,23 +293,3 @@ def check_tree(names: Collection[str] | None) -> None:
     """ValueError if these are the techniques of a pass tree that makes no picture. None: no tree, Auto."""
     if names is not None and Film.name not in names:
         raise ValueError("The pass tree holds no Film, which makes the picture: add it, or use New from Auto.")
-
-
-def resolve(frame: Frame, target: images.Target | None = None) -> images.Image:
-    """The mean of all samples so far as one picture, scene-linear, premultiplied: in `target`, or film.combined.
-
-    Needs a plan with a film.
-    """
-    target = target or frame.target("film.combined")
-    with shown_sum(frame, "diffuse_indirect") as indirect:
-        textures = {name: frame.to_show(f"radiance.{name}") for name in (*PATHS, "emission", "environment")}
-        passes.fullscreen(
-            RESOLVE,
-            target,
-            textures={**textures, "diffuse_indirect": indirect},
-            constants={
-                "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
-                "transparent": int(frame.snapshot.film.transparent),
-            },
-        )  # fmt: skip
-    return target.colors[0]

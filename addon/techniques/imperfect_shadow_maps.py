@@ -126,7 +126,8 @@ PUSH = passes.fullscreen_program(
 
 
 class VirtualMaps:
-    """Maps of what virtual lights see. A technique owns one, calls `draw` in each sample and binds what it gets."""
+    """Maps of what virtual lights see. A technique owns one, calls `begin`, then `draw` in each sample, and binds what
+    it gets."""
 
     def __init__(self):
         self._points = SurfacePoints()
@@ -135,15 +136,17 @@ class VirtualMaps:
         self._filled: list[images.Target] = []  # without holes: whole side, half, …
         self._borrowed: list[images.Image] = []
 
-    def draw(self, frame: Frame, technique: Technique, lights: VirtualLightSet, points: int, side: int) -> BoundGather:
-        """Maps of `side` texels from runs of `points` points, both powers of two. Counts in the technique's row."""
+    def begin(self, frame: Frame, technique: Technique, points: int) -> None:
+        """Spread runs of `points` points, a power of two, over the surfaces, unless they still lie there."""
+        made = self._points.update(frame, points, frame.typical_distance)
+        count = self._points.triangles + self._points.points
+        if count != self._numbers[0]:
+            self._numbers = (count, geometry.numbered_points(count) if count else None)
+        frame.count(technique, "surface points made" if made else "surface points kept", count)
+
+    def draw(self, frame: Frame, technique: Technique, lights: VirtualLightSet, side: int) -> BoundGather:
+        """Maps of `side` texels, a power of two. Counts in the technique's row."""
         unit = frame.typical_distance
-        if frame.sample == 0:
-            made = self._points.update(frame, points, unit)
-            count = self._points.triangles + self._points.points
-            if count != self._numbers[0]:
-                self._numbers = (count, geometry.numbered_points(count) if count else None)
-            frame.count(technique, "surface points made" if made else "surface points kept", count)
         columns = max(int(np.ceil(np.sqrt(len(lights)))), 1)
         rows = max(-(-len(lights) // columns), 1)
         self._prepare(side * columns, side * rows)
@@ -237,9 +240,16 @@ class ImperfectShadowMaps(MultiresRadiosity):
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return False
 
+    def begin(self, frame: Frame) -> None:
+        super().begin(frame)
+        if frame.receivers is not None and len(frame.receivers.distance):
+            self.maps.begin(frame, self, self._power_of_two(frame, "points"))
+
+    def _power_of_two(self, frame: Frame, name: str) -> int:
+        return 1 << round(np.log2(frame.settings.get(self, name)))
+
     def visibility(self, frame: Frame, lights: VirtualLightSet) -> BoundGather:
-        points, side = (1 << round(np.log2(frame.settings.get(self, name))) for name in ("points", "map_size"))
-        bound = self.maps.draw(frame, self, lights, points, side)
+        bound = self.maps.draw(frame, self, lights, self._power_of_two(frame, "map_size"))
         return replace(bound, constants={**bound.constants, "rays": frame.settings.get(self, "rays")})
 
     def release(self) -> None:

@@ -57,6 +57,7 @@ corner several times, the last bounces before the limit may be counted once more
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -64,7 +65,7 @@ import numpy as np
 from ..film.neighbours import smooth
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import Param, Technique, Write
+from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
@@ -96,7 +97,14 @@ NEAR_CONSTANTS = (
     ("FLOAT", "deeper"),
 )  # fmt: skip
 GATHER_CONSTANTS = (*dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)), ("INT", "lobe_rays"))
-OFFERED = "virtual_lights"  # what others may gather, too: bindings with that texture and NEAR_CONSTANTS
+
+
+@dataclass(frozen=True)
+class GatherBindings(Service):
+    """Virtual lights of this sample that others may gather, too: bindings with that texture and NEAR_CONSTANTS."""
+
+    name = "virtual_lights"
+    bindings: dict[str, dict]
 
 
 @cache
@@ -161,13 +169,13 @@ def _may_reflect(graph) -> bool:
 
 
 def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet) -> dict:
-    """What shaders/indirect/near.glsl needs: textures, blocks and constants of this sample. Offers it to others."""
+    """What shaders/indirect/near.glsl needs: textures, blocks and constants of this sample. Provides it to others."""
     bindings = finder.path_bindings(frame)
     bindings["textures"]["virtual_lights"] = lights.image
     near = near_radius(frame, len(lights))
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
     bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
-    frame.services[OFFERED] = bindings
+    frame.provide(GatherBindings(bindings))
     return bindings
 
 
@@ -187,7 +195,7 @@ def deeper_weight(frame: Frame) -> float:
 class InstantRadiosity(Technique):
     name = "instant_radiosity"
     label = "Instant radiosity"
-    slot = "indirect"
+    fills = ("indirect",)
     params = (
         Param(
             "virtual_lights", "Virtual lights", 512,
@@ -201,7 +209,7 @@ class InstantRadiosity(Technique):
     )  # fmt: skip
     reads = LIT_SURFACES
     writes = INDIRECT_WRITES
-    offers = (OFFERED,)
+    provides = (GatherBindings,)
 
     def __init__(self):
         self.virtual_lights = VirtualLights()
@@ -209,7 +217,10 @@ class InstantRadiosity(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def begin(self, frame: Frame) -> None:
+        self.virtual_lights.begin(frame)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))

@@ -27,6 +27,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
+from ..lighting.light_rates import WORLD, LightRates
 from ..sampling.sequence import point, third
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -44,7 +45,6 @@ POINTS, FEWEST_POINTS, RAYS_OF_PROBE = 32, 8, 128  # of each light at most, at l
 EDGES = 0.04
 ROUNDING = 1e-5  # of sums of POINTS equal numbers and their squares
 MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
-WORLD = "world"  # its name among the rates
 RAYS = (*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES)
 GUIDE = passes.fullscreen_program(
     "environment guide",
@@ -82,7 +82,7 @@ class LightProbes(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
-    offers = ("rates",)
+    provides = (LightRates,)
 
     def __init__(self):
         self._sources = lights.Sources()
@@ -97,14 +97,16 @@ class LightProbes(Technique):
                 return "every sample is shown, so each has one point per light"
         return acceleration.too_many(snapshot)
 
-    def run(self, frame: Frame) -> None:
-        if frame.sample > 0 or frame.receivers is None or not len(frame.receivers.distance):
+    def begin(self, frame: Frame) -> None:
+        if frame.receivers is None or not len(frame.receivers.distance):
             return
+        found = LightRates()
+        frame.provide(found)
         lit = _lit(frame.snapshot.world)
         if lit:
-            self._guide(frame)
+            found.world_seen = self._guide(frame)
         if frame.settings.whole and frame.settings.get(self, "maps") > 0:
-            self._share_out(frame, lit)
+            found.by_light = self._share_out(frame, lit)
 
     def _rays(self, frame: Frame) -> dict:
         hierarchy = frame.hierarchy()
@@ -115,10 +117,11 @@ class LightProbes(Technique):
             "constants": {"offset_size": frame.offset_size},
         }  # fmt: skip
 
-    def _guide(self, frame: Frame) -> None:
+    def _guide(self, frame: Frame) -> np.ndarray | None:
+        """Guide directions of the world; what each probe sees of it, as in LightRates.world_seen."""
         if not frame.settings.get(self, "guiding"):
             frame.environment.guide(None)
-            return
+            return None
         rays = self._rays(frame)
         rows, columns = environment.GUIDE_ROWS, environment.GUIDE_COLUMNS
         affordable = FEW * frame.size[0] * frame.size[1] * frame.settings.samples / (rows * columns)
@@ -136,10 +139,11 @@ class LightProbes(Technique):
             found = images.read(target.colors[0]).reshape(grid[1], grid[0], rows, columns, 2)
         useful, facing = found[..., 0], found[..., 1].sum(axis=(0, 1))
         frame.environment.guide(useful.mean(axis=(0, 1)), useful.sum(axis=(0, 1)) / np.maximum(facing, 1e-30))
-        frame.services["world_seen"] = useful
         frame.count(self, "guiding rays", rows * columns * probes)
+        return useful
 
-    def _share_out(self, frame: Frame, lit: bool) -> None:
+    def _share_out(self, frame: Frame, lit: bool) -> dict[str, Rate]:
+        """Rates of the lights by key, and of WORLD."""
         emitters = frame.emitters
         if len(emitters) > MOST_LIGHTS:
             emitters = []
@@ -148,7 +152,7 @@ class LightProbes(Technique):
         if lit:
             trials.append((WORLD, self._points_of_world(frame, points)))
         if not trials:
-            return
+            return {}
         moments = self._moments(frame, [rows for _, rows in trials])
         variance = relative_variance(moments[..., 0], moments[..., 1])
         # Lights in one place count as one, so that two half lights are sampled like the whole.
@@ -159,7 +163,7 @@ class LightProbes(Technique):
         share = relative_share(moments[..., 0])
         film = [EDGES * sum(s for s, place in zip(share, places) if place == one) ** 2 for one in distinct]
         # Soft maps show a light as a whole: few samples need no more of them.
-        points = AccumulatedMaps.name in (technique.name for technique in frame.plan.techniques)
+        points = frame.plan.runs(AccumulatedMaps.name)
         planned = samples if points else max(samples, USUAL_SAMPLES)
         alone = not frame.plan.fills("indirect")
         asked = frame.settings.get(self, "maps")
@@ -170,8 +174,8 @@ class LightProbes(Technique):
         if any(material.transparent or material.soft for material in frame.materials.compiled):
             # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
-        frame.rates = {key: rates[place] for (key, _), place in zip(trials, places)}
         frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * points)
+        return {key: rates[place] for (key, _), place in zip(trials, places)}
 
     def _points_of(self, frame: Frame, emitter: lights.Emitter, count: int) -> list[np.ndarray]:
         seed = frame.settings.seed
@@ -235,8 +239,3 @@ def _lit(world: World) -> bool:
 def _place(emitter: lights.Emitter) -> tuple:
     shape = (emitter.centre, emitter.u, emitter.v, emitter.axis)
     return (emitter.kind, emitter.flags, emitter.radius, *(part.tobytes() for part in shape))
-
-
-def rate_of(frame: Frame, key: str) -> Rate:
-    """How often the light `key`, or WORLD, is sampled; once per sample where nothing else was found."""
-    return frame.rates.get(key, Rate())

@@ -206,7 +206,7 @@ class MultiresRadiosity(InstantRadiosity):
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return 0 < pixels_shown_alone(snapshot, settings) < MANY_PIXELS
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
@@ -272,11 +272,11 @@ class MultiresRadiosity(InstantRadiosity):
                 listed = self._listed(frame, flags, grid)
                 held += listed.values()
                 yield from self._gather_listed(frame, bindings, bound, grid, atlas, listed)
-                if frame.sample == 0:
+                if frame.is_first:
                     frame.count(self, "regions", int(images.read(listed["entry_count"])[0, 0, 0]))
             else:
                 yield from self._gather_levels(frame, bindings, bound, grid, atlas, flags)
-                if levels == 0 and frame.sample == 0:
+                if levels == 0 and frame.is_first:
                     frame.count(self, "regions", frame.size[0] * frame.size[1])
             if levels == 0:
                 held.remove(atlas)

@@ -34,6 +34,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..lighting.point_maps import PointMaps
 from ..lighting.soft_maps import SoftMaps
+from ..lighting.visibility import VisibilityProvider
 from ..snapshot.scene import Light, Snapshot
 from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
@@ -60,7 +61,7 @@ class FewBoxes(ConvolutionSoftShadows):
 class ShadowsByLight(PointMaps):
     name = "shadows_by_light"
     label = "Shadow maps by light"
-    slot = "shadow"
+    fills = ("shadow",)
     params = (
         Param(
             "important", "Important lights", 8,
@@ -81,14 +82,13 @@ class ShadowsByLight(PointMaps):
             return False
         return any(_is_soft(light) for light in snapshot.lights)
 
-    def run(self, frame: Frame) -> None:
-        if frame.sample == 0:
-            self._kinds = self._chosen(frame)
-            for kind in self._kinds.values():
-                frame.count(self, kind)
+    def begin(self, frame: Frame) -> None:
+        self._kinds = self._chosen(frame)
+        for kind in self._kinds.values():
+            frame.count(self, kind)
         for kind in dict.fromkeys(self._kinds.values()):
-            self._services[kind].run(frame)
-        frame.services["shadow"] = self
+            self._services[kind].begin(frame)
+        frame.provide(self, VisibilityProvider)
 
     def serving(self, emitter: lights.Emitter) -> PointMaps:
         return self._services[self._kinds.get(emitter.light.key, PLAIN)]

@@ -135,7 +135,7 @@ def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
 class ScreenSpaceBounce(Technique):
     name = "ssdo"
     label = "Screen-space bounce"
-    slot = "indirect"
+    fills = ("indirect",)
     params = (
         *fan_params(radius=4.0, thickness=0.1),
         Param("rays", "Rays", True, "One ray per pixel and sample for what the screen does not show"),
@@ -153,12 +153,15 @@ class ScreenSpaceBounce(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_indirect_light(snapshot, settings)
 
-    def run(self, frame: Frame) -> Iterator[None]:
+    def begin(self, frame: Frame) -> None:
+        if self._traces(frame):
+            self._paths.begin(frame)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         self._send(frame, SENDERS_OF_LIGHT, {"direct": frame.images["radiance.diffuse_direct"]})
-        traced = frame.settings.get(self, "rays") and frame.settings.get(self, "visibility") == BITS
-        traced = traced and not acceleration.too_many(frame.snapshot)
+        traced = self._traces(frame)
         if traced:
             self._paths.draw_sources(frame)
             target = frame.target("radiance.glossy_indirect")
@@ -175,6 +178,11 @@ class ScreenSpaceBounce(Technique):
         frame.count(self, "passes", traced + 3 * bounces)
         if traced:
             frame.count(self, "paths", frame.size[0] * frame.size[1])
+
+    def _traces(self, frame: Frame) -> bool:
+        """Whether rays look for what the screen does not show."""
+        wanted = frame.settings.get(self, "rays") and frame.settings.get(self, "visibility") == BITS
+        return wanted and not acceleration.too_many(frame.snapshot)
 
     def _send(self, frame: Frame, program: Program, light: dict[str, images.Image]) -> None:
         passes.fullscreen(

@@ -34,6 +34,7 @@ import numpy as np
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
+from ..lighting.visibility import traced_roughness
 from ..sampling.lens import rim
 from ..scene.receivers import TILE, Receivers
 from ..scene.view import VIEW
@@ -76,20 +77,31 @@ class Surfaces(Technique):
         Write(MARKS, "DEPTH_COMPONENT32F", "0 nothing, 0.5 a surface, 1 one with a lobe that rays are traced for"),
     )
 
-    def run(self, frame: Frame) -> None:
-        target = frame.target(*SURFACES, depth="surface.depth_buffer")
-        if frame.sample == 0:
-            modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
-            frame.receivers = self._receivers(frame, target, modes)
-        if frame.sample > 0 or modes != (STOCHASTIC,):  # else what was drawn for the receivers is the first sample
-            draw_sample(frame, self, target)
+    def __init__(self):
+        self._drawn = False  # `begin` has left the first sample in the images
+
+    def begin(self, frame: Frame) -> None:
+        modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
+        frame.receivers = self._receivers(frame, self._target(frame), modes)
+        if modes != (STOCHASTIC,):  # else what was drawn for the receivers is the first sample
+            draw_sample(frame, self, self._target(frame))
+        self._drawn = True
+
+    def sample(self, frame: Frame) -> None:
+        if not self._drawn:
+            draw_sample(frame, self, self._target(frame))
+        self._drawn = False
         passes.fullscreen(
             MARK,
             frame.target(depth=MARKS),
             textures={f"surface_{name}": frame.images[f"surface.{name}"] for name in MARK_IMAGES},
-            constants={"traced_roughness": frame.services.get("traced_roughness", -1.0)},
+            constants={"traced_roughness": traced_roughness(frame)},
         )
         frame.count(self, "passes")
+
+    @staticmethod
+    def _target(frame: Frame) -> images.Target:
+        return frame.target(*SURFACES, depth="surface.depth_buffer")
 
     def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...]) -> Receivers:
         width, height = frame.size

@@ -24,7 +24,7 @@ Fails: above 4 million triangles (instances counted) nothing is traced and narro
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -33,8 +33,10 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import passes
 from ..lighting import repeated_light
+from ..lighting.light_rates import EmissivePoints, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
 from ..lighting.repeated_light import Lit
+from ..lighting.visibility import TracedLobes
 from ..materials.compiler import may_emit
 from ..scene import acceleration
 from ..scene.materials import may_be_glossy
@@ -44,7 +46,6 @@ from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import LIT_SURFACES, NARROW_LOBE, SURFACE_TEXTURES
 from .environment_light import directions_rate
-from .light_probes import rate_of
 
 TRACED = passes.fullscreen_program(
     "traced glossy",
@@ -66,7 +67,7 @@ TRACED = passes.fullscreen_program(
 class TracedGlossy(Technique):
     name = "traced_glossy"
     label = "Traced glossy light"
-    slot = "reflection"
+    fills = ("reflection",)
     params = (
         Param(
             "roughness", "Roughness", 0.6,
@@ -75,7 +76,8 @@ class TracedGlossy(Technique):
     )  # fmt: skip
     reads = LIT_SURFACES
     writes = DIRECT_WRITES
-    uses = ("emissive",)
+    provides = (TracedLobes,)
+    requests = (EmissivePoints, PointsDrawn)
 
     def __init__(self):
         self._sources = lights.Sources()
@@ -92,27 +94,23 @@ class TracedGlossy(Technique):
             return "no light has a size and the world is black: nothing that a ray could hit"
         return acceleration.too_many(snapshot)
 
-    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return object()  # what `prepare` leaves with the frame is needed anew in every frame
+    def begin(self, frame: Frame) -> None:
+        """Tell the techniques that draw points of lights, which run before this one, what share the rays take over."""
+        frame.provide(TracedLobes(frame.settings.get(self, "roughness")))
+        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
+        shown = lights.traceable([emitter for emitter in found if emitter is not None])
+        points = frame.service(PointsDrawn)  # whole lights have one point, whatever their rate
+        drawn = points.per_sample if points else {}
+        rates = [drawn.get(e.light.key, rate_of(frame, e.light.key).per_sample) for e in shown]
+        self._rows = [emitter.row(emitter.centre, 0, 0, rate, rate) for emitter, rate in zip(shown, rates)]
+        sampled = frame.plan.runs("environment_light")
+        self._world_samples = directions_rate(frame).per_sample if sampled else 0.0
 
-    def prepare(self, frame: Frame) -> None:
-        """Tell the techniques that draw light samples, which run before this one, what share the rays take over."""
-        frame.services["traced_roughness"] = frame.settings.get(self, "roughness")
-
-    def run(self, frame: Frame) -> Iterator[None]:
-        roughness = frame.services["traced_roughness"]
-        if frame.sample == 0:
-            found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-            shown = lights.traceable([emitter for emitter in found if emitter is not None])
-            drawn = frame.services.get("light rates", {})  # whole lights have one point, whatever their rate
-            rates = [drawn.get(e.light.key, rate_of(frame, e.light.key).per_sample) for e in shown]
-            rows = [emitter.row(emitter.centre, 0, 0, rate, rate) for emitter, rate in zip(shown, rates)]
-            self._rows = rows
-            sampled = any(technique.name == "environment_light" for technique in frame.plan.techniques)
-            self._world_samples = directions_rate(frame).per_sample if sampled else 0.0
+    def sample(self, frame: Frame) -> Iterator[None]:
+        roughness = frame.settings.get(self, "roughness")
         world = frame.snapshot.world
         hierarchy = frame.hierarchy()
-        emissive_power, emissive_points = frame.services.get("emissive", (0.0, 1.0))
+        emissive = frame.service(EmissivePoints) or EmissivePoints()
         frame.counters.setdefault(self.name, {})["triangles"] = hierarchy.triangles
         bindings = {
             "textures": {
@@ -126,7 +124,7 @@ class TracedGlossy(Technique):
                 "offset_size": frame.offset_size,
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
-                "emissive_power": emissive_power, "emissive_points": emissive_points,
+                "emissive_power": emissive.power, "emissive_points": emissive.count,
             },
         }  # fmt: skip
         yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings, self._rows))

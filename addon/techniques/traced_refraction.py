@@ -53,7 +53,7 @@ from ..sources import lights
 from ..sources.environment import WORLD
 from ..surfaces.draw import LEFT_OUT, SURFACE_TEXTURES, SURFACES, draw_surfaces, surface_bindings
 from ..surfaces.reflectance import Reflectance
-from .instant_radiosity import NEAR_CONSTANTS, OFFERED
+from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
@@ -88,7 +88,7 @@ ALBEDO = passes.fullscreen_program(
 class TracedRefraction(Technique):
     name = "traced_refraction"
     label = "Traced refraction"
-    slot = "transmission"
+    fills = ("transmission",)
     params = (
         Param(
             "interfaces", "Interfaces", 8,
@@ -96,7 +96,7 @@ class TracedRefraction(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
-    uses = (OFFERED,)
+    requests = (GatherBindings,)
     writes = (
         Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
         Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
@@ -104,7 +104,6 @@ class TracedRefraction(Technique):
 
     def __init__(self):
         self._sources = lights.Sources()
-        self._reflectance = Reflectance()
         self._interfaces: images.Image | None = None
         self._triangles: EmissiveTriangles | None = None
 
@@ -131,9 +130,7 @@ class TracedRefraction(Technique):
                 row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
         self._interfaces = images.upload(table)
 
-    def run(self, frame: Frame) -> None:
-        if frame.sample == 0:
-            self._begin(frame)
+    def sample(self, frame: Frame) -> None:
         rows = self._source_rows(frame)
         behind = self._draw_behind(frame)
         virtual_lights, near = self._indirect_light(frame)
@@ -146,7 +143,7 @@ class TracedRefraction(Technique):
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
-                "reflectance": self._reflectance.image, "interface_table": self._interfaces,
+                "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
                 "behind_position": behind.colors[0], "behind_albedo": behind.colors[1],
                 "virtual_lights": virtual_lights,
             },
@@ -188,15 +185,15 @@ class TracedRefraction(Technique):
         return behind
 
     def _indirect_light(self, frame: Frame) -> tuple[images.Image, dict[str, object]]:
-        """Virtual lights and NEAR_CONSTANTS; where nothing offers them, of none and no bounces."""
-        offered = frame.services.get(OFFERED)
-        if offered is None:
+        """Virtual lights and NEAR_CONSTANTS; where nothing provides them, of none and no bounces."""
+        provided = frame.service(GatherBindings)
+        if provided is None:
             return self._interfaces, {name: 0 for _, name in NEAR_CONSTANTS}
-        constants = {name: offered["constants"][name] for _, name in NEAR_CONSTANTS}
-        return offered["textures"]["virtual_lights"], constants
+        constants = {name: provided.bindings["constants"][name] for _, name in NEAR_CONSTANTS}
+        return provided.bindings["textures"]["virtual_lights"], constants
 
-    def _begin(self, frame: Frame) -> None:
-        self._reflectance.update(frame)
+    def begin(self, frame: Frame) -> None:
+        frame.kept(Reflectance).update(frame)
         wanted = lights.TRANSMISSION_FLAG + lights.DIFFUSE_FLAG  # by glass, and by surfaces behind it
         self._emitters = [emitter for emitter in frame.emitters if emitter.flags & wanted]
         used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
@@ -238,5 +235,4 @@ class TracedRefraction(Technique):
 
     def release(self) -> None:
         self._sources.release()
-        self._reflectance.release()
         self._interfaces = self._triangles = None

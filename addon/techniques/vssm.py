@@ -106,7 +106,7 @@ MOMENT_VALUES = tuple(tables.values_program(source) for source in MOMENTS.values
 class VarianceSoftShadows(SoftMaps):
     name = "vssm"
     label = "Variance soft shadow maps"
-    slot = "shadow"
+    fills = ("shadow",)
     params = (
         RESOLUTION,
         CUTOFF,

@@ -11,10 +11,11 @@ import bpy
 
 from ..frame import ledger as ledgers
 from ..frame.settings import AUTO
+from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
 from . import ENGINE, blender_panels, notes
 from .passes import PASSES
-from .properties import identifier, slots
+from .properties import slots
 from .quality import CANDELA_PT_quality_presets
 
 MOST_NOTES = 12  # more than these are counted only
@@ -84,12 +85,12 @@ def _technique_panel(technique) -> type:
 
     @classmethod
     def poll(cls, context):
-        chosen = getattr(context.scene.candela, f"slot_{technique.slot}") if technique.slot else technique.name
-        return _CandelaPanel.poll.__func__(cls, context) and chosen in (AUTO, technique.name)
+        chosen = {getattr(context.scene.candela, f"slot_{slot}") for slot in technique.fills} or {technique.name}
+        return _CandelaPanel.poll.__func__(cls, context) and not chosen.isdisjoint((AUTO, technique.name))
 
     def draw(self, context):
         column = _columns(self)
-        for param in technique.params:
+        for param in technique.params_of(SCENE):
             column.prop(context.scene.candela, identifier(technique.name, param.name))
 
     body = {
@@ -174,7 +175,10 @@ class CANDELA_VIEWLAYER_PT_passes(_CandelaPanel, bpy.types.Panel):
         column = _columns(self, animatable=False)
         for number, render_pass in enumerate(PASSES):
             part = column.column(align=True, heading="Include" if number == 0 else "")
-            part.prop(context.view_layer, render_pass.switch, text=render_pass.name)
+            *owner, switch = render_pass.switch.split(".")
+            holder = getattr(context.view_layer, owner[0], None) if owner else context.view_layer
+            if holder is not None:  # switches that Cycles brings are there while it is enabled
+                part.prop(holder, switch, text=render_pass.name)
 
 
 class CANDELA_LIGHT_PT_beam_shape(_CandelaPanel, bpy.types.Panel):
@@ -316,7 +320,11 @@ _CLASSES = (
     CANDELA_RENDER_PT_sampling,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_parameters,
-    *(_technique_panel(technique) for technique in REGISTRY if technique.params and technique.name not in _WITH_OTHERS),
+    *(
+        _technique_panel(technique)
+        for technique in REGISTRY
+        if technique.params_of(SCENE) and technique.name not in _WITH_OTHERS
+    ),
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_notes,

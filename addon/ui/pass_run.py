@@ -23,7 +23,6 @@ from ..gfx import images
 from ..gfx.context import turn
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import make_registry
-from ..techniques.film import Film, resolve
 from .passes import PASSES
 
 
@@ -80,8 +79,7 @@ def render_steps(
         drawing = min(frame.samples_done + 1, settings.samples)
         yield frame.samples_done / settings.samples, f"sample {drawing} of {settings.samples}"
     with turn:
-        if any(technique.name == Film.name for technique in frame.plan.techniques):
-            resolve(frame)
+        kept.renderer.show(frame)
         colors = sorted(name for name, image in frame.images.items() if image.format == "RGBA32F")
         arrays = kept.renderer.finish(frame, colors)
     ledger = frame.ledger

@@ -1,4 +1,4 @@
-"""The render passes that Candela writes, under Blender's own names: one table for the engine and the interface."""
+"""The render passes that Candela writes, under Blender's own names: those of light from frame/light_paths.py."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+
+from ..frame.light_paths import LIGHT_PATHS
 
 
 @dataclass(frozen=True)
@@ -34,49 +36,47 @@ class RenderPass:
 
 
 # Switch of the view layer, Blender's name since 5.0 and before, channels, type, source, first channel if not 0.
-_TABLE = (
+_SURFACES = (
     ("use_pass_z", "Depth", "Depth", "Z", "VALUE", "film.depth"),
     ("use_pass_mist", "Mist", "Mist", "Z", "VALUE", "color.diffuse", 3),
     ("use_pass_position", "Position", "Position", "XYZ", "VECTOR", "film.position"),
     ("use_pass_normal", "Normal", "Normal", "XYZ", "VECTOR", "surface.normal_sum"),
-    ("use_pass_diffuse_direct", "Diffuse Direct", "DiffDir", "RGB", "COLOR", "radiance.diffuse_direct / color.diffuse"),
-    (
-        "use_pass_diffuse_indirect", "Diffuse Indirect", "DiffInd", "RGB", "COLOR",
-        "radiance.diffuse_indirect / color.diffuse",
-    ),
     ("use_pass_diffuse_color", "Diffuse Color", "DiffCol", "RGB", "COLOR", "color.diffuse"),
-    ("use_pass_glossy_direct", "Glossy Direct", "GlossDir", "RGB", "COLOR", "radiance.glossy_direct / color.glossy"),
-    (
-        "use_pass_glossy_indirect", "Glossy Indirect", "GlossInd", "RGB", "COLOR",
-        "radiance.glossy_indirect / color.glossy",
-    ),
     ("use_pass_glossy_color", "Glossy Color", "GlossCol", "RGB", "COLOR", "color.glossy"),
-    (
-        "use_pass_transmission_direct", "Transmission Direct", "TransDir", "RGB", "COLOR",
-        "radiance.transmission_direct / color.transmission",
-    ),
-    (
-        "use_pass_transmission_indirect", "Transmission Indirect", "TransInd", "RGB", "COLOR",
-        "radiance.transmission_indirect / color.transmission",
-    ),
-    (
-        "use_pass_transmission_color", "Transmission Color", "TransCol", "RGB", "COLOR", "color.transmission",
-    ),
-    ("use_pass_emit", "Emission", "Emit", "RGB", "COLOR", "radiance.emission"),
-    ("use_pass_environment", "Environment", "Env", "RGB", "COLOR", "radiance.environment"),
+    ("use_pass_transmission_color", "Transmission Color", "TransCol", "RGB", "COLOR", "color.transmission"),
     ("use_pass_object_index", "Object Index", "IndexOB", "X", "VALUE", "film.index"),
     ("use_pass_material_index", "Material Index", "IndexMA", "X", "VALUE", "film.index", 1),
-)  # fmt: skip
+)
+_LIGHT = tuple(
+    (path.switch, path.label, path.before_5, "RGB", "COLOR", " / ".join(filter(None, (path.image, path.color))))
+    for path in LIGHT_PATHS
+)
+
+
+def _in_blenders_order(rows: tuple) -> list:
+    """Data passes, then each lobe's light followed by its colour, as Blender's panel lists them."""
+    first = [row for row in rows if row[5].startswith(("film.depth", "film.position", "surface.")) or row[1] == "Mist"]
+    last = [row for row in rows if row[5] == "film.index"]
+    by_lobe = sorted((row for row in rows if row not in first and row not in last), key=lambda row: _place(row[1]))
+    return [*first, *by_lobe, *last]
+
+
+def _place(name: str) -> int:
+    order = ("Diffuse", "Glossy", "Transmission", "Volume", "Emission", "Environment")
+    parts = ("Direct", "Indirect", "Color")
+    lobe, _, part = name.partition(" ")
+    return 4 * order.index(lobe) + (parts.index(part) if part in parts else 0)
+
 
 PASSES = tuple(
     RenderPass(switch, name if bpy.app.version >= (5, 0) else old, channels, kind, source, *first)
-    for switch, name, old, channels, kind, source, *first in _TABLE
+    for switch, name, old, channels, kind, source, *first in _in_blenders_order((*_SURFACES, *_LIGHT))
 )
 
 
 def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     """The passes that a view layer asks for."""
-    return [render_pass for render_pass in PASSES if getattr(layer, render_pass.switch)]
+    return [render_pass for render_pass in PASSES if _ticked(layer, render_pass.switch)]
 
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.

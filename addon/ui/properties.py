@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import bpy
 
-from ..frame.settings import AUTO, BOUNCES, SAMPLES, SEED, Settings
-from ..frame.technique import Param
+from ..frame.settings import AUTO, BOUNCES, OFF, SAMPLES, SEED, Settings
+from ..frame.technique import (
+    CAMERA,
+    DIRECTION,
+    LIGHT,
+    MATERIAL,
+    OBJECT,
+    OF_A_PICTURE,
+    POINT,
+    SCENE,
+    WORLD,
+    Param,
+    identifier,
+)
 from ..techniques import REGISTRY
 from .pass_tree import TREE, order_of
 
+_VECTOR_OF_HANDLE = {POINT: "TRANSLATION", DIRECTION: "DIRECTION"}
+OFF_NUMBER = 255  # of the item in slots' menus, beyond all techniques
 PREVIEW_SAMPLES = 8  # of material icons, which are drafts
 
 
@@ -25,6 +41,15 @@ def _property(param: Param, **changes):
     """A bpy property for a declared parameter."""
     common = {"name": param.label, "description": param.description, "default": param.default, "update": _redraw}
     common |= changes
+    if param.many:
+        del common["default"], common["update"]
+        return bpy.props.CollectionProperty(type=entry_group(param), **common)
+    if param.image:
+        del common["default"]
+        return bpy.props.PointerProperty(type=bpy.types.Image, **common)
+    if isinstance(param.default, tuple):
+        vector = {"size": len(param.default), "subtype": param.unit or _VECTOR_OF_HANDLE.get(param.handle, "NONE")}
+        return bpy.props.FloatVectorProperty(**common, **vector)
     if isinstance(param.default, bool):
         return bpy.props.BoolProperty(**common)
     if isinstance(param.default, str):
@@ -41,22 +66,17 @@ def _property(param: Param, **changes):
     return make(**common, **limits)
 
 
-def identifier(technique: str, param: str) -> str:
-    """Name of the scene property that holds a technique's parameter."""
-    return f"{technique}_{param}"
-
-
 def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
     items = [(AUTO, "Auto", "Let Candela choose by what the scene holds", 0)]
-    for number, technique in enumerate((t for t in REGISTRY if t.slot == slot), 1):
+    for number, technique in enumerate((t for t in REGISTRY if slot in t.fills), 1):
         summary = (technique.__module__ and __import__(technique.__module__, fromlist=["_"]).__doc__) or ""
         items.append((technique.name, technique.label, summary.strip().splitlines()[0], number))
-    return items
+    return [*items, (OFF, "Off", "Leave this light out", OFF_NUMBER)]
 
 
 def slots() -> list[str]:
     """Names of all slots, in the registry's order."""
-    return list(dict.fromkeys(t.slot for t in REGISTRY if t.slot))
+    return list(dict.fromkeys(slot for t in REGISTRY for slot in t.fills))
 
 
 def _annotations() -> dict:
@@ -78,23 +98,83 @@ def _annotations() -> dict:
             default=AUTO,
             update=_redraw,
         )
+    return out | _declared(SCENE)
+
+
+def _declared(scope: str) -> dict:
+    """Properties of all parameters that techniques declare for a kind of data-block; lists have an active entry."""
+    out = {}
     for technique in REGISTRY:
         for param in technique.params:
-            out[identifier(technique.name, param.name)] = _property(param)
+            if param.scope == scope:
+                name = identifier(technique.name, param.name)
+                out[name] = _property(param)
+                if param.many:
+                    out[f"{name}_active"] = bpy.props.IntProperty(name=f"Active of {param.label}", options={"HIDDEN"})
     return out
 
 
-CandelaSceneSettings = type(
-    "CandelaSceneSettings",
-    (bpy.types.PropertyGroup,),
-    {"__annotations__": _annotations(), "__doc__": "Candela's settings of a scene.", "__module__": __name__},
-)
+@cache
+def entry_group(param: Param) -> type:
+    """The property group of one entry of a list; an entry has a name beside the parameters."""
+    annotations = {"name": bpy.props.StringProperty(name="Name", update=_redraw)}
+    annotations |= {own.name: _property(own) for own in param.many}
+    title = "".join(word.title() for word in param.name.split("_"))
+    return _group(f"Candela{title}Entry", annotations, f"One of {param.label}.")
 
 
-def settings_of(scene, viewport: bool, preview: bool = False, layer=None) -> Settings:
-    """The scene's Blender properties as plain settings; in a final render of a view layer, with its number of samples
-    where it has one of its own."""
-    group = scene.candela
+def _group(name: str, annotations: dict, text: str) -> type:
+    return type(
+        name, (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": text, "__module__": __name__}
+    )
+
+
+def _entry_groups() -> list[type]:
+    return [entry_group(param) for technique in REGISTRY for param in technique.params if param.many]
+
+
+_ENTRIES = _entry_groups()  # made first: the groups below refer to them
+CandelaSceneSettings = _group("CandelaSceneSettings", _annotations(), "Candela's settings of a scene.")
+# Of the other kinds of data-block: (type, its group), by scope.
+GROUPS = {
+    scope: (block, _group(f"Candela{scope.title()}Settings", _declared(scope), f"Settings of a {scope.lower()}."))
+    for scope, block in (
+        (CAMERA, bpy.types.Camera), (WORLD, bpy.types.World), (LIGHT, bpy.types.Light),
+        (MATERIAL, bpy.types.Material), (OBJECT, bpy.types.Object),
+    )
+}  # fmt: skip
+
+
+def block_of(scope: str, scene, depsgraph=None):
+    """The data-block of a scope that a picture has one of: the scene, its camera's data or its world; None if missing.
+    With the dependency graph, as it is evaluated: keyframes and drivers of a final render change nothing else."""
+    if scope == CAMERA:
+        camera = scene.camera
+        if camera is None or camera.type != "CAMERA":
+            return None
+        return (camera.evaluated_get(depsgraph) if depsgraph is not None else camera).data
+    block = scene.world if scope == WORLD else scene
+    return block.evaluated_get(depsgraph) if depsgraph is not None and block is not None else block
+
+
+def _values(scene, depsgraph) -> dict[tuple[str, str], object]:
+    """What is set of the parameters of which a picture has one value each."""
+    values = {}
+    blocks = {scope: block_of(scope, scene, depsgraph) for scope in OF_A_PICTURE}
+    for technique in REGISTRY:
+        for param in technique.params:
+            block = blocks.get(param.scope)
+            if block is None or param.many or param.image:
+                continue
+            value = getattr(block.candela, identifier(technique.name, param.name))
+            values[technique.name, param.name] = tuple(value) if isinstance(param.default, tuple) else value
+    return values
+
+
+def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgraph=None) -> Settings:
+    """The Blender properties of the scene, its camera and world as plain settings; in a final render of a view layer,
+    with its number of samples where it has one of its own. With a dependency graph, as they are evaluated."""
+    group = block_of(SCENE, scene, depsgraph).candela
     tree = group.pass_tree
     final = (layer.samples if layer is not None else 0) or group.samples
     samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else final)
@@ -105,20 +185,22 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None) -> Set
         bounces=group.bounces,
         passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
-        values={
-            (technique.name, param.name): getattr(group, identifier(technique.name, param.name))
-            for technique in REGISTRY
-            for param in technique.params
-        },
+        values=_values(scene, depsgraph),
     )
     return settings.as_draft() if preview else settings
 
 
 def register() -> None:
-    bpy.utils.register_class(CandelaSceneSettings)
-    bpy.types.Scene.candela = bpy.props.PointerProperty(type=CandelaSceneSettings)
+    for group in _ENTRIES:
+        bpy.utils.register_class(group)
+    for block, group in ((bpy.types.Scene, CandelaSceneSettings), *GROUPS.values()):
+        bpy.utils.register_class(group)
+        block.candela = bpy.props.PointerProperty(type=group)
 
 
 def unregister() -> None:
-    del bpy.types.Scene.candela
-    bpy.utils.unregister_class(CandelaSceneSettings)
+    for block, group in reversed(((bpy.types.Scene, CandelaSceneSettings), *GROUPS.values())):
+        del block.candela
+        bpy.utils.unregister_class(group)
+    for group in reversed(_ENTRIES):
+        bpy.utils.unregister_class(group)

@@ -12,8 +12,8 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
+from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
-from .properties import identifier
 
 FOLDER = "candela/quality"
 PATH = str(Path(__file__).parent)  # of the folder presets/
@@ -32,7 +32,7 @@ class CANDELA_OT_quality_preset_add(AddPresetBase, bpy.types.Operator):
         for name in (
             "samples",
             "viewport_samples",
-            *(identifier(technique.name, param.name) for technique in REGISTRY for param in technique.params),
+            *(identifier(technique.name, param.name) for technique in REGISTRY for param in technique.params_of(SCENE)),
         )
     )
 

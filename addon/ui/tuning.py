@@ -16,11 +16,12 @@ import bpy
 from ..compare import metrics, tune
 from ..compare.beside import reference_steps
 from ..frame.ledger import RAN
+from ..frame.technique import identifier
 from ..techniques import REGISTRY
 from . import ENGINE, shown_otherwise
 from .jobs import Job, draw_progress, part
 from .pass_run import Rendered, render_steps
-from .properties import identifier, settings_of
+from .properties import settings_of
 
 SEED = 11  # of timed renders; programs are compiled by a render of another one
 REFERENCE_SHARE = 0.3  # of the progress
@@ -31,8 +32,8 @@ def choices(scene) -> dict[str, list[str]]:
     """Techniques to try by slot, the one that is set first; slots without a choice stay away."""
     found: dict[str, list[str]] = {}
     for technique in REGISTRY:
-        if technique.slot:
-            found.setdefault(technique.slot, []).append(technique.name)
+        for slot in technique.fills:
+            found.setdefault(slot, []).append(technique.name)
     chosen = {slot: getattr(scene.candela, f"slot_{slot}") for slot in found}
     return {
         slot: sorted(names, key=lambda name: name != chosen[slot]) for slot, names in found.items() if len(names) > 1

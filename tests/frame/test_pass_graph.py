@@ -7,7 +7,7 @@ import pytest
 from addon.frame.pass_graph import FAMILY, RESULT, SUM, Link, PassGraph, PassNode, check, depths, from_plan, sockets
 from addon.frame.plan import Plan, make_plan
 from addon.frame.settings import Settings
-from addon.frame.technique import Technique, Write
+from addon.frame.technique import Service, Technique, Write
 from addon.techniques import REGISTRY, make_registry
 
 
@@ -16,8 +16,12 @@ class Surface(Technique):
     writes = (Write("surface.position", "RGBA32F", ""), Write("surface.normal", "RGBA32F", ""))
 
 
+class Shadow(Service):
+    name = "shadow"
+
+
 class Maps(Technique):
-    name, label, slot = "maps", "Maps", "shadow"
+    name, label, fills, provides = "maps", "Maps", ("shadow",), (Shadow,)
 
 
 class Volumes(Maps):
@@ -26,7 +30,7 @@ class Volumes(Maps):
 
 class Lamp(Technique):
     name, label = "lamp", "Lamp"
-    reads, uses = ("surface.position", "surface.normal"), ("shadow",)
+    reads, requests = ("surface.position", "surface.normal"), (Shadow,)
     writes = (Write("radiance.diffuse", "RGBA32F", "", True),)
 
 
@@ -94,7 +98,7 @@ def test_who_reads_the_light_of_one_sample_brings_who_takes_it_up():
         writes = (Write("radiance.diffuse", "RGBA32F", "", True),)
 
     class Film(Picture):
-        closes = ("radiance.diffuse",)
+        finishes = ("radiance.diffuse",)
 
     graph = planned(Surface, Lamp, Bounce, Film)
     registry = (Surface, Lamp, Bounce, Film)

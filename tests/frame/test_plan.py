@@ -19,7 +19,8 @@ from addon.techniques import make_registry
 def technique(name, reads=(), writes=(), slot="", reason=None):
     """A technique that computes nothing; `reason` makes it skip."""
     made = Technique()
-    made.name, made.label, made.slot, made.reads = name, name.title(), slot, tuple(reads)
+    made.name, made.label, made.reads = name, name.title(), tuple(reads)
+    made.fills = (slot,) if slot else ()
     made.writes = tuple(Write(image, "RGBA32F", "") for image in writes)
     made.skip = lambda snapshot, settings: reason
     return made
@@ -55,7 +56,7 @@ def test_several_writers_of_an_image_all_run_before_its_reader():
 
 def closing(name, closed, writes=()):
     made = technique(name, (), (*closed, *writes))
-    made.closes = tuple(closed)
+    made.finishes = tuple(closed)
     return made
 
 

@@ -47,11 +47,11 @@ def test_samples_and_seed_are_settings_too():
 
 def test_a_text_fills_a_slot():
     class Other(Rays):
-        slot = "light"
+        fills = ("light",)
 
     assert Settings().override([Other()], ["slot.light=rays"]).slots == {"light": "rays"}
     assert Settings(slots={"light": "rays"}).override([Other()], ["slot.light=AUTO"]).slots == {"light": "AUTO"}
-    with pytest.raises(ValueError, match=r"'slot.light' must be one of AUTO, rays, not 'maps'"):
+    with pytest.raises(ValueError, match=r"'slot.light' must be one of AUTO, OFF, rays, not 'maps'"):
         Settings().override([Other()], ["slot.light=maps"])
 
 

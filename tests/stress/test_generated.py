@@ -32,8 +32,8 @@ SIZE = (24, 16)
 FOUND = Path(__file__).parent / "found"
 SLOTS: dict[str, list[str]] = {}
 for _technique in REGISTRY:
-    if _technique.slot:
-        SLOTS.setdefault(_technique.slot, []).append(_technique.name)
+    for _slot in _technique.fills:
+        SLOTS.setdefault(_slot, []).append(_technique.name)
 
 CLAIMS = 4
 BATCH = min(100, EXAMPLES // CLAIMS) if EXAMPLES else 12  # the first ten of a batch are small

@@ -13,9 +13,9 @@ import pytest
 from addon.compare.metrics import compare_radiance
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
+from addon.frame.technique import identifier
 from addon.lighting.visibility import RESOLUTION
 from addon.techniques import REGISTRY
-from addon.ui.properties import identifier
 
 SCENES = Path(__file__).resolve().parents[2] / "sample_blends"
 SIZE = (128, 96)

@@ -10,7 +10,7 @@ from addon import engine
 from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, images, library
 from addon.lighting import ray_costs
-from addon.techniques.accumulated_maps import AccumulatedMaps
+from addon.lighting.point_maps import PointMaps
 
 
 @pytest.fixture
@@ -89,8 +89,8 @@ def test_of_many_lights_those_that_are_drawn_are_asked_for_rays(room, monkeypatc
     """It takes a thousandth of a second each: not to be spent on what a sample leaves out."""
     for k in range(40):
         room.light("POINT", (k / 20 - 1, 0, 2))
-    asked, traces = [], AccumulatedMaps.traces
-    monkeypatch.setattr(AccumulatedMaps, "traces", lambda *given: asked.append(given[2]) or traces(*given))
+    asked, traces = [], PointMaps.traces
+    monkeypatch.setattr(PointMaps, "traces", lambda *given: asked.append(given[2]) or traces(*given))
     room.scene.candela.direct_light_lights_per_sample = 4
     room.render(2)
     assert 0 < len(asked) <= 2 * 5 and len({emitter.light.key for emitter in asked}) == len(asked)
@@ -224,8 +224,8 @@ def test_error_leaves_no_half_made_frame(room, monkeypatch):
     def broken(self, frame):
         raise KeyError("half made")
 
-    monkeypatch.setattr(AccumulatedMaps, "prepare", broken, raising=False)
-    monkeypatch.setattr(AccumulatedMaps, "key", lambda *_: object())
+    monkeypatch.setattr(PointMaps, "prepare", broken, raising=False)
+    monkeypatch.setattr(PointMaps, "key", lambda *_: object())
     with pytest.raises(RuntimeError, match="half made"):
         room.render(1)
     monkeypatch.undo()

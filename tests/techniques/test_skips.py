@@ -114,8 +114,8 @@ def bound(monkeypatch):
 
 
 def choose(stage, technique):
-    if technique.slot:
-        setattr(stage.scene.candela, f"slot_{technique.slot}", technique.name)
+    for slot in technique.fills:
+        setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 
 
 @pytest.mark.parametrize("technique", [t for t in REGISTRY if t.name not in ALWAYS], ids=lambda t: t.name)

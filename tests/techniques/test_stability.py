@@ -9,8 +9,9 @@ import pytest
 
 from addon import engine
 from addon.compare.reference import RenderFailed
+from addon.frame.technique import OF_A_PICTURE, identifier
 from addon.techniques import REGISTRY
-from addon.ui.properties import identifier
+from addon.ui.properties import block_of
 
 SIZE = (24, 16)
 
@@ -260,10 +261,12 @@ MATERIALS = {
 }
 PARAMETERS = {
     f"{technique.name}.{param.name} {value}": (
-        lambda r, t=technique, p=param, v=value: setattr(r.scene.candela, identifier(t.name, p.name), v)
+        lambda r, t=technique, p=param, v=value: setattr(
+            block_of(p.scope, r.scene).candela, identifier(t.name, p.name), v
+        )
     )
     for technique in REGISTRY
-    for param in technique.params
+    for param in technique.params_of(*OF_A_PICTURE)
     for value in dict.fromkeys((param.minimum, param.maximum, *(item[0] for item in param.items)))
     if value is not None
 }

@@ -6,12 +6,13 @@ import bpy
 import pytest
 
 from addon.frame import ledger
+from addon.frame.technique import SCENE, identifier
 from addon.snapshot.scene import Note
 from addon.techniques import REGISTRY
 from addon.ui import ENGINE, blender_panels, notes, panels
 from addon.ui.pass_tree import TREE
 from addon.ui.passes import PASSES, wanted_passes
-from addon.ui.properties import identifier, slots
+from addon.ui.properties import slots
 
 
 class Layout:
@@ -83,7 +84,7 @@ def test_every_slot_and_parameter_has_a_place(scene):
     assert sorted(shown) == sorted(
         ["pass_tree"]
         + [f"slot_{slot}" for slot in slots()]
-        + [identifier(t.name, p.name) for t in REGISTRY for p in t.params]
+        + [identifier(t.name, p.name) for t in REGISTRY for p in t.params_of(SCENE)]
     )
 
 
@@ -94,17 +95,20 @@ def test_parameters_are_those_of_the_techniques_in_question(scene):
         made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params}
         return {technique for technique, panel in made.items() if panel.poll(Context())}
 
-    assert shown() == {technique for technique in REGISTRY if technique.params}
+    assert shown() == {technique for technique in REGISTRY if technique.params_of(SCENE)}
     scene.candela.slot_shadow = "vssm"
-    assert all(technique.name == "vssm" for technique in shown() if technique.slot == "shadow")
-    assert {technique for technique in REGISTRY if technique.params and technique.slot != "shadow"} <= shown()
+    assert all(technique.name == "vssm" for technique in shown() if "shadow" in technique.fills)
+    assert {
+        technique for technique in REGISTRY if technique.params_of(SCENE) and "shadow" not in technique.fills
+    } <= shown()
 
 
 def test_all_passes_can_be_chosen_and_are_wanted_then(scene):
     layer = bpy.context.view_layer
-    assert drawn(panels.CANDELA_VIEWLAYER_PT_passes) == [render_pass.switch for render_pass in PASSES]
+    assert drawn(panels.CANDELA_VIEWLAYER_PT_passes) == [render_pass.switch.split(".")[-1] for render_pass in PASSES]
     for render_pass in PASSES:
-        setattr(layer, render_pass.switch, True)
+        owner, _, switch = render_pass.switch.rpartition(".")
+        setattr(getattr(layer, owner) if owner else layer, switch, True)
     assert wanted_passes(layer) == list(PASSES)
 
 

@@ -1,0 +1,67 @@
+"""Resolve: the mean of all samples so far as one picture, scene-linear and premultiplied by alpha.
+
+    combined = exposure / n * (direct + indirect + emission + world)
+
+summed over the light paths of the table (frame/light_paths.py) that the picture has. With a transparent film the world
+shows in its own pass only. While a viewport has few samples, indirect diffuse light is shown filtered
+(film/neighbours.py); the sums stay as they are. One pass, a fetch for each light path.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS, SEEN
+from ..frame.run import Frame
+from ..gfx import images, passes
+from ..gfx.library import Program
+from .neighbours import shown_sum
+
+COMBINED = "film.combined"
+
+
+@cache
+def resolve_program(names: tuple[str, ...]) -> Program:
+    """Sums up the light paths of these names."""
+    of_order = {
+        order: [p.name for p in LIGHT_PATHS if p.name in names and p.origin != SEEN and p.order == order]
+        for order in (DIRECT, INDIRECT)
+    }
+    sums = "".join(
+        f"vec3 {order}_light(ivec2 pixel)\n{{\n  return "
+        + (" + ".join(f"{name}_fetch(pixel).rgb" for name in paths) or "vec3(0.0)")
+        + ";\n}\n"
+        for order, paths in of_order.items()
+    )
+    return passes.fullscreen_program(
+        "film resolve",
+        "film/resolve.frag.glsl",
+        textures=tuple(("RGBA32F", name) for name in names),
+        constants=(("FLOAT", "scale"), ("FLOAT", "exposure"), ("INT", "transparent")),
+        snippets=(("generated/light_sums", sums),),
+        outputs=(("VEC4", "out_combined"),),
+    )
+
+
+RESOLVE = tuple(
+    resolve_program(tuple(path.name for path in LIGHT_PATHS if all_of_them or not path.by_need))
+    for all_of_them in (False, True)
+)
+
+
+def resolve(frame: Frame) -> images.Image:
+    """Draw the picture into film.combined. Needs a plan with a film."""
+    target = frame.target(COMBINED)
+    paths = tuple(path.name for path in LIGHT_PATHS if path.image in frame.images)
+    with shown_sum(frame, "diffuse_indirect") as indirect:
+        textures = {name: frame.to_show(f"radiance.{name}") for name in paths}
+        passes.fullscreen(
+            resolve_program(paths),
+            target,
+            textures={**textures, "diffuse_indirect": indirect},
+            constants={
+                "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
+                "transparent": int(frame.snapshot.film.transparent),
+            },
+        )  # fmt: skip
+    return target.colors[0]

@@ -1,0 +1,36 @@
+"""Candela's own settings of a data-block (lamp, material, object): the parameters that techniques declare for it.
+
+The property groups `BLOCK.candela` are generated from those declarations (ui/properties.py), so what is read here is
+whatever has been set, by the property's identifier; what was never touched has the declared default and is left out.
+"""
+
+from __future__ import annotations
+
+Own = tuple[tuple[str, object], ...]  # (identifier, value), in the properties' order; hashable
+
+
+def own_settings(block) -> Own:
+    """What has been set on an evaluated data-block; values are bool, int, float, str, tuples of numbers, names of
+    data-blocks, and for lists a tuple of such tuples, one for each entry."""
+    group = getattr(block, "candela", None)
+    return () if group is None else _values(group, every=False)
+
+
+def _values(group, every: bool) -> Own:
+    found = []
+    for prop in group.bl_rna.properties:
+        name = prop.identifier
+        if name in ("rna_type", "name") or (prop.is_runtime and name.endswith("_active")):
+            continue
+        if prop.type == "COLLECTION":
+            entries = tuple(_values(entry, every=True) for entry in getattr(group, name))
+            if entries:
+                found.append((name, entries))
+        elif every or group.is_property_set(name):
+            value = getattr(group, name)
+            if prop.type == "POINTER":
+                value = value.name if value is not None else ""
+            elif getattr(prop, "is_array", False):
+                value = tuple(value)
+            found.append((name, value))
+    return tuple(found)
