@@ -283,11 +283,18 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         border=border or (0, 0, width, height),
         filter_width=scene.render.filter_size,
         transparent=scene.render.film_transparent,
+        clear_glass=_clear_glass(cycles),
         exposure=getattr(cycles, "film_exposure", 1.0),
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,
     )
+
+
+def _clear_glass(cycles) -> float:
+    if not getattr(cycles, "film_transparent_glass", False):
+        return -1.0
+    return cycles.film_transparent_roughness
 
 
 def _mist(world) -> Mist:

@@ -211,6 +211,7 @@ class Film:
     border: tuple[int, int, int, int]
     filter_width: float = 1.5  # pixels, Blackman-Harris
     transparent: bool = False
+    clear_glass: float = -1.0  # roughness up to which glass shows a transparent film's hole behind it; below 0: none
     exposure: float = 1.0
     mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
     position: bool = False

@@ -72,7 +72,7 @@ REFRACTION = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "interfaces"),
         ("INT", "world_transmission"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"),
-        ("FLOAT", "emissive_points"), *NEAR_CONSTANTS,
+        ("FLOAT", "emissive_points"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
 )  # fmt: skip
@@ -158,6 +158,7 @@ class TracedRefraction(Technique):
                 "world_samples": float(WORLD_DIRECTIONS),
                 "emissive_power": self._triangles.power if self._triangles else 0.0,
                 "emissive_points": float(EMISSIVE_POINTS), **near,
+                "clear_roughness": _clear_roughness(frame),
             },
         )  # fmt: skip
         for image in behind.colors:
@@ -236,3 +237,9 @@ class TracedRefraction(Technique):
     def release(self) -> None:
         self._sources.release()
         self._interfaces = self._triangles = None
+
+
+def _clear_roughness(frame: Frame) -> float:
+    """Roughness up to which glass shows that there is nothing behind it; below 0: none does."""
+    film = frame.snapshot.film
+    return film.clear_glass if film.transparent else -1.0
