@@ -23,12 +23,9 @@ from .own_settings import Own, own_settings
 from .scene import Note, Visibility
 
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
-# Object types that Cycles draws and we do not, as an artist calls them.
-_NOT_DRAWN = {
-    "VOLUME": "volume",
-    "GREASEPENCIL": "grease pencil",
-    "GPENCIL": "grease pencil",
-}
+# Object types that Cycles draws and we do not, as an artist calls them. Grease Pencil is none of them: Blender draws it
+# over the picture of any engine.
+_NOT_DRAWN = {"VOLUME": "volume"}
 _UNUSED_ID = 2147483647  # what Blender fills persistent_id with
 
 
