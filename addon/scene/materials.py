@@ -10,6 +10,7 @@ from ..gfx import images, library
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
+from ..materials.atlas import keys_of, packed
 from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
@@ -74,7 +75,7 @@ class MaterialSet:
         self.notes = tuple(notes)
         needed = {key for compiled in self.compiled for key in compiled.images}
         self._images = {
-            key: self._images.get(key) or upload_image(snapshot.images[key[0]])
+            key: self._images.get(key) or upload_image(image_of(snapshot.images, key[0]))
             for key in ((name, _version(snapshot, name)) for name in needed)
         }
         self._versions = dict(self._images.keys())  # the keys are pairs of name and version
@@ -171,8 +172,17 @@ class MaterialSet:
         self.__init__()
 
 
-def _version(snapshot: Snapshot, name: str) -> int:
-    return snapshot.images[name].version if name in snapshot.images else 0
+def _version(snapshot: Snapshot, name: str) -> int | tuple[int, ...]:
+    versions = tuple(snapshot.images[key].version if key in snapshot.images else 0 for key in keys_of(name))
+    return versions if len(versions) > 1 else versions[0]
+
+
+def image_of(known: dict[str, Image], key: str) -> Image:
+    """The image of a key that a compiled material names: one of `known`, or several in one (materials/atlas.py)."""
+    keys = keys_of(key)
+    if len(keys) == 1 and keys[0] == key:
+        return known[key]
+    return Image(key, 0, packed([known[one].pixels for one in keys]))
 
 
 def upload_image(image: Image) -> images.Image:

@@ -62,7 +62,7 @@ def take(
         notes += cameras.camera_notes(camera.evaluated_get(depsgraph), scene.render)
         border = border or _scene_border(scene.render, width, height)
 
-    images = ImageTable(cache)
+    images = ImageTable(cache, scene.frame_current)
     shading = ShadingTable(cache, images)
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes

@@ -113,6 +113,8 @@ class Image:
     alpha_mode: str = "STRAIGHT"  # STRAIGHT, PREMUL, CHANNEL_PACKED, NONE
     name: str = ""
     missing: bool = False  # it could not be read: the pixels stand in for it, wherever it is asked
+    # Of a UDIM image: number of each tile, where it stands in `pixels` (x, y from the lower left) and its size.
+    tiles: tuple[tuple[int, int, int, int, int], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.compare.exr import read_exr
+from addon.snapshot.exr import read_exr
 
 from .conftest import agree
 
