@@ -385,8 +385,12 @@ def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
     out = np.zeros((len(mesh.corner_vertices), 4), np.float32)
     if attribute.kind == "UV":
         source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
+        if source is None and attribute.name in mesh.colors:
+            source = mesh.colors[attribute.name][:, :3]  # what is no map, too, may be named
     elif attribute.kind == "COLOR":
         source = mesh.colors.get(attribute.name or mesh.active_color)
+        if source is None and attribute.name in mesh.uv_maps:
+            source, out[:, 3] = mesh.uv_maps[attribute.name], 1.0
     elif attribute.kind == "NAMED":
         source, out[:, 3] = mesh.colors.get(attribute.name), 1.0
         if source is None and attribute.name in mesh.uv_maps:

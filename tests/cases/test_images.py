@@ -128,7 +128,7 @@ def test_a_pass_of_a_multilayer_file_is_shown(stage, beside, tmp_path, number):
         settings.media_type = "IMAGE"
     scene.render.filepath, scene.view_layers[0].use_pass_z = before, False
     stage.remove(card)
-    texture = shown(stage, bpy.data.images.load(str(tmp_path / "layers.exr")))
+    shown(stage, bpy.data.images.load(str(tmp_path / "layers.exr")))
     own, cycles = beside(1, (16, 16), reference=1)
     assert not ledger.latest().notes
     agree(quarters(own), quarters(cycles))
