@@ -229,6 +229,7 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
+        self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
         self._glow = EmissionMaps()
         self._environment: tuple[object, Environment] | None = None
@@ -382,7 +383,8 @@ class Renderer:
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad
-        ledger_module.publish(ledger)
+        if self.publishes:
+            ledger_module.publish(ledger)
         return out
 
     def release(self) -> None:
