@@ -18,6 +18,7 @@ def _parts() -> tuple:
     from . import cli, engine
     from .ui import (
         compare_editor,
+        eye_panel,
         jobs,
         panels,
         pass_nodes,
@@ -31,6 +32,7 @@ def _parts() -> tuple:
     )
 
     return (
-        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, tuning,
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
+        tuning,
         pass_operators, compare_editor, cli,
     )  # fmt: skip

@@ -6,7 +6,22 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    ages,
+    costs,
+    direct,
+    everything,
+    glare,
+    growth,
+    hashes,
+    indirect,
+    mutations,
+    page,
+    profile,
+    random_scenes,
+    run,
+)
 
 VERBS = {
     "run": run,
@@ -16,9 +31,12 @@ VERBS = {
     "indirect": indirect,
     "profile": profile,
     "costs": costs,
+    "glare": glare,
     "random": random_scenes,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 

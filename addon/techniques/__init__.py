@@ -12,6 +12,7 @@ from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
 from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
+from .eye import EyeModel
 from .film import Film
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
@@ -20,6 +21,7 @@ from .multires_radiosity import MultiresRadiosity
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
+from .temporal_glare import TemporalGlare
 from .traced_glossy import TracedGlossy
 from .traced_refraction import TracedRefraction
 from .vssm import VarianceSoftShadows
@@ -45,6 +47,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     ScreenSpaceBounce,
     Film,
     Denoise,
+    EyeModel,
+    TemporalGlare,
 )
 
 

@@ -79,7 +79,7 @@ def published():
 def test_every_slot_and_parameter_has_a_place(scene):
     shown = drawn(panels.CANDELA_RENDER_PT_techniques)
     for technique in REGISTRY:
-        if technique.params:
+        if technique.params_of(SCENE):
             shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_{technique.name}"))
     others = scene.render, getattr(scene, "cycles", None)  # settings of Blender's, in the panel of the film
     shown = [name for name in shown if not any(hasattr(other, name) for other in others)]
@@ -94,7 +94,7 @@ def test_parameters_are_those_of_the_techniques_in_question(scene):
     """With Auto, of all; with a technique in the slot, of none of its rivals."""
 
     def shown():
-        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params}
+        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params_of(SCENE)}
         return {technique for technique, panel in made.items() if panel.poll(Context())}
 
     assert shown() == {technique for technique in REGISTRY if technique.params_of(SCENE)}
