@@ -154,6 +154,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     known = before is not None and before.keys == keys
     same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
     made, facts = [], [place.source.facts for place in places]
+    like: dict[int, dict[str, object]] = {}  # fields of an instance of each source
     for k, place in enumerate(places):
         mesh, chosen = resolved[id(place.source)]
         if known and same[k] and before.facts[k] is facts[k]:
@@ -165,13 +166,21 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 made.append(old)
                 continue
         of_object = facts[k]
-        made.append(
-            Instance(
-                of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random, of_object.pass_index,
-                of_object.holdout, of_object.color, place.generated, place.uv, place.key, of_object.terminator,
-                of_object.own,
-            )
-        )  # fmt: skip
+        alike = like.get(id(place.source))
+        if alike is None:
+            alike = like[id(place.source)] = vars(
+                Instance(
+                    of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
+                    of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
+                    of_object.terminator, of_object.own,
+                )
+            )  # fmt: skip
+        # A copy of the first one of the source: the constructor of a frozen dataclass takes half of a large sync's time.
+        one = object.__new__(Instance)
+        vars(one).update(
+            alike, matrix=transforms[k], random=place.random, generated=place.generated, uv=place.uv, key=place.key
+        )
+        made.append(one)
     groups: dict[tuple, list[Instance]] = {}
     for one in made:
         groups.setdefault((one.mesh, one.materials), []).append(one)

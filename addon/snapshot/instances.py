@@ -148,7 +148,11 @@ def walk(
                 continue
             own = f"/hair {data.number}" if hair else ""
             if is_instance:
-                ids = "-".join(str(number) for number in instance.persistent_id if number != _UNUSED_ID)
+                numbers = instance.persistent_id[:]
+                if numbers[1] == _UNUSED_ID and numbers[2] == _UNUSED_ID:  # nearly always
+                    ids = "" if numbers[0] == _UNUSED_ID else str(numbers[0])
+                else:
+                    ids = "-".join([str(number) for number in numbers if number != _UNUSED_ID])
                 key = f"{facts.uid}/{facts.parent_uid}/{ids}{own}"
                 random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
                 place = Place(
