@@ -53,7 +53,9 @@ given: dict[str, dict[str, np.ndarray]] = {}
 
 def session(scene: bpy.types.Scene, use: str) -> Session:
     """The session of a scene for 'final' or 'preview'."""
-    return _sessions.setdefault((scene.original.session_uid, use), Session())
+    shared = _sessions.setdefault((scene.original.session_uid, use), Session())
+    shared.renderer.publishes = use != "preview"
+    return shared
 
 
 def free_sessions() -> None:

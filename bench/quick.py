@@ -265,8 +265,8 @@ def render(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int]) -> 
     import bpy
 
     from addon.compare import reference
-    from addon.compare.exr import read_exr
     from addon.frame import ledger
+    from addon.snapshot.exr import read_exr
 
     with reference.overridden(settings_for(scene, layer, entrant, seed, size)):
         start, cpu_start = time.perf_counter(), time.process_time()

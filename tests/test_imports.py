@@ -25,7 +25,7 @@ BELOW_FRAME = ("gfx", "sampling", "kernels", "scene", "sources", *DATA)
 ON_A_FRAME = ("surfaces", "film", "lighting")  # pieces that techniques share, each on those before it
 BELOW_TECHNIQUES = (*BELOW_FRAME, "eye", "frame", *ON_A_FRAME)
 BELOW_COMPARE = (*BELOW_TECHNIQUES, "materials", "snapshot", "techniques")
-BLENDER = ("bpy", "bpy_extras", "mathutils", "bl_math", "idprop", "numpy")
+BLENDER = ("bpy", "bpy_extras", "imbuf", "mathutils", "bl_math", "idprop", "numpy")
 
 # The longest name that fits is the one that counts: gfx.context has its own line, the rest of gfx another.
 ROOMS = {

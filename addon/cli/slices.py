@@ -15,10 +15,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..compare.exr import ExrError, read_exr
 from ..compare.exr_write import read_about, write_exr
 from ..compare.reference import scene_hash
 from ..frame import slices
+from ..snapshot.exr import ExrError, read_exr
 from .refused import USAGE, Refused
 
 ABOUT = "candela"

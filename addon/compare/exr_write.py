@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .exr import LINES_PER_CHUNK, MAGIC, ExrError, read_attributes
+from ..snapshot.exr import LINES_PER_CHUNK, MAGIC, ExrError, read_attributes
 
 LONG_NAMES = 0x400
 ZIP = 3

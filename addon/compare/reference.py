@@ -31,10 +31,10 @@ import bpy
 import numpy as np
 
 from ..gfx import context
+from ..snapshot.exr import read_exr
 from . import cache
 from .cache import Reference
 from .content import blend_hash
-from .exr import read_exr
 from .passes import IMAGE_OF_PASS, PASS_NAMES, Passes
 
 MANY_BOUNCES = 32  # at albedo 0.8 the light left after 32 bounces is 0.08 %

@@ -17,6 +17,7 @@ from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
+from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
 from ..scene.media import volumes_key
@@ -60,6 +61,7 @@ class Frame:
     hierarchies: HierarchyCache
     surface_means: SurfaceMeans
     measured_opacity: OpacityMaps
+    measured_emission: EmissionMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -158,6 +160,12 @@ class Frame:
         self.measured_opacity.update(self.materials, self.geometry)
         return self.measured_opacity
 
+    @cached_property
+    def emission_maps(self) -> EmissionMaps:
+        """What triangles emit, place by place, where that varies."""
+        self.measured_emission.update(self.materials, self.geometry)
+        return self.measured_emission
+
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
@@ -234,7 +242,9 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
+        self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
+        self._glow = EmissionMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
@@ -295,7 +305,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means, self._opacity, lasting=self._lasting,
+            self._surface_means, self._opacity, self._glow, lasting=self._lasting,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -428,7 +438,8 @@ class Renderer:
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad
-        ledger_module.publish(ledger)
+        if self.publishes:
+            ledger_module.publish(ledger)
         return out
 
     @staticmethod
@@ -487,7 +498,13 @@ class Renderer:
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
-        wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
+        wanted += [self.materials.emission_map_program(k) for k in varied]
+        wanted += [
+            self.materials.tint_program(k)
+            for k in shown
+            if self.materials.compiled[k].tinted or self.materials.compiled[k].added
+        ]
+        wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
         if plan.fills("subsurface"):
             wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))

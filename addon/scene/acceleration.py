@@ -18,6 +18,7 @@ from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
 from . import box_tree
 from .box_tree import LEAF
+from .emission_maps import EmissionMaps, TriangleEmission
 from .opacity_maps import OpacityMaps, TriangleOpacity
 
 LARGEST = 4_000_000  # triangles
@@ -69,6 +70,7 @@ def world_triangles(
     origin: np.ndarray,
     path: str,
     maps: OpacityMaps,
+    glow: EmissionMaps,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_codes), mean emitted radiance, number of the material
@@ -86,8 +88,10 @@ def world_triangles(
     shown = [one for one in instances if _met(one, path) and meshes[one.mesh].triangle_count]
     # Of instances with equal kinds all triangles look the same.
     turns = np.linalg.det([one.matrix[:3, :3] for one in shown]) if shown else ()
-    kinds = zip(shown, ((one.mesh, one.materials, _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)))
-    for (key, slots, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
+    kinds = zip(shown, (
+        (*maps.kind_of(one), glow.kind_of(one), _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)
+    ))  # fmt: skip
+    for (key, slots, _, _, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
         mesh = meshes[key]
         of_triangle = mesh.triangle_materials(slots)
         look_of_triangle = look[rays, bool(mirrored)][of_triangle]
@@ -95,6 +99,9 @@ def world_triangles(
         known = maps.of(copies[0])
         if known is not None:
             _refine(look_of_triangle, of_triangle, materials, known, rays, bool(mirrored))
+        shining = glow.of(copies[0])
+        if shining is not None:
+            _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
             matrices = np.stack([one.matrix[:3] for one in some])
@@ -176,6 +183,17 @@ def _emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple
         return tuple((a + b) / 2 for a, b in zip(front, behind)), 0.0
     side = FRONT_ALONE if any(front) else -FRONT_ALONE
     return (front if any(front) else behind), -side if mirrored else side
+
+
+def _shine(look: np.ndarray, of_triangle: np.ndarray, known: TriangleEmission, mirrored: bool) -> None:
+    """Put what EmissionMaps found of an instance's triangles, `known`, into their rows of `look`, as _emission does."""
+    own = np.flatnonzero(known.measured)
+    front, behind = known.mean[own, 0], known.mean[own, 1]
+    lit, lit_behind = front.any(axis=1), behind.any(axis=1)
+    both = (lit & lit_behind)[:, None]
+    look[own, 1:4] = np.where(both, (front + behind) / 2, front + behind)
+    side = FRONT_ALONE * (lit.astype(float) - lit_behind)
+    look[own, 4] = of_triangle[own] + (-side if mirrored else side)
 
 
 def coverage(codes: np.ndarray, maps: OpacityMaps) -> np.ndarray:
@@ -322,20 +340,20 @@ class HierarchyCache:
         snapshot, origin, draft = frame.snapshot, frame.geometry.origin, frame.settings.draft
         if too_many(snapshot):
             return None
-        materials, maps = frame.measured_materials, frame.opacity_maps
+        materials, maps, glow = frame.measured_materials, frame.opacity_maps, frame.emission_maps
         kinds = {id(i.visibility): i for i in snapshot.instances}
         alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in kinds.values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))
         key = shown, (
             None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            tuple((_mean_code(m), _emission(m)) for m in materials), maps.changes, tuple(origin),
+            tuple((_mean_code(m), _emission(m)) for m in materials), maps.changes, glow.changes, tuple(origin),
         )  # fmt: skip
         tree = self._kept.get(key)
         if tree is None and draft:
-            tree = self._moved(key, snapshot, materials, maps, origin, path)
+            tree = self._moved(key, snapshot, materials, maps, glow, origin, path)
         if tree is None or (tree.refitted and not draft):
-            triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps)
+            triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps, glow)
             tree = build(*triangles, maps.texels)
             if tree.hierarchy.triangles > MOST_REFITTED:
                 tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = tree.nodes = None
@@ -344,7 +362,9 @@ class HierarchyCache:
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
         return replace(tree.hierarchy, instances=tuple(shown))
 
-    def _moved(self, key, snapshot, materials, maps: OpacityMaps, origin: np.ndarray, path: str) -> Tree | None:
+    def _moved(
+        self, key, snapshot, materials, maps: OpacityMaps, glow: EmissionMaps, origin: np.ndarray, path: str
+    ) -> Tree | None:
         """The tree of the same instances, of which a few have moved since; None if there is none."""
         shown, rest = key
         for other in self._kept:
@@ -359,7 +379,7 @@ class HierarchyCache:
                 continue
             starts = np.cumsum(counts) - counts
             numbers = [np.arange(starts[k], starts[k] + counts[k]) for k in moved]
-            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path, maps)
+            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path, maps, glow)
             del self._kept[other]
             return refit(tree, np.concatenate(numbers), *triangles)
         return None

@@ -63,7 +63,7 @@ def take(
         notes += cameras.camera_notes(camera.evaluated_get(depsgraph), scene.render)
         border = border or _scene_border(scene.render, width, height)
 
-    images = ImageTable(cache)
+    images = ImageTable(cache, scene.frame_current)
     shading = ShadingTable(cache, images)
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
@@ -157,6 +157,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     known = before is not None and before.keys == keys
     same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
     made, facts = [], [place.source.facts for place in places]
+    like: dict[int, dict[str, object]] = {}  # fields of an instance of each source
     for k, place in enumerate(places):
         mesh, chosen = resolved[id(place.source)]
         if known and same[k] and before.facts[k] is facts[k]:
@@ -168,14 +169,21 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 made.append(old)
                 continue
         of_object = facts[k]
-        made.append(
-            Instance(
-                of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random, of_object.pass_index,
-                of_object.holdout, of_object.color, place.generated, place.uv, place.key, of_object.terminator,
-                of_object.own,
-                of_object.caustics_caster,
-            )
-        )  # fmt: skip
+        alike = like.get(id(place.source))
+        if alike is None:
+            alike = like[id(place.source)] = vars(
+                Instance(
+                    of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
+                    of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
+                    of_object.terminator, of_object.own, of_object.caustics_caster,
+                )
+            )  # fmt: skip
+        # A copy of the first one of the source: the constructor of a frozen dataclass takes half of a large sync's time.
+        one = object.__new__(Instance)
+        vars(one).update(
+            alike, matrix=transforms[k], random=place.random, generated=place.generated, uv=place.uv, key=place.key
+        )
+        made.append(one)
     groups: dict[tuple, list[Instance]] = {}
     for one in made:
         groups.setdefault((one.mesh, one.materials), []).append(one)
@@ -288,6 +296,7 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         border=border or (0, 0, width, height),
         filter_width=scene.render.filter_size,
         transparent=scene.render.film_transparent,
+        clear_glass=_clear_glass(cycles),
         exposure=getattr(cycles, "film_exposure", 1.0),
         caustics_reflective=getattr(cycles, "caustics_reflective", True),
         caustics_refractive=getattr(cycles, "caustics_refractive", True),
@@ -295,6 +304,12 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,
     )
+
+
+def _clear_glass(cycles) -> float:
+    if not getattr(cycles, "film_transparent_glass", False):
+        return -1.0
+    return cycles.film_transparent_roughness
 
 
 def _mist(world) -> Mist:

@@ -142,6 +142,8 @@ class Image:
     alpha_mode: str = "STRAIGHT"  # STRAIGHT, PREMUL, CHANNEL_PACKED, NONE
     name: str = ""
     missing: bool = False  # it could not be read: the pixels stand in for it, wherever it is asked
+    # Of a UDIM image: number of each tile, where it stands in `pixels` (x, y from the lower left) and its size.
+    tiles: tuple[tuple[int, int, int, int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -242,6 +244,7 @@ class Film:
     border: tuple[int, int, int, int]
     filter_width: float = 1.5  # pixels, Blackman-Harris
     transparent: bool = False
+    clear_glass: float = -1.0  # roughness up to which glass shows a transparent film's hole behind it; below 0: none
     exposure: float = 1.0
     caustics_reflective: bool = True  # switches of the scene: whether light that mirrors or glass throw is wanted
     caustics_refractive: bool = True

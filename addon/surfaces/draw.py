@@ -83,7 +83,7 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
 def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     glass = refracts(frame)
     draw_surfaces(frame, technique, target, STOCHASTIC, glass)
-    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
+    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted or material.added}
     if not tinted:
         return
     # Multiply what was hit by the colour of the layers before it that let this sample pass.
@@ -92,6 +92,19 @@ def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> N
     position = {"surface_position": drawn["surface.position"]}
     with passes.drawing(colors, blend="MULTIPLY", depth_test="NONE", depth_write=False):
         _submit(frame, technique, frame.materials.tint_program, tinted, {"glass_bends": int(glass)}, position)
+    frame.count(technique, "passes")
+
+
+def add_glow(frame: Frame, technique: Technique, position: images.Image, emission: images.Image) -> None:
+    """Add to `emission` what layers emit that stand before the surfaces at `position` (of SURFACE_IMAGES), as seen from
+    where the frame looks now."""
+    glowing = {k for k, material in enumerate(frame.materials.compiled) if material.glows}
+    if not glowing:
+        return
+    state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
+    with passes.drawing(images.Target((emission,)), **state):
+        constants, textures = {"glass_bends": int(refracts(frame))}, {"surface_position": position}
+        _submit(frame, technique, frame.materials.glow_program, glowing, constants, textures)
     frame.count(technique, "passes")
 
 

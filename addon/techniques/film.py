@@ -31,7 +31,15 @@ from ..scene.materials import SURFACE_IMAGES, may_be_glossy
 from ..scene.view import VIEW
 from ..sources import lights
 from ..sources.environment import WORLD
-from ..surfaces.draw import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_indices, draw_sample, surface_bindings
+from ..surfaces.draw import (
+    SOFT_DEFINES,
+    SURFACE_TEXTURES,
+    SURFACES,
+    add_glow,
+    draw_indices,
+    draw_sample,
+    surface_bindings,
+)
 
 SUMS = (
     Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
@@ -41,7 +49,7 @@ SUMS = (
     Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
-WORLD_SUM = 1  # in SUMS
+EMISSION_SUM, WORLD_SUM = 0, 1  # in SUMS
 LIGHT = tuple(path for path in LIGHT_PATHS if path.origin != SEEN)  # what techniques add to in each sample
 
 
@@ -229,6 +237,7 @@ class Film(Technique):
             constants={"light_count": self._light_count, "mist": _mist_constant(frame)},
         )  # fmt: skip
         frame.count(self, "passes")
+        add_glow(frame, self, surfaces["surface_position"], collected[EMISSION_SUM])
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
             world = images.Target((collected[WORLD_SUM],))
             frame.environment.tree.add_background(world, frame.view, frame.view_block, surfaces)

@@ -74,7 +74,7 @@ REFRACTION = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "interfaces"),
         ("INT", "world_transmission"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"),
-        ("FLOAT", "emissive_points"), *NEAR_CONSTANTS,
+        ("FLOAT", "emissive_points"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
 )  # fmt: skip
@@ -152,6 +152,7 @@ class TracedRefraction(Technique):
                 "light_count": len(rows), "offset_size": frame.offset_size, "interfaces": 0,
                 "world_transmission": int(bool(self._sources.world_flags & lights.TRANSMISSION_FLAG)),
                 "world_samples": float(WORLD_DIRECTIONS),
+                "clear_roughness": _clear_roughness(frame),
             },
         }  # fmt: skip
         if frame.service(ShadedLobes) is None:
@@ -212,3 +213,9 @@ class TracedRefraction(Technique):
     def release(self) -> None:
         self._sources.release()
         self._interfaces = None
+
+
+def _clear_roughness(frame: Frame) -> float:
+    """Roughness up to which glass shows that there is nothing behind it; below 0: none does."""
+    film = frame.snapshot.film
+    return film.clear_glass if film.transparent else -1.0

@@ -83,7 +83,8 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
     vec4 seen = surface_position_fetch(pixel);
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
       Surface s = SURFACE_READ(pixel);
-      if (dot(s.geometric_normal, normal) > 0.9) {
+      // Of a holdout the picture has cut out what it reflects.
+      if (s.holdout < 1.0 && dot(s.geometric_normal, normal) > 0.9) {
         return surface_reflection(s, slant);
       }
     }

@@ -242,6 +242,28 @@ vec3 finite_or_black(vec3 color)
   return (is_finite(color.x) && is_finite(color.y) && is_finite(color.z)) ? color : vec3(0.0);
 }
 
+// The chance with which a layer lets the rays of a sample pass, and the share of the light that does, grey. Where a lobe is
+// added to what lets all pass both are more than 1 together: the layer is then drawn as often as they are to each other,
+// and who passes it carries the more light (LEAST_DRAWN: of a faint lobe too, or its highlights were few and bright).
+#define LEAST_DRAWN 0.25
+
+float layer_share(Closures c)
+{
+  return clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+}
+
+float layer_chance(Closures c)
+{
+  float through = layer_share(c);
+#ifdef ADDED_LOBES
+  float drawn = c.diffuse_sum / 3.0 + c.glossy_sum;
+  if (drawn > 0.0 && through + drawn > 1.001) {
+    through /= through + max(drawn, LEAST_DRAWN);
+  }
+#endif
+  return through;
+}
+
 void closures_end(inout Closures c)
 {
   if (c.diffuse_apart) {

@@ -69,10 +69,10 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
 }
 
 // What a ray of the walk finds before `limit` in lights and world. `lobe_density` 0: only the walk can find it.
-vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit)
+vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, bool with_world)
 {
   vec3 sum = vec3(0.0);
-  if (limit >= 1e29 && world_transmission != 0) {
+  if (limit >= 1e29 && with_world) {
     vec3 radiance = environment_radiance(direction);
     if (lobe_density > 0.0) {
       radiance *= power_share(lobe_density, world_samples * environment_density(direction));
@@ -132,6 +132,9 @@ void main()
   vec3 position = s.position;
   vec3 geometric_normal = s.geometric_normal;
   vec3 throughput = vec3(1.0);
+  // With a transparent film, and glass that is said to be, the picture has a hole where clear glass shows the world: the
+  // alpha channels hold how large.
+  bool clear = s.glossy_roughness <= clear_roughness;
   for (int step = 0; step <= interfaces; step++) {
     vec3 gained = throughput * light_through(surface, position, geometric_normal, choice, roll.x);
     vec3 weight;
@@ -142,6 +145,8 @@ void main()
     bool passes = dot(direction, surface.normal) < 0.0;
     float side = dot(direction, geometric_normal);
     throughput *= (passes == (side < 0.0) || (step == 0 && surface_is_edited(s))) ? weight : vec3(0.0);
+    clear = clear && passes;
+    float hole = 0.0;
     float t = 1e29;
     ivec2 hit;
     vec3 origin = ray_origin(position, passes ? -geometric_normal : geometric_normal);
@@ -149,7 +154,8 @@ void main()
     vec3 normal = vec3(0.0);
     if (goes_on) {
       t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, false, hit);
-      gained += throughput * light_found(origin, direction, lobe_density, t);
+      gained += throughput * light_found(origin, direction, lobe_density, t, world_transmission != 0 && !clear);
+      hole = (clear && t >= 1e29) ? dot(throughput, vec3(1.0 / 3.0)) : 0.0;
       goes_on = t < 1e29;
     }
 #ifndef FIRST_ALONE
@@ -162,10 +168,10 @@ void main()
     }
 #endif
     if (step == 0) {
-      out_direct.rgb += gained;
+      out_direct += vec4(gained, hole);
     }
     else {
-      out_indirect.rgb += gained;
+      out_indirect += vec4(gained, hole);
     }
     if (!goes_on) {
       break;
@@ -212,6 +218,7 @@ void main()
     if (shape.z > 1.5) {
       scale = glass_multiscatter(glass.rgb, -dot(smooth_normal, direction), shape.x, ior);
     }
+    clear = clear && shape.x <= clear_roughness;
     surface = interface_begin(smooth_normal, -direction, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
                               scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
     roll = hash3(roll);

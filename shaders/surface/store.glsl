@@ -20,5 +20,9 @@ void store_closures(Closures c, SurfacePoint point, float covered, float holdout
   out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
   out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
                   ior_encode(c.glossy_ior, c.distribution));
+#ifdef GLOWS
+  // What a layer emits is there whether this sample passes it (surface/glow.frag.glsl) or not.
+  covered = min(covered, 1.0);
+#endif
   out_emission = vec4(c.emission * covered, (c.kind == LOBE_TRANSLUCENT) ? lift.y : c.glossy_roughness);
 }

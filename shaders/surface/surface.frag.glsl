@@ -35,7 +35,7 @@ void main()
   evaluate_material(point, c);
   closures_end(c);
 
-  float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+  float through = layer_chance(c);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
   bool passes = (transparent_mode == 0) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
   if (transparent_mode != 1 && passes) {
@@ -43,7 +43,8 @@ void main()
   }
   float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
   float holdout = clamp(c.holdout * covered, 0.0, 1.0);
-  if ((instance.flags & FLAG_HOLDOUT) != 0) {
+  // It cuts its hole in what the camera sees; other views ask for what the object reflects, which lights others.
+  if ((instance.flags & FLAG_HOLDOUT) != 0 && film_view.visibility == FLAG_CAMERA) {
     holdout = 1.0;
     covered = 0.0;
   }

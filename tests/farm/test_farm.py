@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.compare.exr import read_exr
+from addon.snapshot.exr import read_exr
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES, SLICES = 6, 2

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from addon.cli.slices import bounds
-from addon.compare.exr import ExrError, read_exr
 from addon.compare.exr_write import read_about, write_exr
 from addon.frame.settings import Settings
 from addon.frame.slices import Slice, merged
+from addon.snapshot.exr import ExrError, read_exr
 
 TOTAL = 10
 
