@@ -130,7 +130,7 @@ class ShadingTable:
 def wanted_by(graph: Graph) -> Wanted:
     """Tangents and attributes that the nodes of a graph look up in the mesh."""
     attributes = attributes_of(graph)
-    named = {attribute.name for attribute in attributes if attribute.kind in ("COLOR", "NAMED")}
+    named = {attribute.name for attribute in attributes if attribute.kind in ("COLOR", "NAMED", "UV")}
     return Wanted(
         frozenset(attribute.name for attribute in attributes if attribute.kind == "TANGENT"),
         frozenset(named - {""}),

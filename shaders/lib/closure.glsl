@@ -204,6 +204,12 @@ bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
 bool closure_glossy(inout Closures c, vec3 weight, float importance, int kind, vec3 tint, vec3 edge, float ior,
                     float roughness, float anisotropy, vec3 tangent, vec3 normal)
 {
+#ifdef ONE_LOBE
+  // Of a light that meets the surface: what is bent (1) or mirrored (2) alone, so that all photons take one path.
+  if (kind > LOBE_REFRACTION || (kind == LOBE_REFRACTION) != (wanted_lobe == 1)) {
+    return false;
+  }
+#endif
   bool chosen = closure_glossy_choose(c, weight, importance);
   if (chosen) {
     c.kind = kind;
@@ -234,6 +240,28 @@ void closure_transparent(inout Closures c, vec3 weight)
 vec3 finite_or_black(vec3 color)
 {
   return (is_finite(color.x) && is_finite(color.y) && is_finite(color.z)) ? color : vec3(0.0);
+}
+
+// The chance with which a layer lets the rays of a sample pass, and the share of the light that does, grey. Where a lobe is
+// added to what lets all pass both are more than 1 together: the layer is then drawn as often as they are to each other,
+// and who passes it carries the more light (LEAST_DRAWN: of a faint lobe too, or its highlights were few and bright).
+#define LEAST_DRAWN 0.25
+
+float layer_share(Closures c)
+{
+  return clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+}
+
+float layer_chance(Closures c)
+{
+  float through = layer_share(c);
+#ifdef ADDED_LOBES
+  float drawn = c.diffuse_sum / 3.0 + c.glossy_sum;
+  if (drawn > 0.0 && through + drawn > 1.001) {
+    through /= through + max(drawn, LEAST_DRAWN);
+  }
+#endif
+  return through;
 }
 
 void closures_end(inout Closures c)

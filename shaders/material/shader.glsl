@@ -107,6 +107,40 @@ vec3 add_sheen(inout Closures closures, SurfacePoint point, vec3 weight, float r
   return albedo;
 }
 
+// Hair. Of light that meets a fibre about HAIR_MIRRORED is reflected at its surface; the rest crosses the inside, on average
+// 1.57 radii long, and leaves it for the most part. What it absorbs follows from a colour, by the fit of Chiang et al. 2016
+// for the colour of many strands together, or from pigments.
+#define HAIR_MIRRORED 0.08
+#define HAIR_PATH 1.57
+
+vec3 hair_absorption(vec3 color, float roughness)
+{
+  float b = roughness;
+  float fit = 5.969 + b * (-0.215 + b * (2.532 + b * (-10.73 + b * (5.574 + b * 0.245))));
+  vec3 root = log(clamp(color, vec3(1e-5), vec3(1.0))) / fit;
+  return root * root;
+}
+
+void shader_hair(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, int kind, float melanin,
+                 float redness, vec3 tint, vec3 coefficient, float roughness, vec3 normal)
+{
+  vec3 absorption = max(coefficient, vec3(0.0));
+  if (kind == 0) {
+    absorption = hair_absorption(color, roughness);
+  }
+  else if (kind == 1) {
+    float amount = -log(max(1.0 - clamp(melanin, 0.0, 1.0), 1e-4));
+    float red = clamp(redness, 0.0, 1.0);
+    absorption = amount * mix(vec3(0.506, 0.841, 1.653), vec3(0.343, 0.733, 1.924), red)
+                 + hair_absorption(tint, roughness);
+  }
+  vec3 passing = exp(-HAIR_PATH * absorption);
+  vec3 albedo = weight * (HAIR_MIRRORED + (1.0 - HAIR_MIRRORED) * passing);
+  vec3 n = unit_or(normal, point.normal);
+  closure_diffuse(closures, 0.5 * albedo, vec3(1.0), 0.0, n);
+  add_soft(closures, LOBE_TRANSLUCENT, 0.5 * albedo, 1.0, 0.0, vec3(1.0), n);
+}
+
 void shader_diffuse(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
 {
   closure_diffuse(closures, weight, max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));

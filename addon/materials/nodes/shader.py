@@ -240,6 +240,23 @@ ENTRIES = (
         summary=_soft_diffuse,
     ),
     Entry(
+        "ShaderNodeBsdfHairPrincipled",
+        "shader_hair",
+        (
+            Socket("Color", "COLOR", (0.017513, 0.005763, 0.002059)),
+            Choice("parametrization", {"COLOR": 0, "MELANIN": 1, "ABSORPTION": 2}),
+            Socket("Melanin", "FLOAT", 0.8),
+            Socket("Melanin Redness", "FLOAT", 1.0),
+            Socket("Tint", "COLOR", WHITE),
+            Socket("Absorption Coefficient", "VECTOR", (0.245531, 0.52, 1.365)),
+            Socket("Radial Roughness", "FLOAT", 0.3),
+            NORMAL,
+        ),
+        include="material/shader.glsl",
+        note="Drawn as a diffuse strand of the fibre's colour, that lets half of its light through; no highlights.",
+        summary=_soft_diffuse,
+    ),
+    Entry(
         "ShaderNodeBsdfToon",
         "shader_toon",
         (*TOON, Expression("1.0")),
@@ -315,7 +332,7 @@ ENTRIES = (
             f"ShaderNode{name}",
             "shader_inside",
             include="material/shader.glsl",
-            note="Read as coefficients (materials/volume.py); drawn where it absorbs inside glass.",
+            note="Drawn as a volume; in the place of a surface it is left out.",
             summary=lambda sockets: Summary(),
         )
         for name in ("VolumeAbsorption", "VolumeScatter", "VolumePrincipled", "VolumeCoefficients")
