@@ -47,8 +47,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     ScreenSpaceBounce,
     Film,
     Denoise,
-    EyeModel,
     TemporalGlare,
+    EyeModel,
 )
 
 
