@@ -28,11 +28,11 @@ def _parts() -> tuple:
         properties,
         quality,
         scoped_panels,
+        translucency,
         tuning,
     )
 
     return (
         pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
-        tuning,
-        pass_operators, compare_editor, cli,
+        translucency, tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip

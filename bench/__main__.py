@@ -6,7 +6,24 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, glare, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    ages,
+    costs,
+    direct,
+    edges,
+    everything,
+    glare,
+    growth,
+    hashes,
+    indirect,
+    mutations,
+    page,
+    profile,
+    random_scenes,
+    run,
+    subsurface,
+)
 
 VERBS = {
     "run": run,
@@ -17,9 +34,13 @@ VERBS = {
     "profile": profile,
     "costs": costs,
     "glare": glare,
+    "edges": edges,
     "random": random_scenes,
+    "subsurface": subsurface,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 

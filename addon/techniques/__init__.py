@@ -7,6 +7,7 @@ from .accumulated_maps import AccumulatedMaps
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
+from .depth_complexity import DepthComplexity
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
@@ -14,10 +15,12 @@ from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .eye import EyeModel
 from .film import Film
+from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
+from .penumbra_wedges import PenumbraWedges
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
@@ -32,6 +35,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     AccumulatedMaps,
     VarianceSoftShadows,
     ConvolutionSoftShadows,
+    DepthComplexity,
+    PenumbraWedges,
     ShadowsByLight,
     DirectLight,
     EmissiveLight,
@@ -45,6 +50,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ImageSpaceSubsurface,
     Film,
     Denoise,
     TemporalGlare,

@@ -58,6 +58,13 @@ def dark(stage):
     no_emission(stage)
 
 
+def no_source_to_shadow(stage):
+    """Chosen by hand, soft maps serve the world and emissive meshes, too."""
+    no_shadow(stage)
+    no_world(stage)
+    no_emission(stage)
+
+
 def no_glare(stage):
     stage.scene.camera.data.candela.glare_mode = "OFF"
 
@@ -67,8 +74,10 @@ SAMPLES = 4  # with fewer, a picture is not denoised
 WITHOUT = {
     "light_probes": nothing_lit,
     "accumulated_maps": no_shadow,
-    "vssm": no_shadow,
-    "cssm": no_shadow,
+    "vssm": no_source_to_shadow,
+    "cssm": no_source_to_shadow,
+    "depth_complexity": no_shadow,
+    "penumbra_wedges": no_shadow,
     "shadows_by_light": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
