@@ -19,6 +19,7 @@ from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
+from ..scene.media import volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
@@ -474,7 +475,8 @@ class Renderer:
         return self._environment[1]
 
     def _programs(self, plan: Plan, snapshot: Snapshot, settings: Settings) -> list:
-        shown = sorted({draw.material for draw in self.geometry.draws})
+        drawn = {draw.material for draw in self.geometry.draws}
+        shown = sorted(k for k in drawn if not self.materials.compiled[k].bounds_alone)
         wanted = [self.materials.surface_program(material) for material in shown]
         wanted += [program for t in plan.techniques for program in t.programs(snapshot, settings)]
         wanted += [
@@ -494,12 +496,14 @@ class Renderer:
         lights = tuple(
             (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
              light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.bounces, light.visibility, light.own)
+             light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera
+        # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
+        casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            lights, casters, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw),

@@ -96,12 +96,11 @@ class _Compilation:
         )
 
     def _unused_slots(self, medium: Medium | None, glass: bool) -> None:
-        if medium is not None:
-            node, text = self.graph.nodes[self.graph.volume[0]], "The volume of the material is not drawn."
-            if glass:
-                text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
+        if medium is not None and glass:
+            node = self.graph.nodes[self.graph.volume[0]]
+            text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
             absorbs_alone = medium.even and not (medium.scattering.any() or medium.emission.any() or medium.glow)
-            if not (glass and absorbs_alone):
+            if not absorbs_alone:
                 self.code.note(node, text)
         if self.code.values.overflow:
             sentence = "The material has more sliders than fit a uniform block; the last ones recompile it."

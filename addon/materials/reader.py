@@ -335,8 +335,10 @@ def _kind(socket) -> str:
 
 
 def _default(socket) -> tuple[float, ...] | float | None:
-    """The constant of an unlinked socket; None for shaders and for kinds that are no numbers."""
+    """The constant of an unlinked socket; None for shaders and for kinds that are neither numbers nor names."""
     value = getattr(socket, "default_value", None)
+    if isinstance(value, str):
+        return value
     if socket.type in {"VECTOR", "RGBA", "ROTATION"} and value is not None:
         return tuple(value)
     return float(value) if isinstance(value, (bool, int, float)) else None

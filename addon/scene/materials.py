@@ -121,6 +121,12 @@ class MaterialSet:
         """Draws material `index` into the surface images."""
         return _surface_program(self.compiled[index])
 
+    def lobe_program(self, index: int) -> Program:
+        """Draws one lobe of material `index` into the surface images, as the light of a view meets it: what it
+        refracts (`wanted_lobe` 1) or reflects (2). Of several such lobes `lobe_choice` keeps one, the same for all
+        texels."""
+        return _lobe_program(self.compiled[index])
+
     def tint_program(self, index: int) -> Program:
         """Multiplies what lies behind material `index`, which has coloured transparency, by its colour."""
         return _tint_program(self.compiled[index])
@@ -241,6 +247,16 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+def _lobe_program(compiled: CompiledMaterial) -> Program:
+    like = _surface_program(compiled)
+    return replace(
+        like,
+        name=f"one lobe {compiled.program_key[:8]}",
+        constants=(*like.constants, ("INT", "wanted_lobe"), ("FLOAT", "lobe_choice")),
+        defines=(*like.defines, ("ONE_LOBE", "1")),
+    )
+
+
 def _tint_program(compiled: CompiledMaterial) -> Program:
     shared = _shared(compiled)
     return Program(
@@ -281,7 +297,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
+        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
         defines=PROJECTION_DEFINES,
         **_shared(compiled),
     )

@@ -25,7 +25,6 @@ from .scene import Note, Visibility
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
 # Object types that Cycles draws and we do not, as an artist calls them.
 _NOT_DRAWN = {
-    "VOLUME": "volume",
     "GREASEPENCIL": "grease pencil",
     "GPENCIL": "grease pencil",
 }
@@ -71,6 +70,7 @@ class ObjectFacts:
     color: tuple[float, float, float, float]
     terminator: float
     own: Own
+    caustics_caster: bool
     notes: tuple[Note, ...]
 
 
@@ -135,6 +135,7 @@ def walk(
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
+                        caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:
@@ -180,6 +181,11 @@ def _is_holdout(owner, parent, view_layer) -> bool:
     if view_layer is None:
         return owner.is_holdout or (parent is not None and parent.is_holdout)
     return any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None)
+
+
+def visibility_of(owner) -> Visibility:
+    """Ray visibility of an object by itself."""
+    return _visibility_of(_flags(owner, None))
 
 
 def _visibility(owner, parent, view_layer) -> Visibility:

@@ -204,6 +204,12 @@ bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
 bool closure_glossy(inout Closures c, vec3 weight, float importance, int kind, vec3 tint, vec3 edge, float ior,
                     float roughness, float anisotropy, vec3 tangent, vec3 normal)
 {
+#ifdef ONE_LOBE
+  // Of a light that meets the surface: what is bent (1) or mirrored (2) alone, so that all photons take one path.
+  if (kind > LOBE_REFRACTION || (kind == LOBE_REFRACTION) != (wanted_lobe == 1)) {
+    return false;
+  }
+#endif
   bool chosen = closure_glossy_choose(c, weight, importance);
   if (chosen) {
     c.kind = kind;

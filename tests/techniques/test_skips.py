@@ -91,6 +91,8 @@ WITHOUT = {
     "clustered_visibility": no_bounces,
     "imperfect_shadow_maps": no_bounces,
     "ssdo": no_bounces,
+    "caustics_mapping": no_glass,
+    "screen_space_photons": no_glass,
     "denoise": dark,
     "eye": no_glare,
     "glare": no_glare,

@@ -315,7 +315,7 @@ ENTRIES = (
             f"ShaderNode{name}",
             "shader_inside",
             include="material/shader.glsl",
-            note="Read as coefficients (materials/volume.py); drawn where it absorbs inside glass.",
+            note="Drawn as a volume; in the place of a surface it is left out.",
             summary=lambda sockets: Summary(),
         )
         for name in ("VolumeAbsorption", "VolumeScatter", "VolumePrincipled", "VolumeCoefficients")
