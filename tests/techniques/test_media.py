@@ -177,7 +177,6 @@ def phase(kind, g=0.0, values=(1.33, 0.1, 0.5, 20.0)):
         ("HENYEY_GREENSTEIN", 0.0, ()), ("HENYEY_GREENSTEIN", 0.7, ()), ("HENYEY_GREENSTEIN", -0.7, ()),
         ("RAYLEIGH", 0.0, ()), ("DRAINE", 0.5, (1.33, 0.1, 2.0, 20.0)), ("MIE", 0.0, (1.33, 0.1, 0.5, 0.08)),
         ("MIE", 0.0, (1.33, 0.1, 0.5, 1.0)), ("MIE", 0.0, (1.33, 0.1, 0.5, 3.0)),
-        ("FOURNIER_FORAND", 0.0, (1.33, 0.1, 0.5, 20.0)),
     ],
 )  # fmt: skip
 def test_phase_functions_integrate_to_one(stage, kind, g, values):
@@ -185,7 +184,18 @@ def test_phase_functions_integrate_to_one(stage, kind, g, values):
     stage.render(size=(2, 2))  # a GPU context
     found, _ = phase(kind, g, values or (1.33, 0.1, 0.5, 20.0))
     assert (found >= 0).all()
-    assert found.mean() * 4 * np.pi == pytest.approx(1.0, abs=0.01 if kind == "FOURNIER_FORAND" else 3e-3)
+    assert found.mean() * 4 * np.pi == pytest.approx(1.0, abs=3e-3)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.2])
+def test_fournier_and_forand_scatter_backwards_what_they_are_told(stage, share):
+    """Their peak forwards is a singularity, which no even quadrature finds: 3 % lie in the last of 8,192 cosines."""
+    stage.camera_above()
+    stage.render(size=(2, 2))
+    found, mu = phase("FOURNIER_FORAND", 0.0, (1.33, share, 0.5, 20.0))
+    assert (found >= 0).all()
+    assert found[mu < 0].sum() / 4096 * 2 * np.pi == pytest.approx(share, rel=1e-3)
+    assert 0.95 < found.mean() * 4 * np.pi < 1.001
 
 
 def test_henyey_and_greenstein_mirrors_with_the_sign_of_g(stage):
