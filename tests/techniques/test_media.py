@@ -389,3 +389,12 @@ def test_fog_in_a_scene_without_any_mesh(stage):
     stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.0)
     fog(stage, Density=0.2)
     assert stage.render(2, size=(8, 8))["volume_direct"].min() > 0
+
+
+def test_a_lamp_in_endless_fog_is_seen_as_far_as_it_is(stage):
+    stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.2)
+    stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.4)
+    clear = stage.render(8, size=(9, 9))["emission"][4, 4, 0]
+    fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=0.2)
+    seen = stage.render(8, size=(9, 9))["emission"][4, 4, 0]
+    assert seen == pytest.approx(clear * np.exp(-0.2 * 6.0), rel=0.01)
