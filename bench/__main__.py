@@ -6,7 +6,25 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, everything, growth, hashes, indirect, media, page, profile, random_scenes, run
+from bench import (
+    again,
+    ages,
+    costs,
+    direct,
+    edges,
+    everything,
+    glare,
+    growth,
+    hashes,
+    indirect,
+    media,
+    mutations,
+    page,
+    profile,
+    random_scenes,
+    run,
+    subsurface,
+)
 
 VERBS = {
     "run": run,
@@ -17,9 +35,14 @@ VERBS = {
     "media": media,
     "profile": profile,
     "costs": costs,
+    "glare": glare,
+    "edges": edges,
     "random": random_scenes,
+    "subsurface": subsurface,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 

@@ -259,7 +259,7 @@ def _compile(program: Program):
 
 def _explain(program: Program, log: str, sources: list[tuple[str, list[tuple[str, int]]]]) -> str:
     """The driver's complaints with the file and line of the source that each is about."""
-    text, origin = sources[-1 if "FragShader" in log else 0]
+    text, origin = sources[-1 if "FragShader" in log or "fragment:" in log else 0]  # OpenGL's and Vulkan's words
     places = [f"{file}:{line}" for file, line in origin]
     out = [f"Program {program.name} does not compile."]
     for line in log.splitlines():

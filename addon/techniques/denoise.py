@@ -138,9 +138,6 @@ class Denoise(Technique):
         ),
     )
 
-    def __init__(self):
-        self._half_count = 0
-
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if settings.draft:
             return "it is a draft"
@@ -162,7 +159,6 @@ class Denoise(Technique):
         if done == frame.settings.samples // 2:
             for path in self._paths(frame):
                 passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
-            self._half_count = done
 
     def end(self, frame: Frame) -> Iterator[None]:
         for path in self._paths(frame):
@@ -188,7 +184,7 @@ class Denoise(Technique):
                 passes.fullscreen(
                     BEGIN, light, rows=rows, blocks=blocks,
                     textures={**guides, **sums, "half_sum": frame.images[f"denoise.{path}_half"]},
-                    constants={"count": count, "half_count": self._half_count, "sharpness": how.sharpness},
+                    constants={"count": count, "half_count": count // 2, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
             tolerance = how.tolerance * frame.settings.get(self, "strength")

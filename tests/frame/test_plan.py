@@ -227,3 +227,11 @@ def test_names_in_the_registry_are_unique_and_all_writers_of_an_image_agree_on_i
     for write in (write for one in registry for write in one.writes):
         assert formats.setdefault(write.name, (write.format, write.accumulates)) == (write.format, write.accumulates)
         assert write.description
+
+
+def test_of_a_pass_tree_the_first_one_fills_a_slot():
+    both = [technique("maps", slot="shadow"), technique("volumes", slot="shadow")]
+    plan = make_plan(both, None, Settings(passes=("volumes", "maps")))
+    assert names(plan) == ["volumes"]
+    (row,) = plan.skipped
+    assert (row.name, row.reason) == ("maps", "the shadow slot is filled by Volumes")
