@@ -189,7 +189,7 @@ def test_phase_functions_integrate_to_one(stage, kind, g, values):
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.2])
 def test_fournier_and_forand_scatter_backwards_what_they_are_told(stage, share):
-    """Their peak forwards is a singularity, which no even quadrature finds: up to 42 % lie in the last cosine of 8,192."""
+    """Their peak forwards is a singularity, which no even quadrature finds: up to 42 % lie in one cosine of 8,192."""
     stage.camera_above()
     stage.render(size=(2, 2))
     found, mu = phase("FOURNIER_FORAND", 0.0, (1.33, share, 0.5, 20.0))
