@@ -18,6 +18,7 @@ def _parts() -> tuple:
     from . import cli, engine
     from .ui import (
         compare_editor,
+        eye_panel,
         jobs,
         panels,
         pass_nodes,
@@ -27,10 +28,11 @@ def _parts() -> tuple:
         properties,
         quality,
         scoped_panels,
+        translucency,
         tuning,
     )
 
     return (
-        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, tuning,
-        pass_operators, compare_editor, cli,
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
+        translucency, tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip

@@ -11,7 +11,9 @@ from bench import (
     ages,
     costs,
     direct,
+    edges,
     everything,
+    glare,
     growth,
     hashes,
     indirect,
@@ -20,6 +22,7 @@ from bench import (
     profile,
     random_scenes,
     run,
+    subsurface,
 )
 
 VERBS = {
@@ -30,7 +33,10 @@ VERBS = {
     "indirect": indirect,
     "profile": profile,
     "costs": costs,
+    "glare": glare,
+    "edges": edges,
     "random": random_scenes,
+    "subsurface": subsurface,
     "page": page,
     "ages": ages,
     "hashes": hashes,

@@ -29,7 +29,7 @@ from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
 from .bands import Bands
-from .ledger import RAN, REUSED, Ledger, Row
+from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
 from .technique import Service, Technique
@@ -62,11 +62,13 @@ class Frame:
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
+    drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     receivers: Receivers | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
+    needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -186,10 +188,20 @@ class Frame:
         """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
         return self.plan.owner(transport) is not None
 
+    @property
+    def shown_with(self) -> tuple:
+        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in self.plan.techniques if technique.only_shows]
+        return tuple((t.name, self.settings.of(t), self.snapshot.moment) for t in showing)
+
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
+
+    def leave(self, technique: Technique, reason: str) -> None:
+        """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
+        self.needless[technique.name] = reason
 
     def to_show(self, name: str) -> images.Image:
         """The image of that name, or, of sums, the one that shows them better."""
@@ -272,6 +284,7 @@ class Renderer:
             self.frame.profiler = Profiler(settings.profile)
             self.frame.counters = {}
             self.frame.settings = settings
+            self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
         self._frame_key = key
         self._drop_frame()
@@ -309,29 +322,33 @@ class Renderer:
         """
         done = frame.samples_done
         try:
-            yield from self._parts_of_sample(frame)
+            yield from _timed(frame, self._parts_of_sample(frame))
         finally:
             if self.frame is frame and frame.samples_done == done:
                 self._frame_key = None
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
-        settings = frame.settings
+        settings, profiler = frame.settings, frame.profiler
+        measured = settings.samples_to_draw if settings.whole else 0
         if frame.samples_done == 0:
-            yield from self._begin_samples(frame)
-            if settings.sample_offset:
-                # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
-                # picture; its light is that of another slice.
-                yield from _stage(frame, "sample")
-                self._clear_sums(frame)
-                for name in frame.shown.values():
-                    frame.target(name).clear()
+            with profiler.once(measured):
+                yield from self._begin_samples(frame)
+                if settings.sample_offset:
+                    # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
+                    # picture; its light is that of another slice.
+                    yield from _stage(frame, "sample")
+                    self._clear_sums(frame)
+                    for name in frame.shown.values():
+                        frame.target(name).clear()
         if frame.samples_done or settings.sample_offset:
             frame.sample = settings.sample_offset + frame.samples_done
             frame.look()
             frame.shown.clear()
-        yield from _stage(frame, "sample")
+        with profiler.measured(frame.samples_done, measured):
+            yield from _stage(frame, "sample")
         if frame.samples_done + 1 == settings.samples:
-            yield from _stage(frame, "end")
+            with profiler.once(measured):
+                yield from _stage(frame, "end")
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
 
@@ -365,9 +382,16 @@ class Renderer:
     def show(self, frame: Frame) -> images.Image | None:
         """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
         where no technique of the plan makes it. It changes with the next call. No sample may be half drawn."""
+        frame.picture = Frame.picture
+        frame.needless.clear()
         for _ in _stage(frame, "show"):
             pass
         return frame.images.get(frame.picture)
+
+    def drawn_with(self, settings: Settings) -> dict:
+        """The values of settings that samples depend on."""
+        showing = {technique.name for technique in self.techniques if technique.only_shows}
+        return {name: value for name, value in settings.values.items() if name[0] not in showing}
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -392,27 +416,33 @@ class Renderer:
                 pixels /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
-        if not ledger.rows:
-            seconds = frame.profiler.seconds
-            ledger.rows = [
-                Row(
-                    t.name,
-                    t.label,
-                    RAN,
-                    "",
-                    1000 * seconds.get(t.name, 0.0),
-                    ", ".join(frame.plan.slots_of(t)),
-                    frame.counters.get(t.name, {}),
-                )
+        took = frame.drawn_s + frame.profiler.awaited + waited - started
+        spent = frame.profiler.shares([t.name for t in frame.plan.techniques], took)
+        if ledger.rows:  # reused but for what was done to show them
+            worked = frame.counters.keys() | frame.needless.keys()
+            shown = {
+                t.name: self._row(frame, t, spent[t.name])
                 for t in frame.plan.techniques
-            ] + list(frame.plan.skipped)
-            drawn = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques)
-            ledger.times["passes"] = drawn + frame.profiler.awaited + waited - started
+                if t.only_shows and t.name in worked
+            }
+            ledger.rows = [shown.get(row.name, row) for row in ledger.rows]
+        else:
+            rows = [self._row(frame, t, spent[t.name]) for t in frame.plan.techniques]
+            ledger.rows = rows + list(frame.plan.skipped)
+            ledger.times["passes"] = took
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad
         ledger_module.publish(ledger)
         return out
+
+    @staticmethod
+    def _row(frame: Frame, technique: Technique, seconds: float) -> Row:
+        slot = ", ".join(frame.plan.slots_of(technique))
+        if technique.name in frame.needless:
+            return Row(technique.name, technique.label, SKIPPED, frame.needless[technique.name], slot=slot)
+        counters = frame.counters.get(technique.name, {})
+        return Row(technique.name, technique.label, RAN, "", 1000 * seconds, slot, counters)
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -462,6 +492,8 @@ class Renderer:
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
+        if plan.fills("subsurface"):
+            wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
@@ -477,7 +509,7 @@ class Renderer:
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
-            tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
+            tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
@@ -499,3 +531,15 @@ def _stage(frame: Frame, stage: str) -> Iterator[None]:
             parts = iter(run(frame) or ())
         for _ in frame.profiler.steps(technique.name, parts):
             yield
+
+
+def _timed(frame: Frame, parts: Iterator[None]) -> Iterator[None]:
+    """The same parts; what they take is added to the frame's time."""
+    end = object()
+    while True:
+        started = time.perf_counter()
+        part = next(parts, end)
+        frame.drawn_s += time.perf_counter() - started
+        if part is end:
+            return
+        yield

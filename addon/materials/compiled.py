@@ -49,4 +49,5 @@ class CompiledMaterial:
     tinted: bool  # what passes straight through may be coloured
     glass: Interface | None  # how it bends light, on average
     medium: Medium | None  # what its inside does with light
+    scatter: float  # about how far light spreads below its surface, m; 0: it does not
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated

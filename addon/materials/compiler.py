@@ -91,6 +91,7 @@ class _Compilation:
             tinted=summary.tinted,
             glass=summary.glass,
             medium=medium,
+            scatter=summary.scatter,
             fallbacks=tuple(code.fallbacks),
         )
 
@@ -228,6 +229,15 @@ def may_refract(graph: Graph) -> bool:
     return any(
         node.type in REFRACTING
         or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Transmission Weight")))
+        for node in graph.nodes.values()
+    )
+
+
+def may_scatter(graph: Graph) -> bool:
+    """Whether some node of the graph can scatter light below the surface: cheap, by its sockets alone."""
+    return any(
+        node.type == "ShaderNodeSubsurfaceScattering"
+        or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Subsurface Weight")))
         for node in graph.nodes.values()
     )
 

@@ -125,6 +125,10 @@ class MaterialSet:
         """Multiplies what lies behind material `index`, which has coloured transparency, by its colour."""
         return _tint_program(self.compiled[index])
 
+    def scatter_program(self, index: int) -> Program:
+        """Draws what of material `index` light enters elsewhere, where the surface images show it."""
+        return _scatter_program(self.compiled[index])
+
     def caster_program(self, index: int) -> Program:
         """Draws material `index`, which has alpha, into a depth map."""
         return _caster_program(self.compiled[index])
@@ -252,6 +256,21 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
         constants=(("INT", "first_instance"), ("INT", "glass_bends")),
         defines=CAMERA_DEFINES,
         **{**shared, "textures": (*shared["textures"], ("RGBA32F", "surface_position"))},
+    )
+
+
+SCATTER_IMAGES = ("length", "share", "entry")  # layout: shaders/subsurface/image.glsl
+
+
+def _scatter_program(compiled: CompiledMaterial) -> Program:
+    like = _tint_program(compiled)
+    return replace(
+        like,
+        name=f"subsurface {compiled.program_key[:8]}",
+        fragment="surface/scatter.frag.glsl",
+        outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
+        textures=(*like.textures, ("RGBA32F", "scatter_objects")),
+        defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1")),
     )
 
 

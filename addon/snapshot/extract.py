@@ -17,7 +17,7 @@ from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
-from .scene import Camera, Film, Instance, Light, Mesh, Mist, Note, Snapshot, Visibility, World
+from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
 from .world import constant_world, read_world, sun_of
 
@@ -85,6 +85,7 @@ def take(
         film=_film(scene, depsgraph.view_layer_eval, width, height, border),
         notes=tuple(dict.fromkeys(notes)),
         scene_name=scene.name,
+        moment=Moment(scene.frame_current_final, scene.render.fps / scene.render.fps_base),
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start

@@ -232,6 +232,18 @@ class Mist:
 
 
 @dataclass(frozen=True)
+class Moment:
+    """When the scene is looked at: its frame, with a fraction between frames, and how many make a second."""
+
+    frame: float = 0.0
+    per_second: float = 24.0
+
+    @property
+    def seconds(self) -> float:
+        return self.frame / self.per_second
+
+
+@dataclass(frozen=True)
 class Snapshot:
     """One frame of one view layer."""
 
@@ -245,6 +257,7 @@ class Snapshot:
     film: Film
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
+    moment: Moment = Moment()
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 
     @cached_property

@@ -77,6 +77,19 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
     frame.count(technique, "passes")
 
 
+def draw_scatter(
+    frame: Frame, technique: Technique, target: images.Target, objects: images.Image, materials: set[int]
+) -> None:
+    """Draw how far light spreads below the surfaces of `materials`, where this sample's surface images show them, into
+    SCATTER_IMAGES. `objects`: by instance, see scene/scatter_points.py."""
+    target.clear((0.0, 0.0, 0.0, 0.0))
+    textures = {"surface_position": frame.images["surface.position"], "scatter_objects": objects}
+    with passes.drawing(target, depth_test="NONE", depth_write=False):
+        constants = {"glass_bends": int(refracts(frame))}
+        _submit(frame, technique, frame.materials.scatter_program, materials, constants, textures)
+    frame.count(technique, "passes")
+
+
 def _submit(
     frame: Frame, technique: Technique, program_of, materials: set[int] | None, constants: dict, textures=None,
     indices: list[int] | None = None,

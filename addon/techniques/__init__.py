@@ -7,19 +7,24 @@ from .accumulated_maps import AccumulatedMaps
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
+from .depth_complexity import DepthComplexity
 from .direct_light import DirectLight
 from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
 from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
+from .eye import EyeModel
 from .film import Film
+from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .multires_radiosity import MultiresRadiosity
+from .penumbra_wedges import PenumbraWedges
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
+from .temporal_glare import TemporalGlare
 from .traced_glossy import TracedGlossy
 from .traced_refraction import TracedRefraction
 from .vssm import VarianceSoftShadows
@@ -30,6 +35,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     AccumulatedMaps,
     VarianceSoftShadows,
     ConvolutionSoftShadows,
+    DepthComplexity,
+    PenumbraWedges,
     ShadowsByLight,
     DirectLight,
     EmissiveLight,
@@ -43,8 +50,11 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ImageSpaceSubsurface,
     Film,
     Denoise,
+    EyeModel,
+    TemporalGlare,
 )
 
 

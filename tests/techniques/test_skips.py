@@ -65,6 +65,10 @@ def no_source_to_shadow(stage):
     no_emission(stage)
 
 
+def no_glare(stage):
+    stage.scene.camera.data.candela.glare_mode = "OFF"
+
+
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
@@ -72,6 +76,8 @@ WITHOUT = {
     "accumulated_maps": no_shadow,
     "vssm": no_source_to_shadow,
     "cssm": no_source_to_shadow,
+    "depth_complexity": no_shadow,
+    "penumbra_wedges": no_shadow,
     "shadows_by_light": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
@@ -86,6 +92,8 @@ WITHOUT = {
     "imperfect_shadow_maps": no_bounces,
     "ssdo": no_bounces,
     "denoise": dark,
+    "eye": no_glare,
+    "glare": no_glare,
 }
 
 
@@ -121,6 +129,9 @@ def bound(monkeypatch):
 
 
 def choose(stage, technique):
+    if technique.name in ("eye", "glare"):
+        stage.scene.camera.data.candela.glare_mode = "CONVOLUTION"
+        stage.scene.camera.data.candela.glare_white = 0.01
     for slot in technique.fills:
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 

@@ -78,7 +78,7 @@ def published():
 def test_every_slot_and_parameter_has_a_place(scene):
     shown = drawn(panels.CANDELA_RENDER_PT_techniques)
     for technique in REGISTRY:
-        if technique.params:
+        if technique.params_of(SCENE):
             shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_{technique.name}"))
     shown = [name for name in shown if not hasattr(scene.render, name)]  # Blender's own, in the panel of the film
     assert sorted(shown) == sorted(
@@ -92,7 +92,7 @@ def test_parameters_are_those_of_the_techniques_in_question(scene):
     """With Auto, of all; with a technique in the slot, of none of its rivals."""
 
     def shown():
-        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params}
+        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params_of(SCENE)}
         return {technique for technique, panel in made.items() if panel.poll(Context())}
 
     assert shown() == {technique for technique in REGISTRY if technique.params_of(SCENE)}
