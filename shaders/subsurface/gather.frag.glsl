@@ -51,9 +51,9 @@ float pixel_width_at(vec3 position)
   return (film_view.eye.w > 0.5) ? across : across * w;
 }
 
-// Mean of what arrives at pixels of the object within `range`, by the windowed profile; taps on a spiral, denser inwards.
-Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float range, float pixel_size,
-                    float translucency)
+// Mean of what arrives at pixels of the object within `extent`, by the profile in the window; taps on a spiral, denser inwards.
+Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float extent, float range,
+                    float pixel_size, float translucency)
 {
   Arriving sum;
   sum.direct = sum.indirect = sum.whole = vec3(0.0);
@@ -63,8 +63,8 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
   uvec3 roll = roll_of(here, film_view.sample_index, film_view.seed, 211);
   float turn = to_unit(roll.x) * 2.0 * PI;
   float shift = to_unit(roll.y);
-  float inner = max(0.5 * pixel_size, 1e-3 * range);
-  float ratio = log(1.0 + range / inner);
+  float inner = max(0.5 * pixel_size, 1e-3 * extent);
+  float ratio = log(1.0 + extent / inner);
   for (int k = 0; k < taps; k++) {
     float r = inner * (exp((float(k) + shift) / float(taps) * ratio) - 1.0);
     float angle = turn + GOLDEN * float(k);
@@ -212,10 +212,10 @@ void main()
   vec4 object = scatter_objects_fetch(ivec2(place & 2047, place >> 11));
   float reach = profile_reach(profile);
   if (reach > width) {  // else all of it lies within the pixel
-    // Without points all is taken from pixels.
-    bool has_points = object.y > 0.5 && reach > 2.0 * width && points_lit != 0;
-    float range = has_points ? min(RANGE * object.z, reach) : reach;
-    Arriving near = near_light(pixel, position, normal, profile, code, range, width, translucency);
+    // Without points, or where they lie too far apart to know more than pixels do, all is taken from these.
+    bool has_points = reach > max(RANGE * object.z, 2.0 * width) && object.y > 0.5 && points_lit != 0;
+    float range = has_points ? RANGE * object.z : 1e3 * reach;
+    Arriving near = near_light(pixel, position, normal, profile, code, min(range, reach), range, width, translucency);
     vec3 found = step(vec3(1e-20), near.whole);
     direct = mix(own.direct, near.direct / max(near.whole, vec3(1e-20)), found);
     indirect = mix(own.indirect, near.indirect / max(near.whole, vec3(1e-20)), found);

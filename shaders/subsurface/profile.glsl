@@ -120,14 +120,16 @@ float near_window(float r, float range)
 // Integral over t = 0..a of (1 - (t / a)^2)^2 exp(-t): what of a lobe lies in the window, a = range / scale.
 float lobe_near(float a)
 {
+  a = min(a, 1e9);
   if (a < 1.0) {  // the series in a of the moments of the window
     return a * (8.0 / 15.0 - a * (1.0 / 6.0 - a * (4.0 / 105.0 - a * (1.0 / 144.0 - a * (1.0 / 945.0
            - a * (1.0 / 7200.0 - a / 62370.0))))));
   }
-  float e = exp(-min(a, 80.0));
+  float m = min(a, 80.0);  // beyond, nothing is left of the exponential, and powers of a leave float32
+  float e = exp(-m);
   float b = 1.0 / (a * a);
-  float second = 2.0 - e * (a * a + 2.0 * a + 2.0);
-  float fourth = 24.0 - e * (a * a * a * a + 4.0 * a * a * a + 12.0 * a * a + 24.0 * a + 24.0);
+  float second = 2.0 - e * (m * m + 2.0 * m + 2.0);
+  float fourth = 24.0 - e * (m * m * m * m + 4.0 * m * m * m + 12.0 * m * m + 24.0 * m + 24.0);
   return 1.0 - e - 2.0 * b * second + b * b * fourth;
 }
 

@@ -3,10 +3,10 @@
 import bpy
 import numpy as np
 import pytest
-from conftest import places
 
 from addon.kernels import diffusion
 from addon.techniques import instant_radiosity
+from tests.techniques.conftest import places
 
 COLOR = (0.8, 0.5, 0.2)
 PATH = 0.25 / np.pi  # of a radius: Burley's d
@@ -187,7 +187,7 @@ def test_one_sample_is_smooth(stage):
     [
         {"Subsurface_Radius": (0, 0, 0)}, {"Subsurface_Scale": 1e6}, {"Base_Color": (1, 1, 1, 1)},
         {"Base_Color": (0, 0, 0, 1)}, {"Subsurface_Anisotropy": 0.99}, {"Subsurface_Radius": (1e30, 1, 0)},
-        {"Thin_Wall": 1.0},
+        {"Thin_Wall": True},
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
@@ -212,3 +212,49 @@ def test_many_materials_and_no_light(stage):
     assert shown(stage.render(1)).max() == 0.0
     stage.light("SUN")
     assert shown(stage.render(1)).max() > 0.0
+
+
+def _map(name, color):
+    """An image of 64 x 64 pixels, scene-linear, by a function of u."""
+    image = bpy.data.images.new(name, 64, 64, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    u = (np.arange(64) + 0.5) / 64
+    pixels = np.ones((64, 64, 4), np.float32)
+    pixels[..., :3] = np.array([color(x) for x in u], np.float32)[None]
+    image.pixels.foreach_set(pixels.ravel())
+    return image
+
+
+def _painted_plane(stage, **maps):
+    material = scattering(stage)
+    plane = stage.card(material, 0.0, 1.0)
+    plane.scale = (2, 2, 1)
+    for name, image in maps.items():
+        setattr(material.candela, f"image_space_subsurface_{name}", image)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(2.0)
+    return stage.render(16)
+
+
+def test_neutral_maps_equal_no_maps_to_the_bit(stage):
+    plain = shown(_painted_plane(stage))
+    stage.clear()
+    maps = {"blur_map": 0.5, "tint_map": 1.0, "translucency_map": 1.0}
+    painted = {name: _map(name, lambda x, value=value: (value,) * 3) for name, value in maps.items()}
+    assert np.array_equal(shown(_painted_plane(stage, **painted)), plain)
+
+
+def test_the_edge_of_a_painted_tint_is_as_soft_as_the_range(stage):
+    tint = _map("tint", lambda x: (0.25, 1.0, 1.0) if x > 0.5 else (1.0, 1.0, 1.0))
+    picture = shown(_painted_plane(stage, tint_map=tint)).mean(axis=0)
+    x = places((32, 32), 2.0)[0][0]
+    beside = diffusion.burley(PATH).edge(x)
+    assert picture[:, 0] / COLOR[0] == pytest.approx(1.0 - 0.75 * beside, abs=0.03)
+    assert picture[:, 1] / COLOR[1] == pytest.approx(1.0, abs=0.03)
+
+
+def test_where_nothing_is_translucent_it_is_diffuse_and_gives_nothing(stage):
+    mask = _map("mask", lambda x: (0.0, 0.0, 0.0))
+    assert shown(_painted_plane(stage, translucency_map=mask)) == pytest.approx(
+        np.broadcast_to(COLOR, (32, 32, 3)), abs=1e-5
+    )
