@@ -1,6 +1,6 @@
 # Every target makes the environment that it needs first; see tools/environment.py.
 
-# 5.2 (the current LTS), 5.0 or 4.5 (the older LTS), each in an environment of its own.
+# 5.2 (the current LTS), 5.3 (the newest, on Vulkan), 5.0 or 4.5 (the older LTS), each in an environment of its own.
 BLENDER ?= 5.2
 PYTHON3 ?= python3
 STRESS ?= 2000
@@ -11,10 +11,10 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
+.PHONY: help environment demo pictures samples test test-fast stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
 
 help: ## this list
-	@echo "make TARGET [BLENDER=5.2|5.0|4.5]"
+	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1@\2/p' Makefile | column -t -s @
 
 environment: ## the virtual environment, with Blender as a Python module
@@ -42,6 +42,12 @@ check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff format --check --quiet .
 	$(PYTHON) -m ruff check --quiet .
 	$(PYTHON) -m pytest -q $(PARALLEL) -m "not window and not timing and not slow"
+
+matrix: environment ## fast tests with each supported Blender (VERSIONS="5.0 4.5"), and the result in the README
+	$(PYTHON) tools/matrix.py $(VERSIONS)
+
+mutations: environment ## small wrongs that the tests must notice
+	$(PYTHON) -m bench mutations
 
 package: environment ## the extension as a zip, in build/
 	$(PYTHON) tools/package.py --output build

@@ -8,17 +8,24 @@ import sys
 
 from bench import (
     again,
+    ages,
     caustics,
     costs,
     direct,
+    edges,
     everything,
+    glare,
     growth,
     hashes,
     indirect,
+    media,
+    mutations,
     page,
     profile,
     random_scenes,
+    reflections,
     run,
+    subsurface,
 )
 
 VERBS = {
@@ -27,12 +34,19 @@ VERBS = {
     "growth": growth,
     "direct": direct,
     "indirect": indirect,
+    "media": media,
     "caustics": caustics,
     "profile": profile,
     "costs": costs,
+    "glare": glare,
+    "edges": edges,
     "random": random_scenes,
+    "reflections": reflections,
+    "subsurface": subsurface,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 

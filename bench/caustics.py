@@ -82,7 +82,12 @@ def command(options: argparse.Namespace) -> int:
             print(f"{name:10} {one.label:22} " + "  ".join(cell(f) for f in figures), flush=True)
     shown = [name for name in options.scenes if name in known]
     parts = []
-    titles = ("relMSE of the caustic's own light", "Its energy", "relMSE of all light on the floor", "Processor seconds of the render")
+    titles = (
+        "relMSE of the caustic's own light",
+        "Its energy",
+        "relMSE of all light on the floor",
+        "Processor seconds of the render",
+    )
     for number, title in enumerate(titles):
         table = [["", *(SCENES[name].label for name in shown)]]
         table += [[one.label, *(cell(figures[number]) for figures in found)] for one, found in rows.items() if found]

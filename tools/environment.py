@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Make the environment that the Makefile's targets run in: Blender as a Python module, and the development tools.
 
-    python3 tools/environment.py [--blender 5.2 | 5.0 | 4.5]
+    python3 tools/environment.py [--blender 5.3 | 5.2 | 5.0 | 4.5]
 
 Runs under any Python from 3.8 on and needs nothing but its standard library. In order, each step only when it is due:
 
-1. find the Python that this Blender needs (3.13 for 5.2, 3.11 for the older ones),
-2. make a virtual environment with it, `.venv` for 5.2 and `.venv-5.0`, `.venv-4.5`,
+1. find the Python that this Blender needs (3.13 for 5.2 and 5.3, 3.11 for the older ones),
+2. make a virtual environment with it, `.venv` for 5.2 and `.venv-5.3`, `.venv-5.0`, `.venv-4.5`,
 3. install what `[dependency-groups]` in pyproject.toml pins,
 4. look for the system libraries that Blender loads, and name the Debian packages of those that are missing.
 
@@ -25,8 +25,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 # Blender version -> the Python it is built for, and the folder of its environment.
-PYTHON_OF = {"5.2": "3.13", "5.0": "3.11", "4.5": "3.11"}
-FOLDER_OF = {"5.2": ".venv", "5.0": ".venv-5.0", "4.5": ".venv-4.5"}
+PYTHON_OF = {"5.3": "3.13", "5.2": "3.13", "5.0": "3.11", "4.5": "3.11"}
+FOLDER_OF = {"5.3": ".venv-5.3", "5.2": ".venv", "5.0": ".venv-5.0", "4.5": ".venv-4.5"}
 # What stands in for a Blender whose Python is not on this machine.
 FALLBACK_OF = {"5.2": "5.0"}
 

@@ -1,8 +1,27 @@
-"""The pass that lights surfaces by a batch of points of lights, with the visibility that a lookup tells."""
+"""The light loop: points of lights, what tells from where they are seen, and the pass that lights surfaces by them.
+
+Every source of direct light (lamps, directions of the world, emissive triangles, areas fitted to the world) draws
+points of it for a sample, each with the provider that tells its visibility. The loop groups them by provider, lets each
+make batches of them with depth maps, rays or images to be asked, and runs one pass for a batch:
+
+    L(x, v) = sum over points  f(x, v, w) cos(w) Le(y, -w) V(x, y) / p
+
+A lighting program is compiled for a lookup, with or without soft lobes, and for kinds of light sources.
+
+| cost | per batch of at most 64 points |
+|---|---|
+| passes | 1 over the screen, and what the provider draws |
+| fetches per pixel | 6 surface + per point 5 to 8 of its row, and those of the lookup |
+
+Where a round light's radius is more than a quarter of its distance, points that ask maps are asked by rays: in its ball
+a point is drawn, and light arrives from the ball's projection towards the receiver, so that a map from the point shows
+what blocks it only as long as the ball is small beside its distance.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,15 +30,33 @@ from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import passes
 from ..gfx.library import Program
+from ..scene import acceleration
 from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import repeated_light, shared_visibility
+from .media import MediaService, attenuated
 from .repeated_light import Lit
-from .visibility import Lookup, Maps, traced_roughness
+from .visibility import (
+    RAY_CONSTANTS,
+    LightPoint,
+    Lookup,
+    Maps,
+    VisibilityProvider,
+    ray_bindings,
+    source_of,
+    traced_roughness,
+)
 
 CANDIDATES = 4  # directions that traced_glossy draws from a lobe per sample, of which it traces one
 TRACED_DEFINES = (("CANDIDATES", str(CANDIDATES)),)
+NEAR = 0.25  # radius / distance of a round light from which rays are traced instead of asking maps
+RAYS_WHERE_NEAR = Lookup(
+    "rays where near",
+    "light/near_visibility.glsl",
+    textures=acceleration.HIERARCHY_TEXTURES,
+    constants=(*RAY_CONSTANTS, ("FLOAT", "near_share")),
+)
 
 
 @cache
@@ -43,7 +80,7 @@ def lighting(lookup: Lookup, soft_lobes: bool, kinds: int = -1) -> Program:
             *lookup.defines,
             ("LIGHT_KINDS", str(kinds)),
         ),
-        snippets=(("generated/visibility", f'#include "{lookup.file}"\n'),),
+        snippets=source_of(lookup),
         outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
     )
 
@@ -69,11 +106,50 @@ def shade(
         },
     }  # fmt: skip
     program = lighting(maps.lookup, frame.materials.soft, kinds)
+    media = frame.service(MediaService)
+    if media is not None:
+        program = attenuated(program)
+        bindings["textures"] |= media.bindings
     lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
     if maps.sparse:
         between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
+        between = attenuated(between) if media is not None else between
         yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
     else:
         yield from repeated_light.add(frame, technique, sources, lit)
         frame.count(technique, "passes")
     frame.count(technique, "light samples", len(rows))
+
+
+def light_surfaces(
+    frame: Frame,
+    technique: Technique,
+    points: list[LightPoint],
+    kinds: int,
+    sources: lights.Sources,
+    adjust: Callable[[Maps, int], Maps] | None = None,
+) -> Iterator[None]:
+    """Add the light of these points, of light sources of these `kinds`, to the radiance images, in parts. `adjust`:
+    changes what tells the visibility of a batch of so many points."""
+    by_provider: dict[VisibilityProvider, list[LightPoint]] = {}
+    for point in points:
+        by_provider.setdefault(point.provider, []).append(point)
+        kinds |= bool(point.flags & lights.WHOLE_FLAG) << lights.WHOLE
+    for provider, own in sorted(by_provider.items(), key=lambda group: group[0].asks_views):
+        for batch, maps in provider.batches(frame, technique, own):
+            yield from maps.drawing
+            yield
+            maps = adjust(maps, len(batch)) if adjust else maps
+            near = [point.row for point in batch if point.flags & lights.NEAR_FLAG]
+            others = [point.row for point in batch if not point.flags & lights.NEAR_FLAG]
+            if others:
+                yield from shade(frame, technique, others, kinds, sources, maps)
+            if near:
+                yield from shade(frame, technique, near, kinds, sources, _with_rays(frame, maps))
+
+
+def _with_rays(frame: Frame, maps: Maps) -> Maps:
+    """The same maps, asked only where the light is small beside its distance."""
+    textures, constants = ray_bindings(frame)
+    constants["near_share"] = NEAR
+    return replace(maps, lookup=RAYS_WHERE_NEAR, textures=textures, constants=constants)

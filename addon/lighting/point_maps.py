@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,13 +20,16 @@ from .visibility import (
     EDGES,
     FINER_BY_LOT,
     FINER_FROM,
+    Batch,
     DepthMapService,
+    LightPoint,
     Maps,
     VisibilityProvider,
     by_rays,
     drawn_by_lot,
     map_resolution,
     ray_bindings,
+    rounds,
 )
 
 CUTOFF = Param(
@@ -59,10 +63,6 @@ class PointMaps(Technique, VisibilityProvider):
     def begin(self, frame: Frame) -> None:
         frame.provide(self, VisibilityProvider)
         self._find_reached(frame)
-
-    def serving(self, emitter: lights.Emitter) -> PointMaps:
-        """The kind of maps that this light has."""
-        return self
 
     def _find_reached(self, frame: Frame) -> None:
         """For each light the receivers where its shadows can be seen (see CUTOFF)."""
@@ -100,23 +100,16 @@ class PointMaps(Technique, VisibilityProvider):
         finer = FINER_BY_LOT if frame.settings.samples >= FINER_FROM and drawn_by_lot(frame) else 1.0
         return map_resolution(frame, finer * frame.settings.get(self, "texels_per_pixel"))
 
-    def cell(self, frame: Frame, number: int, points: float) -> float:
-        """Share of a light's extent, along each axis, that the map of point `number` of `points` stands for; 0: a point
-        alone; 1: the whole light, from its middle."""
-        return 0.0
-
-    def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
-        """The part of the light that point `number` of `points` stands for as a whole; None where it is a point."""
-        return None
-
     def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:
         """Whether rays take the place of this light's maps."""
         return by_rays(frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame))
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""
-        receivers = self._reached.get(emitter.light.key)
-        if not emitter.light.cast_shadow or receivers is None or not len(receivers.distance):
+        of_world_or_mesh = emitter.light is None
+        receivers = frame.receivers if of_world_or_mesh else self._reached.get(emitter.light.key)
+        shadowed = of_world_or_mesh or emitter.light.cast_shadow
+        if not shadowed or receivers is None or not len(receivers.distance):
             return []
         found = self._views(frame, emitter, sample, receivers, self.jitter(frame, emitter, number), cell)
         return [replace(view, glass_blocks=True) for view in found] if answered(frame, emitter) else found
@@ -146,6 +139,10 @@ class PointMaps(Technique, VisibilityProvider):
     def most_texels(self, frame: Frame) -> int:
         """Of the views of a round."""
         return self.atlas_texels
+
+    def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
+        for own, views in rounds(frame, points, self.resolution(frame), self.most_texels(frame)):
+            yield own, self.draw(frame, views)
 
     def draw(self, frame: Frame, views: list) -> Maps:
         """Draw the views of a round. The maps may be asked once `drawing` is exhausted."""

@@ -58,7 +58,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from . import repeated_light
-from .visibility import Lookup, Maps
+from .visibility import Lookup, Maps, source_of
 
 RATE = 4  # pixels between lookups, along both axes
 # Differences of visibility between a cell's corners up to which pixels within it interpolate: whatever lies around, and
@@ -106,7 +106,7 @@ def _looking(lookup: Lookup, kinds: int, *more: tuple[str, str]) -> dict:
         "blocks": ((VIEW, "film_view"), (lights.SOURCES, "sources"), *lookup.blocks),
         "constants": (*lookup.constants, ("INT", "light_count")),
         "defines": (*DEFINES, *lookup.defines, ("LIGHT_KINDS", str(kinds))),
-        "snippets": (("generated/visibility", f'#include "{lookup.file}"\n'),),
+        "snippets": source_of(lookup),
     }
 
 

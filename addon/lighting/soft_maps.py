@@ -23,10 +23,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..frame.run import Frame
+from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..gfx import images
 from ..kernels import tables
+from ..materials.compiler import may_emit
 from ..scene import acceleration
+from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps, shared_visibility
 from .point_maps import PointMaps
@@ -81,6 +84,14 @@ def with_contacts(lookup: Lookup) -> Lookup:
     )
 
 
+def lit_by_others(snapshot: Snapshot) -> bool:
+    """Whether the world or an emissive mesh lights something that may stand in shadow."""
+    if not any(instance.visibility.shadow for instance in snapshot.instances):
+        return False
+    used = {slot for instance in snapshot.instances for slot in instance.materials}
+    return bool(np.any(snapshot.world.color)) or any(may_emit(snapshot.materials[k].graph) for k in used)
+
+
 def few_samples(frame: Frame) -> bool:
     """Whether each sample is so much of the picture that it pays to spend rays on it, and to save texels."""
     return frame.settings.samples < FEWEST_POINTS
@@ -97,6 +108,15 @@ class SoftMaps(PointMaps):
         super().__init__()
         self._drawn: tuple[tuple, Maps] | None = None
         self._kept: dict[str, images.Image] = {}
+
+    def serves_every_source(self, frame: Frame) -> bool:
+        """Where it is chosen by hand. Auto takes it for lamps alone: a map for each of many directions costs more."""
+        return self.name in (frame.settings.slots.get("shadow"), *(frame.settings.passes or ()))
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        reason = super().skip(snapshot, settings)
+        chosen = self.name in (settings.slots.get("shadow"), *(settings.passes or ()))
+        return None if chosen and lit_by_others(snapshot) else reason
 
     def cell(self, frame: Frame, number: int, points: float) -> float:
         if not frame.settings.get(self, "refine"):

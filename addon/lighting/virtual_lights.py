@@ -70,6 +70,7 @@ from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
+from .media import MediaService, attenuated
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe
@@ -296,7 +297,15 @@ class VirtualLights:
         """FOUND, a row per probe."""
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
-        passes.fullscreen(candidates_program(self.kinds), found, **self._probing(frame, grid))
+        program, bindings, media = (
+            candidates_program(self.kinds),
+            self._probing(frame, grid),
+            frame.service(MediaService),
+        )
+        if media is not None:
+            program = attenuated(program)
+            bindings["textures"] |= media.bindings
+        passes.fullscreen(program, found, **bindings)
         return found
 
     def _radiances(self, frame: Frame, grid: Grid, found: images.Target) -> tuple[np.ndarray, ...]:

@@ -47,9 +47,59 @@ def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
 
 
 class VisibilityProvider(Service):
-    """What tells the visibility of lights, light by light: fills the shadow slot (point_maps.PointMaps)."""
+    """What tells whether points of lights are seen from surfaces. The one in the shadow slot serves the lamps.
+
+    It says how it would have a light drawn, point by point (`traces` to `views`; by default as single points), and then
+    answers batches of such points with a lookup and what that binds. `asks_views`: it answers by depth maps, so that a
+    point without views is seen from everywhere.
+    """
 
     name = "shadow"
+    asks_views = True
+
+    def serving(self, emitter: lights.Emitter) -> VisibilityProvider:
+        """The provider of this lamp: itself, or one of several that it chooses among."""
+        return self
+
+    def serves_every_source(self, frame: Frame) -> bool:
+        """Whether the world and emissive meshes are drawn as lights with extent that it serves, too."""
+        return False
+
+    def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:
+        """Whether rays take its place for this lamp."""
+        return False
+
+    def cell(self, frame: Frame, number: int, points: float) -> float:
+        """Share of a light's extent, along each axis, that point `number` of `points` stands for; 0: a point alone;
+        1: the whole light, from its middle."""
+        return 0.0
+
+    def part(self, frame: Frame, emitter: lights.Emitter, number: int, points: float) -> lights.Emitter | None:
+        """The part of the light that point `number` of `points` stands for as a whole; None where it is a point."""
+        return None
+
+    def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
+        """Views of the maps that point `number` of the light needs, at `sample`."""
+        return []
+
+    def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
+        """The points in batches that fit a uniform block, each with what tells their visibility."""
+        raise NotImplementedError
+
+
+@dataclass
+class LightPoint:
+    """A point of a light that a sample draws: its row for the light list (lights.TEXELS, 4), the views of its map, and
+    what tells from where it is seen."""
+
+    row: np.ndarray
+    provider: VisibilityProvider
+    views: list = field(default_factory=list)
+
+    @property
+    def flags(self) -> int:
+        """Of sources/lights.py."""
+        return int(self.row[0, 1])
 
 
 @dataclass(frozen=True)
@@ -68,11 +118,12 @@ def traced_roughness(frame: Frame) -> float:
 
 @dataclass(frozen=True)
 class Lookup:
-    """GLSL file with `float light_visibility(Light, ivec2 pixel, vec3 position, vec3 normal)` and what else it binds.
-    `maps`: it reads depth maps."""
+    """GLSL with `float light_visibility(Light, ivec2 pixel, vec3 position, vec3 normal)`, a file below shaders/ or a
+    text, and what else it binds. `maps`: it reads depth maps."""
 
     name: str
-    file: str
+    file: str = ""
+    text: str = ""
     textures: tuple[tuple[str, str], ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
     defines: tuple[tuple[str, str], ...] = ()
@@ -113,6 +164,11 @@ RAYS = Lookup(
 )
 
 
+def source_of(lookup: Lookup) -> tuple[tuple[str, str], ...]:
+    """The snippet by which programs include a lookup."""
+    return (("generated/visibility", lookup.text or f'#include "{lookup.file}"\n'),)
+
+
 def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, object]]:
     """Textures and RAY_CONSTANTS: what casts shadows, for rays."""
     hierarchy = frame.hierarchy("shadow")
@@ -122,7 +178,9 @@ def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, objec
 
 def drawn_by_lot(frame: Frame) -> list[Draw]:
     """Casters that let some light pass."""
-    return [draw for draw in frame.geometry.draws if frame.materials.compiled[draw.material].casts_by_lot]
+    compiled = frame.materials.compiled
+    casting = {k for k, one in enumerate(compiled) if one.casts_by_lot and not one.bounds_alone}
+    return [draw for draw in frame.geometry.draws if draw.material in casting]
 
 
 def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:
@@ -197,25 +255,54 @@ class DepthMapService:
         self._atlas.release()
 
 
+Batch = tuple[list[LightPoint], Maps]
+
+
+class Rays(VisibilityProvider):
+    """A ray of each pixel to each point."""
+
+    asks_views = False
+
+    def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
+        for first in range(0, len(points), lights.MOST_LIGHTS):
+            yield points[first : first + lights.MOST_LIGHTS], traced_shadows(frame)
+
+
+class PlainMaps(VisibilityProvider):
+    """Depth maps of single points or directions, with a resolution of its owner's."""
+
+    def __init__(self, resolution: Callable[[Frame], int]):
+        self.resolution = resolution
+        self._service = DepthMapService()
+
+    def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
+        resolution = self.resolution(frame)
+        for own, views in rounds(frame, points, resolution):
+            yield own, self._service.draw(frame, technique, views, resolution)
+
+    def release(self) -> None:
+        self._service.release()
+
+
 _NO_VIEW = depth_maps.MapView(np.zeros((4, 4)), 1.0, (0.0, 0.0, 0.0, 0.0))
 
 
 def rounds(
-    frame: Frame, items: list[tuple[np.ndarray, list]], resolution: int, most_texels: int = ATLAS_TEXELS
-) -> Iterator[tuple[list[np.ndarray], list]]:
-    """Split lights (rows, views) so that a round fits the atlas and the block; fills in the view numbers. Maps of a
+    frame: Frame, points: list[LightPoint], resolution: int, most_texels: int = ATLAS_TEXELS
+) -> Iterator[tuple[list[LightPoint], list]]:
+    """Split points so that a round with its views fits the atlas and the block; fills in the view numbers. Maps of a
     second round lie where those of the first were, whose light then cannot be repeated."""
-    rows, views, texels = [], [], 0
-    for row, own in items:
-        size = sum((resolution // view.scale) ** 2 for view in own)
-        full = texels + size > most_texels or len(views) + len(own) > lights.MOST_VIEWS
-        if rows and (full or len(rows) == lights.MOST_LIGHTS):
-            yield rows, views
+    own, views, texels = [], [], 0
+    for point in points:
+        size = sum((resolution // view.scale) ** 2 for view in point.views)
+        full = texels + size > most_texels or len(views) + len(point.views) > lights.MOST_VIEWS
+        if own and (full or len(own) == lights.MOST_LIGHTS):
+            yield own, views
             repeated_light.forbid(frame)
-            rows, views, texels = [], [], 0
+            own, views, texels = [], [], 0
         texels += size
-        row[0, 2:4] = len(views), len(own)
-        rows.append(row)
-        views += own
-    if rows:
-        yield rows, views
+        point.row[0, 2:4] = len(views), len(point.views)
+        own.append(point)
+        views += point.views
+    if own:
+        yield own, views

@@ -97,7 +97,13 @@ class Reflectance:
         shown: dict[int, list] = {}
         for draw in frame.geometry.draws:
             shown.setdefault(draw.material, []).append((draw.batch.number, draw.first, draw.count))
-        return {material: (prints[material], prints[count:], shown[material]) for material in sorted(shown)}
+        return {
+            material: (
+                prints[material], prints[count:], shown[material],
+                frame.materials.around(material, frame.geometry),
+            )
+            for material in sorted(shown)
+        }  # fmt: skip
 
     def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
         all_draws = frame.geometry.draws

@@ -26,7 +26,6 @@ sqrt(a / pi) no more than at that distance: otherwise single points beside a sur
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -36,38 +35,13 @@ from ..frame.technique import Param, Technique
 from ..lighting import shared_visibility
 from ..lighting.caustic_casters import answered
 from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
-from ..lighting.loop import DIRECT_WRITES, lighting, shade
-from ..lighting.point_maps import PointMaps
-from ..lighting.visibility import (
-    ATLAS_TEXELS,
-    EDGES,
-    HARD,
-    RAY_CONSTANTS,
-    RAYS,
-    DepthMapService,
-    Lookup,
-    Maps,
-    VisibilityProvider,
-    ray_bindings,
-    rounds,
-    traced_shadows,
-)
+from ..lighting.loop import DIRECT_WRITES, NEAR, RAYS_WHERE_NEAR, light_surfaces, lighting
+from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, VisibilityProvider
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.rates import Rate
 from ..surfaces.draw import LIT_SURFACES
-
-# A point of a round light is drawn in its ball; the light arrives from the ball's projection towards the receiver.
-# A map from the point shows what blocks the light as long as the ball is small beside its distance.
-NEAR = 0.25  # radius / distance from which rays are traced instead
-RAYS_WHERE_NEAR = Lookup(
-    "rays where near",
-    "light/near_visibility.glsl",
-    textures=acceleration.HIERARCHY_TEXTURES,
-    constants=(*RAY_CONSTANTS, ("FLOAT", "near_share")),
-)
-
 
 LIGHTING = tuple(
     lighting(lookup, soft_lobes)
@@ -93,7 +67,7 @@ class DirectLight(Technique):
     def __init__(self):
         self._emitters: list[lights.Emitter] = []
         self._by_rays: dict[str, bool] = {}  # lights by key, of this frame
-        self._unshadowed = DepthMapService()
+        self._unshadowed, self._rays = PlainMaps(lambda frame: 16), Rays()
         self._sources = lights.Sources()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
@@ -110,61 +84,42 @@ class DirectLight(Technique):
         self._by_rays = {}
         drawn, provider = PointsDrawn(), frame.service(VisibilityProvider)
         for emitter, weight in zip(self._emitters, 1.0 / self._chances(frame)):
-            rate = self._rate(frame, emitter, weight, provider.serving(emitter) if provider else None)
+            rate = self._rate(frame, emitter, weight, provider.serving(emitter) if provider else self._unshadowed)
             drawn.per_sample[emitter.light.key] = rate.per_sample
         frame.provide(drawn)
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._emitters or frame.receivers is None or not len(frame.receivers.distance):
             return
-        service = frame.service(VisibilityProvider)
-        items: dict[PointMaps | None, list] = {}
-        traced: list[np.ndarray] = []
-        kinds = lights.kinds_of(self._emitters)
+        yield from light_surfaces(frame, self, self._points(frame), lights.kinds_of(self._emitters), self._sources)
+
+    def _points(self, frame: Frame) -> list[LightPoint]:
+        """This sample's points on the lamps."""
+        service, found = frame.service(VisibilityProvider), []
         for emitter, weight in self._chosen(frame):
-            shadow = service.serving(emitter) if service else None
-            rate = self._rate(frame, emitter, weight, shadow)
+            provider = service.serving(emitter) if service else self._unshadowed
+            rate = self._rate(frame, emitter, weight, provider)
             points = rate.per_sample * frame.settings.samples / weight
-            if shadow and self._has_rays(frame, emitter, shadow):
-                for number in rate.points(frame.sample):
-                    sample = emitter.sample(*frame.random_volume_at(number, "light"))
-                    row = emitter.row(sample, 0, 1, weight, rate.per_sample, points)
-                    row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced)
-                    row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
-                    traced.append(row)
-                continue
+            if service and self._has_rays(frame, emitter, provider):
+                provider = self._rays
+            flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
+            flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
             for number in rate.points(frame.sample):
-                part = shadow.part(frame, emitter, number, points) if shadow else None
+                part = provider.part(frame, emitter, number, points)
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
-                cell = 1.0 if part else (shadow.cell(frame, number, points) if shadow else 0.0)
+                cell = 1.0 if part else provider.cell(frame, number, points)
                 whole = cell >= 1.0 and emitter.extended
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
-                near = bool(shadow) and cell == 0.0 and emitter.light.key in self._near
-                views = shadow.views(frame, shown, sample, number, cell) if shadow else []
-                row = shown.row(sample, 0, len(views) or near, weight, rate.per_sample * share, points * share)
-                row[0, 1] += lights.WHOLE_FLAG * whole
-                kinds |= whole << lights.WHOLE
-                row[0, 1] += lights.TRACED_FLAG * (emitter.light.key in self._traced) + lights.NEAR_FLAG * near
-                row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
-                items.setdefault(shadow, []).append((row, views))
-        for first in range(0, len(traced), lights.MOST_LIGHTS):
-            rows = traced[first : first + lights.MOST_LIGHTS]
-            yield from shade(frame, self, rows, kinds, self._sources, traced_shadows(frame))
-        for shadow, own in items.items():
-            resolution = shadow.resolution(frame) if shadow else 16
-            for rows, views in rounds(frame, own, resolution, shadow.most_texels(frame) if shadow else ATLAS_TEXELS):
-                maps = shadow.draw(frame, views) if shadow else self._unshadowed.draw(frame, self, [], 16)
-                yield from maps.drawing
-                yield
-                near = [row for row in rows if int(row[0, 1]) & lights.NEAR_FLAG]
-                others = [row for row in rows if not int(row[0, 1]) & lights.NEAR_FLAG]
-                if others:
-                    yield from shade(frame, self, others, kinds, self._sources, maps)
-                if near:
-                    yield from shade(frame, self, near, kinds, self._sources, self._with_rays(frame, maps))
+                near = bool(service) and provider.asks_views and cell == 0.0 and emitter.light.key in self._near
+                views = provider.views(frame, shown, sample, number, cell)
+                asked = len(views) or near or not provider.asks_views
+                row = shown.row(sample, 0, asked, weight, rate.per_sample * share, points * share)
+                row[0, 1] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
+                found.append(LightPoint(row, provider, views))
+        return found
 
-    def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: PointMaps) -> bool:
+    def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: VisibilityProvider) -> bool:
         """Whether the light has rays in place of maps; asked when it is first drawn, as one of many may never be."""
         key = emitter.light.key
         if key not in self._by_rays:
@@ -175,16 +130,10 @@ class DirectLight(Technique):
         """Points per sample: one where each would be the whole light, seen from its middle again and again."""
         rate = rate_of(frame, emitter.light.key)
         points = rate.per_sample * frame.settings.samples / weight
-        alike = shadow is not None and emitter.extended and rate.per_sample > 1
+        alike = emitter.extended and rate.per_sample > 1
         if alike and shadow.cell(frame, 0, points) >= 1.0 and shadow.part(frame, emitter, 0, points) is None:
             return Rate()
         return rate
-
-    def _with_rays(self, frame: Frame, maps: Maps) -> Maps:
-        """The same maps, asked only where the light is small beside its distance."""
-        textures, constants = ray_bindings(frame)
-        constants["near_share"] = NEAR
-        return replace(maps, lookup=RAYS_WHERE_NEAR, textures=textures, constants=constants)
 
     def _chances(self, frame: Frame) -> np.ndarray:
         """Chance of each light to be drawn in a sample: in proportion to power where there are many."""

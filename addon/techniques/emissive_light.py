@@ -13,8 +13,9 @@ As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissiv
 | maps | `points` x (1 view, or up to 6 cube faces), or a ray per pixel for each where that costs less |
 | passes | 1 over the screen |
 
-Fails: emission that varies is taken at its mean over the surfaces that show the material; very many small emitters
-need many samples.
+Emission that varies is measured place by place (scene/emission_maps.py).
+
+Fails: very many small emitters need many samples.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from ..frame.technique import Param, Technique
 from ..lighting import depth_maps
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.light_rates import EmissivePoints
-from ..lighting.loop import DIRECT_WRITES, shade
-from ..lighting.visibility import RESOLUTION, DepthMapService, by_rays, map_resolution, rounds, traced_shadows
+from ..lighting.loop import DIRECT_WRITES, light_surfaces
+from ..lighting.visibility import RESOLUTION, LightPoint, PlainMaps, Rays, VisibilityProvider, by_rays, map_resolution
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -50,9 +51,10 @@ class EmissiveLight(Technique):
     reads = LIT_SURFACES
     writes = DIRECT_WRITES
     provides = (EmissivePoints,)
+    requests = (VisibilityProvider,)
 
     def __init__(self):
-        self.service = DepthMapService()
+        self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
         self._traced = False  # rays take the place of maps
@@ -75,23 +77,46 @@ class EmissiveLight(Technique):
         count = self._count(frame.settings)
         if not self._triangles.power > 0:
             return
-        resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+        resolution = self._resolution(frame)
         flags = lights.SHADOW_FLAG + lights.TRACED_FLAG
-        items = []
+        provider = frame.service(VisibilityProvider)
+        patches = provider is not None and provider.serves_every_source(frame)
+        points = []
         for k in range(count):
             number = frame.sample * count + k
             numbers = frame.random_volume_at(number, "emissive")
             point = self._triangles.draw(*numbers)[1]
+            if patches:
+                points.append(self._patch(frame, provider, numbers, number, count, flags))
+                continue
             if number == 0:
                 self._traced = by_rays(frame, lambda place=point: _views(frame, place, 0, resolution), resolution)
             views = [] if self._traced else _views(frame, point, number, resolution)
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
-            items.append((row, views))
-        for rows, views in rounds(frame, items, resolution):
-            maps = traced_shadows(frame) if self._traced else self.service.draw(frame, self, views, resolution)
-            yield from maps.drawing
-            yield
-            yield from shade(frame, self, rows, 1 << lights.SURFACE, self._sources, maps)
+            points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
+        yield from light_surfaces(frame, self, points, 1 << lights.SURFACE, self._sources)
+
+    def _resolution(self, frame: Frame) -> int:
+        return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+
+    def _patch(
+        self, frame: Frame, provider: VisibilityProvider, numbers, number: int, count: int, flags: int
+    ) -> LightPoint:
+        """A disc of the emissive surface around a point: the area that the picture's points leave to this one."""
+        k, point, density = self._triangles.draw(*numbers)
+        points = count * frame.settings.samples if frame.settings.whole else number + 1
+        radius = float(np.sqrt(1.0 / (np.pi * density * points)))
+        normal, zero = self._triangles.normal[k], np.zeros(3)
+        disc = lights.Emitter(
+            None, lights.SURFACE, flags, point, radius, self._triangles.radiance[k], 1.0 / density, normal, 0.0,
+            zero, zero, zero,
+        )  # fmt: skip
+        views = provider.views(frame, disc, point, number, 1.0)
+        row = self._triangles.row(numbers, count, flags, len(views), frame.settings.samples)
+        across = np.cross(normal, (1.0, 0.0, 0.0) if abs(normal[0]) < 0.9 else (0.0, 1.0, 0.0))
+        across *= radius / max(float(np.linalg.norm(across)), 1e-30)
+        row[5, :3], row[6, :3] = across, np.cross(normal, across)
+        return LightPoint(row, provider, views)
 
     def _count(self, settings: Settings) -> int:
         """Points per sample: more where a picture of few samples would have few in all."""
@@ -99,7 +124,7 @@ class EmissiveLight(Technique):
         return max(points, min(FEWEST_POINTS // settings.samples, MOST_POINTS)) if settings.whole else points
 
     def release(self) -> None:
-        self.service.release()
+        self._maps.release()
         self._sources.release()
         self._triangles = None
 

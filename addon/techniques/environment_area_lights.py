@@ -44,9 +44,9 @@ from ..frame.run import Frame
 from ..frame.settings import AUTO, Settings
 from ..frame.technique import Param, Technique
 from ..lighting import depth_maps
-from ..lighting.loop import DIRECT_WRITES, shade
+from ..lighting.loop import DIRECT_WRITES, light_surfaces
 from ..lighting.soft_maps import SoftMaps
-from ..lighting.visibility import map_resolution, rounds
+from ..lighting.visibility import LightPoint, map_resolution
 from ..snapshot.scene import Snapshot
 from ..sources import area_fit, lights
 from ..sources.environment import Environment
@@ -100,7 +100,7 @@ class EnvironmentAreaLights(Technique):
         shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
         jitter = (*frame.random("map/environment"), *frame.random("map/environment/turn"))
         kinds = 1 << lights.SUN | (cell >= 1.0) << lights.WHOLE
-        items = []
+        points = []
         for light in self._lights(frame):
             emitter = _emitter(light, flags)
             sample = emitter.middle() if cell >= 1.0 else emitter.sample(*frame.random_volume("light"))
@@ -112,12 +112,9 @@ class EnvironmentAreaLights(Technique):
             row = emitter.row(sample, 0, len(views))
             row[0, 1] += lights.WHOLE_FLAG * (cell >= 1.0)
             row[2, 3] = NO_SHARE
-            items.append((row, views))
-        for rows, views in rounds(frame, items, resolution, maps_of.most_texels(frame)):
-            maps = maps_of.draw(frame, views)
-            frame.count(self, "maps", len(views))
-            yield
-            yield from shade(frame, self, rows, kinds, self._sources, maps)
+            points.append(LightPoint(row, maps_of, views))
+        frame.count(self, "maps", sum(len(point.views) for point in points))
+        yield from light_surfaces(frame, self, points, kinds, self._sources)
 
     def _lights(self, frame: Frame) -> list[area_fit.AreaLight]:
         """Fitted anew when the world or the number of lights has changed."""

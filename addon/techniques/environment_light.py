@@ -58,21 +58,22 @@ from ..frame.technique import Param, Technique
 from ..gfx import images, passes
 from ..lighting import depth_maps
 from ..lighting.light_rates import LightRates, world_rate
-from ..lighting.loop import DIRECT_WRITES, lighting, shade
+from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
 from ..lighting.visibility import (
     HARD,
     NO_VIEWS,
     RAY_CONSTANTS,
     RAYS,
     RESOLUTION,
-    DepthMapService,
+    LightPoint,
     Lookup,
     Maps,
+    PlainMaps,
+    Rays,
+    VisibilityProvider,
     by_rays,
     map_resolution,
     ray_bindings,
-    rounds,
-    traced_shadows,
 )
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
@@ -120,6 +121,7 @@ OPENNESS = passes.fullscreen_program(
 RAY_LIGHTING = tuple(lighting(WORLD_RAYS, soft_lobes, 1 << lights.DIRECTION) for soft_lobes in (False, True))
 UNSHARED = 1.5  # times less of the noise of rays than of shared directions remains after denoising
 USUAL = 4.0  # shared directions of a sample that rays are compared with: with more of both the same one wins
+WIDEST_PATCH = np.pi  # steradians of the world that one soft map stands for, at most
 MAPS_PER_RAY = 2  # a ray of each pixel takes about the time of so many maps
 FRAGMENTED = 3.0  # variance of a single shared direction below which a low-discrepancy set of them does better still
 
@@ -163,10 +165,10 @@ class EnvironmentLight(Technique):
     )
     reads = LIT_SURFACES
     writes = DIRECT_WRITES
-    requests = (LightRates,)
+    requests = (LightRates, VisibilityProvider)
 
     def __init__(self):
-        self.service = DepthMapService()
+        self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
         self._traced = False  # directions are shared, and rays take the place of their maps
@@ -179,9 +181,10 @@ class EnvironmentLight(Technique):
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         self._give_openness()
-        self._edges = self._tables(frame, directions_rate(frame))
-        resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
-        self._traced = self._edges is None and _cast_shadows(frame) and self._traces(frame, resolution)
+        patches = self._patches(frame) is not None
+        self._edges = None if patches else self._tables(frame, directions_rate(frame))
+        own = not patches and self._edges is None
+        self._traced = own and _cast_shadows(frame) and self._traces(frame, self._resolution(frame))
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if frame.receivers is None or not len(frame.receivers.distance):
@@ -194,19 +197,25 @@ class EnvironmentLight(Technique):
             + lights.GLOSSY_FLAG * seen.glossy
             + lights.EVEN_FLAG * frame.snapshot.world.even
         )
-        resolution = map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+        resolution = self._resolution(frame)
         rate = directions_rate(frame)
         if self._edges is not None:
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
             rays = max(1, int(rate.per_sample / MAPS_PER_RAY))
-            yield from shade(frame, self, [row] * rays, 1 << lights.DIRECTION, self._sources, self._rays(frame))
+            points = [LightPoint(row, self._rays)] * rays
+            yield from light_surfaces(
+                frame, self, points, 1 << lights.DIRECTION, self._sources, lambda *_: self._own_rays(frame)
+            )
             frame.count(self, "rays per pixel", rays)
             return
         shadows = _cast_shadows(frame)
-        items = []
+        points, patches = [], self._patches(frame)
         for number in rate.points(frame.sample):
             direction, radiance, density = frame.environment.draw(*frame.random_at(number, "environment"))
+            if patches is not None:
+                points.append(_patch(frame, patches, flags, rate, number, direction, radiance, density, shadows))
+                continue
             views = []
             if shadows and not self._traced:
                 jitter = (
@@ -217,15 +226,27 @@ class EnvironmentLight(Technique):
                 direction, radiance / density, density, flags, 0, len(views) or self._traced, rate.per_sample,
                 float(frame.environment.openness(direction)),
             )  # fmt: skip
-            items.append((row, views))
-        for rows, views in rounds(frame, items, resolution):
-            maps = traced_shadows(frame) if self._traced else self.service.draw(frame, self, views, resolution)
-            yield from maps.drawing
-            yield
-            maps = self._known(frame, maps, len(rows) / (len(items) * min(rate.per_sample, 1.0)))
-            yield from shade(frame, self, rows, 1 << lights.DIRECTION, self._sources, maps)
-        if items and frame.sample + 1 < frame.settings.samples:
+            points.append(LightPoint(row, self._rays if self._traced else self._maps, views))
+        if patches is not None:
+            yield from light_surfaces(frame, self, points, 1 << lights.SUN, self._sources)
+            return
+
+        def known(maps: Maps, count: int) -> Maps:
+            return self._known(frame, maps, count / (len(points) * min(rate.per_sample, 1.0)))
+
+        yield from light_surfaces(frame, self, points, 1 << lights.DIRECTION, self._sources, known)
+        if self._openness and points and frame.sample + 1 < frame.settings.samples:
             self._sum_openness(frame)
+
+    def _resolution(self, frame: Frame) -> int:
+        return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
+
+    @staticmethod
+    def _patches(frame: Frame) -> VisibilityProvider | None:
+        """What tells the visibility of patches of the world, each the share of it that a direction stands for; None
+        where directions are single."""
+        provider = frame.service(VisibilityProvider)
+        return provider if provider is not None and provider.serves_every_source(frame) else None
 
     def _traces(self, frame: Frame, resolution: int) -> bool:
         """Whether rays take the place of maps."""
@@ -280,7 +301,7 @@ class EnvironmentLight(Technique):
         self._tiles = (useful.shape[1], useful.shape[0])
         return images.upload(world_tiles.lower_edges(chance), "R32F")
 
-    def _rays(self, frame: Frame) -> Maps:
+    def _own_rays(self, frame: Frame) -> Maps:
         world, (textures, constants) = frame.environment, ray_bindings(frame)
         return Maps(
             None, NO_VIEWS, WORLD_RAYS,
@@ -298,8 +319,24 @@ class EnvironmentLight(Technique):
     def release(self) -> None:
         self._edges = None
         self._give_openness()
-        self.service.release()
+        self._maps.release()
         self._sources.release()
+
+
+def _patch(
+    frame: Frame, provider: VisibilityProvider, flags: int, rate: Rate, number: int, direction: np.ndarray,
+    radiance: np.ndarray, density: float, shadows: bool,
+) -> LightPoint:  # fmt: skip
+    """The cap of the world around a direction that the picture's directions leave to this one, as a sun."""
+    count = rate.per_sample * frame.settings.samples if frame.settings.whole else number + 1.0
+    steradians = min(1.0 / (density * count), WIDEST_PATCH)
+    half = float(np.arccos(1.0 - steradians / (2.0 * np.pi)))
+    zero = np.zeros(3)
+    sun = lights.Emitter(
+        None, lights.SUN, flags, direction, half, radiance, 1.0 / density, -direction, 0.0, zero, zero, zero
+    )
+    views = provider.views(frame, sun, direction, number, 1.0) if shadows else []
+    return LightPoint(sun.row(direction, 0, len(views), rate=rate.per_sample), provider, views)
 
 
 def _cast_shadows(frame: Frame) -> bool:

@@ -74,7 +74,7 @@ class ShadowsByLight(PointMaps):
     )  # fmt: skip
 
     def __init__(self):
-        self._services = {PLAIN: AccumulatedMaps(), VARIANCE: VarianceSoftShadows(), CONVOLUTION: FewBoxes()}
+        self._providers = {PLAIN: AccumulatedMaps(), VARIANCE: VarianceSoftShadows(), CONVOLUTION: FewBoxes()}
         self._kinds: dict[str, str] = {}
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
@@ -87,11 +87,11 @@ class ShadowsByLight(PointMaps):
         for kind in self._kinds.values():
             frame.count(self, kind)
         for kind in dict.fromkeys(self._kinds.values()):
-            self._services[kind].begin(frame)
+            self._providers[kind].begin(frame)
         frame.provide(self, VisibilityProvider)
 
     def serving(self, emitter: lights.Emitter) -> PointMaps:
-        return self._services[self._kinds.get(emitter.light.key, PLAIN)]
+        return self._providers[self._kinds.get(emitter.light.key, PLAIN)]
 
     def _chosen(self, frame: Frame) -> dict[str, str]:
         """Kind by light."""
@@ -101,19 +101,19 @@ class ShadowsByLight(PointMaps):
             return {}
         kinds, soft = {}, []
         for emitter in emitters:
-            if penumbra(frame, emitter) * self._services[PLAIN].resolution(frame) < 1.0:
+            if penumbra(frame, emitter) * self._providers[PLAIN].resolution(frame) < 1.0:
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)
         soft.sort(key=lambda emitter: -strength(frame, emitter))
         for kind in (VARIANCE, CONVOLUTION):
-            self._services[kind].least_side = LEAST_SIDE if len(soft) <= FEW_LIGHTS else SoftMaps.least_side
+            self._providers[kind].least_side = LEAST_SIDE if len(soft) <= FEW_LIGHTS else SoftMaps.least_side
         most = frame.settings.get(self, "important")
         kinds |= {emitter.light.key: VARIANCE for emitter in soft[:most]}
         return kinds | {emitter.light.key: CONVOLUTION for emitter in soft[most:]}
 
     def release(self) -> None:
-        for service in self._services.values():
+        for service in self._providers.values():
             service.release()
         self._kinds = {}
 

@@ -147,7 +147,7 @@ class CANDELA_OT_edit_list(bpy.types.Operator):
 
 
 def _handles(block_object) -> list[tuple[object, Param, str]]:
-    """(settings, parameter, property) of all vectors with a handle: the object's own, and the active entries' of lists."""
+    """(settings, parameter, property) of all vectors with a handle: the object's, and of active entries of lists."""
     found = []
     for technique in REGISTRY:
         for param in scoped(technique).get(OBJECT, ()):

@@ -7,6 +7,9 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
+#ifdef MEDIA  // last: what it includes, too, would be missing where this is left out
+#include "media/media.glsl"
+#endif
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 
@@ -80,7 +83,8 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
     vec4 seen = surface_position_fetch(pixel);
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
       Surface s = SURFACE_READ(pixel);
-      if (dot(s.geometric_normal, normal) > 0.9) {
+      // Of a holdout the picture has cut out what it reflects.
+      if (s.holdout < 1.0 && dot(s.geometric_normal, normal) > 0.9) {
         return surface_reflection(s, slant);
       }
     }
@@ -193,6 +197,10 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
+#ifdef MEDIA
+      float reach = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
+      chosen_light *= media_transmittance(origin, chosen_direction, reach, salt);
+#endif
       Reflection reflection = met.reflection;
 #ifdef MIRRORS_OWNED
       if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {

@@ -39,6 +39,19 @@ Interface interface_begin(vec3 normal, vec3 view, float roughness, float ior, ve
   return surface;
 }
 
+// Turned by the edit of what the picture shows: light is bent from elsewhere.
+Interface interface_edited(Interface surface, Surface s)
+{
+#ifdef HAS_SURFACE_EDIT
+  if (surface_is_edited(s)) {
+    surface.tangent = quaternion_turned(s.edit, surface.tangent);
+    surface.bitangent = quaternion_turned(s.edit, surface.bitangent);
+    surface.normal = quaternion_turned(s.edit, surface.normal);
+  }
+#endif
+  return surface;
+}
+
 vec3 interface_to_world(Interface surface, vec3 v)
 {
   return safe_normalize(v.x * surface.tangent + v.y * surface.bitangent + v.z * surface.normal);

@@ -93,13 +93,13 @@ def test_time_is_predicted_from_what_is_most_alike():
 
 def test_choice_of_techniques_comes_from_the_registry():
     class One:
-        slot, name, label = "shadow", "one", "One"
+        fills, name, label = ("shadow",), "one", "One"
 
     class Two(One):
         name, label = "two", "Two"
 
     class Alone(One):
-        slot, name, label = "indirect", "alone", "Alone"
+        fills, name, label = ("indirect",), "alone", "Alone"
 
     series = cells.own_series([One, Two, Alone])
     assert [(one.label, one.slots) for one in series] == [

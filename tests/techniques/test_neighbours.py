@@ -34,7 +34,7 @@ def frame_of(gpu_context):
         values = {name: np.zeros(4) if kind == "vec4" else 0 for name, (kind, _) in VIEW.fields.items()}
         values |= {"eye": (0, 0, 5, 1), "frame": (-SPAN / 2, SPAN / 2) * 2, "film": (SIZE, SIZE, 0.1, 100)}
         frame = SimpleNamespace(
-            size=(SIZE, SIZE), sample=0, samples_done=1,
+            size=(SIZE, SIZE), is_first=True, samples_done=1,
             settings=SimpleNamespace(samples=samples, draft=samples == 1, whole=whole),
             images={name: images.upload(np.dstack(layer).astype(np.float32)) for name, layer in layers.items()},
             view_block=Block(VIEW, **values), count=lambda *counter: None,

@@ -117,7 +117,7 @@ def test_samples_that_are_drawn_in_parts_are_the_same(stage, light_of, monkeypat
     stage.world((1, 1, 1), 0.5)
     whole = light_of("diffuse_direct", 4, True)
     light_of("diffuse_direct", 4, False)  # else the picture is only shown again
-    monkeypatch.setattr("addon.techniques.accumulated_maps.PART_TEXELS", 1)
+    monkeypatch.setattr("addon.lighting.visibility.PART_TEXELS", 1)
     monkeypatch.setattr("addon.engine._whole_samples", samples_in_parts)
     np.testing.assert_array_equal(whole, light_of("diffuse_direct", 4, True))
 

@@ -58,13 +58,26 @@ def dark(stage):
     no_emission(stage)
 
 
+def no_source_to_shadow(stage):
+    """Chosen by hand, soft maps serve the world and emissive meshes, too."""
+    no_shadow(stage)
+    no_world(stage)
+    no_emission(stage)
+
+
+def no_glare(stage):
+    stage.scene.camera.data.candela.glare_mode = "OFF"
+
+
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
     "light_probes": nothing_lit,
     "accumulated_maps": no_shadow,
-    "vssm": no_shadow,
-    "cssm": no_shadow,
+    "vssm": no_source_to_shadow,
+    "cssm": no_source_to_shadow,
+    "depth_complexity": no_shadow,
+    "penumbra_wedges": no_shadow,
     "shadows_by_light": no_shadow,
     "direct_light": no_light,
     "emissive_light": no_emission,
@@ -81,6 +94,8 @@ WITHOUT = {
     "caustics_mapping": no_glass,
     "screen_space_photons": no_glass,
     "denoise": dark,
+    "eye": no_glare,
+    "glare": no_glare,
 }
 
 
@@ -116,6 +131,9 @@ def bound(monkeypatch):
 
 
 def choose(stage, technique):
+    if technique.name in ("eye", "glare"):
+        stage.scene.camera.data.candela.glare_mode = "CONVOLUTION"
+        stage.scene.camera.data.candela.glare_white = 0.01
     for slot in technique.fills:
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 
