@@ -27,12 +27,13 @@ def _parts() -> tuple:
         pass_tree,
         properties,
         quality,
+        reflection_operators,
         scoped_panels,
+        translucency,
         tuning,
     )
 
     return (
         pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
-        tuning,
-        pass_operators, compare_editor, cli,
+        reflection_operators, translucency, tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip

@@ -57,6 +57,7 @@ def render_passes(
     size: tuple[int, int] | None = None,
     view_layer: bpy.types.ViewLayer | None = None,
     bounces: int | None = None,
+    diffuse_bounces: int | None = None,
 ) -> Passes:
     """Render one view layer of `scene` with `engine` and return its passes.
 
@@ -64,8 +65,8 @@ def render_passes(
     a render border the pictures hold the bordered rectangle only. `bounces` limits how often light is reflected on
     its way to the surface that is seen; None leaves it to Candela's own setting, and Cycles goes on until nothing is
     left. `direct_only` means none: the direct passes stay what they are in a full render, and Combined shows direct
-    light, emission and world. EEVEE knows no such limit. Compositor and sequencer stay out of it. Blender's Render
-    Result shows this render afterwards.
+    light, emission and world. EEVEE knows no such limit. `diffuse_bounces` limits Cycles' diffuse ones further.
+    Compositor and sequencer stay out of it. Blender's Render Result shows this render afterwards.
     Raises `RenderFailed`.
     """
     engine = engine_identifier(scene, engine)
@@ -73,7 +74,10 @@ def render_passes(
     with tempfile.TemporaryDirectory(prefix="candela_") as folder:
         path = Path(folder) / "passes.exr"
         with overridden(
-            render_settings(scene, view_layer, engine, samples, seed, 0 if direct_only else bounces, size)
+            [
+                *render_settings(scene, view_layer, engine, samples, seed, 0 if direct_only else bounces, size),
+                *([] if diffuse_bounces is None else [(scene.cycles, "diffuse_bounces", diffuse_bounces)]),
+            ]
         ) as notes:
             transparent = scene.render.film_transparent
             start = time.perf_counter()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -20,6 +20,7 @@ from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
+from ..scene.media import volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
@@ -362,6 +363,12 @@ class Renderer:
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
 
+    def stop(self, frame: Frame) -> None:
+        """End the picture with the samples that it has."""
+        frame.settings = replace(frame.settings, samples=frame.samples_done)
+        for _ in _stage(frame, "end"):
+            pass
+
     def _begin_samples(self, frame: Frame) -> Iterator[None]:
         frame.sample = 0
         frame.look()
@@ -485,7 +492,8 @@ class Renderer:
         return self._environment[1]
 
     def _programs(self, plan: Plan, snapshot: Snapshot, settings: Settings) -> list:
-        shown = sorted({draw.material for draw in self.geometry.draws})
+        drawn = {draw.material for draw in self.geometry.draws}
+        shown = sorted(k for k in drawn if not self.materials.compiled[k].bounds_alone)
         wanted = [self.materials.surface_program(material) for material in shown]
         wanted += [program for t in plan.techniques for program in t.programs(snapshot, settings)]
         wanted += [
@@ -503,21 +511,25 @@ class Renderer:
             if self.materials.compiled[k].tinted or self.materials.compiled[k].added
         ]
         wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
+        if plan.fills("subsurface"):
+            wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
         lights = tuple(
             (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
              light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.bounces, light.visibility, light.own)
+             light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera
+        # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
+        casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            lights, casters, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
-            settings.whole and (settings.sample_offset, settings.samples_to_draw),
+            settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),

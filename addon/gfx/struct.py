@@ -85,6 +85,10 @@ class Block:
             self._data = data
             self.buffer.update(self._bytes())
 
+    def value(self, field: str) -> np.ndarray:
+        """What was set last."""
+        return self._data[field]
+
     def _bytes(self):
         flat = np.frombuffer(self._data.tobytes(), np.float32)
         return gpu.types.Buffer("FLOAT", flat.size, flat.copy())

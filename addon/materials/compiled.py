@@ -52,4 +52,11 @@ class CompiledMaterial:
     added: bool  # a lobe is added to what lets light pass, so that both together may be more than 1
     glass: Interface | None  # how it bends light, on average
     medium: Medium | None  # what its inside does with light
+    scatter: float  # about how far light spreads below its surface, m; 0: it does not
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated
+
+    @property
+    def bounds_alone(self) -> bool:
+        """Whether it has no surface to be seen, and only says where its medium ends: nothing draws it."""
+        clear = self.transparent and self.opacity <= 0.0 and not (self.uneven or self.tinted or self.emissive)
+        return clear and self.medium is not None and self.glass is None

@@ -97,16 +97,16 @@ class _Compilation:
             added=transparent and self._adds_lobes_to_transparency(),
             glass=summary.glass,
             medium=medium,
+            scatter=summary.scatter,
             fallbacks=tuple(code.fallbacks),
         )
 
     def _unused_slots(self, medium: Medium | None, glass: bool) -> None:
-        if medium is not None:
-            node, text = self.graph.nodes[self.graph.volume[0]], "The volume of the material is not drawn."
-            if glass:
-                text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
+        if medium is not None and glass:
+            node = self.graph.nodes[self.graph.volume[0]]
+            text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
             absorbs_alone = medium.even and not (medium.scattering.any() or medium.emission.any() or medium.glow)
-            if not (glass and absorbs_alone):
+            if not absorbs_alone:
                 self.code.note(node, text)
         if self.code.values.overflow:
             sentence = "The material has more sliders than fit a uniform block; the last ones recompile it."
@@ -256,6 +256,15 @@ def may_refract(graph: Graph) -> bool:
     return any(
         node.type in REFRACTING
         or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Transmission Weight")))
+        for node in graph.nodes.values()
+    )
+
+
+def may_scatter(graph: Graph) -> bool:
+    """Whether some node of the graph can scatter light below the surface: cheap, by its sockets alone."""
+    return any(
+        node.type == "ShaderNodeSubsurfaceScattering"
+        or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Subsurface Weight")))
         for node in graph.nodes.values()
     )
 

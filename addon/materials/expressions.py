@@ -27,6 +27,7 @@ MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the pr
 PLAIN_MAPPING = ("POINT", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
 
+SURFACE_HEAD = "void evaluate_material(SurfacePoint point, inout Closures closures)"
 GLSL_TYPES = {"FLOAT": "float", "VECTOR": "vec3", "COLOR": "vec3"}
 
 
@@ -77,15 +78,14 @@ class Expressions:
         """What the function that grows has computed: link -> GLSL variable, kind."""
         return self._scopes[-1].outputs
 
-    def text(self) -> str:
-        """The whole source: includes, the images' functions, evaluate_material."""
+    def text(self, head: str = SURFACE_HEAD) -> str:
+        """The whole source: includes, the images' functions, and the function of that head."""
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
         wanted = [(k, source) for k, sources in enumerate(self.image_keys.values()) for source in sources]
         keys = list(self.image_keys)
         functions = "".join("\n" + self._image_functions(keys[k], k, source) for k, source in wanted)
         functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
-        head = "void evaluate_material(SurfacePoint point, inout Closures closures)"
         return f"{includes}{functions}\n{head}\n{{\n{body}}}\n"
 
     def _image_functions(self, key: str, k: int, source: str) -> str:

@@ -51,6 +51,11 @@ class Hierarchy:
     nodes: images.Image
     leaves: images.Image
     triangles: int
+    # For who needs more of a triangle than leaves hold (surfaces/hits.py): the place of each triangle of `instances`,
+    # in their order, among the slots of the leaves (LEAF each; -1: left out); the first one is that of `first_leaf`.
+    slots: np.ndarray | None = None  # (T,) int32
+    first_leaf: int = 0
+    instances: tuple[Instance, ...] = ()
 
     @property
     def textures(self) -> dict[str, images.Image]:
@@ -239,6 +244,7 @@ class Tree:
     high: np.ndarray | None
     tiles: np.ndarray  # (N, 4) texels of OpacityMaps, before the leaves: a whole number of leaves
     refitted: bool = False
+    nodes: np.ndarray | None = None  # (N, NODE_TEXELS, 4)
 
 
 def build(corners: np.ndarray, look: np.ndarray, tiles: np.ndarray = NO_TILES) -> Tree:
@@ -290,7 +296,9 @@ def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarra
     leaves = np.concatenate([tree.tiles, tree.leaves.reshape(-1, 4)]) if len(tree.tiles) else tree.leaves
     nodes, leaves = (images.upload_list(texels.reshape(-1, 4)) for texels in (rows, leaves))
     leaves.defines = TILED if len(tree.tiles) else ()
-    return replace(tree, hierarchy=Hierarchy(nodes, leaves, tree.hierarchy.triangles))
+    first_leaf = len(tree.tiles) // LEAF_TEXELS
+    hierarchy = Hierarchy(nodes, leaves, tree.hierarchy.triangles, tree.place.astype(np.int32), first_leaf)
+    return replace(tree, hierarchy=hierarchy, nodes=rows)
 
 
 def _pack_boxes(rows: np.ndarray, low: np.ndarray, high: np.ndarray, least: float) -> None:
@@ -348,11 +356,11 @@ class HierarchyCache:
             triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps, glow)
             tree = build(*triangles, maps.texels)
             if tree.hierarchy.triangles > MOST_REFITTED:
-                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = None
+                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = tree.nodes = None
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
-        return tree.hierarchy
+        return replace(tree.hierarchy, instances=tuple(shown))
 
     def _moved(
         self, key, snapshot, materials, maps: OpacityMaps, glow: EmissionMaps, origin: np.ndarray, path: str

@@ -128,7 +128,7 @@ def closed_triangles(mesh: Mesh) -> np.ndarray:
         return np.ones(len(triangles), bool)
     found = np.zeros(len(triangles), bool)
     if len(triangles) <= LARGEST_OPEN:
-        label = _parts(triangles, len(mesh.positions))
+        label = parts(triangles, len(mesh.positions))
         names = np.unique(label)
         for name in names if len(names) <= MOST_PARTS else ():
             own = label == name
@@ -136,7 +136,7 @@ def closed_triangles(mesh: Mesh) -> np.ndarray:
     return found
 
 
-def _parts(triangles: np.ndarray, vertices: int) -> np.ndarray:
+def parts(triangles: np.ndarray, vertices: int) -> np.ndarray:
     """(T,) a number that triangles share if they hang together: the least vertex of their part."""
     label = np.arange(vertices)
     while True:

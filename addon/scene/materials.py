@@ -133,9 +133,19 @@ class MaterialSet:
         """Draws material `index` into the surface images."""
         return _surface_program(self.compiled[index])
 
+    def lobe_program(self, index: int) -> Program:
+        """Draws one lobe of material `index` into the surface images, as the light of a view meets it: what it
+        refracts (`wanted_lobe` 1) or reflects (2). Of several such lobes `lobe_choice` keeps one, the same for all
+        texels."""
+        return _lobe_program(self.compiled[index])
+
     def tint_program(self, index: int) -> Program:
         """Multiplies what lies behind material `index`, which has coloured transparency, by its colour."""
         return _tint_program(self.compiled[index])
+
+    def scatter_program(self, index: int) -> Program:
+        """Draws what of material `index` light enters elsewhere, where the surface images show it."""
+        return _scatter_program(self.compiled[index])
 
     def glow_program(self, index: int) -> Program:
         """Adds what layers of material `index` emit that this sample passes."""
@@ -266,6 +276,16 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+def _lobe_program(compiled: CompiledMaterial) -> Program:
+    like = _surface_program(compiled)
+    return replace(
+        like,
+        name=f"one lobe {compiled.program_key[:8]}",
+        constants=(*like.constants, ("INT", "wanted_lobe"), ("FLOAT", "lobe_choice")),
+        defines=(*like.defines, ("ONE_LOBE", "1")),
+    )
+
+
 def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     """How layers of a material are drawn, see surface.frag.glsl."""
     return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added
@@ -289,6 +309,21 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+SCATTER_IMAGES = ("length", "share", "entry")  # layout: shaders/subsurface/image.glsl
+
+
+def _scatter_program(compiled: CompiledMaterial) -> Program:
+    like = _tint_program(compiled)
+    return replace(
+        like,
+        name=f"subsurface {compiled.program_key[:8]}",
+        fragment="surface/scatter.frag.glsl",
+        outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
+        textures=(*like.textures, ("RGBA32F", "scatter_objects")),
+        defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1")),
+    )
+
+
 def _glow_program(compiled: CompiledMaterial) -> Program:
     return replace(
         _tint_program(compiled),
@@ -306,7 +341,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
+        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
         defines=PROJECTION_DEFINES,
         **_shared(compiled),
     )

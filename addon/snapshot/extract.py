@@ -19,6 +19,7 @@ from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
 from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
+from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
 
 
@@ -69,6 +70,7 @@ def take(
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, notes)
+    volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]
@@ -86,6 +88,7 @@ def take(
         notes=tuple(dict.fromkeys(notes)),
         scene_name=scene.name,
         moment=Moment(scene.frame_current_final, scene.render.fps / scene.render.fps_base),
+        volumes=volumes,
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start
@@ -172,7 +175,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 Instance(
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
-                    of_object.terminator, of_object.own,
+                    of_object.terminator, of_object.own, of_object.caustics_caster,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
@@ -295,6 +298,8 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         transparent=scene.render.film_transparent,
         clear_glass=_clear_glass(cycles),
         exposure=getattr(cycles, "film_exposure", 1.0),
+        caustics_reflective=getattr(cycles, "caustics_reflective", True),
+        caustics_refractive=getattr(cycles, "caustics_refractive", True),
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,

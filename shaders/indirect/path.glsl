@@ -7,6 +7,9 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
+#ifdef MEDIA  // last: what it includes, too, would be missing where this is left out
+#include "media/media.glsl"
+#endif
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 
@@ -15,6 +18,9 @@ struct Vertex {
   vec3 normal;  // of the triangle, on the side that the ray came from, to which it sends light
   vec3 lit;     // the same, or on the other side: that from which light reaches it
   Reflection reflection;
+#ifdef MIRRORS_OWNED
+  bool photons;  // lamps' light that it mirrors arrives as photons of caustics
+#endif
 };
 
 // Pixel of the picture in which a point of a surface lies that faces the camera; false if there is none. What the pixel
@@ -100,6 +106,10 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     met.normal = -met.normal;
   }
   met.reflection = reflection_at(hit, met.position, met.normal);
+#ifdef MIRRORS_OWNED
+  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
+#endif
   met.lit = met.normal;
   float through = met.reflection.through;
   if (through > 0.0) {
@@ -187,7 +197,17 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
-      sum += chosen_light * reflection_of(met.reflection, normal, chosen_direction, viewer)
+#ifdef MEDIA
+      float reach = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
+      chosen_light *= media_transmittance(origin, chosen_direction, reach, salt);
+#endif
+      Reflection reflection = met.reflection;
+#ifdef MIRRORS_OWNED
+      if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
+        reflection.straight = reflection.grazing = vec3(0.0);
+      }
+#endif
+      sum += chosen_light * reflection_of(reflection, normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);
     }
   }

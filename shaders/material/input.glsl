@@ -125,7 +125,8 @@ void input_camera(SurfacePoint point, out vec3 view, out float depth, out float 
   distance = length(p);
 }
 
-// The camera looks at everything that is drawn, light asks casters for their transparency: no other ray has a surface.
+// The camera looks at everything that is drawn, light asks casters for their transparency, and rays of lobes and through
+// glass meet the rest (hits/): those all count as reflected.
 void input_light_path(SurfacePoint point, out float camera_ray, out float shadow_ray, out float diffuse_ray,
                       out float glossy_ray, out float singular_ray, out float reflection_ray,
                       out float transmission_ray, out float volume_ray, out float ray_length, out float ray_depth,
@@ -135,9 +136,9 @@ void input_light_path(SurfacePoint point, out float camera_ray, out float shadow
   camera_ray = (point.ray == RAY_CAMERA) ? 1.0 : 0.0;
   shadow_ray = (point.ray == RAY_SHADOW) ? 1.0 : 0.0;
   diffuse_ray = 0.0;
-  glossy_ray = 0.0;
+  glossy_ray = (point.ray == RAY_GLOSSY) ? 1.0 : 0.0;
   singular_ray = 0.0;
-  reflection_ray = 0.0;
+  reflection_ray = glossy_ray;
   transmission_ray = 0.0;
   volume_ray = 0.0;
   ray_length = length(point.position - material_scene.camera_position.xyz);

@@ -1,0 +1,314 @@
+"""Penumbra wedge blending: areas in closed form, known values of unions of casters, and what it leaves alone."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.gfx import images
+from addon.lighting import silhouettes
+from addon.sources import lights
+
+from .conftest import places
+from .test_depth_complexity import fill, share
+from .test_opacity_maps import with_alpha
+
+NAME = "penumbra_wedges"
+
+
+@pytest.fixture
+def by_wedges(stage):
+    stage.scene.candela.slot_shadow = NAME
+    stage.scene.candela.light_probes_maps = 0.0
+    return stage
+
+
+def square(stage, turn=0.0, size=1.0):
+    return stage.light("AREA", (0, 0, 4), (0, 0, turn), size=size, shape="SQUARE")
+
+
+def half_plane(stage, x=0.0, z=2.0, turn=0.0):
+    return stage.blocker((-20, -20), (x, 20), z, turn=(0, 0, turn))
+
+
+def row(stage):
+    return next(row for row in stage.ledger.rows if row.name == NAME)
+
+
+def test_one_half_plane_is_exact(by_wedges):
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage)
+    square(stage)
+    stage.camera_above(span=2.0)
+    size = (64, 4)
+    x, _ = places(size, 2.0)
+    assert np.abs(share(stage, size) - np.clip(0.5 + x, 0, 1)).max() < 1e-4
+
+
+def test_a_square_lamp_turned_by_an_eighth_is_cut_at_its_corners(by_wedges):
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage)
+    square(stage, np.pi / 4)
+    stage.camera_above(span=2.0)
+    size = (64, 4)
+    x, _ = places(size, 2.0)
+    half = np.sqrt(0.5)
+    cut = np.clip(half - np.abs(x), 0, half) ** 2
+    assert np.abs(share(stage, size) - np.where(x < 0, cut, 1 - cut)).max() < 2e-4
+
+
+@pytest.mark.parametrize("union, expected", (("BOXES", 0.5), ("SUM", 0.0), ("PRODUCT", 0.25)))
+def test_the_same_half_plane_twice(by_wedges, union, expected):
+    """Along the lamp's sides boxes are exact; a sum takes the light away twice."""
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage)
+    half_plane(stage, z=2.0001)
+    square(stage)
+    stage.scene.candela.penumbra_wedges_union = union
+    stage.camera_above(span=0.002)
+    assert share(stage, (4, 4)).mean() == pytest.approx(expected, abs=2e-3)
+
+
+@pytest.mark.parametrize("union, expected", (("BOXES", 0.375), ("SUM", 0.0), ("PRODUCT", 0.25)))
+def test_the_same_edge_across_the_lamp_twice_has_a_known_error(by_wedges, union, expected):
+    """An edge at 45 degrees leaves one half; quarters that are half full, twice, are taken for three quarters."""
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage)
+    half_plane(stage, z=2.0001)
+    square(stage, np.pi / 4)
+    stage.scene.candela.penumbra_wedges_union = union
+    stage.camera_above(span=0.002)
+    assert share(stage, (4, 4)).mean() == pytest.approx(expected, abs=5e-3)
+
+
+@pytest.mark.parametrize("union, expected", (("BOXES", 1 / 3), ("SUM", 1 / 3), ("PRODUCT", 4 / 9)))
+def test_casters_beside_each_other_hide_their_sum(by_wedges, union, expected):
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage, x=-1 / 12)
+    stage.blocker((1 / 12, -20), (20, 20), 2.0)
+    square(stage)
+    stage.scene.candela.penumbra_wedges_union = union
+    stage.camera_above(span=0.002)
+    assert share(stage, (4, 4)).mean() == pytest.approx(expected, abs=5e-3)
+
+
+def areas(stage, every=13, across=24):
+    """What some pixels see of the lamp's area, found and by asking all triangles from a grid of places. Light by rays
+    would weigh the lamp's parts by their cosines, which a share of the area does not know."""
+    own = next(one for one in stage.renderer.techniques if one.name == NAME)
+    receivers = images.read(own.tiles._kept["receivers"]).reshape(-1, 4)
+    found = images.read(own.tiles._kept["seen_share"]).reshape(-1)
+    emitter = stage.renderer.frame.emitters[0]
+    chosen = np.flatnonzero(receivers[:, 3] != 0)[::every]
+    grid = (np.arange(across) + 0.5) / across * 2 - 1
+    given = [emitter.centre + x * emitter.u[:3] + y * emitter.v[:3] for x in grid for y in grid]
+    expected = [
+        np.mean([not silhouettes.crossings(own._casters.corners, p, s).any() for s in given])
+        for p in receivers[chosen, :3].astype(float)
+    ]
+    return found[chosen], np.array(expected)
+
+
+def exact(stage, size, samples=256):
+    settings = stage.scene.candela
+    settings.slot_shadow, settings.accumulated_maps_by = "accumulated_maps", "RAYS"
+    found = share(stage, size, samples=samples)
+    settings.slot_shadow = NAME
+    return found
+
+
+@pytest.mark.parametrize("thing", ("monkey", "torus", "cube"))
+def test_one_group_is_the_area_that_it_hides(by_wedges, thing):
+    """A cube, a ring with its hole, and an open head with eyes that are islands of their own."""
+    stage = by_wedges
+    stage.floor()
+    mesh = bpy.ops.mesh
+    if thing == "torus":
+        mesh.primitive_torus_add(location=(0, 0, 1.5), rotation=(0.2, 0.1, 0), major_radius=0.4, minor_radius=0.1)
+    elif thing == "cube":
+        mesh.primitive_cube_add(location=(0, 0, 1.5), rotation=(0.4, 0.3, 0.1), size=0.7)
+    else:
+        mesh.primitive_monkey_add(location=(0, 0, 1.2), rotation=(0.3, 0.2, 0.4), size=0.8)
+    bpy.context.object.visible_camera = False
+    square(stage)
+    stage.camera_above(span=3.0)
+    stage.render(size=(24, 24))
+    found, expected = areas(stage)
+    error = np.abs(found - expected)
+    assert expected.min() < 0.6
+    assert error.mean() < (0.02 if thing == "monkey" else 0.002)
+    assert error.max() < (0.3 if thing == "monkey" else 0.02)
+
+
+@pytest.mark.parametrize("kind", ("ELLIPSE", "SUN", "POINT"))
+def test_round_lights_count_as_squares_of_their_area(by_wedges, kind):
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage)
+    if kind == "ELLIPSE":
+        stage.light("AREA", (0, 0, 4), shape="DISK", size=1.0)
+    elif kind == "SUN":
+        stage.light("SUN", angle=0.25)
+    else:
+        stage.light("POINT", (0, 0, 4), shadow_soft_size=0.5)
+    stage.camera_above(span=2.0)
+    size = (32, 8)
+    found, expected = share(stage, size), exact(stage, size)
+    assert 0.2 < expected.mean() < 0.8
+    assert np.abs(found - expected).max() < 0.09
+
+
+def test_the_camera_in_a_wedge_or_a_shadow_changes_nothing(by_wedges):
+    """One group: the same receivers, seen from above and from within the shadow."""
+    stage = by_wedges
+    stage.floor()
+    bpy.ops.mesh.primitive_cube_add(location=(0, 0, 1.5), size=0.7)
+    square(stage)
+    stage.camera((0.1, 0.1, 0.5), (0.5, 0, 0.3), 1.4)
+    size = (24, 24)
+    assert np.abs(share(stage, size) - exact(stage, size)).max() < 0.03
+
+
+def test_several_objects_err_half_as_much_as_their_product(by_wedges):
+    """Random boxes between a lamp and the floor, against rays."""
+    stage = by_wedges
+    stage.floor()
+    random = np.random.default_rng(3)
+    for _ in range(12):
+        centre = random.uniform((-0.8, -0.8, 1.0), (0.8, 0.8, 2.5))
+        bpy.ops.mesh.primitive_cube_add(location=centre, rotation=random.uniform(0, 3, 3), size=0.35)
+        bpy.context.object.visible_camera = False
+    square(stage, size=1.5)
+    stage.camera_above(span=2.0)
+    errors = {}
+    for union in ("BOXES", "PRODUCT", "SUM"):
+        stage.scene.candela.penumbra_wedges_union = union
+        stage.render(size=(24, 24))
+        found, expected = areas(stage)
+        errors[union] = float(np.sqrt(((found - expected) ** 2).mean()))
+    assert errors["BOXES"] <= 0.5 * errors["PRODUCT"] < errors["SUM"]
+
+
+def test_shares_stay_between_plain_sum_and_all(by_wedges):
+    stage = by_wedges
+    fill(stage)
+    square(stage)
+    stage.camera((0, -4.2, 2.6), (1.13, 0, 0), 0.9)
+    size = (32, 24)
+    found = share(stage, size)
+    stage.scene.candela.penumbra_wedges_union = "SUM"
+    least = share(stage, size)
+    assert (found <= 1 + 1e-5).all() and (found >= least - 1e-4).all()
+
+
+def test_alpha_casters_are_added(by_wedges):
+    stage = by_wedges
+    stage.floor()
+    half_plane(stage, x=-0.2)
+    sheet = with_alpha(stage, np.arange(64)[None] * np.ones((64, 1)) < 32, "Closest")
+    card = stage.card(sheet, 0, 1, location=(0, 0, 2), turn=(0, 0, np.pi), scale=(8, 8, 1))
+    card.visible_camera = False
+    square(stage)
+    stage.camera_above(span=2.0)
+    size = (64, 4)
+    x, _ = places(size, 2.0)
+    # From x the plane hides the lamp up to -0.4 - x, the opaque half of the card what lies beyond -x.
+    expected = np.clip(np.minimum(0.5, -x) - np.maximum(-0.5, -0.4 - x), 0, 1)
+    assert np.abs(share(stage, size) - expected).mean() < 0.02
+
+
+def test_lights_with_too_many_groups_have_depth_complexity(by_wedges):
+    stage = by_wedges
+    stage.floor()
+    for k in range(70):
+        stage.blocker((0.02 * k, 0), (0.02 * k + 0.01, 0.5), 1.0)
+    square(stage)
+    stage.camera_above()
+    stage.render()
+    assert row(stage).counters["lights with too many groups of edges: depth complexity"] == 1
+
+
+def test_boxes_hold_what_a_group_hides():
+    """The rule for boxes without order, in numpy, on random triangles before a quarter of a light: never too small."""
+    random = np.random.default_rng(1)
+    grid = (np.stack(np.meshgrid(np.arange(48), np.arange(48)), axis=-1).reshape(-1, 2) + 0.5) / 48
+    for _ in range(150):
+        points = random.uniform(-1.5, 1.5, (3, 2))
+        inside = _inside(points, grid)
+        centre = bool(_inside(points, np.zeros((1, 2)))[0])
+        low, high = (np.zeros(2), np.ones(2)) if centre else (np.ones(2), np.zeros(2))
+        area, border, far = float(centre), 2.0 * centre, np.zeros(2)
+        for a, b in zip(points, np.roll(points, -1, axis=0)):
+            clipped = _clip(a, b)
+            if clipped is None:
+                continue
+            a, b = clipped
+            outer = _turn(points) * np.sign(a[0] * b[1] - a[1] * b[0]) < 0
+            sign = 1.0 if outer else -1.0
+            area += sign * (abs(_swept(a) - _swept(b)) - 0.5 * abs(a[0] * b[1] - a[1] * b[0]))
+            border += sign * abs(_along(a) - _along(b))
+            far = np.maximum(far, np.maximum(a, b))
+            if outer:
+                low = np.minimum(low, np.minimum(a, b))
+                corner = (a[0] >= a[1]) != (b[0] >= b[1])
+                high = np.maximum(high, np.ones(2) if corner else np.maximum(a / a.max(), b / b.max()))
+        assert area == pytest.approx(inside.mean(), abs=0.02)
+        if inside.any():
+            high = np.minimum(high, far) if border < 1e-4 else high
+            assert (grid[inside] >= low - 0.02).all() and (grid[inside] <= high + 0.02).all()
+
+
+def _turn(points):
+    (ax, ay), (bx, by) = points[1] - points[0], points[2] - points[0]
+    return np.sign(ax * by - ay * bx)
+
+
+def _inside(points, places):
+    sides = []
+    for a, b in zip(points, np.roll(points, -1, axis=0)):
+        way, off = b - a, places - a
+        sides.append(way[0] * off[:, 1] - way[1] * off[:, 0])
+    sides = np.stack(sides)
+    return (sides >= 0).all(axis=0) | (sides <= 0).all(axis=0)
+
+
+def _clip(a, b):
+    """The part of a segment within the unit square; None without any."""
+    low, high = 0.0, 1.0
+    for axis in range(2):
+        for at_a, at_b in ((a[axis], b[axis]), (1 - a[axis], 1 - b[axis])):
+            if at_a < 0 and at_b < 0:
+                return None
+            if at_a < 0:
+                low = max(low, at_a / (at_a - at_b))
+            elif at_b < 0:
+                high = min(high, at_a / (at_a - at_b))
+    return (a + low * (b - a), a + high * (b - a)) if low < high else None
+
+
+def _swept(q):
+    return 0.5 * q[1] / q[0] if q[0] >= q[1] else 1 - 0.5 * q[0] / q[1]
+
+
+def _along(q):
+    return q[1] / q[0] if q[0] >= q[1] else 2 - q[0] / q[1]
+
+
+def test_extent_of_a_sun_is_its_cone():
+    emitter = lights.Emitter(
+        None,
+        lights.SUN,
+        0,
+        np.array([0, 0, 1.0]),
+        0.1,
+        np.ones(3),
+        1.0,
+        np.array([0, 0, -1.0]),
+        0.0,
+        *[np.zeros(3)] * 3,
+    )
+    assert silhouettes.Extent.of(emitter).radius == pytest.approx(2 * np.sin(0.05))
