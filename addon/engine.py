@@ -30,6 +30,7 @@ from .ui import ENGINE
 from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
+AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
@@ -164,7 +165,8 @@ class CandelaEngine(bpy.types.RenderEngine):
                 frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            for _ in self._merged(shared.renderer, frame, layer.name) or self._drawn(shared.renderer, frame):
+            drawn = self._drawn(shared.renderer, frame, started)
+            for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
                 if self.test_break():
                     self.end_result(result, cancel=True)
                     with context.turn:
@@ -206,8 +208,12 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
-    def _drawn(self, renderer: Renderer, frame: Frame) -> Iterator[None]:
-        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile."""
+    def _drawn(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
+        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
+
+        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
+        """
+        limit, first, before = frame.settings.time_limit, time.perf_counter(), frame.samples_done
         parts = _whole_samples if bpy.app.background else samples_in_parts
         shown = -1
         for _ in parts(renderer, frame):
@@ -216,6 +222,14 @@ class CandelaEngine(bpy.types.RenderEngine):
                 wanted = frame.settings.samples_to_draw
                 self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
                 self.update_progress(shown / wanted)
+                if limit and shown > before:
+                    with context.turn:
+                        images.finish()
+                        now = time.perf_counter()
+                        each = (now - first) / (shown - before)
+                        if shown < wanted and now - started + (1 + AFTER_LAST) * each > limit:
+                            renderer.stop(frame)
+                            return
             yield
 
     def _merged(self, renderer: Renderer, frame: Frame, layer: str) -> list[None]:

@@ -126,14 +126,16 @@ def judge(mutation: Mutation, folder: Path, sound: dict[tuple[str, ...], str]) -
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--only", metavar="TEXT", help="mutations whose name or file contains this")
+    parser.add_argument("--only", metavar="TEXT", nargs="+", help="mutations whose name or file has one of these texts")
     parser.add_argument("--part", metavar="K/N", default="1/1", help="every Nth mutation, from the Kth on")
     parser.add_argument("--list", action="store_true", help="print the mutations and end")
 
 
 def chosen(options: argparse.Namespace) -> list[Mutation]:
     first, _, step = options.part.partition("/")
-    found = [one for one in read() if not options.only or options.only in f"{one.name} {one.file}"]
+    found = [
+        one for one in read() if not options.only or any(text in f"{one.name} {one.file}" for text in options.only)
+    ]
     return found[int(first) - 1 :: int(step or 1)]
 
 

@@ -33,7 +33,7 @@ ROOMS = {
     "gfx.context": Room(modules=("bpy", "gpu")),
     "materials": Room(modules=("numpy",)),
     "materials.reader": Room(modules=BLENDER),
-    "snapshot": Room(rooms=("materials",), modules=BLENDER),
+    "snapshot": Room(rooms=("materials",), modules=BLENDER, optional=("openvdb",)),
     "snapshot.scene": Room(rooms=("materials",), modules=("numpy",)),
     "sampling": Room(rooms=DATA, modules=("numpy",)),
     "kernels": Room(rooms=("gfx",), modules=("numpy",)),

@@ -47,9 +47,13 @@ bpy.context.object.modifiers.new("Cloth", "CLOTH").point_cache.use_disk_cache = 
 image = bpy.data.images.new("Texture", 4, 4)
 image.filepath_raw, image.file_format = str(folder / "texture.png"), "PNG"
 image.save()
+packed = bpy.data.images.new("Packed", 4, 4)
+packed.pack()
+packed.filepath_raw = str(folder / "other" / "victim.png")
 material = bpy.data.objects["Cube"].data.materials[0]
 material.use_nodes = True
-material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+for shown in (image, packed):
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = shown
 
 if bpy.app.version >= (5, 0):
     tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositor", "CompositorNodeTree")

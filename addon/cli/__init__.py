@@ -22,7 +22,7 @@ from ..compare.cache import LIMIT_BYTES
 from ..compare.reference import cache_folder
 from ..frame.settings import SAMPLES
 from ..techniques import REGISTRY
-from . import farm, merging, tuning, verbs
+from . import farm, farm_operator, merging, tuning, verbs
 from .refused import FAILURE, USAGE, Refused
 from .terminal import STDOUT
 
@@ -234,8 +234,10 @@ _handle: list = []  # of the registered command
 def register() -> None:
     """Make `blender --command candela` known."""
     _handle.append(bpy.utils.register_cli_command(COMMAND, main))
+    farm_operator.register()
 
 
 def unregister() -> None:
+    farm_operator.unregister()
     while _handle:
         bpy.utils.unregister_cli_command(_handle.pop())

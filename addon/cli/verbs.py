@@ -391,5 +391,7 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
         finally:
             del renderer.advance
             progress(terminal, "")
+    if renderer.frame is not None and renderer.frame.settings.time_limit:
+        wanted = renderer.frame.settings.samples_to_draw  # as many as there was time for
     if seen < wanted and not engine.given:
         raise Refused(f"The render of {job.options.file} ended after {seen} of {wanted} samples.")

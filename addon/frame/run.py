@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -363,6 +363,12 @@ class Renderer:
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
 
+    def stop(self, frame: Frame) -> None:
+        """End the picture with the samples that it has."""
+        frame.settings = replace(frame.settings, samples=frame.samples_done)
+        for _ in _stage(frame, "end"):
+            pass
+
     def _begin_samples(self, frame: Frame) -> Iterator[None]:
         frame.sample = 0
         frame.look()
@@ -523,7 +529,7 @@ class Renderer:
             lights, casters, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
-            settings.whole and (settings.sample_offset, settings.samples_to_draw),
+            settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),

@@ -21,7 +21,11 @@ SAMPLE_OFFSET = Param(
 SAMPLE_COUNT = Param(
     "sample_count", "Sample Count", 0, "How many samples to render from there on; 0: all that are left", 0, 65536
 )
-SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT)
+TIME_LIMIT = Param(
+    "time_limit", "Time Limit", 0.0,
+    "Seconds after which a final render ends with the samples that it has by then; 0: none", 0.0, 1e6,
+)  # fmt: skip
+SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT)
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 
@@ -40,6 +44,7 @@ class Settings:
     draft: bool = False  # a picture of a moment, in coarse pixels: parameters are at most what they declare for it
     sample_offset: int = SAMPLE_OFFSET.default  # `samples` stays the number of the whole picture, for all techniques
     sample_count: int = SAMPLE_COUNT.default
+    time_limit: float = TIME_LIMIT.default  # s; the picture may end with fewer samples than it asks for
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):

@@ -51,6 +51,8 @@ class Param:
         """`value` in this parameter's type and range, or ValueError with a sentence."""
         kind = type(self.default)
         if kind is tuple:
+            if isinstance(value, tuple):
+                return value
             raise ValueError(f"'{self.name}' is set on data-blocks in Blender, not by a text.")
         try:
             value = _as_bool(value) if kind is bool else kind(value)

@@ -15,14 +15,17 @@ from ..frame.run import Frame
 from ..frame.technique import Service
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..gfx.struct import Block
 from ..scene.media import ATTENUATION_TEXTURES, Media
 from ..scene.view import VIEW
+from ..sources import lights
 
 VIEW_PROGRAM = passes.fullscreen_program(
     "media along the view",
     "media/view.frag.glsl",
     textures=(("RGBA32F", "surface_position"), *ATTENUATION_TEXTURES),
-    blocks=((VIEW, "film_view"),),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+    constants=(("INT", "light_count"),),
     outputs=(("VEC4", "out_through"),),
 )
 
@@ -35,13 +38,16 @@ class MediaService(Service):
     media: Media
 
     @contextmanager
-    def passing(self, frame: Frame, surfaces: dict[str, images.Image]) -> Iterator[images.Image]:
-        """An image of what passes between the eye and the `surfaces` (by their bindings), or infinity."""
+    def passing(
+        self, frame: Frame, surfaces: dict[str, images.Image], seen: Block, count: int
+    ) -> Iterator[images.Image]:
+        """An image of what passes between the eye and the `surfaces` (by their bindings), or infinity. `seen`: lamps
+        that the camera sees, `count` of them."""
         with images.borrowed(*frame.size, "RGBA32F") as target:
             passes.fullscreen(
                 VIEW_PROGRAM, target,
                 textures={"surface_position": surfaces["surface_position"], **self.media.attenuation()},
-                blocks={"film_view": frame.view_block},
+                blocks={"film_view": frame.view_block, "sources": seen}, constants={"light_count": count},
             )  # fmt: skip
             yield target.colors[0]
 

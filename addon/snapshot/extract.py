@@ -178,7 +178,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                     of_object.terminator, of_object.own, of_object.caustics_caster,
                 )
             )  # fmt: skip
-        # A copy of the first one of the source: the constructor of a frozen dataclass takes half of a large sync's time.
+        # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
         one = object.__new__(Instance)
         vars(one).update(
             alike, matrix=transforms[k], random=place.random, generated=place.generated, uv=place.uv, key=place.key

@@ -67,8 +67,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     ScreenSpacePhotons,
     Film,
     Denoise,
-    EyeModel,
     TemporalGlare,
+    EyeModel,
 )
 
 

@@ -168,11 +168,34 @@ class Denoise(Technique):
 
     def sample(self, frame: Frame) -> None:
         done = frame.sample + 1
-        if done == frame.settings.samples // 2:
+        if frame.settings.time_limit:
+            self._keep_doubles(frame, done)
+        elif done == frame.settings.samples // 2:
             for path in self._paths(frame):
                 passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
 
+    def _keep_doubles(self, frame: Frame, done: int) -> None:
+        """Where nobody knows how many samples there will be: copies after 1, 2, 4, … samples, the last two of them. One
+        is always from a third to two thirds of the way."""
+        if done & (done - 1):
+            return
+        for path in self._paths(frame):
+            half, before = f"denoise.{path}_half", f"denoise.{path}_before"
+            if before not in frame.images:
+                frame.images[before] = images.pool.take(*frame.size, "RGBA32F")
+            passes.copy(frame.images[half], frame.target(before))
+            passes.copy(frame.images[f"film.{path}"], frame.target(half))
+
+    def _half(self, frame: Frame, path: str, count: int) -> tuple[int, str]:
+        """Samples of the first part of all, and the image of their sum."""
+        if not frame.settings.time_limit:
+            return count // 2, f"denoise.{path}_half"
+        last = 1 << (count.bit_length() - 1)
+        return (last // 2, f"denoise.{path}_before") if 2 * count < 3 * last else (last, f"denoise.{path}_half")
+
     def end(self, frame: Frame) -> Iterator[None]:
+        if frame.settings.samples < FEWEST:
+            return
         for path in self._paths(frame):
             yield from self._filter(frame, path, frame.settings.samples)
             frame.shown[f"radiance.{path}"] = f"denoise.{path}"
@@ -191,12 +214,13 @@ class Denoise(Technique):
             "surface_position": frame.images["surface.position"], "normal_sum": frame.images["surface.normal_sum"],
         }  # fmt: skip
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
+        half_count, half = self._half(frame, path, count)
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
                 passes.fullscreen(
                     BEGIN, light, rows=rows, blocks=blocks,
-                    textures={**guides, **sums, "half_sum": frame.images[f"denoise.{path}_half"]},
-                    constants={"count": count, "half_count": count // 2, "sharpness": how.sharpness},
+                    textures={**guides, **sums, "half_sum": frame.images[half]},
+                    constants={"count": count, "half_count": half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
             level, shown = LEVEL, {}

@@ -261,7 +261,7 @@ class Film(Technique):
         if media is None:
             frame.count(self, "passes", film_filter.add(frame, seen, offset, share))
             return
-        with media.passing(frame, surfaces) as through:
+        with media.passing(frame, surfaces, self._lights, self._light_count) as through:
             frame.count(self, "passes", 1 + film_filter.add(frame, seen, offset, share, through))
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:

@@ -62,7 +62,7 @@ IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
 
 POINT_TEXTURES = (("RGBA32F", "point_position"), ("RGBA32F", "point_normal"), ("RGBA32F", "point_entry"))
 PICTURE = (
-    "surface_position", "surface_normal", "surface_diffuse", "scatter_length", "scatter_share", "scatter_entry",
+    "surface_position", "surface_normal", "surface_diffuse", "spread_length", "scatter_share", "spread_entry",
     "light_direct",
     "light_indirect",
 )  # fmt: skip

@@ -24,7 +24,7 @@ objects are right; quads with the normalised weight instead of lines.
 
 Bias: the kernel's width; a beam seen nearly end-on is bounded (sine of 1/20). Rough glass and mirrors are taken as
 smooth up to SMOOTH and left out beyond. Materials count by their mean colour. The world and shining meshes throw no
-beams. A beam behind glass is not seen.
+beams: their light passes glass straight. A beam behind glass is not seen.
 """
 
 from __future__ import annotations

@@ -52,6 +52,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         settings = context.scene.candela
         column = _columns(self)
         column.prop(settings, "samples", text="Render Samples")
+        column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
         column.prop(settings, "bounces")

@@ -16,6 +16,7 @@ struct Asked {
   vec3 direction;
   float reach;
   bool shadow;
+  bool glass_stops;  // what glass lets pass of it arrives as beams
   vec3 found;
 };
 
@@ -25,6 +26,7 @@ Asked ask_nothing()
   asked.direction = vec3(0.0, 0.0, 1.0);
   asked.reach = 0.0;
   asked.shadow = false;
+  asked.glass_stops = false;
   asked.found = vec3(0.0);
   return asked;
 }
@@ -36,6 +38,7 @@ Asked ask_light(Light light, vec3 position, out float density)
   asked.found = light_sample(light, position, asked.direction, density);
   asked.reach = light_distance(light, position, asked.direction);
   asked.shadow = (light.flags & LIGHT_SHADOW) != 0;
+  asked.glass_stops = glass_blocks != 0 && light.kind < LIGHT_DIRECTION;
   return asked;
 }
 
@@ -49,6 +52,7 @@ Asked ask_scattered(int number, uint inside, vec3 position, vec3 onwards, vec2 u
     asked.direction = -phase_direction(g, onwards, u);
     asked.reach = 1e29;
     asked.shadow = true;
+    asked.glass_stops = false;
     float lobe = phase_henyey_greenstein(g, dot(-asked.direction, onwards));
     float rows = world_rows * environment_density(asked.direction);
     asked.found = environment_radiance(asked.direction) / max(rows + lobe, 1e-30);  // balance heuristic
@@ -79,7 +83,7 @@ vec3 asked_arriving(Asked asked, vec3 position, uint salt)
   if (asked.shadow) {
     ivec2 hit;
     float until = asked.reach * 0.9999;
-    clear = (trace_layers(position, asked.direction, until, until, salt, glass_blocks != 0, true, hit) >= until) ? 1.0 : 0.0;
+    clear = (trace_layers(position, asked.direction, until, until, salt, asked.glass_stops, true, hit) >= until) ? 1.0 : 0.0;
   }
   if (clear <= 0.0) {
     return vec3(0.0);

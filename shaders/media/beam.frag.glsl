@@ -30,8 +30,8 @@ void main()
   float pixel_size = abs(film_view.frame.y - film_view.frame.x) / film_view.film.x;
   pixel_size *= (film_view.eye.w > 0.5) ? 1.0 : along_view * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
   float wide = clamp(beam_flux.w, beam_pixels * pixel_size, beam_most_pixels * pixel_size);
-  float kernel = max(1.0 - off / wide, 0.0) / wide;
-  if (!(kernel > 0.0)) {
+  float tent = max(1.0 - off / wide, 0.0) / wide;
+  if (!(tent > 0.0)) {
     discard;
   }
   uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 47).x + floatBitsToUint(along_beam);
@@ -44,6 +44,6 @@ void main()
   }
   vec3 passing = media_transmittance(position, -ray.direction, along_view, seed)
                  * media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);
-  vec3 light = beam_flux.rgb * scattered * passing * (kernel / max(sqrt(sine_squared), LEAST_SINE));
+  vec3 light = beam_flux.rgb * scattered * passing * (tent / max(sqrt(sine_squared), LEAST_SINE));
   out_volume = vec4((is_finite(light.x) && is_finite(light.y) && is_finite(light.z)) ? light : vec3(0.0), 0.0);
 }

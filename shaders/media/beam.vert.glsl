@@ -15,7 +15,7 @@ void main()
   if (beam_start.w > 0.0 && max(max(beam_flux.x, beam_flux.y), beam_flux.z) > 0.0) {
     vec4 a = beam_clip(beam_start.xyz);
     vec4 b = beam_clip(beam_end.xyz);
-    float near = (film_view.eye.w > 0.5) ? -1e30 : 1e-3 * distance(beam_start.xyz, beam_end.xyz) * 0.01 + film_view.film.z;
+    float near = (film_view.eye.w > 0.5) ? -1e30 : max(film_view.film.z, 1e-20);  // clipped before it is divided
     bool seen = max(a.w, b.w) > near;
     if (seen) {
       vec4 first = (a.w < near) ? mix(a, b, (near - a.w) / (b.w - a.w)) : a;

@@ -23,6 +23,7 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
     asked.direction = cosine_direction(normal, u);
     asked.reach = 1e29;
     asked.shadow = true;
+    asked.glass_stops = false;
     float lobe = max(dot(asked.direction, normal), 0.0) / PI;
     float rows = world_rows * environment_density(asked.direction);
     asked.found = environment_radiance(asked.direction) * lobe / max(rows + lobe, 1e-30);

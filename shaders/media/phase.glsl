@@ -25,7 +25,7 @@ float phase_draine(float g, float alpha, float mu)
 // `values`: index of the particles, exponent v, (d180^-v - 1) / (d180 - 1).
 float phase_fournier_forand(vec3 values, float mu)
 {
-  float square = max(0.5 * (1.0 - mu), 1e-6);  // sin^2 of half the angle
+  float square = max(0.5 * (1.0 - mu), 1e-8);  // sin^2 of half the angle
   float v = values.y;
   float d = 4.0 * square / (3.0 * (values.x - 1.0) * (values.x - 1.0));
   float tail = (3.0 * mu * mu - 1.0) * values.z / (16.0 * PI);

@@ -24,7 +24,7 @@ void arriving_pixel(inout Arriving sum, ivec2 pixel, float translucency, vec3 we
 {
   vec3 albedo = surface_diffuse_fetch(pixel).rgb;
   vec3 known = step(vec3(LEAST_COLOR), albedo) * weight;
-  vec4 entry = scatter_entry_fetch(pixel);
+  vec4 entry = spread_entry_fetch(pixel);
   vec3 per = known / max(albedo, vec3(LEAST_COLOR)) * entry.rgb * min(entry.w, translucency);
   sum.direct += per * light_direct_fetch(pixel).rgb;
   sum.indirect += per * light_indirect_fetch(pixel).rgb;
@@ -188,7 +188,7 @@ void main()
   if (share.w < 4.0) {
     return;
   }
-  vec4 length_m = scatter_length_fetch(pixel);
+  vec4 length_m = spread_length_fetch(pixel);
   vec3 position = surface_position_fetch(pixel).xyz;
   vec3 normal = octahedral_decode(surface_normal_fetch(pixel).zw);
   vec3 albedo = surface_diffuse_fetch(pixel).rgb;
@@ -203,7 +203,7 @@ void main()
 
   Arriving own;
   own.direct = own.indirect = own.whole = vec3(0.0);
-  float translucency = scatter_entry_fetch(pixel).w;
+  float translucency = spread_entry_fetch(pixel).w;
   arriving_pixel(own, pixel, translucency, vec3(1.0));
   vec3 direct = own.direct;
   vec3 indirect = own.indirect;

@@ -250,6 +250,23 @@ def test_a_farm_that_loses_a_worker_makes_what_one_process_makes(moving, tmp_pat
     assert not list((bundle / "pictures").glob(".writing_*"))
 
 
+def test_the_operator_writes_the_job_of_the_saved_file(registered, tmp_path):
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / "cornell_box.blend"))
+    bpy.context.scene.render.engine = "CANDELA"
+    with pytest.raises(RuntimeError, match="cannot be split"):
+        bpy.ops.candela.farm_job(directory=str(tmp_path / "job"), split_samples=10000)
+    assert not list(tmp_path.iterdir())
+    assert bpy.ops.candela.farm_job(directory=str(tmp_path / "job"), chunk=100, split_samples=2) == {"FINISHED"}
+    template = json.loads((tmp_path / "job" / "template.json").read_text("utf-8"))
+    assert [step["name"] for step in template["steps"]] == ["Render", "Assemble"]
+    arguments = template["steps"][0]["script"]["actions"]["onRun"]["args"]
+    assert arguments[arguments.index("--scene") + 1] == "Cornell Box"
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert not bpy.ops.candela.farm_job.poll()
+
+
 FLAMENCO_STUBS = """
 const fs = require("fs");
 const made = [];

@@ -1,5 +1,7 @@
 """Denoising: less error, the same light, nothing where there is no noise, and nothing of it where it is not wanted."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from addon.gfx import images, passes
 from addon.gfx.struct import Block
 from addon.scene.view import VIEW, View
 from addon.snapshot.scene import Camera, Film
-from addon.techniques.denoise import LEVEL
+from addon.techniques.denoise import LEVEL, Denoise
 
 SIZE = (64, 48)
 
@@ -169,3 +171,13 @@ def test_noise_goes_from_pixel_to_pixel_of_one_surface_alone(gpu_context, apart)
     for half, mean in ((out[:, :16], 1.25), (out[:, 16:], 2.25)):
         assert half.mean() == pytest.approx(mean, abs=0.01)
         assert np.abs(half[4:-4, 4:-4] - mean).max() < 0.1
+
+
+@pytest.mark.parametrize("count", range(2, 34))
+def test_of_an_unknown_number_of_samples_about_half_are_kept(count):
+    """From a third to two thirds of them, and never all."""
+    settings = SimpleNamespace(settings=SimpleNamespace(time_limit=5.0))
+    half, name = Denoise()._half(settings, "diffuse_direct", count)
+    kept = [1 << k for k in range(8) if 1 << k <= count][-2:]
+    assert half == kept[-1 if name.endswith("_half") else -2]
+    assert count / 3 <= half <= 2 * count / 3 + 1e-9 or count == 2
