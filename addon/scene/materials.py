@@ -357,6 +357,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
+        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
         defines=EVERY_DEFINES,
     )
 
