@@ -11,7 +11,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
+.PHONY: help environment demo pictures samples test test-fast stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -42,6 +42,12 @@ check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff format --check --quiet .
 	$(PYTHON) -m ruff check --quiet .
 	$(PYTHON) -m pytest -q $(PARALLEL) -m "not window and not timing and not slow"
+
+matrix: environment ## fast tests with each supported Blender (VERSIONS="5.0 4.5"), and the result in the README
+	$(PYTHON) tools/matrix.py $(VERSIONS)
+
+mutations: environment ## small wrongs that the tests must notice
+	$(PYTHON) -m bench mutations
 
 package: environment ## the extension as a zip, in build/
 	$(PYTHON) tools/package.py --output build

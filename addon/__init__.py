@@ -18,6 +18,7 @@ def _parts() -> tuple:
     from . import cli, engine
     from .ui import (
         compare_editor,
+        eye_panel,
         jobs,
         panels,
         pass_nodes,
@@ -26,11 +27,13 @@ def _parts() -> tuple:
         pass_tree,
         properties,
         quality,
+        reflection_operators,
         scoped_panels,
+        translucency,
         tuning,
     )
 
     return (
-        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, tuning,
-        pass_operators, compare_editor, cli,
+        pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
+        reflection_operators, translucency, tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip

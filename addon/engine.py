@@ -17,6 +17,7 @@ import numpy as np
 
 from . import viewport
 from .frame import ledger as ledgers
+from .frame import slices
 from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
@@ -26,9 +27,10 @@ from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import RenderPass, missing_passes, wanted_passes
+from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
+AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
@@ -44,10 +46,17 @@ class Session:
 
 _sessions: dict[tuple, Session] = {}
 
+# What the command line takes from final renders and gives to them, by view layer (frame/slices.py): while `taken` is a
+# dictionary, each layer's samples are put there; of a layer in `given` no sample is drawn, but those sums are shown.
+taken: dict[str, slices.Slice] | None = None
+given: dict[str, dict[str, np.ndarray]] = {}
+
 
 def session(scene: bpy.types.Scene, use: str) -> Session:
     """The session of a scene for 'final' or 'preview'."""
-    return _sessions.setdefault((scene.original.session_uid, use), Session())
+    shared = _sessions.setdefault((scene.original.session_uid, use), Session())
+    shared.renderer.publishes = use != "preview"
+    return shared
 
 
 def free_sessions() -> None:
@@ -94,7 +103,7 @@ class CandelaEngine(bpy.types.RenderEngine):
     def update_render_passes(self, scene=None, renderlayer=None):
         """Tell Blender (and the compositor) which passes will come."""
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
-        for asked in wanted_passes(renderlayer):
+        for asked in wanted_passes(renderlayer, scene):
             self.register_pass(scene, renderlayer, asked.name, len(asked.channels), asked.channels, asked.kind)
 
     def update(self, data, depsgraph):
@@ -156,14 +165,17 @@ class CandelaEngine(bpy.types.RenderEngine):
                 frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            for _ in self._drawn(shared.renderer, frame):
+            drawn = self._drawn(shared.renderer, frame, started)
+            for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
                 if self.test_break():
                     self.end_result(result, cancel=True)
                     with context.turn:
                         shared.renderer.finish(frame, ())
                     return
-            wanted = wanted_passes(layer)
+            wanted = wanted_passes(layer, scene)
             with context.turn:
+                if taken is not None:
+                    taken[layer.name] = slices.taken(frame)
                 pixels = _finished(shared.renderer, frame, wanted)
             for name, array in pixels.items():
                 render_pass = result.layers[0].passes.find_by_name(name, eye)
@@ -196,16 +208,37 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
-    def _drawn(self, renderer: Renderer, frame: Frame) -> Iterator[None]:
-        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile."""
+    def _drawn(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
+        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
+
+        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
+        """
+        limit, first, before = frame.settings.time_limit, time.perf_counter(), frame.samples_done
         parts = _whole_samples if bpy.app.background else samples_in_parts
         shown = -1
         for _ in parts(renderer, frame):
             if frame.samples_done != shown:
                 shown = frame.samples_done
-                self.update_stats("Candela", f"Sample {shown} of {frame.settings.samples}")
-                self.update_progress(shown / frame.settings.samples)
+                wanted = frame.settings.samples_to_draw
+                self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
+                self.update_progress(shown / wanted)
+                if limit and shown > before:
+                    with context.turn:
+                        images.finish()
+                        now = time.perf_counter()
+                        each = (now - first) / (shown - before)
+                        if shown < wanted and now - started + (1 + AFTER_LAST) * each > limit:
+                            renderer.stop(frame)
+                            return
             yield
+
+    def _merged(self, renderer: Renderer, frame: Frame, layer: str) -> list[None]:
+        """Parts in which a picture of samples that were drawn before is finished; none where they are to be drawn."""
+        if layer not in given:
+            return []
+        with context.turn:
+            renderer.merge(frame, given[layer])
+        return [None]
 
     def _compiling(self, done: int, total: int) -> bool:
         self.update_stats("Candela", f"Compiling shaders {done} of {total}")
@@ -231,7 +264,7 @@ def eyes(scene) -> list[str]:
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
     leash = Leash(frame.profiler, BEHIND_S)
-    while frame.samples_done < frame.settings.samples:
+    while frame.samples_done < frame.settings.samples_to_draw:
         yield
         with context.turn:
             renderer.advance(frame)
@@ -245,5 +278,7 @@ def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dic
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     renderer.show(frame)
     arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
+    if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
+        arrays[GLARE.source] = arrays["film.combined"]
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays["film.combined"], **pixels}

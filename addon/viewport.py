@@ -98,6 +98,7 @@ class Viewport:
         self._changed_at = 0.0
         self._finished = False
         self._target: images.Target | None = None  # the picture, apart from the frame's images, which come and go
+        self._shown_with: tuple = ()  # what the picture was shown with, see Frame.shown_with
         self._waits = False  # what is shown is this view of this scene, only coarser
         self.place = (0, 0, 1, 1)  # where the picture lies, in pixels of the region: x, y, width, height
         self._sample: Iterator | None = None  # what is left of a sample that was begun
@@ -158,6 +159,8 @@ class Viewport:
         frame, started = self.frame, clock()
         if self._target is None and self._sample is None and frame.samples_done:
             self._resolve(frame)  # the frame outlived an error that took its picture
+        elif self._sample is None and frame.samples_done and frame.shown_with != self._shown_with:
+            self._resolve(frame)  # the same samples, at another time or with other settings of a `show` stage
         budget = min(max(elsewhere, BUDGET_S), MOST_BUDGET_S) if self.scale == 1 else BUDGET_S
         while frame.samples_done < settings.samples:
             spent = self._work(frame, clock, budget)
@@ -201,6 +204,7 @@ class Viewport:
             self._drop_picture()
             self._target = images.Target((images.pool.take(*frame.size, "RGBA32F"),))
         passes.copy(self.renderer.show(frame), self._target)
+        self._shown_with = frame.shown_with
         film = frame.snapshot.film
         x, y = self._size[0] / film.width, self._size[1] / film.height
         x0, y0, x1, y1 = film.border
@@ -219,7 +223,12 @@ class Viewport:
 
     def _prepare(self, source, camera: Camera, size, border, settings: Settings, clock) -> None:
         """Bring `self.frame` to what is asked: kept if nothing changed, else begun anew at a fitting scale."""
-        asked = (_view_key(camera), size, border, replace(settings, samples=0))
+        asked = (
+            _view_key(camera),
+            size,
+            border,
+            replace(settings, samples=0, values=self.renderer.drawn_with(settings)),
+        )
         moved, begun, reading = asked != self._asked, False, 0.0
         if self.dirty:
             started = clock()

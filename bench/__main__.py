@@ -6,7 +6,27 @@ import argparse
 import os
 import sys
 
-from bench import again, costs, direct, edges, everything, growth, hashes, indirect, page, profile, random_scenes, run
+from bench import (
+    again,
+    ages,
+    caustics,
+    costs,
+    direct,
+    edges,
+    everything,
+    glare,
+    growth,
+    hashes,
+    indirect,
+    media,
+    mutations,
+    page,
+    profile,
+    random_scenes,
+    reflections,
+    run,
+    subsurface,
+)
 
 VERBS = {
     "run": run,
@@ -14,12 +34,19 @@ VERBS = {
     "growth": growth,
     "direct": direct,
     "indirect": indirect,
+    "media": media,
+    "caustics": caustics,
     "profile": profile,
     "costs": costs,
+    "glare": glare,
     "edges": edges,
     "random": random_scenes,
+    "reflections": reflections,
+    "subsurface": subsurface,
     "page": page,
+    "ages": ages,
     "hashes": hashes,
+    "mutations": mutations,
     "all": everything,
 }
 

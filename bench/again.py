@@ -16,6 +16,7 @@ from pathlib import Path
 
 from bench.cells import OWN, PEERS, Series
 from bench.figures import MIDDLE, Results, load
+from bench.markdown import write_whole
 from bench.run import OUT, RESULTS, Worker, ask_for, rounded
 
 AGAIN = (OWN, *(peer for peer in PEERS if peer.engine == "CYCLES" and peer.main))
@@ -85,6 +86,8 @@ def command(options: argparse.Namespace) -> int:
         print("No scene has Candela and Cycles at 16 samples yet: run `python -m bench run` first.")
         return 1
     path = options.results.with_name("again.json")
-    path.write_text(json.dumps({"rows": rounded(rows)}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_whole(
+        path, json.dumps({"run": results.about.get("run"), "rows": rounded(rows)}, indent=1, ensure_ascii=False) + "\n"
+    )
     print(sentence(rows))
     return 0

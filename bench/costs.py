@@ -17,6 +17,7 @@ import numpy as np
 
 from bench.cells import choices
 from bench.figures import Results, geometric_mean, load
+from bench.markdown import write_whole
 from bench.run import RESULTS, rounded
 
 
@@ -94,7 +95,7 @@ def command(options: argparse.Namespace) -> int:
     missing = sorted(set(slots) - set(table))
     if missing:
         print(f"Nothing was measured for the slot {', '.join(missing)}; its row stays away.")
-    auto.PATH.write_text(text(results, table), encoding="utf-8")
+    write_whole(auto.PATH, text(results, table))
     for slot, names in slots.items():
         for samples in (1, 4, 16, 64):
             print(f"{slot}, {samples} samples: {auto.preferred(auto.read(auto.PATH), slot, names, samples)}")

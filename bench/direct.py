@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import markdown
+from bench import ages, markdown
+from bench.markdown import write_whole
 from bench.quick import size_of, table
 
 SCENES = Path(__file__).resolve().parent.parent / "sample_blends"
@@ -66,6 +67,7 @@ def page(rows: list[tuple[str, ...]], samples: int, size: tuple[int, int], refer
         "errors (relMSE). Without the worst 0.1 %: without the 49 pixels with the largest error. Of it noise: what two",
         "pictures by Candela differ by, without their worst 0.1 %; what is left of the column before it is bias.",
         "Single pixels of a path that is black elsewhere: finding 110 of [performance.md](performance.md).", "",
+        ages.now(), "",
         markdown.table([HEAD, *rows]), "",
     ])  # fmt: skip
 
@@ -103,5 +105,5 @@ def command(options: argparse.Namespace) -> int:
         print(table([HEAD, *added]), flush=True)
         rows += added
         if options.page:  # after each scene: what is measured stays when the run is ended
-            options.page.write_text(page(rows, options.samples, options.size, options.reference), encoding="utf-8")
+            write_whole(options.page, page(rows, options.samples, options.size, options.reference))
     return 0

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.cells import ROOT, SCENES, Series
+from bench.markdown import write_whole
 
 RESULTS = ROOT / "bench" / "results" / "growth.json"
 SAMPLES, SIZE = 4, (128, 96)
@@ -196,7 +197,7 @@ def command(options: argparse.Namespace) -> int:
     about |= {"date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"), "load": load()}
     options.results.parent.mkdir(parents=True, exist_ok=True)
     lines = ",\n".join(json.dumps(rounded(row), ensure_ascii=False) for row in rows)
-    options.results.write_text(f'{{"about": {json.dumps(rounded(about))},\n"rows": [\n{lines}\n]}}\n', encoding="utf-8")
+    write_whole(options.results, f'{{"about": {json.dumps(rounded(about))},\n"rows": [\n{lines}\n]}}\n')
     print(aligned(table(rows)))
     print(options.results)
     return 0

@@ -17,8 +17,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import markdown
+from bench import ages, markdown
 from bench.cells import Scene, Series
+from bench.markdown import write_whole
 
 BOUNCES = 16
 SAMPLES = (1, 16)
@@ -197,7 +198,7 @@ def gathers(scenes=GATHER_SCENES, size=GATHER_SIZE, virtual_lights=GATHER_LIGHTS
 def page(about: dict, size, reference: int, by_scene: dict, gathered: list, grown: list, moved: list) -> str:
     """The whole page as Markdown."""
     made = f"{about['date']}, Blender {about['blender']}, {about['device']}, {about['cpu']}."
-    intro = f"""Written by `python -m bench indirect --page PATH`; do not edit. {made}
+    intro = f"""Written by `python -m bench indirect --page PATH`; do not edit. {ages.now()} {made}
 
 {size[0]} x {size[1]} pixels, {BOUNCES} bounces, against two renders of {reference} samples by Cycles, whose noise is
 taken off the errors (relMSE); the passes of one sample are means of several seeds. Seconds are those of a whole
@@ -243,7 +244,7 @@ def write(path: Path, scenes, techniques: list[str], size: tuple[int, int], refe
 
     def save(title: str, head, rows) -> None:
         print(f"\n{title}\n{table([head, *rows])}", flush=True)
-        path.write_text(page(about, size, reference, by_scene, gathered, grown, moved), encoding="utf-8")
+        write_whole(path, page(about, size, reference, by_scene, gathered, grown, moved))
 
     for name in scenes:
         by_scene[name] = measured(name, techniques, size, reference)

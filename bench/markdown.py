@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 END = "<!-- end of what is written -->"
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Replace the file at once: whoever reads or interrupts finds the old text or the new one."""
+    path = path.resolve()
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
 
 
 def begin(command: str) -> str:
@@ -19,11 +35,18 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
 
 
-def put_between(path: Path, command: str, part: str) -> None:
-    """Replace what stands between the mark of `command` and the next end. ValueError when the file has none."""
+def put_between(path: Path, command: str, part: str, stamped: bool = True, made: str = "") -> None:
+    """Replace what stands between the mark of `command` and the next end. ValueError when the file has none.
+
+    Unless it is not to be `stamped`, the part says when and at which commit it was `made` (bench/ages.py); now, if that
+    is empty.
+    """
     mark = begin(command)
     before, found, rest = path.read_text(encoding="utf-8").partition(mark)
     _, end, after = rest.partition(END)
     if not (found and end):
         raise ValueError(f"{path.name} lacks the marks '{mark}' and '{END}'.")
-    path.write_text(f"{before}{mark}\n\n{part}\n\n{END}{after}", encoding="utf-8")
+    from bench import ages
+
+    said = f"{made or ages.now()}\n\n" if stamped else ""
+    write_whole(path, f"{before}{mark}\n\n{said}{part}\n\n{END}{after}")

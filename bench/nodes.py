@@ -16,6 +16,8 @@ import numpy as np
 import addon
 from addon.materials import nodes
 from addon.materials.nodes.entry import Entry
+from bench import ages
+from bench.markdown import write_whole
 
 from .node_cases import Case, Difference, compare, new_material
 from .node_list import CASES
@@ -29,11 +31,13 @@ LEFT_OUT = ("ShaderNodeOutput", "ShaderNodeGroup", "ShaderNodeTree", "ShaderNode
 HEAD = """\
 # Shader nodes
 
-Written by `make nodes` with Blender {version}; do not edit.
+Written by `make nodes` with Blender {version}; do not edit. {made}
 
-{supported} node types are drawn as Cycles draws them, {limited} with a stated limit, {stand_in} by a stated stand-in,
-{missing} not at all. A node that is not known keeps the value that is set in the socket it feeds. Everything but the
-first kind is named in the render properties, with material and node.
+{supported} node types are drawn in full, {limited} with a stated limit, {stand_in} by a stated stand-in, {missing} not
+at all. {beside} of all types have cases beside Cycles, below. Of those drawn in full these have none: {without}.
+
+A node that is not known keeps the value that is set in the socket it feeds. Everything but the first kind is named in
+the render properties, with material and node.
 
 ## What is drawn
 
@@ -105,7 +109,11 @@ def page(found: list[Difference], pixels: int) -> str:
     rows = node_rows()
     counts = {state: sum(row[1] == state for row in rows) for state in ("supported", "limited", "stand-in", "missing")}
     counts["stand_in"] = counts.pop("stand-in")
-    lines = [HEAD.format(version=bpy.app.version_string, **counts)]
+    beside = {difference.case.node for difference in found} | {d.case.through for d in found if d.case.through}
+    labels = {getattr(bpy.types, f"ShaderNode{name}").bl_rna.name for name in beside if name}
+    without = ", ".join(name for name, state, _ in rows if state == "supported" and name not in labels) or "none"
+    about = {"version": bpy.app.version_string, "made": ages.now(), "beside": len(labels), "without": without}
+    lines = [HEAD.format(**about, **counts)]
     lines += [f"| {name} | {state} | {text} |\n" for name, state, text in rows]
     good = sum(difference.good for difference in found)
     lines.append(COMPARISON.format(count=len(found), pixels=pixels, good=good))
@@ -146,7 +154,7 @@ def main() -> None:
             print(f"{difference.largest:7.2f} {difference.percentile_99:7.2f}  {state:5}  {difference.case.name}")
     else:
         contact_sheet(found, arguments.output / "images" / "nodes.png")
-        (arguments.output / "nodes.md").write_text(page(found, arguments.pixels), encoding="utf-8")
+        write_whole(arguments.output / "nodes.md", page(found, arguments.pixels))
         print(f"{sum(difference.good for difference in found)} of {len(found)} cases agree; see docs/nodes.md")
     # As in the tests: Blender 4.5 as a module does not come back from its exit handlers once a GPU was used.
     sys.stdout.flush()

@@ -13,7 +13,7 @@ import statistics
 from pathlib import Path
 from string import Template
 
-from bench import again, markdown, plots, profile
+from bench import again, ages, markdown, plots, profile
 from bench import growth as growth_of_cost
 from bench.cells import RAW, ROOT
 from bench.figures import (
@@ -37,6 +37,7 @@ REMEDIES = {  # of the paths that figures.at_fault ranks
     "glossy_indirect": "rays by the surface's lobe that reuse those of neighbours, where virtual lights are too few",
     "transmission_indirect": "more than one path through glass a sample",
 }
+FEWEST_SCENES = 5  # of which a mean is shown
 WORDS = 28  # letters from which on a cell of a table is text that may be broken
 BUSY = 2.0  # processes that want each thread, from which on times say little; the benchmark itself wants about one
 PEERS = ("EEVEE", "EEVEE, ray traced", "Cycles", "Cycles, denoised")
@@ -102,6 +103,7 @@ def summary(results: Results) -> Table:
     head = ("scene", *(f"{peer}: {what}" for peer in PEERS for what in ("speed-up", "error ratio")))
     rows: Table = [head]
     columns: list[list[float]] = [[] for _ in range(2 * len(PEERS))]
+    bounds = [0] * len(columns)
     for scene in results.scenes:
         cells = [scene.replace("_", " ")]
         own = results.own_curve(scene)
@@ -111,9 +113,16 @@ def summary(results: Results) -> Table:
                 cells.append(f"{bound} {times(value)}".strip())
                 if value is not None and not vague(value, bound):
                     columns[place].append(value)
+                    bounds[place] += bool(bound)
         rows.append(tuple(cells))
-    rows.append(("geometric mean", *(times(geometric_mean(column)) for column in columns)))
+    rows.append(("geometric mean", *map(mean_of, columns, bounds)))
     return rows
+
+
+def mean_of(values: list[float], bounds: int) -> str:
+    """The geometric mean with the number of scenes, and of bounds among them; of few scenes it says nothing."""
+    scenes = f"{len(values)} scene{'s' * (len(values) != 1)}" + (f", {bounds} of them bounds" if bounds else "")
+    return f"{times(geometric_mean(values))} ({scenes})" if len(values) >= FEWEST_SCENES else f"– ({scenes})"
 
 
 def vague(value: float, bound: str) -> bool:
@@ -399,11 +408,14 @@ def readme_part(results: Results) -> str:
     """The part of the README: the picture, and the means of the table."""
     means = summary(results)[-1]
     rows = [("geometric mean over the scenes", "time for equal error", "error in equal time")]
-    for number, peer in enumerate(PEERS):
+    for number, peer in sorted(enumerate(PEERS), key=lambda one: "denoised" not in one[1]):  # like with like first
         if any(results.curve(scene, peer) for scene in results.scenes):
             rows.append((f"{peer}, over Candela", means[1 + 2 * number], means[2 + 2 * number]))
     picture = "![Time against error of every sample scene](docs/images/bench.png)"
-    more = "More than 1 is in favour of Candela; [docs/performance.md](docs/performance.md) has every scene."
+    more = (
+        f"More than 1 is in favour of Candela; of fewer than {FEWEST_SCENES} scenes no mean is given. "
+        "[docs/performance.md](docs/performance.md) has every scene."
+    )
     return "\n\n".join([facts(results), *reserve(results), picture, markdown.table(rows), more])
 
 
@@ -422,14 +434,30 @@ def rows_beside(path: Path, name: str) -> list[dict]:
     return json.loads(beside.read_text(encoding="utf-8"))["rows"] if beside.exists() else []
 
 
+def repeated_rows(path: Path, about: dict) -> list[dict]:
+    """Rows of again.json, if it repeats this very run; a sentence on the terminal if it repeats another."""
+    beside = path.with_name("again.json")
+    if not beside.exists():
+        return []
+    data = json.loads(beside.read_text(encoding="utf-8"))
+    if data.get("run") is None or data.get("run") != about.get("run"):
+        print(
+            f"{beside.name} repeats another run than {path.name} and is left out; `python -m bench again` repeats it."
+        )
+        return []
+    return data["rows"]
+
+
 def command(options: argparse.Namespace) -> int:
     results = load(options.results)
-    beside = [rows_beside(options.results, f"{name}.json") for name in ("growth", "profile", "again")]
+    beside = [rows_beside(options.results, f"{name}.json") for name in ("growth", "profile")]
+    beside.append(repeated_rows(options.results, results.about))
     page = make_page(results, *beside, options.output)
     print(page)
     if not options.no_docs:
         plots.overview(results, PICTURE)
-        markdown.put_between(PERFORMANCE, COMMAND, generated_part(results, *beside))
-        markdown.put_between(README, COMMAND, readme_part(results))
+        made = ages.stamp(results.about["date"][:10], results.about.get("commit", ""))
+        markdown.put_between(PERFORMANCE, COMMAND, generated_part(results, *beside), made=made)
+        markdown.put_between(README, COMMAND, readme_part(results), made=made)
         print(f"{PERFORMANCE}\n{README}")
     return 0

@@ -25,6 +25,7 @@ import time
 from pathlib import Path
 
 from bench.cells import ROOT, Scene, Series, named_scenes
+from bench.markdown import write_whole
 
 RESULTS = ROOT / "bench" / "results" / "profile.json"
 MOST_PYTHON = 0.15
@@ -198,7 +199,7 @@ def command(options: argparse.Namespace) -> int:
     options.results.parent.mkdir(parents=True, exist_ok=True)
     rows = joined(kept(options.results, about), rows)
     text = json.dumps(rounded({"about": about, "rows": rows}), indent=1, ensure_ascii=False)
-    options.results.write_text(text + "\n", encoding="utf-8")
+    write_whole(options.results, text + "\n")
     print(aligned(table(rows)))
     misses = [sentence for row in rows for sentence in missed(row)]
     print("\n".join(misses) or "Both targets are met on every scene.")

@@ -29,6 +29,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.markdown import write_whole
+
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_blends"
 SLOW = 30.0  # seconds of a cold render; what is slower is timed once instead of several times
@@ -200,7 +202,9 @@ def draw(found: dict[str, list[Result]], about: dict, path: Path) -> None:
             marker = {"CANDELA": "D", "BLENDER_EEVEE": "s"}.get(entrant.engine, "^" if entrant.samples == 4 else "o")
             if entrant.engine == "CYCLES" and not entrant.bounces:
                 marker = "X"
-            label = f"{entrant.label}, {entrant.samples} samples" if row == 0 else None
+            which = "all bounces" if entrant.bounces else "no bounces"
+            named = entrant.label if which in entrant.label else f"{entrant.label}, {which}"
+            label = f"{named}, {entrant.samples} samples" if row == 0 else None
             axes.plot([min(result.times), max(result.times)], [y, y], color=color, linewidth=1.2)
             face = "white" if hollow else color
             axes.plot(result.median, y, marker, color=color, markerfacecolor=face, markersize=7, label=label, zorder=3)
@@ -261,8 +265,8 @@ def render(scene, layer, entrant: Entrant, seed: int, size: tuple[int, int]) -> 
     import bpy
 
     from addon.compare import reference
-    from addon.compare.exr import read_exr
     from addon.frame import ledger
+    from addon.snapshot.exr import read_exr
 
     with reference.overridden(settings_for(scene, layer, entrant, seed, size)):
         start, cpu_start = time.perf_counter(), time.process_time()
@@ -391,7 +395,7 @@ def main(arguments: list[str]) -> int:
                 found[name] = measure(path, options.size, options.runs, options.reference_samples, tick)
         print(f"{name}: EEVEE / Candela {ratio(found[name]):.1f}", flush=True)
         options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(as_json(found, about), encoding="utf-8")
+        write_whole(options.json, as_json(found, about))
         draw(found, about, options.picture)
     print(f"\n{report(found)}")
     print(f"\n{options.json}\n{options.picture}")

@@ -21,10 +21,12 @@ import statistics
 import subprocess
 import sys
 import time
+import uuid
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
+from bench import ages
 from bench.cells import (
     DRAFT,
     EXTRA,
@@ -42,6 +44,7 @@ from bench.cells import (
     Store,
     in_turns,
 )
+from bench.markdown import write_whole
 
 RESULTS = ROOT / "bench" / "results" / "bench.json"
 OUT = ROOT / "out" / "bench"
@@ -302,7 +305,7 @@ def beside(rows: list[dict], before: list[dict]) -> list[dict]:
 def write_results(path: Path, about: dict, references: dict, rows: list[dict], left_out: list[str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     data = {"about": about, "references": references, "left_out": left_out, "cells": rows}
-    path.write_text(one_row_per_line(data), encoding="utf-8")
+    write_whole(path, one_row_per_line(data))
 
 
 def one_row_per_line(data: dict) -> str:
@@ -414,6 +417,8 @@ def command(options: argparse.Namespace) -> int:
         done.measure()
     about = done.about | {
         "date": dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "commit": ages.git("rev-parse", "--short=10", "HEAD") or "",
+        "run": uuid.uuid4().hex,  # what repeats it or is joined to it says so
         "size": list(options.size),
         "reference_samples": options.reference_samples,
         "load": load(),

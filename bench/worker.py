@@ -178,7 +178,7 @@ def render(opened: Open, series: Series, samples: int, seed: int, size: tuple[in
     import bpy
 
     from addon.compare import reference
-    from addon.compare.exr import read_exr
+    from addon.snapshot.exr import read_exr
 
     scene, layer = opened.scene, opened.layer
     with reference.overridden(settings_for(opened, series, samples, seed, size, passes)):

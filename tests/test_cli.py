@@ -193,7 +193,7 @@ def test_render_writes_the_files_passes_as_multilayer_exr(tmp_path):
     output = tmp_path / "picture.exr"
     done = candela("render", CORNELL, *TINY, "--output", output, folder=tmp_path)
     assert done.returncode == 0 and done.stderr == ""
-    from addon.compare.exr import read_exr
+    from addon.snapshot.exr import read_exr
 
     layers = read_exr(output)
     assert layers["ViewLayer.Combined"].shape == (24, 32, 4)

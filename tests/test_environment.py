@@ -72,4 +72,4 @@ def test_missing_libraries_are_named_with_their_packages(tmp_path, monkeypatch, 
 def test_unknown_blender_ends_with_one_sentence():
     done = subprocess.run([sys.executable, SCRIPT, "--blender", "2.79"], check=False, capture_output=True, text=True)
     assert done.returncode == 1
-    assert done.stderr == "There is no environment for Blender 2.79: BLENDER is one of 5.2, 5.0, 4.5.\n"
+    assert done.stderr == "There is no environment for Blender 2.79: BLENDER is one of 5.3, 5.2, 5.0, 4.5.\n"

@@ -23,9 +23,9 @@ class Room:
 DATA = ("materials", "snapshot.scene")
 BELOW_FRAME = ("gfx", "sampling", "kernels", "scene", "sources", *DATA)
 ON_A_FRAME = ("surfaces", "film", "lighting")  # pieces that techniques share, each on those before it
-BELOW_TECHNIQUES = (*BELOW_FRAME, "frame", *ON_A_FRAME)
+BELOW_TECHNIQUES = (*BELOW_FRAME, "eye", "frame", *ON_A_FRAME)
 BELOW_COMPARE = (*BELOW_TECHNIQUES, "materials", "snapshot", "techniques")
-BLENDER = ("bpy", "bpy_extras", "mathutils", "bl_math", "idprop", "numpy")
+BLENDER = ("bpy", "bpy_extras", "imbuf", "mathutils", "bl_math", "idprop", "numpy")
 
 # The longest name that fits is the one that counts: gfx.context has its own line, the rest of gfx another.
 ROOMS = {
@@ -33,10 +33,13 @@ ROOMS = {
     "gfx.context": Room(modules=("bpy", "gpu")),
     "materials": Room(modules=("numpy",)),
     "materials.reader": Room(modules=BLENDER),
-    "snapshot": Room(rooms=("materials",), modules=BLENDER),
+    "snapshot": Room(rooms=("materials",), modules=BLENDER, optional=("openvdb",)),
     "snapshot.scene": Room(rooms=("materials",), modules=("numpy",)),
     "sampling": Room(rooms=DATA, modules=("numpy",)),
     "kernels": Room(rooms=("gfx",), modules=("numpy",)),
+    "eye": Room(modules=("numpy",)),
+    "eye.point_spread": Room(rooms=("gfx", "kernels"), modules=("numpy",)),
+    "eye.scatter": Room(rooms=("gfx", "kernels"), modules=("numpy",)),
     "scene": Room(rooms=("gfx", "sampling", "kernels", *DATA), modules=("numpy",)),
     "sources": Room(rooms=("gfx", "sampling", "kernels", "scene", *DATA), modules=("numpy",)),
     "frame": Room(rooms=BELOW_FRAME, modules=("numpy",)),

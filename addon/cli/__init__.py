@@ -1,4 +1,4 @@
-"""`blender --command candela render | compare | plan | tune FILE.blend …`, and the same as `python -m addon …`.
+"""`blender --command candela render | compare | plan | tune | merge | farm …`, and the same as `python -m addon …`.
 
 What a person may get wrong ends in one sentence on standard error: exit code 2 when the command line cannot be meant
 as it stands, 1 when the file, the scene or the output will not do. Results are written beside their final place and
@@ -8,17 +8,21 @@ renamed, so that nothing half-written is ever seen. The opened file is changed i
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
+import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
+from ..compare.cache import LIMIT_BYTES
+from ..compare.reference import cache_folder
 from ..frame.settings import SAMPLES
 from ..techniques import REGISTRY
-from . import tuning, verbs
+from . import farm, farm_operator, merging, tuning, verbs
 from .refused import FAILURE, USAGE, Refused
 from .terminal import STDOUT
 
@@ -36,10 +40,11 @@ def main(arguments: list[str], program: str = f"blender --command {COMMAND}") ->
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without × shows a question mark
+    with contextlib.suppress(ValueError):  # not the main thread
+        signal.signal(signal.SIGTERM, _interrupt)  # a farm that takes a task back: as Ctrl+C
     try:
         options = _parser(program).parse_args(arguments)
-        job = verbs.open_job(options)
-        options.verb(job)
+        options.verb(verbs.open_job(options) if options.opens else options)
         sys.stdout.flush()
     except Refused as refusal:
         return _end(str(refusal), refusal.code)
@@ -53,6 +58,10 @@ def main(arguments: list[str], program: str = f"blender --command {COMMAND}") ->
     except SystemExit as end:  # --help
         return int(end.code or OK)
     return OK
+
+
+def _interrupt(*_) -> None:
+    raise KeyboardInterrupt
 
 
 def _end(sentence: str, code: int) -> int:
@@ -78,14 +87,48 @@ def _parser(program: str) -> argparse.ArgumentParser:
         "--set", metavar="NAME=VALUE", action="append", default=[], dest="assignments",
         help=f"a setting of Candela, such as {_example()}; may be repeated; a wrong name gets the list",
     )  # fmt: skip
+    shared.add_argument(
+        "--run-scripts", action="store_true",
+        help="run the file's scripts and drivers in Python; only for files that you trust",
+    )  # fmt: skip
     shared.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
 
     parser = _Parser(prog=program, description="Candela, a render engine for Blender.", allow_abbrev=False)
-    commands = parser.add_subparsers(metavar="render|compare|plan|tune", required=True)
+    commands = parser.add_subparsers(metavar="render|compare|plan|tune|merge|farm", required=True)
     add = {"parents": [shared], "allow_abbrev": False}
     render = commands.add_parser("render", help="render a picture", **add)
     render.add_argument("--output", metavar="PATH", type=Path, help=".png, or .exr with all passes of the file")
-    render.set_defaults(verb=verbs.render)
+    render.add_argument(
+        "--compositing", action="store_true",
+        help="run the file's compositor; its File Output nodes write below the folder of the output, or not at all",
+    )  # fmt: skip
+    render.add_argument(
+        "--frames", metavar="A-B", type=_frames,
+        help="several frames, such as 1-10, 1-100:5 or 1,3,7; the name of the output has #### for their number",
+    )  # fmt: skip
+    render.add_argument("--slice", metavar="K/N", help="the Kth of N parts of the samples, as .exr; see merge")
+    _add_farming(render)
+    render.set_defaults(verb=verbs.render, opens=True)
+    merge = commands.add_parser("merge", help="make a picture of its slices", allow_abbrev=False)
+    merge.add_argument("slices", metavar="SLICE.exr", type=Path, nargs="+", help="all slices of one picture")
+    merge.add_argument("--file", metavar="FILE.blend", type=Path, help="default: the file that the slices name")
+    merge.add_argument("--output", metavar="PATH", type=Path, required=True, help=".png, or .exr with all passes")
+    merge.add_argument("--frames", metavar="A-B", type=_frames, help="several pictures; names have #### for the frame")
+    merge.add_argument("--run-scripts", action="store_true", help="as for render")
+    merge.add_argument("--compositing", action="store_true", help="as for render")
+    merge.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
+    _add_farming(merge)
+    merge.set_defaults(verb=merging.merge, opens=False)
+    job = commands.add_parser("farm", help="write a job for a render farm", **add)
+    job.add_argument("--frames", metavar="A-B", type=_frames, help="default: the file's range")
+    job.add_argument("--chunk", metavar="N", type=_count, default=1, help="frames of a task (default 1)")
+    job.add_argument("--split-samples", metavar="N", type=_count, default=1, help="slices of a picture (default 1)")
+    job.add_argument("--output", metavar="FOLDER", type=Path, required=True, help="for the job's description")
+    job.add_argument("--results", metavar="FOLDER", type=Path, help="for the pictures (default: in the job's folder)")
+    job.add_argument("--format", choices=("png", "exr"), default="exr", help="of the pictures (default exr)")
+    job.add_argument("--extensions", metavar="FOLDER", help="shared folder of extensions that nodes find Candela in")
+    job.add_argument("--gpu", action="store_true", help="ask for nodes with a GPU")
+    job.set_defaults(verb=farm.write_job, opens=True)
     against = commands.add_parser("compare", help="render by Candela and by Cycles, and compare", **add)
     against.add_argument("--output", metavar="FOLDER", type=Path, help="for index.html and the pictures")
     against.add_argument(
@@ -100,9 +143,10 @@ def _parser(program: str) -> argparse.ArgumentParser:
         help="both engines without bounces",
     )  # fmt: skip
     against.add_argument("--no-cache", action="store_true", help="render the reference anew and do not keep it")
-    against.set_defaults(verb=verbs.compare)
+    _add_cache(against)
+    against.set_defaults(verb=verbs.compare, opens=True)
     plan = commands.add_parser("plan", help="print what would run and why the rest is skipped", **add)
-    plan.set_defaults(verb=verbs.plan)
+    plan.set_defaults(verb=verbs.plan, opens=True)
     tune = commands.add_parser("tune", help="find the settings with the least error within a time", **add)
     tune.add_argument(
         "--milliseconds", metavar="N", type=_positive, required=True, help="that a picture may take on this machine"
@@ -113,8 +157,21 @@ def _parser(program: str) -> argparse.ArgumentParser:
     )
     tune.add_argument("--apply", action="store_true", help="write what was found into the file, or into --output")
     tune.add_argument("--output", metavar="PATH.blend", type=Path, help="with --apply: leave FILE as it is")
-    tune.set_defaults(verb=tuning.tune_scene)
+    _add_cache(tune)
+    tune.set_defaults(verb=tuning.tune_scene, opens=True)
     return parser
+
+
+def _add_farming(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--progress", action="store_true", help="print lines of progress that render farms read")
+    parser.add_argument("--expect", metavar="VERSION", help="end at once unless this Blender has it, such as 5.2")
+
+
+def _add_cache(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--cache", metavar="FOLDER", type=Path,
+        help=f"for references, up to {LIMIT_BYTES >> 30} GiB (default: {cache_folder()})".replace("%", "%%"),
+    )  # fmt: skip
 
 
 def _example() -> str:
@@ -140,6 +197,19 @@ def _frame(text: str) -> int:
     raise argparse.ArgumentTypeError(f"'{text}' is not a frame: whole numbers from {FRAMES[0]} to {FRAMES[-1]} are")
 
 
+def _frames(text: str) -> list[int]:
+    found: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(-?\d+)(?:-(-?\d+)(?::(\d+))?)?\s*", part)
+        if match is None or int(match[3] or 1) < 1:
+            raise argparse.ArgumentTypeError(f"'{text}' are no frames: 1-10, 1-100:5 or 1,3,7 are")
+        first, last = int(match[1]), int(match[2] or match[1])
+        found += range(first, last + 1, int(match[3] or 1))
+    if not found or not all(frame in FRAMES for frame in found):
+        raise argparse.ArgumentTypeError(f"'{text}' holds no frame, or one beyond {FRAMES[0]} to {FRAMES[-1]}")
+    return list(dict.fromkeys(found))
+
+
 def _positive(text: str) -> float:
     try:
         if 0 < float(text) < float("inf"):
@@ -151,7 +221,7 @@ def _positive(text: str) -> float:
 
 def _count(text: str) -> int:
     try:
-        return replace(SAMPLES, name="reference-samples").check(text)
+        return replace(SAMPLES, name="number").check(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
 
@@ -164,8 +234,10 @@ _handle: list = []  # of the registered command
 def register() -> None:
     """Make `blender --command candela` known."""
     _handle.append(bpy.utils.register_cli_command(COMMAND, main))
+    farm_operator.register()
 
 
 def unregister() -> None:
+    farm_operator.unregister()
     while _handle:
         bpy.utils.unregister_cli_command(_handle.pop())

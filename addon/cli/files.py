@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
+import os
+import platform
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from .refused import Refused, reason
 
+WRITING = ".writing_"  # how the names of folders begin whose files are not in place yet
 BLEND_STARTS = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # plain, compressed by zstd, by gzip (before 3.0)
 
 
@@ -57,16 +63,51 @@ def _stands(path: Path) -> bool:
     return True
 
 
+def clear_abandoned(folder: Path) -> None:
+    """Delete what processes of this machine were writing there when they were killed."""
+    for place in folder.glob(f"{WRITING}{_machine()}_*"):
+        pid = place.name.removeprefix(WRITING).split("_")[1]
+        if os.name == "posix" and pid.isdigit() and not _lives(int(pid)):  # elsewhere asking would end the process
+            shutil.rmtree(place, ignore_errors=True)
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+@functools.cache
+def _machine() -> str:
+    """Of all processes whose numbers mean the same: this machine, or this container of it."""
+    try:
+        space = str(Path("/proc/self/ns/pid").readlink())
+    except OSError:
+        space = ""
+    return hashlib.blake2b(f"{platform.node()} {space}".encode(), digest_size=4).hexdigest()
+
+
 @contextlib.contextmanager
-def placed_in(folder: Path) -> Iterator[Path]:
-    """A temporary folder, whose files are moved into `folder` at the end. Raises Refused; then nothing is left."""
+def placed_in(folder: Path, last: str = "") -> Iterator[Path]:
+    """A temporary folder, whose files are moved into `folder` at the end, that of the name `last` after all others.
+
+    Raises Refused; then nothing is left.
+    """
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".writing_", dir=folder) as place:
+        clear_abandoned(folder)
+        with tempfile.TemporaryDirectory(prefix=f"{WRITING}{_machine()}_{os.getpid()}_", dir=folder) as place:
             yield Path(place)
-            for file in sorted(Path(place).iterdir()):
-                file.replace(folder / file.name)
+            found = sorted(file for file in Path(place).rglob("*") if file.is_file())
+            for file in sorted(found, key=lambda file: file.name == last):
+                final = folder / file.relative_to(place)
+                final.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(final)
     except BaseException as error:
         for place in made:
             with contextlib.suppress(OSError):

@@ -14,6 +14,7 @@ from ..gfx import context
 from ..techniques import REGISTRY
 from ..ui.properties import settings_of
 from ..ui.tuning import SEED, choices, properties
+from . import untrusted
 from .files import output
 from .refused import USAGE, Refused, reason
 from .terminal import progress, quiet
@@ -27,6 +28,8 @@ def tune_scene(job: Job) -> None:
     path = output(options.output or options.file, folder=False) if options.apply else None
     if path is not None and path.suffix.lower() != ".blend":
         raise Refused(f"The output of tune must end in .blend, and {path.name} does not.", USAGE)
+    if path is not None and path != options.file.resolve():
+        untrusted.refuse_inputs([path])
     if job.scene.candela.pass_tree is not None:
         raise Refused("The scene renders by a pass tree, whose nodes decide; tune needs a scene without one.")
     seconds = options.milliseconds / 1000
@@ -34,7 +37,7 @@ def tune_scene(job: Job) -> None:
         with quiet(options.verbose) as terminal:
             context.ensure()
             progress(terminal, f"Cycles renders the reference, 2 × {options.reference_samples} samples")
-            truth = reference.reference(job.scene, options.reference_samples, False, None, layer)
+            truth = reference.reference(job.scene, options.reference_samples, False, None, layer, folder=options.cache)
             deadline = time.monotonic() + options.budget
             render = _renders(job, layer, truth, deadline, seconds, terminal)
             values = settings_of(job.scene, viewport=False).values

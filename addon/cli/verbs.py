@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,15 +16,17 @@ from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
 from ..frame import ledger as ledgers
 from ..frame.plan import PlanError, make_plan
+from ..frame.settings import SCENE_PARAMS
 from ..gfx import context
 from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
 from ..techniques import REGISTRY, make_registry
 from ..ui.properties import identifier, settings_of
+from . import slices, untrusted
 from .files import output, placed_in, refuse_blend
 from .refused import USAGE, Refused, reason
-from .terminal import progress, quiet
+from .terminal import STDOUT, progress, quiet
 
 # ------------------------------------------------------------------------------------------------------ the open file
 
@@ -34,6 +38,7 @@ class Job:
     options: argparse.Namespace
     scene: bpy.types.Scene
     layer: bpy.types.ViewLayer | None  # None: all that are rendered
+    held_back: tuple[str, ...] = ()  # what the file would have done beside being rendered, as sentences
 
     @property
     def title(self) -> str:
@@ -51,9 +56,11 @@ class Job:
 
 def open_job(options: argparse.Namespace) -> Job:
     """Check the file, open it and apply the options. Raises Refused."""
+    expect(getattr(options, "expect", None))
     refuse_blend(options.file)
     with quiet(options.verbose):
-        why = open_mainfile(options.file)
+        why = open_mainfile(options.file, options.run_scripts)
+        held_back = untrusted.contain(getattr(options, "compositing", False))
     if why:
         raise Refused(f"{options.file} could not be opened: {why}.")
     scene = _named("scene", options.scene, bpy.data.scenes) or bpy.context.scene
@@ -72,14 +79,21 @@ def open_job(options: argparse.Namespace) -> Job:
             scene.frame_set(options.frame)
     if scene.camera is None:
         raise Refused(f"Scene '{scene.name}' in {options.file} has no camera: add one, or make one active.")
-    return Job(options, scene, layer)
+    return Job(options, scene, layer, tuple(held_back))
 
 
-def open_mainfile(path: Path) -> str:
+def expect(version: str | None) -> None:
+    """Raise Refused unless this Blender has the version, compared in as many places as are given ("5.2")."""
+    here = ".".join(map(str, bpy.app.version))
+    if version is not None and f"{here}.".find(f"{version}.") != 0:
+        raise Refused(f"This is Blender {here}, and the job was made for {version}: give the node that version.")
+
+
+def open_mainfile(path: Path, run_scripts: bool = False) -> str:
     """Open the file in Blender; why it could not be opened, or an empty string."""
     full = str(path.resolve())
     try:
-        bpy.ops.wm.open_mainfile(filepath=full)
+        bpy.ops.wm.open_mainfile(filepath=full, use_scripts=run_scripts)
     except RuntimeError as error:
         if bpy.data.filepath != full:  # else it is open, and only something that it links to is missing
             return reason(error)
@@ -102,7 +116,8 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
             layer.samples = 0  # its own number of samples would count
     settings = settings_of(scene, viewport=False).override(REGISTRY, given)
     group = scene.candela
-    group.samples, group.seed, group.bounces = settings.samples, settings.seed, settings.bounces
+    for param in SCENE_PARAMS:
+        setattr(group, param.name, getattr(settings, param.name))
     for slot, technique in settings.slots.items():
         setattr(group, f"slot_{slot}", technique)
     for (technique, param), value in settings.values.items():
@@ -113,24 +128,81 @@ def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None
 
 
 def render(job: Job) -> None:
-    path = output(job.options.output or Path(f"{job.options.file.stem}.png"), folder=False)
+    """One picture, or one for each frame; a slice of it with --slice."""
+    options, scene = job.options, job.scene
+    path = output(options.output or Path(f"{options.file.stem}.png"), folder=False)
     if path.suffix.lower() not in (".png", ".exr"):
         raise Refused(f"The output must end in .png or .exr, and {path.name} does not.", USAGE)
+    frames = getattr(options, "frames", None)
+    if getattr(options, "slice", None):
+        _share_out(job, path)
+    paths = {frame: numbered(path, frame, frames is not None) for frame in frames or [scene.frame_current]}
+    untrusted.refuse_inputs(list(paths.values()))
+    for place, (frame, one) in enumerate(paths.items()):
+        if frame != scene.frame_current:
+            with quiet(options.verbose):
+                scene.frame_set(frame)
+        _render_picture(job, one, place / len(paths), 1 / len(paths))
+
+
+def numbered(path: Path, frame: int, several: bool) -> Path:
+    """The path with the frame's number in place of its last row of #; where it has none but there are several frames,
+    the number is added to the name."""
+    name = path.name
+    if "#" not in name:
+        if not several:
+            return path
+        name = f"{path.stem}_####{path.suffix}"
+    marks = re.findall("#+", name)[-1]
+    head, _, tail = name.rpartition(marks)
+    return path.with_name(f"{head}{frame:0{len(marks)}d}{tail}")
+
+
+def _share_out(job: Job, path: Path) -> None:
+    """Set the samples of the slice that is asked for. Raises Refused."""
+    slices.check_output(path)
+    if any(layer.samples for layer in job.scene.view_layers):
+        raise Refused(
+            "View layers have numbers of samples of their own; with --slice, --samples gives one for all.", USAGE
+        )
+    group = job.scene.candela
+    try:
+        group.sample_offset, group.sample_count = slices.bounds(job.options.slice, group.samples)
+    except ValueError as error:
+        raise Refused(str(error), USAGE) from None
+
+
+def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
+    """Render the scene's frame into a file; `begun` and `share` say which part of the whole work that is."""
+    options, scene = job.options, job.scene
     target = {"layer": job.layer.name} if job.layer else {}
-    with _watched(job):
+    sliced = scene.candela.sample_offset > 0 or scene.candela.sample_count > 0
+    about = slices.about_slice(job) if sliced else {}
+    with placed_in(path.parent, path.name) as folder:
+        held_back = [*job.held_back, *untrusted.hold_file_outputs(scene, path.parent, folder)]
+        engine.taken = {} if sliced else None
         try:
-            bpy.ops.render.render(scene=job.scene.name, **target)
-        except RuntimeError as error:
-            raise Refused(f"{job.options.file} could not be rendered: {reason(error)}.") from None
-    _choose_format(job.scene.render.image_settings, path.suffix.lower(), job.scene.render.film_transparent)
-    with placed_in(path.parent) as folder, quiet(job.options.verbose):
-        result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
-        result.save_render(str(folder / path.name), scene=job.scene)
+            with _watched(job, begun=begun, share=share):
+                try:
+                    bpy.ops.render.render(scene=scene.name, **target)
+                except RuntimeError as error:
+                    raise Refused(f"{options.file} could not be rendered: {reason(error)}.") from None
+            if sliced:
+                slices.write(folder / path.name, about | {"device": context.describe()}, engine.taken)
+        finally:
+            engine.taken = None
+        if not sliced:
+            _choose_format(scene.render.image_settings, path.suffix.lower(), scene.render.film_transparent)
+            with quiet(options.verbose):
+                result = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
+                result.save_render(str(folder / path.name), scene=scene)
         if not (folder / path.name).is_file():
             raise OSError(None, "Blender wrote no file")
+        held_back += untrusted.leave_what_stands(folder, path.parent, path.name)
     print(job.title)
     _print_ledger()
-    print(path)
+    _print_held_back(held_back)
+    print(f"Saved: '{path}'" if getattr(options, "progress", False) else path, flush=True)
 
 
 def _choose_format(image, suffix: str, transparent: bool) -> None:
@@ -149,6 +221,13 @@ def _print_ledger() -> None:
     _print_notes(ledger.notes)
 
 
+def _print_held_back(sentences) -> None:
+    if sentences:
+        print("Held back of what the file would do beside the picture:")
+    for sentence in dict.fromkeys(sentences):
+        print(f"  {sentence}")
+
+
 def _print_notes(notes) -> None:
     texts = dict.fromkeys(str(note) for note in notes)
     if texts:
@@ -160,9 +239,13 @@ def _print_notes(notes) -> None:
 # ------------------------------------------------------------------------------------------------------------ compare
 
 
+PICTURES = ("candela.png", "cycles.png")
+
+
 def compare(job: Job) -> None:
     options = job.options
     folder = output(options.output or Path(f"{options.file.stem}_compare"), folder=True)
+    untrusted.refuse_inputs([folder / name for name in ("index.html", *PICTURES)])
     try:
         with _watched(job, f"Cycles renders the reference, 2 × {options.reference_samples} samples"):
             data = compare_scene(
@@ -171,6 +254,7 @@ def compare(job: Job) -> None:
                 options.reference_samples,
                 direct_only=options.direct_only,
                 use_cache=not options.no_cache,
+                folder=options.cache,
                 view_layer=job.layer,
                 seed=job.scene.candela.seed,
             )
@@ -179,7 +263,7 @@ def compare(job: Job) -> None:
     with placed_in(folder) as place:
         write_report(place / "index.html", data)
         combined = data.pictures[0]
-        for name, pixels in (("candela.png", combined.x), ("cycles.png", combined.reference)):
+        for name, pixels in zip(PICTURES, (combined.x, combined.reference)):
             if pixels is not None:
                 shown = metrics.display(pixels[::-1])
                 (place / name).write_bytes(png.png((shown * 255 + 0.5).astype("uint8")))
@@ -191,6 +275,7 @@ def compare(job: Job) -> None:
     print(f"Candela {data.seconds:.2f} s, Cycles {data.reference_seconds / 2:.2f} s per reference")
     print(ledgers.latest().text())
     _print_notes(data.notes)
+    _print_held_back(job.held_back)
     print(folder / "index.html")
 
 
@@ -270,24 +355,35 @@ def _material_notes(snapshot: Snapshot) -> list[Note]:
 
 
 @contextlib.contextmanager
-def _watched(job: Job, then: str = "") -> Iterator[None]:
+def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -> Iterator[None]:
     """Candela renders inside: with progress on a terminal, without Blender's chatter, and to the last sample.
 
-    `then` is said when the last sample is done. Raises Refused when the render ended before it.
+    `then` is said when the last sample is done. With --progress, lines for render farms are printed: of the whole work,
+    `begun` was done before and this is `share` of it. Raises Refused when the render ended before its last sample.
     """
-    with quiet(job.options.verbose) as terminal:
+    lines = os.fdopen(os.dup(STDOUT), "w") if getattr(job.options, "progress", False) else None
+    with contextlib.ExitStack() as stack:
+        if lines is not None:
+            stack.enter_context(lines)
+        terminal = stack.enter_context(quiet(job.options.verbose))
         try:
             context.ensure()
         except RuntimeError as error:
             raise Refused(str(error)) from None
         renderer = engine.session(job.scene, "final").renderer
-        advance, seen, wanted = renderer.advance, 0, job.scene.candela.samples
+        advance, seen, wanted = renderer.advance, 0, 1
 
         def advance_and_tell(frame) -> None:
             nonlocal seen, wanted
             advance(frame)
-            seen, wanted = frame.samples_done, frame.settings.samples
+            seen, wanted = frame.samples_done, frame.settings.samples_to_draw
             progress(terminal, f"Sample {seen} of {wanted}" if seen < wanted else then)
+            if lines is not None:
+                print(
+                    f"Fra:{job.scene.frame_current} | {job.scene.name} | Rendering {seen} / {wanted} samples\n"
+                    f"openjd_progress: {100 * (begun + share * seen / wanted):.1f}",
+                    file=lines, flush=True,
+                )  # fmt: skip
 
         renderer.advance = advance_and_tell
         try:
@@ -295,5 +391,7 @@ def _watched(job: Job, then: str = "") -> Iterator[None]:
         finally:
             del renderer.advance
             progress(terminal, "")
-    if seen < wanted:
+    if renderer.frame is not None and renderer.frame.settings.time_limit:
+        wanted = renderer.frame.settings.samples_to_draw  # as many as there was time for
+    if seen < wanted and not engine.given:
         raise Refused(f"The render of {job.options.file} ended after {seen} of {wanted} samples.")

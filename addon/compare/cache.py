@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import tempfile
+import time
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,8 @@ import numpy as np
 from .passes import light_paths
 
 LIMIT_BYTES = 2 << 30
+WRITING = ".writing_"  # how names of entries begin that some process is writing
+ABANDONED_S = 24 * 3600.0  # an entry that is being written for so long belongs to a process that was ended
 HALF_MAX = 65504.0  # largest float16: the half difference is kept in 16 bits, it only measures noise
 
 
@@ -97,7 +100,7 @@ def save(folder: Path, reference: Reference) -> None:
     temporary = None
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=".writing_", suffix=".npz")
+        handle, temporary = tempfile.mkstemp(dir=folder, prefix=WRITING, suffix=".npz")
         with os.fdopen(handle, "wb") as file:
             np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
         Path(temporary).replace(folder / f"{reference.key}.npz")
@@ -109,11 +112,18 @@ def save(folder: Path, reference: Reference) -> None:
 
 
 def make_room(folder: Path, limit: int = LIMIT_BYTES) -> None:
-    """Delete the least recently used entries until the folder is within its limit; the newest one stays."""
+    """Delete the least recently used entries until the folder is within its limit; the newest one stays.
+
+    What another process is writing is left alone, unless that process must have ended long ago.
+    """
     entries = []
     for path in folder.glob("*.npz"):
         with contextlib.suppress(OSError):
-            entries.append((path.stat().st_mtime_ns, path.stat().st_size, path))
+            about = path.stat()
+            if not path.name.startswith(WRITING):
+                entries.append((about.st_mtime_ns, about.st_size, path))
+            elif time.time() - about.st_mtime > ABANDONED_S:
+                path.unlink()
     entries.sort(reverse=True)
     total = 0
     for number, (_, size, path) in enumerate(entries):

@@ -109,6 +109,7 @@ def compare_scene(
     use_cache: bool = True,
     view_layer=None,
     seed: int = 1,
+    folder=None,
 ) -> Comparison:
     """Render `scene` (a bpy Scene) by `engine` and by Cycles, and compare them.
 
@@ -121,7 +122,7 @@ def compare_scene(
     passes = rendering.render_passes(scene, engine, samples, seed, direct_only, size, view_layer)
     if ledger is None and engine == "CANDELA":
         ledger = _latest_ledger()
-    truth = rendering.reference(scene, reference_samples, direct_only, size, view_layer, use_cache)
+    truth = rendering.reference(scene, reference_samples, direct_only, size, view_layer, use_cache, folder)
     about = rendering.describe(scene)
     return Comparison(
         scene=scene.name,

@@ -39,7 +39,9 @@ OTHER_NAMES = (
     PassName("object_index", "Object Index", "IndexOB", "use_pass_object_index"),
     PassName("material_index", "Material Index", "IndexMA", "use_pass_material_index"),
 )
-IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES + OTHER_NAMES for name in (row.blender, row.before_5)}
+IMAGE_OF_PASS = {name: row.image for row in PASS_NAMES + OTHER_NAMES for name in (row.blender, row.before_5)} | {
+    "Glare": "glare"  # written where a camera sees with an eye, without a switch of the view layer
+}
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -30,10 +31,10 @@ import bpy
 import numpy as np
 
 from ..gfx import context
+from ..snapshot.exr import read_exr
 from . import cache
 from .cache import Reference
 from .content import blend_hash
-from .exr import read_exr
 from .passes import IMAGE_OF_PASS, PASS_NAMES, Passes
 
 MANY_BOUNCES = 32  # at albedo 0.8 the light left after 32 bounces is 0.08 %
@@ -56,6 +57,7 @@ def render_passes(
     size: tuple[int, int] | None = None,
     view_layer: bpy.types.ViewLayer | None = None,
     bounces: int | None = None,
+    diffuse_bounces: int | None = None,
 ) -> Passes:
     """Render one view layer of `scene` with `engine` and return its passes.
 
@@ -63,8 +65,8 @@ def render_passes(
     a render border the pictures hold the bordered rectangle only. `bounces` limits how often light is reflected on
     its way to the surface that is seen; None leaves it to Candela's own setting, and Cycles goes on until nothing is
     left. `direct_only` means none: the direct passes stay what they are in a full render, and Combined shows direct
-    light, emission and world. EEVEE knows no such limit. Compositor and sequencer stay out of it. Blender's Render
-    Result shows this render afterwards.
+    light, emission and world. EEVEE knows no such limit. `diffuse_bounces` limits Cycles' diffuse ones further.
+    Compositor and sequencer stay out of it. Blender's Render Result shows this render afterwards.
     Raises `RenderFailed`.
     """
     engine = engine_identifier(scene, engine)
@@ -72,7 +74,10 @@ def render_passes(
     with tempfile.TemporaryDirectory(prefix="candela_") as folder:
         path = Path(folder) / "passes.exr"
         with overridden(
-            render_settings(scene, view_layer, engine, samples, seed, 0 if direct_only else bounces, size)
+            [
+                *render_settings(scene, view_layer, engine, samples, seed, 0 if direct_only else bounces, size),
+                *([] if diffuse_bounces is None else [(scene.cycles, "diffuse_bounces", diffuse_bounces)]),
+            ]
         ) as notes:
             transparent = scene.render.film_transparent
             start = time.perf_counter()
@@ -134,14 +139,15 @@ def reference(
     size: tuple[int, int] | None = None,
     view_layer: bpy.types.ViewLayer | None = None,
     use_cache: bool = True,
+    folder: Path | None = None,
 ) -> Reference:
     """The scene by Cycles, twice with `samples` samples and different seeds, from the cache when it was made before.
 
-    Arguments as in `render_passes`. A reference that cannot be kept (disk full, no permission) is returned all the
-    same. Raises `RenderFailed`.
+    Arguments as in `render_passes`; `folder`: of the cache, if not `cache_folder()`. A reference that cannot be kept
+    (disk full, no permission) is returned all the same. Raises `RenderFailed`.
     """
     view_layer = view_layer or active_view_layer(scene)
-    folder = cache_folder() if use_cache else None
+    folder = (folder or cache_folder()) if use_cache else None
     key = reference_key(scene, samples, direct_only, size, view_layer) if folder else ""
     found = cache.load(folder, key) if folder else None
     if found:
@@ -163,17 +169,25 @@ def render_reference(scene, samples: int, direct_only: bool, size, view_layer, k
 
 
 def cache_folder() -> Path:
-    """Where references are kept: $CANDELA_CACHE if set, the extension's own folder if Candela is one, else out/cache.
-
-    The last is relative to the working directory.
-    """
+    """Where references are kept: $CANDELA_CACHE if set, the extension's own folder if Candela is one, else a folder
+    among the user's caches."""
     given = os.environ.get("CANDELA_CACHE")
     if given:
         return Path(given)
     parts = (__package__ or "").split(".")
     if parts[0] == "bl_ext":
         return Path(bpy.utils.extension_path_user(".".join(parts[:3]), path="references"))
-    return Path("out") / "cache"
+    return user_caches() / "candela" / "references"
+
+
+def user_caches() -> Path:
+    """The folder that the system has for caches of this user."""
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return given if given.is_absolute() else Path.home() / ".cache"  # a relative one is to be ignored
 
 
 def reference_key(
@@ -288,6 +302,7 @@ def cycles_settings(scene: bpy.types.Scene, samples: int, seed: int, bounces: in
     cycles = scene.cycles
     values = {
         "device": "CPU",
+        "shading_system": False,  # Open Shading Language: scripts of the file, which may write files
         "feature_set": "SUPPORTED",
         "samples": samples,
         "seed": seed,

@@ -33,6 +33,7 @@ from functools import cache
 
 import numpy as np
 
+from ..frame.light_paths import MEDIUM, named
 from ..frame.run import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
@@ -59,14 +60,25 @@ def taps(place: float, width: float) -> tuple[int, np.ndarray]:
     return pixel, weights / weights.sum()
 
 
+# What media let pass of an image on its way to the eye: nothing is lost of it, colours are, and of the image that holds
+# the world what media hide counts as covered.
+CLEAR, DIMMED, COVERED = range(3)
+_SEEN = (
+    "seen_{0}_fetch(place)", "vec4(passing.rgb, 1.0) * seen_{0}_fetch(place)",
+    "film_dimmed(seen_{0}_fetch(place), passing.rgb)",
+)  # fmt: skip
+
+
 @cache
-def program(count: int, pixels: int) -> Program:
-    """Adds `count` images of a sample to as many sums; `pixels` as of `reach`."""
+def program(count: int, pixels: int, dimmed: tuple[int, ...] = ()) -> Program:
+    """Adds `count` images of a sample to as many sums; `pixels` as of `reach`. `dimmed`: what media do to each; the
+    image `through` then holds what they let pass."""
     each = range(count)
+    seen = [_SEEN[kind] for kind in dimmed or (CLEAR,) * count]
     return passes.fullscreen_program(
         f"film filter, {count} images, {2 * pixels + 1} pixels wide",
         "film/filter.frag.glsl",
-        textures=tuple(("RGBA32F", f"seen_{i}") for i in each),
+        textures=(*(("RGBA32F", f"seen_{i}") for i in each), *((("RGBA32F", "through"),) if dimmed else ())),
         constants=(
             ("FLOAT", "film_share"), ("IVEC2", "film_pixel"), ("VEC4", "weights_x"), ("VEC4", "weights_y"),
             ("VEC2", "last_weights"),
@@ -74,7 +86,11 @@ def program(count: int, pixels: int) -> Program:
         defines=(
             ("PIXELS", str(pixels)),
             ("BEGIN_ALL", " ".join(f"vec4 sum_{i} = vec4(0.0);" for i in each)),
-            ("GATHER_ALL", " ".join(f"sum_{i} += weight * seen_{i}_fetch(place);" for i in each)),
+            (
+                "GATHER_ALL",
+                ("vec4 passing = through_fetch(place); " if dimmed else "")
+                + " ".join(f"sum_{i} += weight * {seen[i].format(i)};" for i in each),
+            ),
             ("END_ALL", " ".join(f"out_{i} = film_share * sum_{i};" for i in each)),
         ),
         outputs=tuple(("VEC4", f"out_{i}") for i in each),
@@ -84,23 +100,37 @@ def program(count: int, pixels: int) -> Program:
 PROGRAMS = tuple(program(count, pixels) for count in (1, MOST_IMAGES) for pixels in range(FARTHEST + 1))
 
 
-def add(frame: Frame, seen: dict[str, images.Image], place: tuple[float, float], share: float) -> int:
+def add(
+    frame: Frame, seen: dict[str, images.Image], place: tuple[float, float], share: float,
+    through: images.Image | None = None,
+) -> int:  # fmt: skip
     """Add `share` of the images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset),
-    to the frame's images of these names. Returns the number of passes."""
+    to the frame's images of these names. `through`: what media let pass there. Returns the number of passes."""
     width = frame.snapshot.film.filter_width
     (x, across), (y, up) = (taps(one, width) for one in place)
     across, up = (np.append(weights, np.zeros(2 * FARTHEST + 1 - len(weights))) for weights in (across, up))
     count = -(-len(seen) // MOST_IMAGES)
     for part in range(count):
         names = tuple(seen)[part::count]
+        dimmed = () if through is None else tuple(_dimmed(name) for name in names)
         passes.fullscreen(
-            program(len(names), reach(width)),
+            program(len(names), reach(width), dimmed),
             frame.target(*names),
             blend="ADDITIVE_PREMULT",
-            textures={f"seen_{i}": seen[name] for i, name in enumerate(names)},
+            textures={
+                **{f"seen_{i}": seen[name] for i, name in enumerate(names)},
+                **({"through": through} if dimmed else {}),
+            },
             constants={
                 "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
                 "last_weights": (across[4], up[4]),
             },
         )  # fmt: skip
     return count
+
+
+def _dimmed(name: str) -> int:
+    """What media do to the image that is added to this sum."""
+    if name == "surface.normal_sum" or name.removeprefix("film.") in named(MEDIUM):
+        return CLEAR
+    return COVERED if name == "radiance.environment" else DIMMED

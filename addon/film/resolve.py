@@ -2,6 +2,8 @@
 
     combined = exposure / n * (direct + indirect + emission + world)
 
+    alpha    = coverage - what of the world shows through clear glass (Film > Transparent Glass)
+
 summed over the light paths of the table (frame/light_paths.py) that the picture has. With a transparent film the world
 shows in its own pass only. While a viewport has few samples, indirect diffuse light is shown filtered
 (film/neighbours.py); the sums stay as they are. One pass, a fetch for each light path.
@@ -33,6 +35,9 @@ def resolve_program(names: tuple[str, ...]) -> Program:
         + ";\n}\n"
         for order, paths in of_order.items()
     )
+    through = [p.name for p in LIGHT_PATHS if p.name in names and p.lobe == "transmission"]
+    sums += "float seen_through_glass(ivec2 pixel)\n{\n  return "
+    sums += (" + ".join(f"{name}_fetch(pixel).a" for name in through) or "0.0") + ";\n}\n"
     return passes.fullscreen_program(
         "film resolve",
         "film/resolve.frag.glsl",

@@ -2,9 +2,9 @@
 
 costs.json is written by `python -m bench costs` and holds, for each slot with a choice, each technique's error (relMSE
 of the whole picture) and time (of a whole render) relative to the slot's first technique at the same samples, as
-geometric means over the benchmark's scenes. Auto takes the technique with the least error x time: the variance of an
-unbiased method falls as its time grows, so that the product does not depend on the samples; of a biased one it rises
-with them. Another technique than the first must win by more than the figures scatter from run to run.
+geometric means over the scenes that it names (one, as yet). Auto takes the technique with the least error x time: the
+variance of an unbiased method falls as its time grows, so that the product does not depend on the samples; of a biased
+one it rises with them. Another technique than the first must win by more than the figures scatter from run to run.
 """
 
 from __future__ import annotations

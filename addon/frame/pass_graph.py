@@ -7,7 +7,7 @@ The sockets of a pass are not written down anywhere: they follow from what the t
 - A sum that several techniques add to (Write.accumulates) runs through all of them: each has it coming in, optional,
   and going out. The last one in the row holds the whole sum.
 - What one technique offers to others while it runs (Technique.provides and requests) goes by a link of its own.
-- What nobody reads is a result, with one socket for each image.
+- What nobody reads is a result, with one socket for each image; so are pictures (film.…), which later passes may take.
 
 A tree may be wrong in any way: circles, missing links, links between things that do not fit. Nothing here raises;
 `check` says in sentences what is wrong with which pass, and orders what is left.
@@ -23,6 +23,7 @@ from .plan import Plan
 from .technique import Technique
 
 SUM, FAMILY, SERVICE, RESULT = "sum", "family", "service", "result"
+PICTURES = "film"  # the family whose images are results each, also where a later pass takes one up
 
 
 def in_words(name: str) -> str:
@@ -104,6 +105,9 @@ def sockets(technique: type[Technique], registry: tuple[type[Technique], ...]):
         inputs[name] = Socket(name, SERVICE, description=f"What a technique that provides '{name}' brings; optional")
     for name in technique.reads:
         family = name.partition(".")[0]
+        if family == PICTURES:
+            inputs[name] = Socket(name, RESULT, (name,), True, "The picture that the pass works on")
+            continue
         known = inputs[family].images if family in inputs else ()
         inputs[family] = Socket(family, FAMILY, (*known, name), True, f"Images that the pass reads: {family}.…")
     for name in (service.name for service in technique.provides):
@@ -113,7 +117,7 @@ def sockets(technique: type[Technique], registry: tuple[type[Technique], ...]):
         if write.accumulates and write.name in added:
             inputs[write.name] = Socket(write.name, SUM, (write.name,), False, "The sum so far; optional")
             outputs[write.name] = Socket(write.name, SUM, (write.name,), False, write.description)
-        elif write.name in read:
+        elif write.name in read and family != PICTURES:
             known = outputs[family].images if family in outputs else ()
             outputs[family] = Socket(family, FAMILY, (*known, write.name), False, f"Images of the family {family}")
         else:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from ..gfx import context, images
+from ..gfx import context, images, passes
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
+from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
+from ..scene.media import volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
@@ -29,7 +31,7 @@ from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
 from .bands import Bands
-from .ledger import RAN, REUSED, Ledger, Row
+from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
 from .technique import Service, Technique
@@ -59,14 +61,17 @@ class Frame:
     hierarchies: HierarchyCache
     surface_means: SurfaceMeans
     measured_opacity: OpacityMaps
+    measured_emission: EmissionMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
+    drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     receivers: Receivers | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
+    needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -155,6 +160,12 @@ class Frame:
         self.measured_opacity.update(self.materials, self.geometry)
         return self.measured_opacity
 
+    @cached_property
+    def emission_maps(self) -> EmissionMaps:
+        """What triangles emit, place by place, where that varies."""
+        self.measured_emission.update(self.materials, self.geometry)
+        return self.measured_emission
+
     def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
         """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
         first call."""
@@ -186,10 +197,20 @@ class Frame:
         """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
         return self.plan.owner(transport) is not None
 
+    @property
+    def shown_with(self) -> tuple:
+        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in self.plan.techniques if technique.only_shows]
+        return tuple((t.name, self.settings.of(t), self.snapshot.moment) for t in showing)
+
     def count(self, technique: Technique, name: str, amount: int = 1) -> None:
         """Add to a counter of the technique's ledger row."""
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
+
+    def leave(self, technique: Technique, reason: str) -> None:
+        """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
+        self.needless[technique.name] = reason
 
     def to_show(self, name: str) -> images.Image:
         """The image of that name, or, of sums, the one that shows them better."""
@@ -221,7 +242,9 @@ class Renderer:
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
         self.frame: Frame | None = None
+        self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
+        self._glow = EmissionMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
@@ -244,6 +267,8 @@ class Renderer:
     def _begin(self, snapshot: Snapshot, settings: Settings, progress) -> Frame:
         if snapshot.camera is None:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
+        if settings.samples_to_draw < 1:
+            raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
         started = time.perf_counter()
         context.ensure()
         ledger = Ledger(samples=0)
@@ -270,6 +295,7 @@ class Renderer:
             self.frame.profiler = Profiler(settings.profile)
             self.frame.counters = {}
             self.frame.settings = settings
+            self.frame.snapshot = snapshot  # the same but for what only `show` asks for, as the time
             return self.frame
         self._frame_key = key
         self._drop_frame()
@@ -279,7 +305,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means, self._opacity, lasting=self._lasting,
+            self._surface_means, self._opacity, self._glow, lasting=self._lasting,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -305,31 +331,78 @@ class Renderer:
 
         A sample that is not brought to its end leaves sums that are good for nothing: the next `begin` starts anew.
         """
+        done = frame.samples_done
         try:
-            yield from self._parts_of_sample(frame)
+            yield from _timed(frame, self._parts_of_sample(frame))
         finally:
-            if self.frame is frame and frame.samples_done == frame.sample:
+            if self.frame is frame and frame.samples_done == done:
                 self._frame_key = None
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
-        frame.sample = frame.samples_done
-        frame.look()
-        frame.shown.clear()
-        if frame.sample == 0:
-            self._clear_sums(frame)
-            yield from _stage(frame, "begin")
-        yield from _stage(frame, "sample")
-        if frame.sample + 1 == frame.settings.samples:
-            yield from _stage(frame, "end")
+        settings, profiler = frame.settings, frame.profiler
+        measured = settings.samples_to_draw if settings.whole else 0
+        if frame.samples_done == 0:
+            with profiler.once(measured):
+                yield from self._begin_samples(frame)
+                if settings.sample_offset:
+                    # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
+                    # picture; its light is that of another slice.
+                    yield from _stage(frame, "sample")
+                    self._clear_sums(frame)
+                    for name in frame.shown.values():
+                        frame.target(name).clear()
+        if frame.samples_done or settings.sample_offset:
+            frame.sample = settings.sample_offset + frame.samples_done
+            frame.look()
+            frame.shown.clear()
+        with profiler.measured(frame.samples_done, measured):
+            yield from _stage(frame, "sample")
+        if frame.samples_done + 1 == settings.samples:
+            with profiler.once(measured):
+                yield from _stage(frame, "end")
         frame.samples_done += 1
         frame.ledger.rows = []  # what was reused up to here is being added to
+
+    def stop(self, frame: Frame) -> None:
+        """End the picture with the samples that it has."""
+        frame.settings = replace(frame.settings, samples=frame.samples_done)
+        for _ in _stage(frame, "end"):
+            pass
+
+    def _begin_samples(self, frame: Frame) -> Iterator[None]:
+        frame.sample = 0
+        frame.look()
+        frame.shown.clear()
+        self._clear_sums(frame)
+        yield from _stage(frame, "begin")
+
+    def merge(self, frame: Frame, sums: dict[str, np.ndarray]) -> None:
+        """Bring a frame to its end with sums over all samples that were drawn elsewhere (frame/slices.py)."""
+        for parts in (self._begin_samples(frame), _stage(frame, "sample")):
+            for _ in parts:
+                pass
+        for name, pixels in sums.items():
+            if name in frame.images:
+                passes.copy(images.upload(pixels, frame.images[name].format), frame.target(name))
+        frame.sample, frame.samples_done = frame.settings.samples - 1, frame.settings.samples
+        frame.look()
+        for _ in _stage(frame, "end"):
+            pass
+        frame.ledger.rows = []
 
     def show(self, frame: Frame) -> images.Image | None:
         """The mean of the samples so far as the image that is to be shown: scene-linear, premultiplied by alpha; None
         where no technique of the plan makes it. It changes with the next call. No sample may be half drawn."""
+        frame.picture = Frame.picture
+        frame.needless.clear()
         for _ in _stage(frame, "show"):
             pass
         return frame.images.get(frame.picture)
+
+    def drawn_with(self, settings: Settings) -> dict:
+        """The values of settings that samples depend on."""
+        showing = {technique.name for technique in self.techniques if technique.only_shows}
+        return {name: value for name, value in settings.values.items() if name[0] not in showing}
 
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
@@ -354,27 +427,34 @@ class Renderer:
                 pixels /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
-        if not ledger.rows:
-            seconds = frame.profiler.seconds
-            ledger.rows = [
-                Row(
-                    t.name,
-                    t.label,
-                    RAN,
-                    "",
-                    1000 * seconds.get(t.name, 0.0),
-                    ", ".join(frame.plan.slots_of(t)),
-                    frame.counters.get(t.name, {}),
-                )
+        took = frame.drawn_s + frame.profiler.awaited + waited - started
+        spent = frame.profiler.shares([t.name for t in frame.plan.techniques], took)
+        if ledger.rows:  # reused but for what was done to show them
+            worked = frame.counters.keys() | frame.needless.keys()
+            shown = {
+                t.name: self._row(frame, t, spent[t.name])
                 for t in frame.plan.techniques
-            ] + list(frame.plan.skipped)
-            drawn = sum(seconds.get(t.name, 0.0) for t in frame.plan.techniques)
-            ledger.times["passes"] = drawn + frame.profiler.awaited + waited - started
+                if t.only_shows and t.name in worked
+            }
+            ledger.rows = [shown.get(row.name, row) for row in ledger.rows]
+        else:
+            rows = [self._row(frame, t, spent[t.name]) for t in frame.plan.techniques]
+            ledger.rows = rows + list(frame.plan.skipped)
+            ledger.times["passes"] = took
         ledger.times["readback"] = time.perf_counter() - waited
         ledger.samples = frame.samples_done
         ledger.bad_pixels = bad
-        ledger_module.publish(ledger)
+        if self.publishes:
+            ledger_module.publish(ledger)
         return out
+
+    @staticmethod
+    def _row(frame: Frame, technique: Technique, seconds: float) -> Row:
+        slot = ", ".join(frame.plan.slots_of(technique))
+        if technique.name in frame.needless:
+            return Row(technique.name, technique.label, SKIPPED, frame.needless[technique.name], slot=slot)
+        counters = frame.counters.get(technique.name, {})
+        return Row(technique.name, technique.label, RAN, "", 1000 * seconds, slot, counters)
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -412,7 +492,8 @@ class Renderer:
         return self._environment[1]
 
     def _programs(self, plan: Plan, snapshot: Snapshot, settings: Settings) -> list:
-        shown = sorted({draw.material for draw in self.geometry.draws})
+        drawn = {draw.material for draw in self.geometry.draws}
+        shown = sorted(k for k in drawn if not self.materials.compiled[k].bounds_alone)
         wanted = [self.materials.surface_program(material) for material in shown]
         wanted += [program for t in plan.techniques for program in t.programs(snapshot, settings)]
         wanted += [
@@ -423,22 +504,33 @@ class Renderer:
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
-        wanted += [self.materials.tint_program(k) for k in shown if self.materials.compiled[k].tinted]
+        wanted += [self.materials.emission_map_program(k) for k in varied]
+        wanted += [
+            self.materials.tint_program(k)
+            for k in shown
+            if self.materials.compiled[k].tinted or self.materials.compiled[k].added
+        ]
+        wanted += [self.materials.glow_program(k) for k in shown if self.materials.compiled[k].glows]
+        if plan.fills("subsurface"):
+            wanted += [self.materials.scatter_program(k) for k in shown if self.materials.compiled[k].scatter > 0.0]
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
         lights = tuple(
             (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
              light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.bounces, light.visibility, light.own)
+             light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
             for light in snapshot.lights
         )  # fmt: skip
         camera = snapshot.camera
+        # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
+        casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights, self._environment[0], self.materials.fingerprint(), snapshot.film,
+            lights, casters, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
             camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
-            tuple(sorted(settings.slots.items())), tuple(sorted(settings.values.items())),
+            settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
+            tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
@@ -460,3 +552,15 @@ def _stage(frame: Frame, stage: str) -> Iterator[None]:
             parts = iter(run(frame) or ())
         for _ in frame.profiler.steps(technique.name, parts):
             yield
+
+
+def _timed(frame: Frame, parts: Iterator[None]) -> Iterator[None]:
+    """The same parts; what they take is added to the frame's time."""
+    end = object()
+    while True:
+        started = time.perf_counter()
+        part = next(parts, end)
+        frame.drawn_s += time.perf_counter() - started
+        if part is end:
+            return
+        yield

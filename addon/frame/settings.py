@@ -14,7 +14,18 @@ BOUNCES = Param(
     "How often light is reflected by surfaces on its way to the surface that is seen; 0: direct light only", 0, 64,
 )  # fmt: skip
 DRAFT_BOUNCES = 4
-SCENE_PARAMS = (SAMPLES, SEED, BOUNCES)
+SAMPLE_OFFSET = Param(
+    "sample_offset", "Sample Offset", 0,
+    "The first of the picture's samples to render, where several machines share them", 0, 65535,
+)  # fmt: skip
+SAMPLE_COUNT = Param(
+    "sample_count", "Sample Count", 0, "How many samples to render from there on; 0: all that are left", 0, 65536
+)
+TIME_LIMIT = Param(
+    "time_limit", "Time Limit", 0.0,
+    "Seconds after which a final render ends with the samples that it has by then; 0: none", 0.0, 1e6,
+)  # fmt: skip
+SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT)
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 
@@ -31,6 +42,9 @@ class Settings:
     passes: tuple[str, ...] | None = None  # names of the techniques of a pass tree, in its order; None: all, by slot
     whole: bool = False  # only the mean of all samples is shown, so that a sample may leave out what others bring
     draft: bool = False  # a picture of a moment, in coarse pixels: parameters are at most what they declare for it
+    sample_offset: int = SAMPLE_OFFSET.default  # `samples` stays the number of the whole picture, for all techniques
+    sample_count: int = SAMPLE_COUNT.default
+    time_limit: float = TIME_LIMIT.default  # s; the picture may end with fewer samples than it asks for
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):
@@ -44,6 +58,17 @@ class Settings:
         """Value of a parameter that the technique named `owner` declares."""
         value = self.values.get((owner, param.name), param.default)
         return min(value, param.draft) if self.draft and param.draft is not None else value
+
+    @property
+    def samples_to_draw(self) -> int:
+        """Samples of this slice of the picture, at least 0: those from `sample_offset` on."""
+        left = max(self.samples - self.sample_offset, 0)
+        return min(self.sample_count, left) if self.sample_count else left
+
+    @property
+    def is_slice(self) -> bool:
+        """Whether other samples of the same picture are rendered elsewhere."""
+        return self.samples_to_draw < self.samples
 
     def as_draft(self) -> Settings:
         """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""

@@ -51,6 +51,8 @@ class Param:
         """`value` in this parameter's type and range, or ValueError with a sentence."""
         kind = type(self.default)
         if kind is tuple:
+            if isinstance(value, tuple):
+                return value
             raise ValueError(f"'{self.name}' is set on data-blocks in Blender, not by a text.")
         try:
             value = _as_bool(value) if kind is bool else kind(value)
@@ -173,6 +175,14 @@ class Technique:
 
     def show(self, frame: Frame) -> Iterator[None] | None:
         """Work on the mean of the samples so far, each time when it is shown."""
+
+    @property
+    def only_shows(self) -> bool:
+        """Whether it works on the mean of the samples alone: no sample is drawn anew where its parameters change, or
+        the time."""
+        mine = type(self)
+        stages = ("prepare", "begin", "sample", "end")
+        return mine.show is not Technique.show and all(getattr(mine, s) is getattr(Technique, s) for s in stages)
 
     def release(self) -> None:
         """Drop GPU resources."""

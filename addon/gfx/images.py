@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
 import gpu
@@ -39,13 +39,15 @@ _CHANNELS = {
 @dataclass(eq=False)
 class Image:
     """A two-dimensional GPU image. Row 0 is the bottom row. Passes that read it are compiled with its `defines`, so
-    that what only some content needs costs others nothing."""
+    that what only some content needs costs others nothing; so they are with the images `beside` it, by the names under
+    which they are bound, too, and with HAS_NAME for each, unless the program has 16 textures already."""
 
     width: int
     height: int
     format: str
     texture: gpu.types.GPUTexture
     defines: tuple[tuple[str, str], ...] = ()
+    beside: dict[str, Image] = field(default_factory=dict)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -191,6 +193,7 @@ class Pool:
         return image
 
     def give(self, image: Image) -> None:
+        image.beside = {}
         self._free.setdefault((image.width, image.height, image.format), []).append(image)
 
     def trim(self) -> None:

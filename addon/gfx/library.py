@@ -30,6 +30,7 @@ _QUOTED_LINE = re.compile(r"^\s*\d+ \| (.*\S)")
 # Types of a texture: the format of its texels, or, where that is not known beforehand, only what they are read as.
 _FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D") | {"RGBA32UI": "UINT_2D"}
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
+MOST_TEXTURES = 16  # of a program
 _MOST_IMAGES = 8  # that Blender binds at once
 _CONSTANTS = {"FLOAT", "VEC2", "VEC3", "VEC4", "INT", "IVEC2", "IVEC4", "MAT4", "BOOL"}
 _PUSH_BYTES = {"FLOAT": 4, "VEC2": 8, "VEC3": 16, "VEC4": 16, "INT": 4, "IVEC2": 8, "IVEC4": 16, "MAT4": 64, "BOOL": 4}
@@ -78,8 +79,8 @@ class Program:
         size = sum(_PUSH_BYTES[kind] for kind, _ in self.constants)
         if size > 128:
             raise ShaderError(f"Program {self.name}: {size} bytes of constants; above 128 put them into a block.")
-        if len(self.textures) > 16:
-            raise ShaderError(f"Program {self.name}: {len(self.textures)} textures; Metal allows 16.")
+        if len(self.textures) > MOST_TEXTURES:
+            raise ShaderError(f"Program {self.name}: {len(self.textures)} textures; Metal allows {MOST_TEXTURES}.")
         if bool(self.compute) == bool(self.fragment):
             raise ShaderError(f"Program {self.name}: give either compute, or vertex and fragment.")
 

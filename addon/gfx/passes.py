@@ -10,14 +10,17 @@ import gpu
 import numpy as np
 
 from .context import on_release, overtakes_draws
-from .geometry import Batch
+from .geometry import Batch, vertex_buffer
 from .images import Image, Target, finish
-from .library import FULLSCREEN_VERTEX, Program, Shader, get
+from .library import FULLSCREEN_VERTEX, MOST_TEXTURES, Program, Shader, get
 
 FULLSCREEN_INPUTS = (("VEC2", "corner"),)
 FULLSCREEN_VARYINGS = (("smooth", "VEC2", "screen"),)
 
+QUAD_INPUTS = FULLSCREEN_INPUTS
+
 _triangle: list[gpu.types.GPUBatch] = []
+_quad: list[gpu.types.GPUBatch] = []
 
 
 def fullscreen_program(name: str, fragment: str, **declared) -> Program:
@@ -81,6 +84,19 @@ def draw_points(shader: Shader, batch: gpu.types.GPUBatch, instances: int = 1) -
     gpu.state.program_point_size_set(False)
 
 
+def draw_quads(shader: Shader, instances: int) -> None:
+    """Draw instances of a square of two triangles whose attribute `corner` runs from -1 to 1. Only inside `drawing`."""
+    if not _quad:
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
+        _quad.append(gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(corner=corners)))
+    _quad[0].draw_instanced(shader.handle, instance_start=0, instance_count=instances)
+
+
+def get_for(program: Program, textures: dict[str, Image]) -> Shader:
+    """The shader of a program for mesh or quad draws that read these images, with what they define."""
+    return _for_images(program, {"textures": textures})
+
+
 def compute(program: Program, size: tuple[int, int], **bindings) -> None:
     """Dispatch enough groups for `size` threads. Blender issues texture and image barriers after it."""
     shader = _for_images(program, bindings)
@@ -93,14 +109,24 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 
 
 def _for_images(program: Program, bindings: dict) -> Shader:
-    """The shader of a program, with what the images that it reads define."""
+    """The shader of a program, with what the images that it reads define and bring along, if it has room for that."""
     read = bindings.get("textures") or {}
-    return get(_with_defines(program, tuple(one for image in read.values() for one in image.defines)))
+    beside = {name: image for one in read.values() for name, image in one.beside.items() if name not in read}
+    if len(program.textures) + len(beside) > MOST_TEXTURES:
+        beside = {}
+    if beside:
+        bindings["textures"] = {**read, **beside}
+    defines = tuple(one for image in read.values() for one in image.defines)
+    return get(_with_images(program, defines, tuple((image.format, name) for name, image in beside.items())))
 
 
 @cache
-def _with_defines(program: Program, defines: tuple[tuple[str, str], ...]) -> Program:
-    return replace(program, defines=(*program.defines, *defines)) if defines else program
+def _with_images(program: Program, defines: tuple[tuple[str, str], ...], beside: tuple[tuple[str, str], ...]):
+    if not defines and not beside:
+        return program
+    there = tuple((f"HAS_{name.upper()}", "1") for _, name in beside)
+    textures = (*program.textures, *beside)
+    return replace(program, defines=(*program.defines, *defines, *there), textures=textures)
 
 
 @contextmanager
@@ -140,3 +166,4 @@ def _fullscreen_batch() -> gpu.types.GPUBatch:
 @on_release
 def _release() -> None:
     _triangle.clear()
+    _quad.clear()

@@ -35,6 +35,7 @@ class MapView:
     scale: int = 1  # resolution is divided by this
     least_q: float = -np.inf  # of the receivers: what lies farther from the light casts no shadow on any of them
     cell: float = 0.0  # share of the light's extent, along each axis, that the map stands for; 0: a point
+    glass_blocks: bool = False  # what passes glass arrives otherwise (caustic_casters.py)
 
 
 def directional_views(
@@ -327,7 +328,8 @@ def draw_views(
         with passes.drawing(atlas.target, viewport=viewport):
             for call in calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q))):
                 shader, bindings = alpha.programs[call.draw.material]
-                own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point}
+                own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point,
+                       "glass_blocks": int(view.glass_blocks)}  # fmt: skip
                 shader.bind(**bindings, constants={**constants, **own})
                 passes.draw(shader, call.draw.batch, call.count)
                 sent += call.triangles

@@ -1,4 +1,4 @@
-"""Triangles whose material emits, ready to draw points of light from."""
+"""Triangles whose material emits, or pieces of them, ready to draw points of light from."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ import numpy as np
 
 from ..frame.run import Frame
 from ..materials.compiled import CompiledMaterial
+from ..scene.emission_maps import TriangleEmission
 from ..sources import lights
-
-BOTH, FRONT, BEHIND = "both", "front", "behind"
-SIDES = ((BOTH, 1.0), (FRONT, 1.0), (BEHIND, -1.0))  # with the sign of the normal
 
 PATHS = {"diffuse": lights.DIFFUSE_FLAG, "glossy": lights.GLOSSY_FLAG, "transmission": lights.TRANSMISSION_FLAG}
 
@@ -22,28 +20,34 @@ class EmissiveTriangles:
 
     def __init__(self, frame: Frame, paths: Sequence[str]):
         corners, radiance, normals, sided, flags = [], [], [], [], []
-        of_side = {side: np.array([_emission(m, side) for m in frame.measured_materials]) for side, _ in SIDES}
-        emissive = {k for emission in of_side.values() for k in np.flatnonzero(emission.any(axis=1))}
+        front, behind = (
+            np.array([_emission(m, side) for m in frame.measured_materials]).reshape(-1, 3) for side in (0, 1)
+        )
+        emissive = {k for k, material in enumerate(frame.measured_materials) if material.emissive}
         for instance in frame.snapshot.instances:
             mesh = frame.snapshot.meshes[instance.mesh]
             seen = sum(PATHS[path] * getattr(instance.visibility, path) for path in paths)
             if not seen or emissive.isdisjoint(instance.materials) or not mesh.triangle_count:
                 continue
             slots = mesh.triangle_materials(instance.materials)
-            for side, sign in SIDES:
-                emission = of_side[side][slots]
-                shining = np.abs(emission).max(axis=1) > 0
-                if not shining.any():
+            local = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]]
+            of_sides = np.stack([front[slots], behind[slots]], axis=1)
+            known = frame.emission_maps.of(instance)
+            if known is not None:
+                local, of_sides = _in_pieces(local, of_sides, known)
+            matrix = instance.matrix.copy()
+            matrix[:3, 3] -= frame.geometry.origin
+            alike = (of_sides[:, 0] == of_sides[:, 1]).all(axis=1)
+            for side, chosen, sign in ((0, alike, 1.0), (0, ~alike, 1.0), (1, ~alike, -1.0)):
+                shining = np.flatnonzero(chosen & (np.abs(of_sides[:, side]).max(axis=1) > 0))
+                if not len(shining):
                     continue
-                matrix = instance.matrix.copy()
-                matrix[:3, 3] -= frame.geometry.origin
-                world = mesh.positions[mesh.corner_vertices[mesh.triangle_corners[shining]]] @ matrix[:3, :3].T
-                corners.append(world + matrix[:3, 3])
-                radiance.append(emission[shining])
+                corners.append(local[shining] @ matrix[:3, :3].T + matrix[:3, 3])
+                radiance.append(of_sides[shining, side])
                 # A mirrored triangle's corners run the other way round.
-                normals.append(np.full(len(world), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
-                sided.append(np.full(len(world), side != BOTH))
-                flags.append(np.full(len(world), seen))
+                normals.append(np.full(len(shining), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
+                sided.append(np.full(len(shining), chosen is not alike))
+                flags.append(np.full(len(shining), seen))
         self.corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
         self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
         self.sided = np.concatenate(sided) if sided else np.zeros(0, bool)
@@ -77,8 +81,16 @@ class EmissiveTriangles:
         return k, point, float(np.abs(self.radiance[k]) @ lights.LUMINANCE) / self.power
 
 
-def _emission(material: CompiledMaterial, side: str) -> tuple[float, float, float]:
-    """What a material emits to one of its sides, or to both: it does either, or none."""
-    if not material.emissive or (side == BOTH) != (material.emission == material.emission_behind):
+def _emission(material: CompiledMaterial, side: int) -> tuple[float, float, float]:
+    """What a material emits to its front (0) or its back (1), on average."""
+    if not material.emissive:
         return 0.0, 0.0, 0.0
-    return material.emission_behind if side == BEHIND else material.emission
+    return material.emission_behind if side else material.emission
+
+
+def _in_pieces(corners: np.ndarray, radiance: np.ndarray, known: TriangleEmission) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (N, 3, 3) and what they emit (N, 2, 3), with pieces in the place of those that were measured."""
+    rest = ~known.measured
+    first, edges = corners[known.triangle, :1], corners[known.triangle, 1:] - corners[known.triangle, :1]
+    pieces = first + known.places[..., :1] * edges[:, :1] + known.places[..., 1:] * edges[:, 1:]
+    return np.concatenate([corners[rest], pieces]), np.concatenate([radiance[rest], known.radiance])

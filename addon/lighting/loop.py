@@ -35,6 +35,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import repeated_light, shared_visibility
+from .media import MediaService, attenuated
 from .repeated_light import Lit
 from .visibility import (
     RAY_CONSTANTS,
@@ -105,9 +106,14 @@ def shade(
         },
     }  # fmt: skip
     program = lighting(maps.lookup, frame.materials.soft, kinds)
+    media = frame.service(MediaService)
+    if media is not None:
+        program = attenuated(program)
+        bindings["textures"] |= media.bindings
     lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
     if maps.sparse:
         between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
+        between = attenuated(between) if media is not None else between
         yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
     else:
         yield from repeated_light.add(frame, technique, sources, lit)

@@ -14,6 +14,7 @@ from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps
+from .caustic_casters import answered
 from .visibility import (
     ATLAS_TEXELS,
     EDGES,
@@ -110,7 +111,10 @@ class PointMaps(Technique, VisibilityProvider):
         shadowed = of_world_or_mesh or emitter.light.cast_shadow
         if not shadowed or receivers is None or not len(receivers.distance):
             return []
-        jitter = self.jitter(frame, emitter, number)
+        found = self._views(frame, emitter, sample, receivers, self.jitter(frame, emitter, number), cell)
+        return [replace(view, glass_blocks=True) for view in found] if answered(frame, emitter) else found
+
+    def _views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, receivers, jitter, cell: float) -> list:
         if emitter.kind == lights.SUN:
             reach = cell * np.tan(min(emitter.radius, 1.5))
             return depth_maps.directional_views(

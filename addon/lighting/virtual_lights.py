@@ -68,7 +68,9 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
+from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
+from .media import MediaService, attenuated
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
 LEAST_RAYS, DRAFT_RAYS = 6, 3  # per probe
@@ -281,7 +283,9 @@ class VirtualLights:
                 sample = emitter.sample(*frame.random_volume_at(frame.sample * points + k, "virtual lights/light"))
                 total = points * frame.settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
-                rows.append(emitter.row(sample, 0, shadowed, weight / points, points=total))
+                row = emitter.row(sample, 0, shadowed, weight / points, points=total)
+                row[0, 1] += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
+                rows.append(row)
         return rows
 
     def _probing(self, frame: Frame, grid: Grid) -> dict:
@@ -293,7 +297,15 @@ class VirtualLights:
         """FOUND, a row per probe."""
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
-        passes.fullscreen(candidates_program(self.kinds), found, **self._probing(frame, grid))
+        program, bindings, media = (
+            candidates_program(self.kinds),
+            self._probing(frame, grid),
+            frame.service(MediaService),
+        )
+        if media is not None:
+            program = attenuated(program)
+            bindings["textures"] |= media.bindings
+        passes.fullscreen(program, found, **bindings)
         return found
 
     def _radiances(self, frame: Frame, grid: Grid, found: images.Target) -> tuple[np.ndarray, ...]:

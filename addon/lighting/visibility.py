@@ -178,7 +178,9 @@ def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, objec
 
 def drawn_by_lot(frame: Frame) -> list[Draw]:
     """Casters that let some light pass."""
-    return [draw for draw in frame.geometry.draws if frame.materials.compiled[draw.material].casts_by_lot]
+    compiled = frame.materials.compiled
+    casting = {k for k, one in enumerate(compiled) if one.casts_by_lot and not one.bounds_alone}
+    return [draw for draw in frame.geometry.draws if draw.material in casting]
 
 
 def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:

@@ -1,4 +1,5 @@
-"""Which attributes of a mesh a tree reads: asked when a mesh is read, long before anything is compiled."""
+"""What a tree reads of the world around it: attributes of its mesh (asked when a mesh is read, long before anything is
+compiled), the instance that shows it, and the camera."""
 
 from __future__ import annotations
 
@@ -32,4 +33,34 @@ def attributes_of(graph: Graph) -> frozenset[Attribute]:
                 given = node.inputs.get(argument.identifier)
                 if (given is None or given.link is None) and asked_for(node, argument):
                     found.add(IMPLICIT[argument.implicit])
+    return frozenset(found)
+
+
+INSTANCE, CAMERA = "instance", "camera"
+# Node types, of some only these outputs, whose values differ between instances of one mesh: by what the object says of
+# itself, or by where it stands.
+_OF_INSTANCE = {
+    "ShaderNodeObjectInfo": (), "ShaderNodeParticleInfo": (), "ShaderNodeCameraData": (),
+    "ShaderNodeVectorTransform": (),
+    "ShaderNodeNewGeometry": ("Position", "Normal", "Tangent", "True Normal", "Incoming"),
+    "ShaderNodeTexCoord": ("Camera", "Window", "Reflection"), "ShaderNodeLightPath": ("Ray Length",),
+}  # fmt: skip
+_OF_CAMERA = {
+    "ShaderNodeCameraData": (), "ShaderNodeTexCoord": ("Camera", "Window"), "ShaderNodeLightPath": ("Ray Length",),
+    "ShaderNodeVectorTransform": (),
+}  # fmt: skip
+
+
+def surroundings_of(graph: Graph) -> frozenset[str]:
+    """INSTANCE where a tree may give other values for instances of one mesh, CAMERA where for other views."""
+    read = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+    found = set()
+    for node in graph.nodes.values():
+        for name, table in ((INSTANCE, _OF_INSTANCE), (CAMERA, _OF_CAMERA)):
+            outputs = table.get(node.type)
+            if outputs is not None and (not outputs or any((node.key, output) in read for output in outputs)):
+                found.add(name)
+        elsewhere = node.properties.get("attribute_type", "GEOMETRY") != "GEOMETRY"
+        if node.properties.get("from_instancer") or node.properties.get("of_another_object") or elsewhere:
+            found.add(INSTANCE)
     return frozenset(found)

@@ -43,10 +43,20 @@ class CompiledMaterial:
     # Opacity, emission vary: what they are depends on the surfaces (scene/opacity_maps.py, scene/surface_means.py).
     uneven: bool
     uneven_emission: bool
+    reads: frozenset[str]  # of what is around it: INSTANCE, CAMERA of attributes.py
     diffuse: bool  # has a diffuse closure
     glossy: bool  # has a glossy closure
     soft: bool  # has a lobe of shaders/lib/soft_lobe.glsl: sheen, velvet, translucent, toon
     tinted: bool  # what passes straight through may be coloured
+    glows: bool  # emits where rays may pass: layers add what they emit to what lies behind them
+    added: bool  # a lobe is added to what lets light pass, so that both together may be more than 1
     glass: Interface | None  # how it bends light, on average
     medium: Medium | None  # what its inside does with light
+    scatter: float  # about how far light spreads below its surface, m; 0: it does not
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated
+
+    @property
+    def bounds_alone(self) -> bool:
+        """Whether it has no surface to be seen, and only says where its medium ends: nothing draws it."""
+        clear = self.transparent and self.opacity <= 0.0 and not (self.uneven or self.tinted or self.emissive)
+        return clear and self.medium is not None and self.glass is None

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import nodes
+from .attributes import surroundings_of
 from .bounds import Bounds
 from .compiled import CompiledMaterial
 from .estimate import Estimate, Summary, constant
@@ -57,6 +58,7 @@ class _Compilation:
         self.code = Expressions(name, graph, images, lean)
         self.code.fallbacks.update(dict.fromkeys(tuple(note) for note in notes))
         self.bounds = Bounds(self.code)
+        self._leaves: dict[tuple[str, str], Summary] = {}
 
     def result(self) -> CompiledMaterial:
         self._displacement()
@@ -68,6 +70,7 @@ class _Compilation:
         identity = f"{glsl}\0{kinds}\0{len(code.image_keys)}\0{len(values)}"
         passes, emission = summary.transparency, summary.emission
         transparent = bool(np.any(passes.high > 1e-5))
+        emissive = not np.all((emission.high <= 0.0) & (emission.low >= 0.0))  # not known: it may be
         shining = tuple(float(channel) for channel in emission.mean)
         opacity = float(np.clip(1.0 - passes.luminance().mean[0], 0.0, 1.0))
         return CompiledMaterial(
@@ -79,28 +82,31 @@ class _Compilation:
             values=values,
             transparent=transparent,
             casts_by_lot=transparent and (self.graph.transparent_shadow or summary.glass is not None),
-            emissive=not np.all((emission.high <= 0.0) & (emission.low >= 0.0)),  # not known: it may be
+            emissive=emissive,
             emission=shining,
             emission_behind=shining,
             opacity=opacity,
             uneven=transparent and not passes.constant,
             uneven_emission=not emission.constant,
+            reads=surroundings_of(self.graph),
             diffuse=summary.diffuse,
             glossy=summary.glossy,
             soft=summary.soft,
             tinted=summary.tinted,
+            glows=transparent and emissive,
+            added=transparent and self._adds_lobes_to_transparency(),
             glass=summary.glass,
             medium=medium,
+            scatter=summary.scatter,
             fallbacks=tuple(code.fallbacks),
         )
 
     def _unused_slots(self, medium: Medium | None, glass: bool) -> None:
-        if medium is not None:
-            node, text = self.graph.nodes[self.graph.volume[0]], "The volume of the material is not drawn."
-            if glass:
-                text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
+        if medium is not None and glass:
+            node = self.graph.nodes[self.graph.volume[0]]
+            text = "Of the volume of the material only what it absorbs is drawn, as if it were the same everywhere."
             absorbs_alone = medium.even and not (medium.scattering.any() or medium.emission.any() or medium.glow)
-            if not (glass and absorbs_alone):
+            if not absorbs_alone:
                 self.code.note(node, text)
         if self.code.values.overflow:
             sentence = "The material has more sliders than fit a uniform block; the last ones recompile it."
@@ -143,8 +149,30 @@ class _Compilation:
             if entry.combine:
                 self._combine(node, entry, weight, estimate, weights)
             else:
-                total += self._leaf(node, entry, weight).weighted(estimate)
+                self._leaves[link] = self._leaf(node, entry, weight)
+                total += self._leaves[link].weighted(estimate)
         return total
+
+    def _adds_lobes_to_transparency(self) -> bool:
+        """Whether an Add Shader has what lets light pass on one side and a lobe on the other."""
+        if not self.code.exists(self.graph.surface):
+            return False
+        found: dict[tuple[str, str], tuple[bool, bool]] = {}  # whether there is either below a link
+        for link in self._shader_order(self.graph.surface)[::-1]:
+            below = [found[child] for child in self._shader_inputs(link)]
+            if link in self._leaves:
+                leaf = self._leaves[link]
+                lobes = leaf.diffuse or leaf.glossy or leaf.soft
+                below = [(bool(np.any(leaf.transparency.high > 0.0)), lobes)]
+            passing, lobes = (any(one[k] for one in below) for k in (0, 1))
+            node = self.graph.nodes[link[0]]
+            entry = nodes.find(node.type, node.properties)
+            if entry is not None and entry.combine == "ADD" and len(below) == 2:
+                (passes_a, lobes_a), (passes_b, lobes_b) = below
+                if (passes_a and lobes_b) or (passes_b and lobes_a):
+                    return True
+            found[link] = passing, lobes
+        return False
 
     def _shader_inputs(self, link: tuple[str, str]) -> list[tuple[str, str]]:
         """Links of the SHADER sockets of a Mix or Add Shader."""
@@ -228,6 +256,15 @@ def may_refract(graph: Graph) -> bool:
     return any(
         node.type in REFRACTING
         or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Transmission Weight")))
+        for node in graph.nodes.values()
+    )
+
+
+def may_scatter(graph: Graph) -> bool:
+    """Whether some node of the graph can scatter light below the surface: cheap, by its sockets alone."""
+    return any(
+        node.type == "ShaderNodeSubsurfaceScattering"
+        or (node.type == "ShaderNodeBsdfPrincipled" and _not_black(node.inputs.get("Subsurface Weight")))
         for node in graph.nodes.values()
     )
 

@@ -108,6 +108,7 @@ class Summary:
     soft: bool = False  # a lobe of shaders/lib/soft_lobe.glsl
     tinted: bool = False  # what passes straight through may be coloured
     glass: Interface | None = None  # the most of such lobes
+    scatter: float = 0.0  # about how far light spreads below the surface, m; 0: it does not
 
     def weighted(self, weight: Estimate) -> Summary:
         seen = bool(np.any(weight.high > 0.0))
@@ -119,6 +120,7 @@ class Summary:
             self.soft and seen,
             self.tinted and seen,
             replace(self.glass, share=self.glass.share * _share(weight)) if self.glass and seen else None,
+            self.scatter if seen else 0.0,
         )
 
     def __add__(self, other: Summary) -> Summary:
@@ -130,6 +132,7 @@ class Summary:
             self.soft or other.soft,
             self.tinted or other.tinted,
             max((self.glass, other.glass), key=lambda glass: glass.share if glass else -1.0),
+            max(self.scatter, other.scatter),
         )
 
 

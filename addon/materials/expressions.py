@@ -9,12 +9,14 @@ and called for both neighbours; at the point itself the height is an ordinary va
 from __future__ import annotations
 
 from . import nodes
+from .atlas import PREFIX, atlas_key, keys_of, layout
 from .attributes import asked_for
 from .compiled import Attribute
 from .graph import Graph, Node
 from .nodes import entry as words
 from .nodes.entry import Entry
-from .nodes.image import FUNCTIONS, MISSING_COLOR
+from .nodes.image import FUNCTIONS, MISSING_COLOR, part_functions, tiled_functions
+from .nodes.image import SOURCE as IMAGE_SOURCE
 from .values import ValueBlock, glsl_number, to_kind
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
@@ -25,6 +27,7 @@ MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the pr
 PLAIN_MAPPING = ("POINT", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
 
+SURFACE_HEAD = "void evaluate_material(SurfacePoint point, inout Closures closures)"
 GLSL_TYPES = {"FLOAT": "float", "VECTOR": "vec3", "COLOR": "vec3"}
 
 
@@ -58,6 +61,7 @@ class Expressions:
         # In sampler order, with the files that their functions call: of one, unless nodes of two kinds read an image.
         self.image_keys: dict[str, dict[str, None]] = {}
         self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
+        self._atlas = self._shared_sampler()
         self._scopes = [_Scope()]
         self._functions: list[str] = []
         self._function_names: dict[tuple[tuple[str, str], str], str] = {}
@@ -74,15 +78,46 @@ class Expressions:
         """What the function that grows has computed: link -> GLSL variable, kind."""
         return self._scopes[-1].outputs
 
-    def text(self) -> str:
-        """The whole source: includes, the images' functions, evaluate_material."""
+    def text(self, head: str = SURFACE_HEAD) -> str:
+        """The whole source: includes, the images' functions, and the function of that head."""
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
         wanted = [(k, source) for k, sources in enumerate(self.image_keys.values()) for source in sources]
-        functions = "".join("\n" + FUNCTIONS[source].format(k=k) for k, source in wanted)
+        keys = list(self.image_keys)
+        functions = "".join("\n" + self._image_functions(keys[k], k, source) for k, source in wanted)
         functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
-        head = "void evaluate_material(SurfacePoint point, inout Closures closures)"
         return f"{includes}{functions}\n{head}\n{{\n{body}}}\n"
+
+    def _image_functions(self, key: str, k: int, source: str) -> str:
+        """The lookups of sampler `k`: of an image, of each image of an atlas, or of a UDIM image's tiles."""
+        text = FUNCTIONS[source]
+        if key.startswith(PREFIX):
+            corners, _ = layout([self._size(one) for one in keys_of(key)])
+            parts = zip(corners, (self._size(one) for one in keys_of(key)))
+            return "\n".join(part_functions(k, n, (*corner, *size)) for n, (corner, size) in enumerate(parts))
+        tiles = self.images[key].tiles if self.images and key in self.images else ()
+        if tiles and source == IMAGE_SOURCE:
+            return tiled_functions(k, tiles)
+        return text.format(k=k)
+
+    def _size(self, key: str) -> tuple[int, int]:
+        height, width = self.images[key].pixels.shape[:2]
+        return width, height
+
+    def _shared_sampler(self) -> dict[str, str]:
+        """The atlas for each image of those that share a sampler, the smallest ones: none where there are enough."""
+        read = dict.fromkeys(
+            node.image for node in self.graph.nodes.values()
+            if node.type in ("ShaderNodeTexImage", "ShaderNodeTexEnvironment", "ShaderNodeTexSky") and node.image
+        )  # fmt: skip
+        there = [key for key in read if self.images is not None and key in self.images and not self.images[key].missing]
+        if len(there) <= MAX_IMAGES:
+            return {}
+        skies = {node.image for node in self.graph.nodes.values() if node.type == "ShaderNodeTexSky"}
+        shared = [key for key in there if not self.images[key].tiles and key not in skies]
+        shared.sort(key=lambda key: (self.images[key].pixels.size, there.index(key)))
+        shared = shared[: len(there) - MAX_IMAGES + 1]
+        return dict.fromkeys(shared, atlas_key(shared))
 
     def note(self, node: Node, sentence: str) -> None:
         self.fallbacks.setdefault((node.label, sentence))
@@ -175,7 +210,10 @@ class Expressions:
     def _function(self, node: Node, entry: Entry) -> str:
         settings = {name: str(node.properties.get(name, items[0])).lower() for name, items in entry.choices.items()}
         if entry.image:
-            settings["image"] = str(list(self.image_keys).index(node.image))
+            shared = self._atlas.get(node.image)
+            settings["image"] = str(list(self.image_keys).index(shared or node.image))
+            if shared:
+                settings["image"] += f"_{keys_of(shared).index(node.image)}"
         return entry.function.format(**settings)
 
     def _image_index(self, node: Node, entry: Entry) -> bool:
@@ -185,12 +223,13 @@ class Expressions:
             return False
         if self.images is not None and self.images[node.image].missing:
             return False  # whoever read the scene has said so
-        if node.image not in self.image_keys:
+        key = self._atlas.get(node.image, node.image)
+        if key not in self.image_keys:
             if len(self.image_keys) >= MAX_IMAGES:
                 self.note(node, f"The material reads more than {MAX_IMAGES} images; '{node.label}' is drawn pink.")
                 return False
-            self.image_keys[node.image] = {}
-        self.image_keys[node.image].setdefault(entry.include)
+            self.image_keys[key] = {}
+        self.image_keys[key].setdefault(entry.include)
         return True
 
     def include(self, entry: Entry) -> None:

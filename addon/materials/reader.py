@@ -35,6 +35,7 @@ CONSTANT_NODES = {"ShaderNodeRGB": {}, "ShaderNodeValue": {}, "ShaderNodeNormal"
 
 TABLE_ROWS = 129  # points at which curves, and colour ramps that are no plain blends, are tabulated
 
+SUBSURFACE_SETTINGS = {"subsurface_method", "falloff"}
 _BASE_SETTINGS = {prop.identifier for prop in bpy.types.Node.bl_rna.properties}
 _settings_of_type: dict[str, tuple] = {}
 
@@ -334,8 +335,10 @@ def _kind(socket) -> str:
 
 
 def _default(socket) -> tuple[float, ...] | float | None:
-    """The constant of an unlinked socket; None for shaders and for kinds that are no numbers."""
+    """The constant of an unlinked socket; None for shaders and for kinds that are neither numbers nor names."""
     value = getattr(socket, "default_value", None)
+    if isinstance(value, str):
+        return value
     if socket.type in {"VECTOR", "RGBA", "ROTATION"} and value is not None:
         return tuple(value)
     return float(value) if isinstance(value, (bool, int, float)) else None
@@ -368,6 +371,10 @@ def _settings(node) -> dict[str, object]:
             value = _plain(value, type_name)
             if value is not None:
                 settings[name] = value
+    for name in SUBSURFACE_SETTINGS & settings.keys():
+        known = type(node).bl_rna.properties[name].enum_items.keys()
+        if settings[name] == "RANDOM_WALK" and "RANDOM_WALK_LEGACY" not in known:
+            settings[name] = "RANDOM_WALK_LEGACY"  # before Blender 5.2 that is what it means
     return settings
 
 

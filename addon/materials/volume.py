@@ -1,6 +1,6 @@
 """Volumes: what a material's or world's tree says about light inside, as coefficients per metre.
 
-Parsed here for techniques that draw volumes. With c the colour and d the density (Blender manual, "Volume shaders";
+With c the colour and d the density (Blender manual, "Volume shaders";
 Cycles' closures):
 
     Volume Absorption    absorbs d (1 - c)
@@ -10,7 +10,7 @@ Cycles' closures):
     Emission             emits
 
 Mix and Add Shader weigh and add coefficients. Where a texture or attribute drives a socket, the socket's own constant
-stands for it and `even` is false.
+stands for it and `even` is false; such trees are compiled (volume_program.py) and evaluated on a grid (scene/media.py).
 """
 
 from __future__ import annotations
@@ -20,7 +20,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .graph import Graph, Node
+from .spectra import BLACKBODY
 from .values import to_kind
+
+STEFAN_BOLTZMANN = 5.670373e-8 * 1e-6 / np.pi  # W / (m2 K4), scaled as Cycles scales the glow of volumes
+PHASES = ("HENYEY_GREENSTEIN", "FOURNIER_FORAND", "DRAINE", "RAYLEIGH", "MIE")
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,19 @@ class Medium:
     temperature: float  # kelvin, of the part that glows as a black body
     glow: float  # strength of that glow
     even: bool  # the same everywhere
+    tint: tuple[float, ...] = (1.0, 1.0, 1.0)  # of the glow
+    phase: str = PHASES[0]  # of the part that scatters most
+    phase_values: tuple[float, ...] = (1.33, 0.1, 0.5, 20.0)  # its index, backscatter, alpha, diameter in micrometres
+
+    @property
+    def glowing(self) -> np.ndarray:
+        """(3,) radiance per metre of the part that glows as a black body."""
+        kelvin = max(self.temperature, 0.0)
+        strength = STEFAN_BOLTZMANN * (1.0 - self.glow + self.glow * kelvin**4) if self.glow > 0 else 0.0
+        place = (1.0 / max(kelvin, 1.0) - BLACKBODY.start) / BLACKBODY.extent * (BLACKBODY.count - 1)
+        rows = np.array(BLACKBODY.rows())[:, :3]
+        color = [np.interp(place, np.arange(BLACKBODY.count), rows[:, k]) for k in range(3)]
+        return strength * np.asarray(color) * np.asarray(self.tint)
 
     @property
     def key(self) -> tuple:
@@ -43,7 +60,7 @@ class Medium:
     def __mul__(self, share: float) -> Medium:
         return Medium(
             self.absorption * share, self.scattering * share, self.emission * share, self.anisotropy,
-            self.temperature, self.glow * share, self.even,
+            self.temperature, self.glow * share, self.even, self.tint, self.phase, self.phase_values,
         )  # fmt: skip
 
     def __add__(self, other: Medium) -> Medium:
@@ -51,9 +68,11 @@ class Medium:
         total = sum(weights)
         mean = (self.anisotropy * weights[0] + other.anisotropy * weights[1]) / total if total > 0 else 0.0
         hotter = self if self.glow >= other.glow else other
+        cloudier = self if weights[0] >= weights[1] else other
         return Medium(
             self.absorption + other.absorption, self.scattering + other.scattering, self.emission + other.emission,
-            mean, hotter.temperature, self.glow + other.glow, self.even and other.even,
+            mean, hotter.temperature, self.glow + other.glow, self.even and other.even, hotter.tint,
+            cloudier.phase, cloudier.phase_values,
         )  # fmt: skip
 
 
@@ -112,7 +131,16 @@ def _absorption(node: Node) -> Medium:
 def _scatter(node: Node) -> Medium:
     scattered = _color(node, "Color", 0.8) * _density(node)
     even = _constant(node, "Color", "Density", "Anisotropy")
-    return Medium(np.zeros(3), scattered, np.zeros(3), _number(node, "Anisotropy", 0.0), 0.0, 0.0, even)
+    return Medium(np.zeros(3), scattered, np.zeros(3), _number(node, "Anisotropy", 0.0), 0.0, 0.0, even, **_phase(node))
+
+
+def _phase(node: Node) -> dict:
+    kind = str(node.properties.get("phase", PHASES[0]))
+    names = (("IOR", 1.33), ("Backscatter", 0.1), ("Alpha", 0.5), ("Diameter", 20.0))
+    return {
+        "phase": kind if kind in PHASES else PHASES[0],
+        "phase_values": tuple(_number(node, name, default) for name, default in names),
+    }
 
 
 def _principled(node: Node) -> Medium:
@@ -124,7 +152,7 @@ def _principled(node: Node) -> Medium:
     glow = _number(node, "Blackbody Intensity", 0.0)
     return Medium(
         density * np.maximum(1.0 - color, 0.0) * dark, density * color, emission, _number(node, "Anisotropy", 0.0),
-        _number(node, "Temperature", 1000.0), glow, even,
+        _number(node, "Temperature", 1000.0), glow, even, tuple(_color(node, "Blackbody Tint", 1.0)),
     )  # fmt: skip
 
 
@@ -134,7 +162,7 @@ def _coefficients(node: Node) -> Medium:
         for name in ("Absorption", "Scatter", "Emission")
     )
     even = all(socket.link is None for socket in node.inputs.values())
-    return Medium(absorbed, scattered, emitted, _number(node, "Anisotropy", 0.0), 0.0, 0.0, even)
+    return Medium(absorbed, scattered, emitted, _number(node, "Anisotropy", 0.0), 0.0, 0.0, even, **_phase(node))
 
 
 def _emission(node: Node) -> Medium:

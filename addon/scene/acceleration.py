@@ -18,6 +18,7 @@ from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
 from . import box_tree
 from .box_tree import LEAF
+from .emission_maps import EmissionMaps, TriangleEmission
 from .opacity_maps import OpacityMaps, TriangleOpacity
 
 LARGEST = 4_000_000  # triangles
@@ -50,6 +51,11 @@ class Hierarchy:
     nodes: images.Image
     leaves: images.Image
     triangles: int
+    # For who needs more of a triangle than leaves hold (surfaces/hits.py): the place of each triangle of `instances`,
+    # in their order, among the slots of the leaves (LEAF each; -1: left out); the first one is that of `first_leaf`.
+    slots: np.ndarray | None = None  # (T,) int32
+    first_leaf: int = 0
+    instances: tuple[Instance, ...] = ()
 
     @property
     def textures(self) -> dict[str, images.Image]:
@@ -64,6 +70,7 @@ def world_triangles(
     origin: np.ndarray,
     path: str,
     maps: OpacityMaps,
+    glow: EmissionMaps,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
     (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_codes), mean emitted radiance, number of the material
@@ -81,8 +88,10 @@ def world_triangles(
     shown = [one for one in instances if _met(one, path) and meshes[one.mesh].triangle_count]
     # Of instances with equal kinds all triangles look the same.
     turns = np.linalg.det([one.matrix[:3, :3] for one in shown]) if shown else ()
-    kinds = zip(shown, ((one.mesh, one.materials, _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)))
-    for (key, slots, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
+    kinds = zip(shown, (
+        (*maps.kind_of(one), glow.kind_of(one), _rays(one, path), turn < 0.0) for one, turn in zip(shown, turns)
+    ))  # fmt: skip
+    for (key, slots, _, _, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
         mesh = meshes[key]
         of_triangle = mesh.triangle_materials(slots)
         look_of_triangle = look[rays, bool(mirrored)][of_triangle]
@@ -90,6 +99,9 @@ def world_triangles(
         known = maps.of(copies[0])
         if known is not None:
             _refine(look_of_triangle, of_triangle, materials, known, rays, bool(mirrored))
+        shining = glow.of(copies[0])
+        if shining is not None:
+            _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
         for first in range(0, len(copies), at_once):
             some = copies[first : first + at_once]
             matrices = np.stack([one.matrix[:3] for one in some])
@@ -173,6 +185,17 @@ def _emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple
     return (front if any(front) else behind), -side if mirrored else side
 
 
+def _shine(look: np.ndarray, of_triangle: np.ndarray, known: TriangleEmission, mirrored: bool) -> None:
+    """Put what EmissionMaps found of an instance's triangles, `known`, into their rows of `look`, as _emission does."""
+    own = np.flatnonzero(known.measured)
+    front, behind = known.mean[own, 0], known.mean[own, 1]
+    lit, lit_behind = front.any(axis=1), behind.any(axis=1)
+    both = (lit & lit_behind)[:, None]
+    look[own, 1:4] = np.where(both, (front + behind) / 2, front + behind)
+    side = FRONT_ALONE * (lit.astype(float) - lit_behind)
+    look[own, 4] = of_triangle[own] + (-side if mirrored else side)
+
+
 def coverage(codes: np.ndarray, maps: OpacityMaps) -> np.ndarray:
     """(N,) mean of the two sides' opacity, of what world_triangles says of (N,) triangles."""
     sides = np.abs(codes) % (SIDE_STEPS + 1) ** 2
@@ -221,6 +244,7 @@ class Tree:
     high: np.ndarray | None
     tiles: np.ndarray  # (N, 4) texels of OpacityMaps, before the leaves: a whole number of leaves
     refitted: bool = False
+    nodes: np.ndarray | None = None  # (N, NODE_TEXELS, 4)
 
 
 def build(corners: np.ndarray, look: np.ndarray, tiles: np.ndarray = NO_TILES) -> Tree:
@@ -272,7 +296,9 @@ def _written(tree: Tree, place: np.ndarray, corners: np.ndarray, look: np.ndarra
     leaves = np.concatenate([tree.tiles, tree.leaves.reshape(-1, 4)]) if len(tree.tiles) else tree.leaves
     nodes, leaves = (images.upload_list(texels.reshape(-1, 4)) for texels in (rows, leaves))
     leaves.defines = TILED if len(tree.tiles) else ()
-    return replace(tree, hierarchy=Hierarchy(nodes, leaves, tree.hierarchy.triangles))
+    first_leaf = len(tree.tiles) // LEAF_TEXELS
+    hierarchy = Hierarchy(nodes, leaves, tree.hierarchy.triangles, tree.place.astype(np.int32), first_leaf)
+    return replace(tree, hierarchy=hierarchy, nodes=rows)
 
 
 def _pack_boxes(rows: np.ndarray, low: np.ndarray, high: np.ndarray, least: float) -> None:
@@ -314,29 +340,31 @@ class HierarchyCache:
         snapshot, origin, draft = frame.snapshot, frame.geometry.origin, frame.settings.draft
         if too_many(snapshot):
             return None
-        materials, maps = frame.measured_materials, frame.opacity_maps
+        materials, maps, glow = frame.measured_materials, frame.opacity_maps, frame.emission_maps
         kinds = {id(i.visibility): i for i in snapshot.instances}
         alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in kinds.values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))
         key = shown, (
             None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            tuple((_mean_code(m), _emission(m)) for m in materials), maps.changes, tuple(origin),
+            tuple((_mean_code(m), _emission(m)) for m in materials), maps.changes, glow.changes, tuple(origin),
         )  # fmt: skip
         tree = self._kept.get(key)
         if tree is None and draft:
-            tree = self._moved(key, snapshot, materials, maps, origin, path)
+            tree = self._moved(key, snapshot, materials, maps, glow, origin, path)
         if tree is None or (tree.refitted and not draft):
-            triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps)
+            triangles = world_triangles(list(shown), snapshot.meshes, materials, origin, path, maps, glow)
             tree = build(*triangles, maps.texels)
             if tree.hierarchy.triangles > MOST_REFITTED:
-                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = None
+                tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = tree.nodes = None
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
-        return tree.hierarchy
+        return replace(tree.hierarchy, instances=tuple(shown))
 
-    def _moved(self, key, snapshot, materials, maps: OpacityMaps, origin: np.ndarray, path: str) -> Tree | None:
+    def _moved(
+        self, key, snapshot, materials, maps: OpacityMaps, glow: EmissionMaps, origin: np.ndarray, path: str
+    ) -> Tree | None:
         """The tree of the same instances, of which a few have moved since; None if there is none."""
         shown, rest = key
         for other in self._kept:
@@ -351,7 +379,7 @@ class HierarchyCache:
                 continue
             starts = np.cumsum(counts) - counts
             numbers = [np.arange(starts[k], starts[k] + counts[k]) for k in moved]
-            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path, maps)
+            triangles = world_triangles([shown[k] for k in moved], snapshot.meshes, materials, origin, path, maps, glow)
             del self._kept[other]
             return refit(tree, np.concatenate(numbers), *triangles)
         return None

@@ -125,6 +125,11 @@ class SceneGeometry:
         self._draw_key = key
         return True
 
+    def rows_showing(self, material: int) -> bytes:
+        """What the instance image holds of the instances that show a material."""
+        shown = [k for k, instance in enumerate(self.placed[0]) if material in instance.materials]
+        return self.instance_rows[shown].tobytes()
+
     def resting_casters(self, make: bool = True) -> list[casters.Clusters] | None:
         """Opaque casters in world space; None where there are too many. They are made when first asked for; without
         `make` None where they have not been."""
@@ -146,7 +151,9 @@ class SceneGeometry:
             place = _neighbourhood(instances)
             # Not by the mesh's name, which holds a number of this session: what is drawn by lot depends on the order.
             first = {mesh: k for k, mesh in enumerate(dict.fromkeys(mesh for mesh, _ in kinds))}
-            self._order = sorted(range(len(instances)), key=lambda k: (first[kinds[k][0]], kinds[k][1], place[k]))
+            of_kind = {kind: (first[kind[0]], kind[1]) for kind in set(kinds)}
+            rank = {kind: k for k, kind in enumerate(sorted(of_kind, key=of_kind.__getitem__))}
+            self._order = np.lexsort((place, [rank[kind] for kind in kinds])).tolist()
             self._kinds, self._matrices = kinds, matrices
         return [instances[k] for k in self._order]
 
@@ -169,8 +176,12 @@ class SceneGeometry:
             matrices = _stacked([i.matrix for i in instances], (4, 4)).astype(np.float64)
             finite = np.isfinite(matrices).all(axis=(1, 2))
             matrices[~finite] = np.diag([0.0, 0.0, 0.0, 1.0])
-            low = _stacked([snapshot.meshes[i.mesh].bounds_min for i in instances], (3,))
-            high = _stacked([snapshot.meshes[i.mesh].bounds_max for i in instances], (3,))
+            number = {mesh: k for k, mesh in enumerate(dict.fromkeys(i.mesh for i in instances))}
+            own = np.array([number[i.mesh] for i in instances])
+            low, high = (
+                np.stack([getattr(snapshot.meshes[mesh], name) for mesh in number])[own]
+                for name in ("bounds_min", "bounds_max")
+            )
             centre, half = (low + high) / 2, (high - low) / 2
             world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centre) + matrices[:, :3, 3]
             reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
@@ -187,19 +198,9 @@ class SceneGeometry:
             rows[:, 3:] = self.instance_rows[:, 3:]
         else:
             self._written = [None] * len(instances)
-        for k, (instance, written) in enumerate(zip(instances, self._written)):
-            if instance is written:
-                continue
-            seen = instance.visibility
-            flags = (
-                CAMERA_FLAG * seen.camera + SHADOW_FLAG * seen.shadow + DIFFUSE_FLAG * seen.diffuse
-                + GLOSSY_FLAG * seen.glossy + HOLDOUT_FLAG * instance.holdout
-                + TRANSMISSION_FLAG * seen.transmission
-            )  # fmt: skip
-            rows[k, 3] = (instance.random, instance.pass_index, flags, 0.0)
-            rows[k, 4] = instance.color
-            rows[k, 5] = (*instance.generated, instance.uv[0])
-            rows[k, 6, :2] = instance.uv[1], instance.terminator
+        new = [k for k, (instance, written) in enumerate(zip(instances, self._written)) if instance is not written]
+        if new:
+            rows[new, 3:7] = _facts_rows([instances[k] for k in new])
         self._written = instances
         if len(instances):
             users = Counter(instance.mesh for instance in instances)
@@ -295,17 +296,39 @@ class SceneGeometry:
         """(N,) whether an instance is opaque all over and its mesh bounds a volume."""
         kept = {}
         shell = np.zeros(len(instances), bool)
+        of_kind: dict[tuple, bool] = {}
         for k, instance in enumerate(instances):
-            mesh = meshes[instance.mesh]
-            key = (mesh.key, mesh.version)
-            if key not in kept:
-                kept[key] = self._closed[key] if key in self._closed else _closed(mesh)
-            shell[k] = kept[key] and not any(materials[slot].casts_by_lot for slot in instance.materials)
+            kind = instance.mesh, instance.materials
+            if kind not in of_kind:
+                mesh = meshes[instance.mesh]
+                key = (mesh.key, mesh.version)
+                if key not in kept:
+                    kept[key] = self._closed[key] if key in self._closed else _closed(mesh)
+                of_kind[kind] = kept[key] and not any(materials[slot].casts_by_lot for slot in instance.materials)
+            shell[k] = of_kind[kind]
         self._closed = kept
         return shell
 
     def release(self) -> None:
         self.__init__()
+
+
+def _facts_rows(instances: list[Instance]) -> np.ndarray:
+    """(N, 4, 4) what the instance image holds of each beside its matrix; what depends on others is 0."""
+    rows = np.zeros((len(instances), 4, 4), np.float32)
+    flags: dict[tuple[int, bool], int] = {}
+    for one in {(id(i.visibility), i.holdout): i for i in instances}.values():
+        seen = one.visibility
+        flags[id(seen), one.holdout] = (
+            CAMERA_FLAG * seen.camera + SHADOW_FLAG * seen.shadow + DIFFUSE_FLAG * seen.diffuse
+            + GLOSSY_FLAG * seen.glossy + HOLDOUT_FLAG * one.holdout + TRANSMISSION_FLAG * seen.transmission
+        )  # fmt: skip
+    rows[:, 0, :3] = [(i.random, i.pass_index, flags[id(i.visibility), i.holdout]) for i in instances]
+    rows[:, 1] = [i.color for i in instances]
+    rows[:, 2, :3] = [i.generated for i in instances]
+    rows[:, 2, 3], rows[:, 3, 0] = np.array([i.uv for i in instances], np.float64).T
+    rows[:, 3, 1] = [i.terminator for i in instances]
+    return rows
 
 
 def _stacked(arrays: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
@@ -380,8 +403,12 @@ def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
     out = np.zeros((len(mesh.corner_vertices), 4), np.float32)
     if attribute.kind == "UV":
         source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
+        if source is None and attribute.name in mesh.colors:
+            source = mesh.colors[attribute.name][:, :3]  # what is no map, too, may be named
     elif attribute.kind == "COLOR":
         source = mesh.colors.get(attribute.name or mesh.active_color)
+        if source is None and attribute.name in mesh.uv_maps:
+            source, out[:, 3] = mesh.uv_maps[attribute.name], 1.0
     elif attribute.kind == "NAMED":
         source, out[:, 3] = mesh.colors.get(attribute.name), 1.0
         if source is None and attribute.name in mesh.uv_maps:

@@ -10,10 +10,13 @@ from ..gfx import images, library
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
+from ..materials.atlas import keys_of, packed
+from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..snapshot.scene import Image, Note, Snapshot
+from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
 from .view import VIEW, View
 
@@ -43,6 +46,7 @@ class MaterialSet:
         self.notes: tuple[Note, ...] = ()
         self.energy_table: images.Image | None = None
         self._scene: Block | None = None
+        self._view: tuple = ()
         self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int], images.Image] = {}
@@ -71,7 +75,7 @@ class MaterialSet:
         self.notes = tuple(notes)
         needed = {key for compiled in self.compiled for key in compiled.images}
         self._images = {
-            key: self._images.get(key) or upload_image(snapshot.images[key[0]])
+            key: self._images.get(key) or upload_image(image_of(snapshot.images, key[0]))
             for key in ((name, _version(snapshot, name)) for name in needed)
         }
         self._versions = dict(self._images.keys())  # the keys are pairs of name and version
@@ -96,6 +100,7 @@ class MaterialSet:
             "camera_backward": (*camera.matrix[:3, 2], 0.0),
             "window": (left, bottom, right - left, top - bottom),
         }
+        self._view = tuple(np.asarray(value, float).tobytes() for value in values.values())
         if self._scene is None:
             self._scene = Block(MATERIAL_SCENE, **values)
         else:
@@ -117,13 +122,34 @@ class MaterialSet:
             (c.program_key, c.values.tobytes(), c.images, c.medium and c.medium.key) for c in self.compiled
         ) + tuple(self._images)
 
+    def around(self, index: int, geometry: SceneGeometry) -> tuple:
+        """Equal in two frames if what material `index` reads of the instances that show it, and of the camera, is."""
+        reads = self.compiled[index].reads
+        rows = geometry.rows_showing(index) if INSTANCE in reads else b""
+        origin = tuple(geometry.origin) if reads else ()
+        return rows, origin, self._view if CAMERA in reads else ()
+
     def surface_program(self, index: int) -> Program:
         """Draws material `index` into the surface images."""
         return _surface_program(self.compiled[index])
 
+    def lobe_program(self, index: int) -> Program:
+        """Draws one lobe of material `index` into the surface images, as the light of a view meets it: what it
+        refracts (`wanted_lobe` 1) or reflects (2). Of several such lobes `lobe_choice` keeps one, the same for all
+        texels."""
+        return _lobe_program(self.compiled[index])
+
     def tint_program(self, index: int) -> Program:
         """Multiplies what lies behind material `index`, which has coloured transparency, by its colour."""
         return _tint_program(self.compiled[index])
+
+    def scatter_program(self, index: int) -> Program:
+        """Draws what of material `index` light enters elsewhere, where the surface images show it."""
+        return _scatter_program(self.compiled[index])
+
+    def glow_program(self, index: int) -> Program:
+        """Adds what layers of material `index` emit that this sample passes."""
+        return _glow_program(self.compiled[index])
 
     def caster_program(self, index: int) -> Program:
         """Draws material `index`, which has alpha, into a depth map."""
@@ -132,6 +158,10 @@ class MaterialSet:
     def opacity_program(self, index: int) -> Program:
         """Adds up how much of their tiles triangles of material `index` cover, for both sides."""
         return _opacity_program(self.compiled[index])
+
+    def emission_map_program(self, index: int) -> Program:
+        """Adds up what places of triangles of material `index` emit, for both sides."""
+        return _emission_map_program(self.compiled[index])
 
     def emission_program(self, index: int) -> Program:
         """Adds up what material `index` emits."""
@@ -152,8 +182,17 @@ class MaterialSet:
         self.__init__()
 
 
-def _version(snapshot: Snapshot, name: str) -> int:
-    return snapshot.images[name].version if name in snapshot.images else 0
+def _version(snapshot: Snapshot, name: str) -> int | tuple[int, ...]:
+    versions = tuple(snapshot.images[key].version if key in snapshot.images else 0 for key in keys_of(name))
+    return versions if len(versions) > 1 else versions[0]
+
+
+def image_of(known: dict[str, Image], key: str) -> Image:
+    """The image of a key that a compiled material names: one of `known`, or several in one (materials/atlas.py)."""
+    keys = keys_of(key)
+    if len(keys) == 1 and keys[0] == key:
+        return known[key]
+    return Image(key, 0, packed([known[one].pixels for one in keys]))
 
 
 def upload_image(image: Image) -> images.Image:
@@ -232,9 +271,24 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             ("INT", "glass_bends"),
             ("INT", "index_shown"),
         ),
-        defines=CAMERA_DEFINES,
+        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
         **_shared(compiled),
     )
+
+
+def _lobe_program(compiled: CompiledMaterial) -> Program:
+    like = _surface_program(compiled)
+    return replace(
+        like,
+        name=f"one lobe {compiled.program_key[:8]}",
+        constants=(*like.constants, ("INT", "wanted_lobe"), ("FLOAT", "lobe_choice")),
+        defines=(*like.defines, ("ONE_LOBE", "1")),
+    )
+
+
+def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
+    """How layers of a material are drawn, see surface.frag.glsl."""
+    return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added
 
 
 def _tint_program(compiled: CompiledMaterial) -> Program:
@@ -250,8 +304,33 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
             (MATERIAL_SCENE, "material_scene"),
         ),
         constants=(("INT", "first_instance"), ("INT", "glass_bends")),
-        defines=CAMERA_DEFINES,
+        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
         **{**shared, "textures": (*shared["textures"], ("RGBA32F", "surface_position"))},
+    )
+
+
+SCATTER_IMAGES = ("length", "share", "entry")  # layout: shaders/subsurface/image.glsl
+
+
+def _scatter_program(compiled: CompiledMaterial) -> Program:
+    like = _tint_program(compiled)
+    return replace(
+        like,
+        name=f"subsurface {compiled.program_key[:8]}",
+        fragment="surface/scatter.frag.glsl",
+        outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
+        textures=(*like.textures, ("RGBA32F", "scatter_objects")),
+        defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1")),
+    )
+
+
+def _glow_program(compiled: CompiledMaterial) -> Program:
+    return replace(
+        _tint_program(compiled),
+        name=f"glow {compiled.program_key[:8]}",
+        fragment="surface/glow.frag.glsl",
+        outputs=(("VEC4", "out_emission"),),
+        defines=CAMERA_DEFINES,
     )
 
 
@@ -262,7 +341,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point")),
+        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
         defines=PROJECTION_DEFINES,
         **_shared(compiled),
     )
@@ -295,6 +374,18 @@ def _opacity_program(compiled: CompiledMaterial) -> Program:
         outputs=(("VEC4", "out_opacity"),),
         constants=(("INT", "first_instance"), ("VEC2", "tile_scale")),
         defines=EVERY_DEFINES,
+    )
+
+
+def _emission_map_program(compiled: CompiledMaterial) -> Program:
+    """See emission_maps.py."""
+    return replace(
+        _opacity_program(compiled),
+        name=f"emission map {compiled.program_key[:8]}",
+        vertex="surface/emission_map.vert.glsl",
+        fragment="surface/emission_map.frag.glsl",
+        outputs=(("VEC4", "out_emission"),),
+        constants=(("INT", "first_instance"), ("VEC2", "tile_scale"), ("VEC2", "shift"), ("FLOAT", "other_side")),
     )
 
 

@@ -17,8 +17,10 @@ card is empty or whole. What is empty all over is left out of the hierarchy.
 Against Cycles: glossy direct light on leaves and the ground below them (alpha_foliage) has relMSE .0104 at 64 samples
 and .0046 at 256, where one opacity for all of a material left .0209 and .0167: what remains is noise.
 
-Fails: instances of a mesh whose opacity depends on the object or on where it is share the mean over some of them, and
-opacity that depends on the direction is that of four directions together.
+Instances of a mesh whose opacity depends on the object or on where it is are measured one by one, up to APART of them.
+
+Fails: more of those share the mean over some of them, and opacity that depends on the direction is that of four
+directions together.
 """
 
 from __future__ import annotations
@@ -40,8 +42,27 @@ SAMPLES = 4  # of each cell and side, as shaders/surface/opacity_map.vert.glsl p
 INSTANCES = 4  # of those that share a mesh
 STEPS = 255  # of a cell's opacity
 ALIKE = 0.5 / STEPS
+APART = 256  # instances that are measured one by one
 MOST_MEASURED = 4_000_000  # triangles, not counting instances; more have their material's mean
 MOST_TILES = 1 << 19  # numbers that an opacity code holds (acceleration.py)
+
+
+Kind = tuple[str, tuple[int, ...], str]  # mesh, materials, and the instance's key, or nothing for all such instances
+
+
+def kinds_of(instances: list[Instance], materials: MaterialSet, varied: set[int], apart: int) -> dict[Kind, list[int]]:
+    """Numbers of the instances of each kind that shows a material of `varied`. Where one of those reads what is around
+    it, as many as `apart` of a mesh are kinds of their own."""
+    found: dict[Kind, list[int]] = {}
+    for number, instance in enumerate(instances):
+        if varied.intersection(instance.materials):
+            found.setdefault((instance.mesh, instance.materials, ""), []).append(number)
+    alone = {k for k in varied if materials.compiled[k].reads}
+    for kind, numbers in [*found.items()]:
+        if len(numbers) <= apart and alone.intersection(kind[1]):
+            del found[kind]
+            found |= {(*kind[:2], instances[number].key): [number] for number in numbers}
+    return found
 
 
 @dataclass(frozen=True)
@@ -64,25 +85,27 @@ class OpacityMaps:
         self.texels = np.zeros((0, 4), np.float32)
         self.means = np.zeros(0)
         self.changes = 0
-        self._of: dict[tuple[str, tuple[int, ...]], TriangleOpacity] = {}
+        self._of: dict[Kind, TriangleOpacity] = {}
         self._key: object = ()
 
     def of(self, instance: Instance) -> TriangleOpacity | None:
         """Of an instance's triangles; None where no material of it varies."""
-        return self._of.get((instance.mesh, instance.materials))
+        return self._of.get(self.kind_of(instance))
+
+    def kind_of(self, instance: Instance) -> Kind:
+        """Equal for instances whose triangles are equally opaque, as far as is known."""
+        alone = instance.mesh, instance.materials, instance.key
+        return alone if alone in self._of else (instance.mesh, instance.materials, "")
 
     def update(self, materials: MaterialSet, geometry: SceneGeometry) -> None:
         """Measure anew if materials or meshes differ."""
         instances, meshes, _ = geometry.placed
         varied = {k for k, material in enumerate(materials.compiled) if material.uneven}
-        kinds: dict[tuple[str, tuple[int, ...]], list[int]] = {}
-        for number, instance in enumerate(instances) if varied else ():
-            if varied.intersection(instance.materials):
-                kinds.setdefault((instance.mesh, instance.materials), []).append(number)
+        kinds = kinds_of(instances, materials, varied, APART) if varied else {}
         prints, count = materials.fingerprint() if kinds else (), len(materials.compiled)
         key = (
-            tuple((mesh, meshes[mesh].version, slots) for mesh, slots in kinds),
-            tuple(prints[k] for k in sorted(varied) if kinds), prints[count:],
+            tuple((mesh, meshes[mesh].version, slots, name) for mesh, slots, name in kinds),
+            tuple((prints[k], materials.around(k, geometry)) for k in sorted(varied) if kinds), prints[count:],
         )  # fmt: skip
         if key == self._key:
             return
@@ -94,20 +117,20 @@ class OpacityMaps:
 
     def _measure(self, materials: MaterialSet, geometry: SceneGeometry, kinds: dict, varied: set[int]) -> None:
         instances, meshes, _ = geometry.placed
-        parts: list[_Part] = []
+        parts: list[Part] = []
         count = 0
-        for (key, slots), numbers in kinds.items():
+        for (key, slots, name), numbers in kinds.items():
             material = meshes[key].triangle_materials(slots)
             for k in sorted(varied.intersection(np.unique(material).tolist())):
                 triangles = np.flatnonzero(material == k)
                 own = slice(count, count + len(triangles))
-                parts.append(_Part(meshes[key], (key, slots), k, triangles, own, numbers))
+                parts.append(Part(meshes[key], (key, slots, name), k, triangles, own, numbers))
                 count = own.stop
         if not 0 < count <= MOST_MEASURED:
             return
-        area = np.concatenate([_areas(part, instances[part.numbers[0]]) for part in parts])
+        area = np.concatenate([areas(part, instances[part.numbers[0]]) for part in parts])
         sides = _tile_sides(area)
-        corners, height = _layout(sides)
+        corners, height = layout(sides)
         covered, drawn = self._drawn(materials, geometry, parts, sides, corners, height)
         self._keep(parts, sides, corners, covered, drawn)
 
@@ -119,7 +142,7 @@ class OpacityMaps:
         state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
         for part in parts:
             attributes = materials.compiled[part.material].attributes
-            batch = _flat_batch(part, attributes, sides[part.own], corners[part.own])
+            batch = flat_batch(part, attributes, sides[part.own], corners[part.own])
             shader = passes.get(materials.opacity_program(part.material))
             bindings = materials.bindings(part.material, geometry.instances)
             with passes.drawing(target, **state):
@@ -171,18 +194,18 @@ class OpacityMaps:
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """Triangles of one material of a mesh."""
 
     mesh: Mesh
-    kind: tuple[str, tuple[int, ...]]  # mesh and slots
+    kind: Kind
     material: int
     triangles: np.ndarray
     own: slice  # which they are among all that are measured
     numbers: list[int]  # of the instances that show it
 
 
-def _areas(part: _Part, instance: Instance) -> np.ndarray:
+def areas(part: Part, instance: Instance) -> np.ndarray:
     """(T,) of an instance's triangles, m2."""
     matrix = instance.matrix[:3, :3].astype(np.float64)
     a, b, c = np.moveaxis(part.mesh.positions[part.mesh.corner_vertices[_corners(part)]] @ matrix.T, 1, 0)
@@ -190,7 +213,7 @@ def _areas(part: _Part, instance: Instance) -> np.ndarray:
     return np.where(np.isfinite(area), area, 0.0)
 
 
-def _corners(part: _Part) -> np.ndarray:
+def _corners(part: Part) -> np.ndarray:
     return part.mesh.triangle_corners[part.triangles]
 
 
@@ -200,7 +223,7 @@ def _tile_sides(area: np.ndarray) -> np.ndarray:
     return np.exp2(np.clip(np.rint(np.log2(wanted)), np.log2(SMALLEST), np.log2(LARGEST))).astype(np.int64)
 
 
-def _layout(sides: np.ndarray) -> tuple[np.ndarray, int]:
+def layout(sides: np.ndarray) -> tuple[np.ndarray, int]:
     """(T, 2) where tiles stand in an image of WIDTH, equal ones side by side; and the image's height."""
     corners, height = np.zeros((len(sides), 2), np.int64), 0
     for side in np.unique(sides)[::-1]:
@@ -211,7 +234,7 @@ def _layout(sides: np.ndarray) -> tuple[np.ndarray, int]:
     return corners, height
 
 
-def _flat_batch(part: _Part, attributes, sides: np.ndarray, corners: np.ndarray) -> gfx_geometry.Batch:
+def flat_batch(part: Part, attributes, sides: np.ndarray, corners: np.ndarray) -> gfx_geometry.Batch:
     """The triangles with corners of their own, and where each corner stands on the tiles."""
     mesh, triangles = part.mesh, _corners(part).reshape(-1)
     cell = corners[:, None] + sides[:, None, None] * np.array([[0, 0], [1, 0], [0, 1]])

@@ -51,7 +51,7 @@ class SurfaceMeans:
             places = tuple(
                 (draw.batch.number, draw.first, draw.count) for draw in map(geometry.draws.__getitem__, numbers)
             )
-            key = prints[material], prints[count:], places
+            key = prints[material], prints[count:], places, materials.around(material, geometry)
             known[key] = self._known.get(key) or _emission(materials, geometry, material, numbers)
             found[material] = replace(found[material], **known[key])
         self._known = known

@@ -69,7 +69,8 @@ class SurfacePoints:
         if key == self._key:
             return False
         shown = [i for i in snapshot.instances if i.visibility.diffuse and snapshot.meshes[i.mesh].triangle_count]
-        corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse", maps)
+        known = maps, frame.emission_maps
+        corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse", *known)
         meshes = [snapshot.meshes[i.mesh] for i in shown]
         surfaces = Surfaces(
             corners, acceleration.coverage(look[:, 0], maps),

@@ -27,7 +27,7 @@ from ..gfx.struct import Block
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..snapshot.scene import Image, Note, World
-from .materials import MATERIAL_SCENE, upload_image, values_block, values_struct
+from .materials import MATERIAL_SCENE, image_of, upload_image, values_block, values_struct
 from .view import VIEW, View
 
 PLAIN, SKY, LARGEST = (1024, 512), (2048, 1024), (4096, 2048)
@@ -48,7 +48,7 @@ class WorldTree:
         self._values = values_block(self.compiled)
         self._textures = {"energy_table": energy_table}
         for slot, key in enumerate(self.compiled.images):
-            self._textures[f"material_image{slot}"] = upload_image(named[key])
+            self._textures[f"material_image{slot}"] = upload_image(image_of(named, key))
 
     def bake(self) -> np.ndarray:
         """Radiance that arrives from all directions, (H, W, 3) float64, equirectangular, bottom row first."""

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..materials.graph import Graph
-from .scene import Image, Instance, Mesh, Note
+from .scene import Image, Instance, Mesh, Note, Volume
 
 # Versions never repeat in this Blender session, not even across caches: a GPU mesh that is stored under
 # (key, version) by one engine instance can then never be mistaken for another content.
@@ -102,6 +102,7 @@ class SnapshotCache:
     meshes: dict[str, MeshEntry] = field(default_factory=dict)
     images: dict[str, ImageEntry] = field(default_factory=dict)
     graphs: dict[str, GraphEntry] = field(default_factory=dict)
+    volumes: dict[str, tuple[tuple, Volume]] = field(default_factory=dict)  # with the state they were read in
     facts: dict[tuple[int, int, int], object] = field(default_factory=dict)  # ObjectFacts by uid, parent's, data's
     placed: Placed | None = None
     changed: set[int] = field(default_factory=set)  # session_uids of original data-blocks
@@ -141,6 +142,7 @@ class SnapshotCache:
         self.meshes.clear()
         self.images.clear()
         self.graphs.clear()
+        self.volumes.clear()
         self.facts.clear()
         self.placed = None
         self.changed.clear()

@@ -17,8 +17,9 @@ from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
-from .scene import Camera, Film, Instance, Light, Mesh, Mist, Note, Snapshot, Visibility, World
+from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
 from .shading import ShadingTable
+from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
 
 
@@ -62,13 +63,14 @@ def take(
         notes += cameras.camera_notes(camera.evaluated_get(depsgraph), scene.render)
         border = border or _scene_border(scene.render, width, height)
 
-    images = ImageTable(cache)
+    images = ImageTable(cache, scene.frame_current)
     shading = ShadingTable(cache, images)
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, notes)
+    volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]
@@ -85,6 +87,8 @@ def take(
         film=_film(scene, depsgraph.view_layer_eval, width, height, border),
         notes=tuple(dict.fromkeys(notes)),
         scene_name=scene.name,
+        moment=Moment(scene.frame_current_final, scene.render.fps / scene.render.fps_base),
+        volumes=volumes,
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start
@@ -153,6 +157,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     known = before is not None and before.keys == keys
     same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
     made, facts = [], [place.source.facts for place in places]
+    like: dict[int, dict[str, object]] = {}  # fields of an instance of each source
     for k, place in enumerate(places):
         mesh, chosen = resolved[id(place.source)]
         if known and same[k] and before.facts[k] is facts[k]:
@@ -164,13 +169,21 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 made.append(old)
                 continue
         of_object = facts[k]
-        made.append(
-            Instance(
-                of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random, of_object.pass_index,
-                of_object.holdout, of_object.color, place.generated, place.uv, place.key, of_object.terminator,
-                of_object.own,
-            )
-        )  # fmt: skip
+        alike = like.get(id(place.source))
+        if alike is None:
+            alike = like[id(place.source)] = vars(
+                Instance(
+                    of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
+                    of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
+                    of_object.terminator, of_object.own, of_object.caustics_caster,
+                )
+            )  # fmt: skip
+        # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
+        one = object.__new__(Instance)
+        vars(one).update(
+            alike, matrix=transforms[k], random=place.random, generated=place.generated, uv=place.uv, key=place.key
+        )
+        made.append(one)
     groups: dict[tuple, list[Instance]] = {}
     for one in made:
         groups.setdefault((one.mesh, one.materials), []).append(one)
@@ -283,11 +296,20 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         border=border or (0, 0, width, height),
         filter_width=scene.render.filter_size,
         transparent=scene.render.film_transparent,
+        clear_glass=_clear_glass(cycles),
         exposure=getattr(cycles, "film_exposure", 1.0),
+        caustics_reflective=getattr(cycles, "caustics_reflective", True),
+        caustics_refractive=getattr(cycles, "caustics_refractive", True),
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,
     )
+
+
+def _clear_glass(cycles) -> float:
+    if not getattr(cycles, "film_transparent_glass", False):
+        return -1.0
+    return cycles.film_transparent_roughness
 
 
 def _mist(world) -> Mist:

@@ -2,19 +2,23 @@
 
 Blender keeps 8-bit images as stored in the file, in the file's colour space and with straight alpha; all others as
 float in scene-linear colours with alpha multiplied in. Both are handed on as they are, and `encoding` and
-`alpha_mode` say which it is: 'PREMUL' where alpha is multiplied into the stored colours.
+`alpha_mode` say which it is: 'PREMUL' where alpha is multiplied into the stored colours. 8-bit images in colour spaces
+that no shader decodes are converted here.
 """
 
 from __future__ import annotations
 
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ..materials.atlas import layout, packed
 from ..materials.sky import Sky, sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
+from .image_files import frame_of, read_file, read_layer, sequence_path, tile_path, to_scene_linear
 from .scene import Image, Note
 
 # Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
@@ -25,26 +29,27 @@ MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not the
 class ImageTable:
     """Images of one sync: hand it `bpy.types.Image`s, get keys, and at the end `images` and `notes`."""
 
-    def __init__(self, cache: SnapshotCache):
+    def __init__(self, cache: SnapshotCache, frame: int = 1):
+        """`frame`: of the scene, which says what a sequence shows."""
         self.images: dict[str, Image] = {}
         self.notes: list[Note] = []
         self.read = self.reused = 0
-        self._cache = cache
+        self._cache, self._frame = cache, frame
 
     def key_of(self, image, user=None) -> str:
         """Image.key of a data-block, which is read at most once per sync.
 
-        `user` (ImageUser) says which frame of a sequence is meant. It is not followed: Image.pixels knows no frames.
+        `user` (ImageUser) says which frame of a sequence is meant, and which pass of a multilayer file.
         """
         original = image.original or image
-        key = f"image {original.session_uid}"
+        part = _part(original, user, self._frame)
+        key = f"image {original.session_uid}" + (f" {part}" if part else "")
         if key in self.images:
             return key
         entry = self._cache.images.get(key)
-        # A painted image that is not saved, and one that moves, changes without a trace: the pixels are compared.
-        restless = original.is_dirty or original.source in ("SEQUENCE", "MOVIE")
-        if entry is None or restless or entry.state != _state(original):
-            entry = self._read(key, original, entry)
+        # A painted image that is not saved changes without a trace: the pixels are compared.
+        if entry is None or original.is_dirty or entry.state != _state(original, part):
+            entry = self._read(key, original, part, entry)
         else:
             self.reused += 1
         self._cache.images[key] = entry
@@ -59,48 +64,121 @@ class ImageTable:
             self.images[key] = Image(key, 0, sky_pixels(sky), "LINEAR", "NONE", "Sky")
         return key
 
-    def _read(self, key: str, original, old: ImageEntry | None) -> ImageEntry:
-        pixels, notes = _pixels(original)
+    def _read(self, key: str, original, part: Part, old: ImageEntry | None) -> ImageEntry:
+        pixels, tiles, missing, notes = _pixels(original, part)
         # The state is taken after reading: asking for pixels makes Blender load the file.
-        state = _state(original)
-        encoding, space_notes = _encoding(original)
+        state = _state(original, part)
+        is_float = original.is_float or isinstance(part, Layer)
+        encoding = "LINEAR" if isinstance(part, Layer) else _encoding(original)
         alpha = original.alpha_mode
         if alpha in ("STRAIGHT", "PREMUL") and original.colorspace_settings.is_data:
             alpha = "CHANNEL_PACKED"  # what is no colour is not covered by alpha
         elif alpha in ("STRAIGHT", "PREMUL"):
-            alpha = "PREMUL" if original.is_float else "STRAIGHT"
+            alpha = "PREMUL" if is_float else alpha if original.source != "GENERATED" else "STRAIGHT"
+        if encoding == "" and not missing:
+            pixels, encoding = to_scene_linear(pixels, original.colorspace_settings.name), "LINEAR"
         same = (
             old is not None
-            and (old.image.encoding, old.image.alpha_mode) == (encoding, alpha)
+            and (old.image.encoding, old.image.alpha_mode, old.image.tiles) == (encoding, alpha, tiles)
             and np.array_equal(old.image.pixels, pixels)
         )
         if same:
             self.reused += 1
-            return ImageEntry(old.image, state, (*notes, *space_notes))
+            return ImageEntry(old.image, state, notes)
         self.read += 1
-        missing = pixels.shape == (1, 1, 4) and not len(original.pixels)
-        made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing)
-        return ImageEntry(made, state, (*notes, *space_notes))
+        made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles)
+        return ImageEntry(made, state, notes)
 
 
-def _pixels(original) -> tuple[np.ndarray, tuple[Note, ...]]:
-    """(H, W, 4) float32, bottom row first, and what is to be said about it."""
-    subject, notes = f"Image '{original.name}'", ()
-    if original.source == "TILED" and len(original.tiles) > 1:
-        notes = (Note(subject, f"only the first UDIM tile of {len(original.tiles)} is drawn."),)
-    moving = original.source in ("SEQUENCE", "MOVIE")
-    if moving:
-        notes = (Note(subject, "the image moves, but is drawn as the one frame that Blender has loaded."),)
+@dataclass(frozen=True)
+class OfSequence:
+    """A frame of an image sequence."""
+
+    frame: int
+
+    def __str__(self) -> str:
+        return f"frame {self.frame}"
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A pass of a multilayer file."""
+
+    layer: int
+    number: int
+
+    def __str__(self) -> str:
+        return f"layer {self.layer} pass {self.number}"
+
+
+Part = OfSequence | Layer | None
+
+
+def _part(original, user, frame: int) -> Part:
+    _ = original.size[0]  # makes Blender load the file, and find out what it holds
+    if original.source == "SEQUENCE":
+        return OfSequence(frame_of(user, frame) if user is not None else 1)
+    if original.type == "MULTILAYER":
+        return Layer(getattr(user, "multilayer_layer", 0), getattr(user, "multilayer_pass", 0))
+    return None
+
+
+def _path(original) -> str:
+    return bpy.path.abspath(original.filepath_raw, library=original.library) if original.filepath_raw else ""
+
+
+def _pixels(original, part: Part) -> tuple[np.ndarray, tuple, bool, tuple[Note, ...]]:
+    """(H, W, 4) float32, bottom row first; where its tiles stand (Image.tiles); whether it is missing; and what is
+    to be said about it."""
+    subject = f"Image '{original.name}'"
+    space, tiles = original.colorspace_settings.name, ()
+    text = "the image is missing or cannot be read and is drawn magenta; check its file path."
+    found = None
+    if isinstance(part, OfSequence):
+        found = read_file(sequence_path(_path(original), part.frame), space)
+        text = f"frame {part.frame} of the sequence is missing and is drawn magenta; check its file path."
+    elif isinstance(part, Layer):
+        found = read_layer(_path(original), part.layer, part.number)
+        if isinstance(found, str):
+            found, text = None, found
+    elif original.source == "MOVIE":
+        text = "frames of movies cannot be read and are drawn magenta; use an image sequence."
+    elif original.source == "TILED" and len(original.tiles) > 1:
+        numbers = [tile.number for tile in original.tiles]
+        parts = [(number, _tile(original, number, space)) for number in numbers]
+        parts = [(number, _four_channels(pixels)) for number, pixels in parts if pixels is not None]
+        if parts:
+            corners, _ = layout([(pixels.shape[1], pixels.shape[0]) for _, pixels in parts])
+            tiles = tuple(
+                (number, *corner, pixels.shape[1], pixels.shape[0]) for (number, pixels), corner in zip(parts, corners)
+            )
+            found = packed([pixels for _, pixels in parts])
+    else:
+        if original.alpha_mode == "PREMUL" and original.packed_file is None and not original.is_dirty:
+            # Blender's bytes are divided by alpha then; the file has what is meant.
+            found = read_file(_path(original), space) if not original.is_float else None
+        found = _own_pixels(original) if found is None else found
+    if found is None or not found.size:
+        return np.array([[MAGENTA]], np.float32), (), True, (Note(subject, text),)
+    return _four_channels(found), tiles, False, ()
+
+
+def _tile(original, number: int, space: str) -> np.ndarray | None:
+    if number == original.tiles[0].number and original.source == "TILED":
+        own = _own_pixels(original)  # with what was painted on it
+        if own is not None:
+            return own
+    return read_file(tile_path(_path(original), number), space)
+
+
+def _own_pixels(original) -> np.ndarray | None:
     width, height = original.size  # makes Blender load the file
     count = len(original.pixels)
     if width == 0 or height == 0 or count == 0:
-        text = "the image is missing or cannot be read and is drawn magenta; check its file path."
-        if moving:
-            text = "frames of image sequences and movies cannot be read and are drawn magenta; use a still image."
-        return np.array([[MAGENTA]], np.float32), (Note(subject, text),)
+        return None
     flat = np.empty(count, np.float32)
     original.pixels.foreach_get(flat)
-    return _four_channels(flat.reshape(height, width, count // (width * height))), notes
+    return flat.reshape(height, width, count // (width * height))
 
 
 def _four_channels(pixels: np.ndarray) -> np.ndarray:
@@ -115,32 +193,40 @@ def _four_channels(pixels: np.ndarray) -> np.ndarray:
     return full
 
 
-def _encoding(original) -> tuple[str, tuple[Note, ...]]:
+def _encoding(original) -> str:
+    """LINEAR, SRGB, or nothing where colours have to be converted before they are filtered, as in Cycles."""
     space = original.colorspace_settings.name
     if original.is_float or original.colorspace_settings.is_data or space in _LINEAR_SPACES:
-        return "LINEAR", ()
-    if space == "sRGB":
-        return "SRGB", ()
-    text = f"colour space '{space}' is not supported for 8-bit images and is drawn as sRGB."
-    return "SRGB", (Note(f"Image '{original.name}'", text),)
+        return "LINEAR"
+    return "SRGB" if space == "sRGB" else ""
 
 
-def _state(original) -> tuple:
+def _state(original, part: Part) -> tuple:
     """Facts that change when the pixels of a saved or generated image do."""
-    path = bpy.path.abspath(original.filepath_raw, library=original.library) if original.filepath_raw else ""
-    try:
-        file = Path(path).stat() if path and original.packed_file is None else None
-    except OSError:
-        file = None
+    path = _path(original)
+    paths = [path] if path and original.packed_file is None else []
+    if isinstance(part, OfSequence):
+        paths = [sequence_path(path, part.frame)]
+    elif original.source == "TILED" and path:
+        paths = [tile_path(path, tile.number) for tile in original.tiles]
     packed = original.packed_file
     return (
         original.source,
         path,
-        (file.st_mtime_ns, file.st_size) if file else None,
+        tuple(_file_state(one) for one in paths),
         zlib.crc32(packed.data) if packed is not None else None,
         tuple(original.size),
+        tuple(tile.number for tile in original.tiles) if original.source == "TILED" else (),
         original.is_float,
         original.alpha_mode,
         original.colorspace_settings.name,
         (original.generated_type, tuple(original.generated_color)) if original.source == "GENERATED" else None,
     )
+
+
+def _file_state(path: str) -> tuple[int, int] | None:
+    try:
+        found = Path(path).stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size

@@ -23,12 +23,6 @@ from .own_settings import Own, own_settings
 from .scene import Note, Visibility
 
 _DRAWN = ("MESH", "CURVES", "POINTCLOUD")
-# Object types that Cycles draws and we do not, as an artist calls them.
-_NOT_DRAWN = {
-    "VOLUME": "volume",
-    "GREASEPENCIL": "grease pencil",
-    "GPENCIL": "grease pencil",
-}
 _UNUSED_ID = 2147483647  # what Blender fills persistent_id with
 
 
@@ -71,6 +65,7 @@ class ObjectFacts:
     color: tuple[float, float, float, float]
     terminator: float
     own: Own
+    caustics_caster: bool
     notes: tuple[Note, ...]
 
 
@@ -95,8 +90,6 @@ def walk(
         found = instance.object
         kind = found.type
         if kind not in _DRAWN and kind != "LIGHT":
-            if kind in _NOT_DRAWN and instance.show_self:
-                notes[_not_drawn(found, kind)] = None
             continue
         is_instance = instance.is_instance
         owner, parent = (instance.instance_object, instance.parent) if is_instance else (found, None)
@@ -135,6 +128,7 @@ def walk(
                         color=tuple(owner.color),
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
+                        caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:
@@ -151,7 +145,11 @@ def walk(
                 continue
             own = f"/hair {data.number}" if hair else ""
             if is_instance:
-                ids = "-".join(str(number) for number in instance.persistent_id if number != _UNUSED_ID)
+                numbers = instance.persistent_id[:]
+                if numbers[1] == _UNUSED_ID and numbers[2] == _UNUSED_ID:  # nearly always
+                    ids = "" if numbers[0] == _UNUSED_ID else str(numbers[0])
+                else:
+                    ids = "-".join([str(number) for number in numbers if number != _UNUSED_ID])
                 key = f"{facts.uid}/{facts.parent_uid}/{ids}{own}"
                 random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
                 place = Place(
@@ -182,6 +180,11 @@ def _is_holdout(owner, parent, view_layer) -> bool:
     return any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None)
 
 
+def visibility_of(owner) -> Visibility:
+    """Ray visibility of an object by itself."""
+    return _visibility_of(_flags(owner, None))
+
+
 def _visibility(owner, parent, view_layer) -> Visibility:
     """Ray visibility of an object, and of what instances it: Cycles lets a ray see it only where both do.
 
@@ -207,10 +210,6 @@ def _flags(one, view_layer) -> tuple[bool, ...]:
 @lru_cache
 def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
     return Visibility(*flags)
-
-
-def _not_drawn(found, kind: str) -> Note:
-    return Note(f"Object '{found.original.name}'", f"a {_NOT_DRAWN[kind]} object is not drawn.")
 
 
 def _object_notes(owner, kind: str, name: str) -> tuple[Note, ...]:

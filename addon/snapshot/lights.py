@@ -45,6 +45,7 @@ def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibi
         strength=strength,
         normalize=getattr(data, "normalize", True),
         cast_shadow=data.use_shadow,
+        caustics=getattr(cycles, "is_caustics_light", False),
         bounces=getattr(cycles, "max_bounces", 1) > 0,  # other limits of single lights are not followed
         visibility=visibility,
         own=own_settings(data),

@@ -10,16 +10,17 @@ list of a quad mesh another 100 ms (Blender copies it element by element).
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..materials.nodes.inputs import ISLAND, POINTINESS
+from ..materials.nodes.inputs import ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
 from .cache import next_version
 from .hair import HairSystem, read_hair
 from .scene import Mesh, Note
 from .shape import island_numbers, pointiness
-from .strands import HAIR_RADIUS, POINT_RADIUS, spheres, tubes
+from .strands import HAIR_RADIUS, POINT_RADIUS, between, point_facts, spheres, strand_facts, strand_places, tubes
 from .tangents import corner_tangents
 
 # Metres. Beyond it the squared length of a position overflows float32 on the GPU; such a vertex is as broken as NaN.
@@ -83,7 +84,7 @@ def read_mesh(mesh, wanted: Wanted) -> RawMesh:
     """Copy the arrays of an evaluated Mesh, Curves or PointCloud, or of a HairSystem. A mesh must hold data, not an
     edit-mode wrapper."""
     if mesh.id_type == "HAIR":
-        return _read_particle_hair(mesh)
+        return _read_particle_hair(mesh, wanted)
     if mesh.id_type != "MESH":
         return _read_strands(mesh, wanted)
     corners, faces = len(mesh.loops), len(mesh.polygons)
@@ -136,14 +137,22 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
     else:
         positions, normals, triangles, source = spheres(points, radii)
     corners = triangles.reshape(-1)
-    colors = {}
+    facts = (
+        (lambda: strand_facts(positions, source, points, radii, offsets))
+        if hair
+        else (lambda: point_facts(source, points, radii))
+    )
+    colors = _facts(wanted, facts, corners)
+    places = strand_places(positions, source, points, offsets) if hair and wanted.attributes else None
     for name in sorted(wanted.attributes):
         attribute = data.attributes.get(name)
         values = None if attribute is None else _as_rgba(attribute)
         if values is not None:
             if attribute.domain == "CURVE":
                 values = np.repeat(values, np.diff(offsets), axis=0)
-            colors[name] = np.ascontiguousarray(_finite(values[source[corners]]))
+            between_points = hair and attribute.domain == "POINT"
+            at_vertices = between(values, places) if between_points else values[source]
+            colors[name] = np.ascontiguousarray(_finite(at_vertices[corners].astype(np.float32)))
     uv_maps = {}
     if hair:  # as in Cycles, the first of them is where a strand grows, however it is called
         curve = np.searchsorted(offsets, source, side="right") - 1
@@ -162,16 +171,28 @@ def _read_strands(data, wanted: Wanted) -> RawMesh:
     )  # fmt: skip
 
 
-def _read_particle_hair(system: HairSystem) -> RawMesh:
+def _facts(wanted: Wanted, made: Callable[[], dict[str, np.ndarray]], corners: np.ndarray) -> dict[str, np.ndarray]:
+    """By corner what nodes about strands and points ask for, where they do."""
+    if wanted.attributes.isdisjoint((STRAND, WAY, PLACE, MARK)):
+        return {}
+    return {name: np.ascontiguousarray(_finite(values[corners])) for name, values in made().items()}
+
+
+def _read_particle_hair(system: HairSystem, wanted: Wanted) -> RawMesh:
     """Strands of a particle system as triangles (see hair.py, strands.py)."""
     strands = read_hair(system)
     positions, normals, triangles, source = tubes(strands.points, strands.radii, strands.offsets)
+
+    def facts() -> dict[str, np.ndarray]:
+        return strand_facts(positions, source, strands.points, strands.radii, strands.offsets)
+
     corners = triangles.reshape(-1)
     curve = np.searchsorted(strands.offsets, source, side="right") - 1
     return RawMesh(
         positions, corners, normals[corners], np.arange(0, len(corners), 3, dtype=np.int32), None, slots=1,
         uv_maps={name: np.ascontiguousarray(values[curve[corners]]) for name, values in strands.uv_maps.items()},
-        active_uv=strands.active_uv, generated=np.ascontiguousarray(strands.generated[curve]),
+        active_uv=strands.active_uv, colors=_facts(wanted, facts, corners),
+        generated=np.ascontiguousarray(strands.generated[curve]),
     )  # fmt: skip
 
 
@@ -291,10 +312,27 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
         elif attribute.domain == "FACE":
             sizes = np.diff(face_starts, append=len(corner_vertices))
             values = np.repeat(values, sizes, axis=0)
+        elif attribute.domain == "EDGE":
+            values = _at_vertices(mesh, values, attribute.data_type)[corner_vertices]
         elif attribute.domain != "CORNER":
             continue
         colors[name] = np.ascontiguousarray(_finite(values))
     return colors, active
+
+
+def _at_vertices(mesh, values: np.ndarray, kind: str) -> np.ndarray:
+    """(V, 4) what edges have, (E, 4), at their vertices: means, rounded for integers; whether any does for booleans."""
+    edges = np.zeros(2 * len(mesh.edges), np.int32)
+    mesh.edges.foreach_get("vertices", edges)
+    total = np.zeros((len(mesh.vertices), 4))
+    np.add.at(total, edges, np.repeat(values, 2, axis=0))
+    count = np.bincount(edges, minlength=len(total))
+    means = total / np.maximum(count, 1)[:, None]
+    if kind == "BOOLEAN":
+        means[:, :3] = total[:, :3] > 0
+    elif kind in ("INT", "INT8"):
+        means = np.rint(means)
+    return means.astype(np.float32)
 
 
 def _shape(mesh, name: str) -> np.ndarray:
@@ -315,6 +353,7 @@ def _shape(mesh, name: str) -> np.ndarray:
 _ATTRIBUTE_FIELDS = {
     "FLOAT_COLOR": ("color", 4, np.float32),
     "BYTE_COLOR": ("color", 4, np.float32),
+    "QUATERNION": ("value", 4, np.float32),
     "FLOAT_VECTOR": ("vector", 3, np.float32),
     "FLOAT2": ("vector", 2, np.float32),
     "FLOAT": ("value", 1, np.float32),
@@ -336,6 +375,8 @@ def _as_rgba(attribute) -> np.ndarray | None:
     rgba = np.zeros((count, 4), np.float32)
     rgba[:, 3] = 1.0
     rgba[:, : max(width, 3) if width == 1 else width] = values.reshape(count, width)
+    if width == 2:
+        rgba[:, 3] = 2.0  # see material/input.glsl
     return rgba
 
 

@@ -97,6 +97,35 @@ class Instance:
     key: str = ""  # stable identity across frames (object and persistent id)
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
+    caustics_caster: bool = False  # set to cast shadow caustics
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """Grids of an OpenVDB object on one lattice of voxels; those outside the arrays are empty."""
+
+    key: str
+    version: int
+    grids: dict[str, np.ndarray]  # name -> (X, Y, Z) or (X, Y, Z, 3) float32
+    low: np.ndarray  # (3,) index of the first voxel
+    to_object: np.ndarray  # (3, 4) float64, from voxel indices (a voxel's centre is a whole number) to object space
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        return next(iter(self.grids.values())).shape[:3]
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeInstance:
+    """One placement of a volume."""
+
+    object_name: str
+    volume: Volume
+    matrix: np.ndarray  # (4, 4) float64
+    material: int  # index into Snapshot.materials
+    visibility: Visibility = Visibility()
+    key: str = ""
+    density: float = 1.0  # factor of all coefficients, so that a scaled object stays as opaque
 
 
 @dataclass(frozen=True)
@@ -113,6 +142,8 @@ class Image:
     alpha_mode: str = "STRAIGHT"  # STRAIGHT, PREMUL, CHANNEL_PACKED, NONE
     name: str = ""
     missing: bool = False  # it could not be read: the pixels stand in for it, wherever it is asked
+    # Of a UDIM image: number of each tile, where it stands in `pixels` (x, y from the lower left) and its size.
+    tiles: tuple[tuple[int, int, int, int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -148,6 +179,7 @@ class Light:
     spot_angle: float = np.pi  # SPOT: full cone angle, radians
     spot_blend: float = 0.0  # SPOT
     cast_shadow: bool = True
+    caustics: bool = False  # set to give shadow caustics
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
@@ -195,6 +227,7 @@ class World:
     graph: Graph | None = None  # a tree that is more than that; it then says all, and `color` is white
     visibility: Visibility = Visibility()
     medium: Medium | None = None  # what fills all space
+    volume: Graph | None = None  # the tree that says so
 
     @property
     def even(self) -> bool:
@@ -211,7 +244,10 @@ class Film:
     border: tuple[int, int, int, int]
     filter_width: float = 1.5  # pixels, Blackman-Harris
     transparent: bool = False
+    clear_glass: float = -1.0  # roughness up to which glass shows a transparent film's hole behind it; below 0: none
     exposure: float = 1.0
+    caustics_reflective: bool = True  # switches of the scene: whether light that mirrors or glass throw is wanted
+    caustics_refractive: bool = True
     mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
     position: bool = False
     indices: bool = False
@@ -232,6 +268,18 @@ class Mist:
 
 
 @dataclass(frozen=True)
+class Moment:
+    """When the scene is looked at: its frame, with a fraction between frames, and how many make a second."""
+
+    frame: float = 0.0
+    per_second: float = 24.0
+
+    @property
+    def seconds(self) -> float:
+        return self.frame / self.per_second
+
+
+@dataclass(frozen=True)
 class Snapshot:
     """One frame of one view layer."""
 
@@ -245,6 +293,8 @@ class Snapshot:
     film: Film
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
+    moment: Moment = Moment()
+    volumes: tuple[VolumeInstance, ...] = ()
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 
     @cached_property

@@ -8,6 +8,7 @@ from ..materials.attributes import attributes_of
 from ..materials.graph import Graph, Input, Node
 from ..materials.reader import read_graph
 from ..materials.sky import Sky
+from ..materials.translucency import names_of, with_maps
 from .cache import GraphEntry, SnapshotCache
 from .images import ImageTable
 from .meshes import Wanted
@@ -98,6 +99,9 @@ class ShadingTable:
             return key
 
         graph, remarks = read_graph(block, image_key)
+        if isinstance(block, bpy.types.Material):
+            named = ((name, bpy.data.images.get(image)) for name, image in names_of(own_settings(block)).items())
+            graph = with_maps(graph, {name: image_key(image, None) for name, image in named if image is not None})
         if old is not None and old.graph == graph:
             graph = old.graph  # the same object, so that whoever compiled it need not compare again
         name = block.name if isinstance(block, bpy.types.Material) else ""
@@ -126,7 +130,7 @@ class ShadingTable:
 def wanted_by(graph: Graph) -> Wanted:
     """Tangents and attributes that the nodes of a graph look up in the mesh."""
     attributes = attributes_of(graph)
-    named = {attribute.name for attribute in attributes if attribute.kind in ("COLOR", "NAMED")}
+    named = {attribute.name for attribute in attributes if attribute.kind in ("COLOR", "NAMED", "UV")}
     return Wanted(
         frozenset(attribute.name for attribute in attributes if attribute.kind == "TANGENT"),
         frozenset(named - {""}),

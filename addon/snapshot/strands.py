@@ -18,6 +18,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..materials.nodes.inputs import MARK, PLACE, STRAND, WAY
+
 SIDES = 4
 STEPS = 2  # pieces per segment of the spline, as many as Cycles draws by default
 FINENESS = ((STEPS, SIDES), (1, SIDES), (1, 3))  # pieces and sides: the first that is not too much
@@ -170,3 +172,80 @@ def _icosphere(level: int) -> tuple[np.ndarray, np.ndarray]:
     )  # fmt: skip
     faces[outward < 0] = faces[outward < 0][:, ::-1]
     return unit, faces
+
+
+def strand_places(
+    positions: np.ndarray, source: np.ndarray, points: np.ndarray, offsets: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Between which points (V,), (V,) of their strands the vertices (V, 3) of tubes lie, and the share (V,) of the way.
+    `source` (V,): the nearest point."""
+    curve = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    first, last, number = offsets[curve], offsets[curve + 1] - 1, np.arange(len(points))
+    onward = points[np.minimum(number + 1, last)] - points[number]
+    back = points[number] - points[np.maximum(number - 1, first)]
+    off = positions - points[source]
+
+    def share(step: np.ndarray) -> np.ndarray:
+        return np.einsum("ij,ij->i", off, step) / np.maximum(np.einsum("ij,ij->i", step, step), 1e-30)
+
+    ahead, behind = share(onward[source]), share(back[source])
+    place = source + np.where(ahead > 0, np.clip(ahead, 0.0, 0.5), np.clip(behind, -0.5, 0.0))
+    place = np.clip(place, first[source], last[source])
+    low = np.floor(place).astype(int)
+    return low, np.minimum(low + 1, last[source]), place - low
+
+
+def between(values: np.ndarray, places: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
+    """What points have (P, n), at the places of strand_places."""
+    low, high, share = places
+    return values[low] + (values[high] - values[low]) * share[:, None]
+
+
+def strand_facts(
+    positions: np.ndarray, source: np.ndarray, points: np.ndarray, radii: np.ndarray, offsets: np.ndarray
+) -> dict[str, np.ndarray]:
+    """What Curves Info tells of the vertices (V, 3) of tubes, which belong to points `source` (V,), in object space.
+
+    STRAND (V, 4): 1, the share of the way from root to tip, the strand's length, the thickness there. WAY (V, 4): the
+    strand's direction and a random number.
+    """
+    places = strand_places(positions, source, points, offsets)
+    curve = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    first, last, number = offsets[curve], offsets[curve + 1] - 1, np.arange(len(points))
+    onward = points[np.minimum(number + 1, last)] - points[number]
+    length = np.bincount(curve, np.linalg.norm(onward, axis=1), len(offsets) - 1)
+    way = points[np.minimum(number + 1, last)] - points[np.maximum(number - 1, first)]
+    way /= np.maximum(np.linalg.norm(way, axis=1), 1e-30)[:, None]
+    share = (number - first) / np.maximum(last - first, 1)
+    strand = np.stack([np.ones(len(points)), share, length[curve], 2.0 * radii], axis=1)
+    along = np.concatenate([way, random_numbers(len(offsets) - 1)[curve][:, None]], axis=1)
+    return {STRAND: between(strand, places).astype(np.float32), WAY: along[source].astype(np.float32)}
+
+
+def point_facts(source: np.ndarray, points: np.ndarray, radii: np.ndarray) -> dict[str, np.ndarray]:
+    """What Point Info tells: PLACE (V, 4) the point's place and radius, MARK (V, 4) 1 and a random number."""
+    place = np.concatenate([points, radii[:, None]], axis=1)
+    mark = np.zeros((len(points), 4))
+    mark[:, 0], mark[:, 1] = 1.0, random_numbers(len(points))
+    return {PLACE: place[source].astype(np.float32), MARK: mark[source].astype(np.float32)}
+
+
+def random_numbers(count: int) -> np.ndarray:
+    """(count,) 0..1, Cycles' random number of each strand or point: its number mixed with zero by Bob Jenkins' final(),
+    public domain."""
+
+    def rotated(value: np.ndarray, bits: int) -> np.ndarray:
+        return (value << np.uint32(bits)) | (value >> np.uint32(32 - bits))
+
+    start = np.uint32(0xDEADBEEF + (2 << 2) + 13)
+    with np.errstate(over="ignore"):
+        a = start + np.arange(count, dtype=np.uint32)
+        b = np.full(count, start)
+        c = (np.full(count, start) ^ b) - rotated(b, 14)
+        a = (a ^ c) - rotated(c, 11)
+        b = (b ^ a) - rotated(a, 25)
+        c = (c ^ b) - rotated(b, 16)
+        a = (a ^ c) - rotated(c, 4)
+        b = (b ^ a) - rotated(a, 14)
+        c = (c ^ b) - rotated(b, 24)
+    return c / np.float64(0xFFFFFFFF)

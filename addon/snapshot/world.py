@@ -14,7 +14,7 @@ from ..materials.graph import Graph, Node
 from ..materials.sky import disc_radiance, sky_of
 from ..materials.volume import medium_of
 from .constants import constant_color, constant_number
-from .scene import Image, Light, Note, Visibility, World
+from .scene import Image, Light, Visibility, World
 
 IDENTITY = np.eye(3, 4)
 LARGEST_LAMP = 0.06  # radians: a sun's disc of this size covers 20 texels of the map across
@@ -23,13 +23,12 @@ LARGEST_LAMP = 0.06  # radians: a sun's disc of this size covers 20 texels of th
 def read_world(graph: Graph, name: str, images: Mapping[str, Image], visibility: Visibility):
     """(World, notes) of a world's graph; `images` by Image.key as the graph's nodes name them."""
     notes = ()
-    if graph.volume is not None:
-        notes = (Note(f"World '{name}'", "the world's volume is not drawn."),)
+    volume = None if graph.volume is None else graph
     plain = _plain(graph, graph.surface, images)
     if plain is None:
-        return World(np.ones(3), None, IDENTITY.copy(), graph, visibility, medium_of(graph)), notes
+        return World(np.ones(3), None, IDENTITY.copy(), graph, visibility, medium_of(graph), volume), notes
     color, image, mapping = plain
-    return World(color, image, mapping, None, visibility, medium_of(graph)), notes
+    return World(color, image, mapping, None, visibility, medium_of(graph), volume), notes
 
 
 def sun_of(graph: Graph, visibility: Visibility) -> tuple[Graph, Light | None]:

@@ -32,6 +32,7 @@ NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for i
 TRANSMISSION_FLAG = 256
 SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
 EVEN_FLAG = 1024  # of a world of one colour
+GLASS_BLOCKS_FLAG = 2048  # what passes glass arrives as photons of caustics
 
 
 @dataclass(frozen=True)

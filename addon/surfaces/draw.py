@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
+
 import numpy as np
 
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
+from ..gfx.struct import Block
 from ..scene.culling import Boxes, calls
 from ..scene.materials import SURFACE_IMAGES
 
@@ -61,11 +64,26 @@ def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> N
         _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
 
 
+class SurfaceStages:
+    """What techniques do to surfaces once they are drawn (frame.shared): called with six surface images at each point
+    of the film. The sample's own point, at which techniques run in order, is theirs."""
+
+    def __init__(self):
+        self.apply: list[Callable[[Frame, images.Target], None]] = []
+
+
 def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     """Draw what the camera sees in one sample into six surface images with a depth buffer."""
+    _draw_sample(frame, technique, target)
+    if target.colors[0] is not frame.images.get(SURFACES[0]):
+        for apply in frame.shared(SurfaceStages).apply:
+            apply(frame, target)
+
+
+def _draw_sample(frame: Frame, technique: Technique, target: images.Target) -> None:
     glass = refracts(frame)
     draw_surfaces(frame, technique, target, STOCHASTIC, glass)
-    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted}
+    tinted = {k for k, material in enumerate(frame.materials.compiled) if material.tinted or material.added}
     if not tinted:
         return
     # Multiply what was hit by the colour of the layers before it that let this sample pass.
@@ -77,22 +95,61 @@ def draw_sample(frame: Frame, technique: Technique, target: images.Target) -> No
     frame.count(technique, "passes")
 
 
-def _submit(
-    frame: Frame, technique: Technique, program_of, materials: set[int] | None, constants: dict, textures=None,
-    indices: list[int] | None = None,
+def add_glow(frame: Frame, technique: Technique, position: images.Image, emission: images.Image) -> None:
+    """Add to `emission` what layers emit that stand before the surfaces at `position` (of SURFACE_IMAGES), as seen from
+    where the frame looks now."""
+    glowing = {k for k, material in enumerate(frame.materials.compiled) if material.glows}
+    if not glowing:
+        return
+    state = {"blend": "ADDITIVE_PREMULT", "depth_test": "NONE", "depth_write": False}
+    with passes.drawing(images.Target((emission,)), **state):
+        constants, textures = {"glass_bends": int(refracts(frame))}, {"surface_position": position}
+        _submit(frame, technique, frame.materials.glow_program, glowing, constants, textures)
+    frame.count(technique, "passes")
+
+
+def draw_scatter(
+    frame: Frame, technique: Technique, target: images.Target, objects: images.Image, materials: set[int]
+) -> None:
+    """Draw how far light spreads below the surfaces of `materials`, where this sample's surface images show them, into
+    SCATTER_IMAGES. `objects`: by instance, see scene/scatter_points.py."""
+    target.clear((0.0, 0.0, 0.0, 0.0))
+    textures = {"surface_position": frame.images["surface.position"], "scatter_objects": objects}
+    with passes.drawing(target, depth_test="NONE", depth_write=False):
+        constants = {"glass_bends": int(refracts(frame))}
+        _submit(frame, technique, frame.materials.scatter_program, materials, constants, textures)
+    frame.count(technique, "passes")
+
+
+def draw_view(
+    frame: Frame, technique: Technique, target: images.Target, view: Block, rows: np.ndarray, program_of,
+    materials: Collection[int], constants: dict, depth_test: str = "LESS_EQUAL",
 ) -> None:  # fmt: skip
-    """Draw what the camera may see of `materials` (None: of all), each with its own program. `indices`: by material,
-    what is shown instead of where surfaces lie."""
-    seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(frame.view_rows))
+    """Draw `materials`, each with the program that `program_of` says, as any view sees them: its fields in a block of
+    VIEW, and its `rows` x, y, w, q. The target, with a depth buffer, is not cleared."""
+    with passes.drawing(target, depth_test=depth_test):
+        _submit(frame, technique, program_of, materials, constants, view=view, rows=rows)
+    frame.count(technique, "passes")
+
+
+def _submit(
+    frame: Frame, technique: Technique, program_of, materials: Collection[int] | None, constants: dict, textures=None,
+    indices: list[int] | None = None, view: Block | None = None, rows: np.ndarray | None = None,
+) -> None:  # fmt: skip
+    """Draw what a view (None: the camera) may see of `materials` (None: of all), each with its own program. `indices`:
+    by material, what is shown instead of where surfaces lie."""
+    rows = frame.view_rows if rows is None else rows
+    seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(rows))
     material = None
+    unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
     for call in calls(frame.geometry.draws, seen):
-        if materials is not None and call.draw.material not in materials:
+        if call.draw.material in unseen or (materials is not None and call.draw.material not in materials):
             continue
         if call.draw.material != material:
             material = call.draw.material
             shader = passes.get(program_of(material))
             bindings = frame.materials.bindings(material, frame.geometry.instances)
-            bindings["blocks"]["film_view"] = frame.view_block
+            bindings["blocks"]["film_view"] = view or frame.view_block
             bindings["textures"] |= textures or {}
             shown = {"index_shown": indices[material]} if indices is not None else {}
             shader.bind(**bindings, constants={"first_instance": call.first, **constants, **shown})

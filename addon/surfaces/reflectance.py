@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.run import Frame
 from ..gfx import images, passes
 from ..gfx.struct import Block
@@ -34,8 +35,11 @@ REFLECTANCE = passes.fullscreen_program(
     "indirect/reflectance.frag.glsl",
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     constants=(("IVEC2", "extent"), ("INT", "rows"), ("FLOAT", "view_cosine")),
+    defines=(("SMOOTH_MIRROR", "0.2501"),),  # roughness, see lighting/caustic_casters.py
     outputs=(("VEC4", "out_reflectance"),),
 )
+# For programs that read the image where a technique brings what mirrors and glass throw on diffuse surfaces.
+MIRRORS_OWNED = (("MIRRORS_OWNED", "1"),)
 
 
 class Reflectance:
@@ -47,6 +51,10 @@ class Reflectance:
 
     def update(self, frame: Frame) -> None:
         """Draw anew the materials that have changed or whose surfaces have."""
+        self._update(frame)
+        self.image.defines = MIRRORS_OWNED if frame.owned(LIGHT_SPECULAR_DIFFUSE) else ()
+
+    def _update(self, frame: Frame) -> None:
         keys = self._keys_of(frame)
         rows = -(-len(frame.materials.compiled) // COLUMNS)
         kept = self.image is not None and self.image.size == (COLUMNS, BANDS * rows)
@@ -89,7 +97,13 @@ class Reflectance:
         shown: dict[int, list] = {}
         for draw in frame.geometry.draws:
             shown.setdefault(draw.material, []).append((draw.batch.number, draw.first, draw.count))
-        return {material: (prints[material], prints[count:], shown[material]) for material in sorted(shown)}
+        return {
+            material: (
+                prints[material], prints[count:], shown[material],
+                frame.materials.around(material, frame.geometry),
+            )
+            for material in sorted(shown)
+        }  # fmt: skip
 
     def _draw(self, frame: Frame, target: images.Target, viewport, material: int, backward: np.ndarray) -> None:
         all_draws = frame.geometry.draws
@@ -107,6 +121,7 @@ class Reflectance:
 
     def release(self) -> None:
         if self.image is not None:
+            self.image.defines = ()
             images.pool.give(self.image)
         self.image, self._keys = None, {}
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from ..frame.technique import Technique
 from .accumulated_maps import AccumulatedMaps
+from .airlight import Airlight
+from .caustics_mapping import CausticsMapping
 from .clustered_visibility import ClusteredVisibility
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
@@ -13,21 +15,31 @@ from .directional_occlusion import DirectionalOcclusion
 from .emissive_light import EmissiveLight
 from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
+from .eye import EyeModel
 from .film import Film
+from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
+from .media import MediaAttenuation
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
+from .reflection_editing import ReflectionEditing
+from .screen_space_photons import ScreenSpacePhotons
+from .shaded_reflections import ShadedReflections
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
+from .temporal_glare import TemporalGlare
 from .traced_glossy import TracedGlossy
 from .traced_refraction import TracedRefraction
+from .volume_caustics import VolumeCaustics
 from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
+    MediaAttenuation,
     Surfaces,
+    ReflectionEditing,
     LightProbes,
     AccumulatedMaps,
     VarianceSoftShadows,
@@ -42,13 +54,21 @@ REGISTRY: tuple[type[Technique], ...] = (
     DirectionalOcclusion,
     TracedGlossy,
     TracedRefraction,
+    Airlight,
+    VolumeCaustics,
     InstantRadiosity,
     MultiresRadiosity,
     ClusteredVisibility,
     ImperfectShadowMaps,
     ScreenSpaceBounce,
+    ShadedReflections,
+    ImageSpaceSubsurface,
+    CausticsMapping,
+    ScreenSpacePhotons,
     Film,
     Denoise,
+    TemporalGlare,
+    EyeModel,
 )
 
 

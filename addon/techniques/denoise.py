@@ -17,6 +17,9 @@ neighbours again: where weights fall short, no wider level mixes odd pixels with
 w is the same from p to q as from q to p, and what weights lack to one stays where it is: pixels exchange light and none
 is lost, however skewed the noise. Dividing by the weights instead filters a little more and moves means by up to 0.4 %.
 
+Reflections have edges where no surface has any: pixels exchange glossy light only if what their lobes show reflects
+alike (shaded_reflections.py), as far as the samples tell.
+
 Where both halves agree nothing is changed, so the result still converges, and textures, which are divided out, stay.
 relMSE over the reference's noise, 16 samples at 128x96, as summed up and denoised:
 
@@ -59,7 +62,7 @@ Not filtered: direct gloss, glass, emission, pixels without the path's colour, p
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..film.points import shown_paths
 from ..film.resolve import COMBINED, resolve
@@ -67,6 +70,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
+from ..lighting.path_sources import SHOWN
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from .instant_radiosity import no_diffuse_light
@@ -106,6 +110,14 @@ LEVEL = passes.fullscreen_program(
     constants=(("INT", "stride"), ("FLOAT", "tolerance"), ("FLOAT", "sharpness")),
     outputs=(("VEC4", "out_light"),),
 )
+# The same for reflections, whose edges no surface has: `shown_sum` is image SHOWN.
+LEVEL_OF_REFLECTIONS = replace(
+    LEVEL,
+    name="denoise: level of reflections",
+    textures=(*LEVEL.textures, ("RGBA32F", "shown_sum")),
+    constants=(*LEVEL.constants, ("INT", "count")),
+    defines=(("REFLECTIONS", "1"),),
+)
 END = passes.fullscreen_program(
     "denoise: reflected light",
     "denoise/end.frag.glsl",
@@ -138,9 +150,6 @@ class Denoise(Technique):
         ),
     )
 
-    def __init__(self):
-        self._half_count = 0
-
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if settings.draft:
             return "it is a draft"
@@ -159,12 +168,34 @@ class Denoise(Technique):
 
     def sample(self, frame: Frame) -> None:
         done = frame.sample + 1
-        if done == frame.settings.samples // 2:
+        if frame.settings.time_limit:
+            self._keep_doubles(frame, done)
+        elif done == frame.settings.samples // 2:
             for path in self._paths(frame):
                 passes.copy(frame.images[f"film.{path}"], frame.target(f"denoise.{path}_half"))
-            self._half_count = done
+
+    def _keep_doubles(self, frame: Frame, done: int) -> None:
+        """Where nobody knows how many samples there will be: copies after 1, 2, 4, … samples, the last two of them. One
+        is always from a third to two thirds of the way."""
+        if done & (done - 1):
+            return
+        for path in self._paths(frame):
+            half, before = f"denoise.{path}_half", f"denoise.{path}_before"
+            if before not in frame.images:
+                frame.images[before] = images.pool.take(*frame.size, "RGBA32F")
+            passes.copy(frame.images[half], frame.target(before))
+            passes.copy(frame.images[f"film.{path}"], frame.target(half))
+
+    def _half(self, frame: Frame, path: str, count: int) -> tuple[int, str]:
+        """Samples of the first part of all, and the image of their sum."""
+        if not frame.settings.time_limit:
+            return count // 2, f"denoise.{path}_half"
+        last = 1 << (count.bit_length() - 1)
+        return (last // 2, f"denoise.{path}_before") if 2 * count < 3 * last else (last, f"denoise.{path}_half")
 
     def end(self, frame: Frame) -> Iterator[None]:
+        if frame.settings.samples < FEWEST:
+            return
         for path in self._paths(frame):
             yield from self._filter(frame, path, frame.settings.samples)
             frame.shown[f"radiance.{path}"] = f"denoise.{path}"
@@ -183,21 +214,26 @@ class Denoise(Technique):
             "surface_position": frame.images["surface.position"], "normal_sum": frame.images["surface.normal_sum"],
         }  # fmt: skip
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
+        half_count, half = self._half(frame, path, count)
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
                 passes.fullscreen(
                     BEGIN, light, rows=rows, blocks=blocks,
-                    textures={**guides, **sums, "half_sum": frame.images[f"denoise.{path}_half"]},
-                    constants={"count": count, "half_count": self._half_count, "sharpness": how.sharpness},
+                    textures={**guides, **sums, "half_sum": frame.images[half]},
+                    constants={"count": count, "half_count": half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield
+            level, shown = LEVEL, {}
+            if path == "glossy_indirect" and SHOWN in frame.images:
+                level, shown = LEVEL_OF_REFLECTIONS, {"shown_sum": frame.images[SHOWN]}
             tolerance = how.tolerance * frame.settings.get(self, "strength")
             for stride in how.strides:
                 constants = {"stride": stride, "tolerance": tolerance, "sharpness": how.sharpness}
+                constants |= {"count": count} if shown else {}
                 for rows in frame.bands(self):
                     passes.fullscreen(
-                        LEVEL, other, rows=rows, blocks=blocks, textures={**guides, "light_in": light.colors[0]},
-                        constants=constants,
+                        level, other, rows=rows, blocks=blocks, constants=constants,
+                        textures={**guides, **shown, "light_in": light.colors[0]},
                     )  # fmt: skip
                     yield
                 light, other = other, light

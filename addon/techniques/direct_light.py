@@ -33,6 +33,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..lighting import shared_visibility
+from ..lighting.caustic_casters import answered
 from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, NEAR, RAYS_WHERE_NEAR, light_surfaces, lighting
 from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, VisibilityProvider
@@ -101,7 +102,8 @@ class DirectLight(Technique):
             points = rate.per_sample * frame.settings.samples / weight
             if service and self._has_rays(frame, emitter, provider):
                 provider = self._rays
-            traced = lights.TRACED_FLAG * (emitter.light.key in self._traced)
+            flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
+            flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
             for number in rate.points(frame.sample):
                 part = provider.part(frame, emitter, number, points)
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
@@ -113,7 +115,7 @@ class DirectLight(Technique):
                 views = provider.views(frame, shown, sample, number, cell)
                 asked = len(views) or near or not provider.asks_views
                 row = shown.row(sample, 0, asked, weight, rate.per_sample * share, points * share)
-                row[0, 1] += lights.WHOLE_FLAG * whole + traced + lights.NEAR_FLAG * near
+                row[0, 1] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
                 found.append(LightPoint(row, provider, views))
         return found
 

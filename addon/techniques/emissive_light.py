@@ -13,8 +13,9 @@ As in Cycles, emission leaves both sides of a surface. Narrow lobes find emissiv
 | maps | `points` x (1 view, or up to 6 cube faces), or a ray per pixel for each where that costs less |
 | passes | 1 over the screen |
 
-Fails: emission that varies is taken at its mean over the surfaces that show the material; very many small emitters
-need many samples.
+Emission that varies is measured place by place (scene/emission_maps.py).
+
+Fails: very many small emitters need many samples.
 """
 
 from __future__ import annotations

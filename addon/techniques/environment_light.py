@@ -235,7 +235,7 @@ class EnvironmentLight(Technique):
             return self._known(frame, maps, count / (len(points) * min(rate.per_sample, 1.0)))
 
         yield from light_surfaces(frame, self, points, 1 << lights.DIRECTION, self._sources, known)
-        if points and frame.sample + 1 < frame.settings.samples:
+        if self._openness and points and frame.sample + 1 < frame.settings.samples:
             self._sum_openness(frame)
 
     def _resolution(self, frame: Frame) -> int:

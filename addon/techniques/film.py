@@ -26,11 +26,20 @@ from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..lighting import repeated_light
+from ..lighting.media import MediaEmission, MediaService
 from ..scene.materials import SURFACE_IMAGES, may_be_glossy
 from ..scene.view import VIEW
 from ..sources import lights
 from ..sources.environment import WORLD
-from ..surfaces.draw import SOFT_DEFINES, SURFACE_TEXTURES, SURFACES, draw_indices, draw_sample, surface_bindings
+from ..surfaces.draw import (
+    SOFT_DEFINES,
+    SURFACE_TEXTURES,
+    SURFACES,
+    add_glow,
+    draw_indices,
+    draw_sample,
+    surface_bindings,
+)
 
 SUMS = (
     Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
@@ -40,7 +49,7 @@ SUMS = (
     Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
     Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
 )
-WORLD_SUM = 1  # in SUMS
+EMISSION_SUM, WORLD_SUM = 0, 1  # in SUMS
 LIGHT = tuple(path for path in LIGHT_PATHS if path.origin != SEEN)  # what techniques add to in each sample
 
 
@@ -105,6 +114,7 @@ class Film(Technique):
     )
     reads = SURFACES
     finishes = tuple(path.image for path in LIGHT)
+    requests = (MediaService, MediaEmission)
     writes = (
         *SUMS,
         *(Write(path.image, "RGBA32F", path.description, True, path.by_need) for path in LIGHT),
@@ -118,7 +128,9 @@ class Film(Technique):
 
     def begin(self, frame: Frame) -> None:
         self._paths, self._pixel_paths = film_points.lit_paths(frame), film_points.pixel_paths(frame)
-        _target(frame, *(f"film.{path}" for path in (*self._paths, *self._pixel_paths))).clear()
+        for paths in (self._paths, self._pixel_paths):  # apart: a target has at most six images
+            if paths:
+                _target(frame, *(f"film.{path}" for path in paths)).clear()
         emitters = frame.emitters
         seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
         self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
@@ -141,7 +153,11 @@ class Film(Technique):
         with _borrowed(frame, len(SUMS)) as collected:
             self._collect(frame, surface_bindings(frame), collected)
             light = {path: frame.images[f"radiance.{path}"] for path in (*self._paths, *self._pixel_paths)}
-            self._filter(frame, collected, light, frame.sample, 1.0 / count)
+            self._filter(frame, collected, light, surface_bindings(frame), frame.sample, 1.0 / count)
+        shining = frame.service(MediaEmission)
+        if shining is not None:
+            emission = {"radiance.emission": frame.images[shining.image]}
+            frame.count(self, "passes", film_filter.add(frame, emission, frame.film_offset(frame.sample), 1.0))
         frame.count(self, "points", count)
         if count > 1:
             yield
@@ -201,7 +217,7 @@ class Film(Technique):
                         repeated_light.repeat(frame, self._repeated, bindings, direct)
                         frame.count(self, "passes", len(frame.shared(repeated_light.KeptLight).passes))
                     own = {path: frame.images[f"radiance.{path}"] for path in self._pixel_paths}
-                    self._filter(frame, collected, by_path | own, point, 1.0 / count)
+                    self._filter(frame, collected, by_path | own, bindings, point, 1.0 / count)
                     yield
             finally:
                 frame.look()
@@ -221,6 +237,7 @@ class Film(Technique):
             constants={"light_count": self._light_count, "mist": _mist_constant(frame)},
         )  # fmt: skip
         frame.count(self, "passes")
+        add_glow(frame, self, surfaces["surface_position"], collected[EMISSION_SUM])
         if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
             world = images.Target((collected[WORLD_SUM],))
             frame.environment.tree.add_background(world, frame.view, frame.view_block, surfaces)
@@ -231,6 +248,7 @@ class Film(Technique):
         frame: Frame,
         collected: tuple[images.Image, ...],
         light: dict[str, images.Image],
+        surfaces: dict[str, images.Image],
         point: int,
         share: float,
     ) -> None:
@@ -238,7 +256,13 @@ class Film(Technique):
         seen = {write.name: image for write, image in zip(SUMS, collected)}
         seen |= {f"film.{path}": image for path, image in light.items()}
         seen = {name: image for name, image in seen.items() if name in self._shown}
-        frame.count(self, "passes", film_filter.add(frame, seen, frame.film_offset(point), share))
+        media = frame.service(MediaService)
+        offset = frame.film_offset(point)
+        if media is None:
+            frame.count(self, "passes", film_filter.add(frame, seen, offset, share))
+            return
+        with media.passing(frame, surfaces, self._lights, self._light_count) as through:
+            frame.count(self, "passes", 1 + film_filter.add(frame, seen, offset, share, through))
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:
         """Those of SUMS and of the sums of light in which something may be seen."""

@@ -69,6 +69,8 @@ from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
+from ..lighting.media import MediaService, attenuated
+from ..lighting.path_sources import shaded_roughness
 from ..lighting.virtual_lights import (
     PATH_BLOCKS,
     PATH_CONSTANTS,
@@ -96,7 +98,11 @@ NEAR_CONSTANTS = (
     ("INT", "bounces"), ("INT", "virtual_count"), ("FLOAT", "near_radius"), ("FLOAT", "glossy_radius"),
     ("FLOAT", "deeper"),
 )  # fmt: skip
-GATHER_CONSTANTS = (*dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)), ("INT", "lobe_rays"))
+GATHER_CONSTANTS = (
+    *dict.fromkeys((*PATH_CONSTANTS, *NEAR_CONSTANTS)),
+    ("INT", "lobe_rays"),
+    ("FLOAT", "shaded_roughness"),
+)
 
 
 @dataclass(frozen=True)
@@ -175,6 +181,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     near = near_radius(frame, len(lights))
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
     bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
+    bindings["constants"]["shaded_roughness"] = shaded_roughness(frame)
     frame.provide(GatherBindings(bindings))
     return bindings
 
@@ -229,7 +236,10 @@ class InstantRadiosity(Technique):
         bindings["constants"] |= self._reach(frame, -(-len(lights) // SUBSETS))
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
-        program = gather_program(self.virtual_lights.kinds, *lobes_of(frame))
+        program, media = gather_program(self.virtual_lights.kinds, *lobes_of(frame)), frame.service(MediaService)
+        if media is not None:
+            program = attenuated(program)
+            bindings["textures"] = bindings["textures"] | media.bindings
         for rows in frame.bands(self):
             passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
             yield

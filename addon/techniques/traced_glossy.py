@@ -35,6 +35,8 @@ from ..gfx import passes
 from ..lighting import repeated_light
 from ..lighting.light_rates import EmissivePoints, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
+from ..lighting.media import MediaService, attenuated
+from ..lighting.path_sources import shaded_roughness
 from ..lighting.repeated_light import Lit
 from ..lighting.visibility import TracedLobes
 from ..materials.compiler import may_emit
@@ -58,6 +60,7 @@ TRACED = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
+        ("FLOAT", "shaded_roughness"),
     ),
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
@@ -125,9 +128,14 @@ class TracedGlossy(Technique):
                 "world_glossy": int(bool(np.any(world.color)) and world.visibility.glossy),
                 "world_samples": self._world_samples,
                 "emissive_power": emissive.power, "emissive_points": emissive.count,
+                "shaded_roughness": shaded_roughness(frame),
             },
         }  # fmt: skip
-        yield from repeated_light.add(frame, self, self._sources, Lit(TRACED, NARROW_LOBE, bindings, self._rows))
+        program, media = TRACED, frame.service(MediaService)
+        if media is not None:
+            program = attenuated(program)
+            bindings["textures"] |= media.bindings
+        yield from repeated_light.add(frame, self, self._sources, Lit(program, NARROW_LOBE, bindings, self._rows))
         frame.count(self, "passes")
 
     def release(self) -> None:

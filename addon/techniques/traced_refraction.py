@@ -29,7 +29,7 @@ Fails: above 4 million triangles nothing is traced, and glass lets light pass st
 Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
 its bumps. Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo
 where they stand behind glass in the picture, too, and else by their material's mean (the boards of that room shine: 5 %
-too dark). Light falls through glass in straight lines, so glass casts grey shadows and no caustics. Against Cycles:
+too dark). Surfaces behind glass have straight grey shadows, and no caustics. Against Cycles:
 within 2 % for a rough ball below a world of which Cycles draws no light samples; where it does, its own result for
 rough glass rises by up to 11 % (a world symmetric in x shows it).
 """
@@ -37,15 +37,16 @@ rough glass rises by up to 11 % (a world symmetric in x shows it).
 from __future__ import annotations
 
 from collections.abc import Hashable
-
-import numpy as np
+from dataclasses import replace
 
 from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
-from ..lighting.emissive_triangles import EmissiveTriangles
-from ..materials.compiler import may_emit, may_refract
+from ..gfx.library import Program
+from ..lighting.interfaces import interface_table
+from ..lighting.path_sources import PathSources, ShadedLobes
+from ..materials.compiler import may_refract
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -57,7 +58,8 @@ from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 2  # drawn per sample, shared by all pixels
 EMISSIVE_POINTS = 2
-MOST_LAMPS = lights.MOST_LIGHTS - WORLD_DIRECTIONS - EMISSIVE_POINTS
+BEHIND = ("reflectance", "interface_table", "behind_position", "behind_albedo", "virtual_lights")
+EMISSIVE = ("emissive_power", "emissive_points")
 REFRACTION = passes.fullscreen_program(
     "traced refraction",
     "light/refraction.frag.glsl",
@@ -72,10 +74,18 @@ REFRACTION = passes.fullscreen_program(
     constants=(
         ("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "interfaces"),
         ("INT", "world_transmission"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"),
-        ("FLOAT", "emissive_points"), *NEAR_CONSTANTS,
+        ("FLOAT", "emissive_points"), ("FLOAT", "clear_roughness"), *NEAR_CONSTANTS,
     ),
     outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
 )  # fmt: skip
+# Where shaded_reflections.py follows what the first interface lets pass, lamps and the world are left:
+FIRST_ALONE = replace(
+    REFRACTION,
+    name="light through the first interface",
+    textures=tuple(one for one in REFRACTION.textures if one[1] not in BEHIND),
+    constants=tuple(one for one in REFRACTION.constants if one not in NEAR_CONSTANTS and one[1] not in EMISSIVE),
+    defines=(("FIRST_ALONE", "1"),),
+)
 ALBEDO = passes.fullscreen_program(
     "surface albedo",
     "surface/albedo.frag.glsl",
@@ -103,9 +113,9 @@ class TracedRefraction(Technique):
     )
 
     def __init__(self):
-        self._sources = lights.Sources()
+        # By glass, and by surfaces behind it.
+        self._sources = PathSources(("transmission", "diffuse"), "refraction", WORLD_DIRECTIONS, EMISSIVE_POINTS)
         self._interfaces: images.Image | None = None
-        self._triangles: EmissiveTriangles | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         used = {slot for instance in snapshot.instances for slot in instance.materials}
@@ -119,51 +129,59 @@ class TracedRefraction(Technique):
     def prepare(self, frame: Frame) -> None:
         """Tell the shader how the materials behind the first interface bend light, and what their insides absorb: three
         texels for each."""
-        table = np.zeros((len(frame.materials.compiled), 3, 4), np.float32)
-        for row, material in zip(table, frame.materials.compiled):
-            if material.glass:
-                glass = material.glass
-                row[0] = *glass.color, glass.ior
-                losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
-                row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
-            if material.medium:
-                row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
-        self._interfaces = images.upload(table)
+        self._interfaces = images.upload(interface_table(frame.materials.compiled))
+
+    def begin(self, frame: Frame) -> None:
+        frame.kept(Reflectance).update(frame)
+        self._sources.begin(frame)
 
     def sample(self, frame: Frame) -> None:
-        rows = self._source_rows(frame)
-        behind = self._draw_behind(frame)
-        virtual_lights, near = self._indirect_light(frame)
+        rows = self._sources.rows(frame)
         hierarchy = frame.hierarchy("transmission")
-        passes.fullscreen(
-            REFRACTION,
-            frame.target("radiance.transmission_direct", "radiance.transmission_indirect"),
-            blend="ADDITIVE_PREMULT",
-            textures={
+        bindings = {
+            "textures": {
                 **surface_bindings(frame), "energy_table": frame.materials.energy_table,
                 "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
                 **hierarchy.textures,
-                "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
-                "behind_position": behind.colors[0], "behind_albedo": behind.colors[1],
-                "virtual_lights": virtual_lights,
             },
-            blocks={
+            "blocks": {
                 "film_view": frame.view_block, "world_light": frame.environment.block,
-                "sources": self._sources.set(rows),
+                "sources": self._sources.block(rows),
             },
-            constants={
-                "light_count": len(rows), "offset_size": frame.offset_size,
-                "interfaces": frame.settings.get(self, "interfaces"),
-                "world_transmission": int(bool(self._world_flags & lights.TRANSMISSION_FLAG)),
+            "constants": {
+                "light_count": len(rows), "offset_size": frame.offset_size, "interfaces": 0,
+                "world_transmission": int(bool(self._sources.world_flags & lights.TRANSMISSION_FLAG)),
                 "world_samples": float(WORLD_DIRECTIONS),
-                "emissive_power": self._triangles.power if self._triangles else 0.0,
-                "emissive_points": float(EMISSIVE_POINTS), **near,
+                "clear_roughness": _clear_roughness(frame),
             },
-        )  # fmt: skip
-        for image in behind.colors:
-            images.pool.give(image)
+        }  # fmt: skip
+        if frame.service(ShadedLobes) is None:
+            self._walk(frame, bindings)
+        else:
+            self._draw(frame, FIRST_ALONE, bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
+
+    @staticmethod
+    def _draw(frame: Frame, program: Program, bindings: dict[str, dict]) -> None:
+        target = frame.target("radiance.transmission_direct", "radiance.transmission_indirect")
+        passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", **bindings)
+
+    def _walk(self, frame: Frame, bindings: dict[str, dict]) -> None:
+        """Follow what passes the first interface by walks among means."""
+        behind = self._draw_behind(frame)
+        virtual_lights, near = self._indirect_light(frame)
+        bindings["textures"] |= {
+            "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
+            "behind_position": behind.colors[0], "behind_albedo": behind.colors[1], "virtual_lights": virtual_lights,
+        }  # fmt: skip
+        bindings["constants"] |= {
+            "interfaces": frame.settings.get(self, "interfaces"), "emissive_power": self._sources.emissive_power,
+            "emissive_points": float(EMISSIVE_POINTS), **near,
+        }  # fmt: skip
+        self._draw(frame, REFRACTION, bindings)
+        for image in behind.colors:
+            images.pool.give(image)
 
     def _draw_behind(self, frame: Frame) -> images.Target:
         """Places and reflectances of what stands behind glass in the picture. Its images go back to the pool."""
@@ -192,47 +210,12 @@ class TracedRefraction(Technique):
         constants = {name: provided.bindings["constants"][name] for _, name in NEAR_CONSTANTS}
         return provided.bindings["textures"]["virtual_lights"], constants
 
-    def begin(self, frame: Frame) -> None:
-        frame.kept(Reflectance).update(frame)
-        wanted = lights.TRANSMISSION_FLAG + lights.DIFFUSE_FLAG  # by glass, and by surfaces behind it
-        self._emitters = [emitter for emitter in frame.emitters if emitter.flags & wanted]
-        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
-        self._triangles = None
-        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
-            triangles = EmissiveTriangles(frame, ("diffuse", "transmission"))
-            self._triangles = triangles if triangles.power > 0 else None
-        seen = frame.snapshot.world.visibility
-        self._world_flags = lights.TRANSMISSION_FLAG * seen.transmission + lights.DIFFUSE_FLAG * seen.diffuse
-        if frame.environment.power <= 0:
-            self._world_flags = 0
-
-    def _source_rows(self, frame: Frame) -> list[np.ndarray]:
-        """Points of this sample on lights, emissive surfaces and the world. More lamps than fit are drawn by lot, and
-        count more: both as points and where a ray meets them."""
-        rows = []
-        count = len(self._emitters)
-        chosen = np.arange(count)
-        if count > MOST_LAMPS:
-            chosen = (np.arange(MOST_LAMPS) + frame.lot("refraction/choose")) * count / MOST_LAMPS
-            chosen = chosen.astype(int)
-        for number in chosen:
-            emitter = self._emitters[number]
-            sample = emitter.sample(*frame.random_volume("refraction/light"))
-            row = emitter.row(sample, 0, int(emitter.light.cast_shadow), max(count / MOST_LAMPS, 1.0))
-            rows.append(row)
-        if self._triangles is not None:
-            for k in range(EMISSIVE_POINTS):
-                index = frame.sample * EMISSIVE_POINTS + k
-                drawn = frame.random_volume_at(index, "refraction/emissive")
-                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG))
-        if self._world_flags:
-            seen = lights.SHADOW_FLAG + self._world_flags
-            for k in range(WORLD_DIRECTIONS):
-                index = frame.sample * WORLD_DIRECTIONS + k
-                direction, radiance, density = frame.environment.draw(*frame.random_at(index, "refraction/world"))
-                rows.append(lights.direction_row(direction, radiance / density, density, seen, 0, 1, WORLD_DIRECTIONS))
-        return rows
-
     def release(self) -> None:
         self._sources.release()
-        self._interfaces = self._triangles = None
+        self._interfaces = None
+
+
+def _clear_roughness(frame: Frame) -> float:
+    """Roughness up to which glass shows that there is nothing behind it; below 0: none does."""
+    film = frame.snapshot.film
+    return film.clear_glass if film.transparent else -1.0

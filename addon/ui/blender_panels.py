@@ -9,9 +9,15 @@ import bpy
 # Panels of EEVEE, and of engines in general, whose settings Candela reads.
 _TAKEN = {
     "DATA_PT_EEVEE_light",
+    "DATA_PT_camera_dof",
+    "DATA_PT_camera_dof_aperture",
     "EEVEE_MATERIAL_PT_context_material",
+    "EEVEE_MATERIAL_PT_displacement",
     "EEVEE_MATERIAL_PT_surface",
+    "EEVEE_MATERIAL_PT_volume",
+    "EEVEE_WORLD_PT_mist",
     "EEVEE_WORLD_PT_surface",
+    "EEVEE_WORLD_PT_volume",
     "MATERIAL_PT_preview",
     "NODE_DATA_PT_EEVEE_light",
     "VIEWLAYER_PT_filter",
@@ -40,7 +46,9 @@ def show(engine: str) -> None:
 
 
 def withdraw(engine: str) -> None:
-    """Undo `show`, in every panel there is: what counts as one of them may have changed since."""
+    """Undo `show`, in every panel there is: what counts as one of them may have changed since. The extension's own
+    panels keep the engine: they are registered again with the same classes."""
+    own = __package__.rpartition(".")[0]
     for panel in bpy.types.Panel.__subclasses__():
-        if engine in getattr(panel, "COMPAT_ENGINES", ()):
+        if not panel.__module__.startswith(own) and engine in getattr(panel, "COMPAT_ENGINES", ()):
             panel.COMPAT_ENGINES.remove(engine)

@@ -52,6 +52,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         settings = context.scene.candela
         column = _columns(self)
         column.prop(settings, "samples", text="Render Samples")
+        column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
         column.prop(settings, "bounces")
@@ -113,14 +114,21 @@ class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
         column = _columns(self)
         column.prop(context.scene.render, "filter_size", text="Filter Size")
         column.prop(context.scene.render, "film_transparent", text="Transparent")
+        cycles = getattr(context.scene, "cycles", None)  # there while the Cycles add-on is enabled
+        if cycles is not None:
+            glass = column.column()
+            glass.active = context.scene.render.film_transparent
+            glass.prop(cycles, "film_transparent_glass", text="Transparent Glass")
+            glass.prop(cycles, "film_transparent_roughness", text="Roughness Threshold")
+            column.prop(cycles, "film_exposure", text="Exposure")
         column.prop(context.scene.candela, "film_points")
         column.prop(context.scene.candela, "film_edges")
 
 
 class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
-    """What ran for the last picture, what was reused or skipped, and why"""
+    """What ran for the last picture, and what of it was reused"""
 
-    bl_label = "Frame"
+    bl_label = "Last Picture"
 
     def draw(self, context):
         ledger = ledgers.latest()
@@ -132,30 +140,60 @@ class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
         _text(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
         column.separator()
         for row in ledger.rows:
-            line = column.row()
-            line.active = row.state == ledgers.RAN
-            line.label(text=row.label, icon=_STATE_ICONS[row.state])
-            value = line.row()
-            value.alignment = "RIGHT"
-            value.label(text=_seconds(row.milliseconds / 1000) if row.state == ledgers.RAN else row.state)
-            if row.reason:
-                _text(column, context, row.reason, dim=True, indent=True)
+            if row.state != ledgers.SKIPPED:
+                _ledger_row(column, context, row)
+
+
+class CANDELA_RENDER_PT_frame_skipped(_CandelaPanel, bpy.types.Panel):
+    """What the last picture did without, and why"""
+
+    bl_label = "Skipped"
+    bl_parent_id = "CANDELA_RENDER_PT_frame"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(row.state == ledgers.SKIPPED for row in _rows())
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        for row in _rows():
+            if row.state == ledgers.SKIPPED:
+                _ledger_row(column, context, row)
+
+
+def _rows() -> list:
+    ledger = ledgers.latest()
+    return ledger.rows if ledger is not None else []
+
+
+def _ledger_row(column, context, row) -> None:
+    line = column.row()
+    line.active = row.state == ledgers.RAN
+    line.label(text=row.label, icon=_STATE_ICONS[row.state])
+    value = line.row()
+    value.alignment = "RIGHT"
+    value.label(text=_seconds(row.milliseconds / 1000) if row.state == ledgers.RAN else row.state)
+    if row.reason:
+        _text(column, context, row.reason, dim=True, indent=True)
 
 
 class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
-    """What is drawn otherwise than it is set up, with a click to the culprit"""
+    """What is drawn otherwise than it is set up, with a click to the culprit; what is missing comes first"""
 
     bl_label = "Warnings"
-    bl_parent_id = "CANDELA_RENDER_PT_frame"
 
     @classmethod
     def poll(cls, context):
         return super().poll(context) and (bool(_notes()) or _bad_pixels() > 0)
 
+    def draw_header(self, context):
+        self.layout.label(text=str(len(_notes()) + (_bad_pixels() > 0)), icon="ERROR")
+
     def draw(self, context):
         if _bad_pixels():
             _text(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
-        for note in _notes()[:MOST_NOTES]:
+        for note in notes.by_weight(_notes())[:MOST_NOTES]:
             row = self.layout.row()
             _text(row.column(align=True), context, str(note), icon="ERROR", room=2)
             kind, name = notes.target(note)
@@ -218,8 +256,47 @@ class CANDELA_OBJECT_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
 
     def draw(self, context):
         column = _columns(self)
-        for name in ("camera", "diffuse", "glossy", "shadow"):
-            column.prop(context.object, f"visible_{name}", text=name.title())
+        for name in (
+            "camera",
+            "diffuse",
+            "glossy",
+            "transmission",
+            "volume_scatter",
+            "shadow",
+        ):  # visible_camera and so on
+            column.prop(context.object, f"visible_{name}", text=name.replace("_", " ").title())
+
+
+class CANDELA_WORLD_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        # The settings are Cycles': there while its add-on is enabled.
+        return super().poll(context) and context.world and hasattr(context.world, "cycles_visibility")
+
+    def draw(self, context):
+        column = _columns(self)
+        for name in ("camera", "diffuse", "glossy", "transmission", "scatter"):
+            text = "Volume Scatter" if name == "scatter" else name.title()
+            column.prop(context.world.cycles_visibility, name, text=text)
+
+
+class CANDELA_MATERIAL_PT_settings(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Settings"
+    bl_context = "material"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.material
+
+    def draw(self, context):
+        column = _columns(self)
+        column.prop(context.material, "pass_index")
+        column.prop(context.material, "use_transparent_shadow", text="Transparent Shadows")
 
 
 class CANDELA_OBJECT_PT_shadow_terminator(_CandelaPanel, bpy.types.Panel):
@@ -281,10 +358,18 @@ def _show_tab(context, tab: str) -> None:
     space = context.space_data
     if space is None or space.type != "PROPERTIES":
         return
+    if not _shows_tab(space, tab):
+        # The editor learns of another active object, and of its tabs, only when it is drawn again.
+        bpy.app.timers.register(lambda: _shows_tab(space, tab) and None, first_interval=0.05)
+
+
+def _shows_tab(space, tab: str) -> bool:
+    """Whether a Properties editor shows this tab now; it may be hidden, or of no use for the kind of object."""
     try:
         space.context = tab
-    except TypeError:
-        pass  # the tab is hidden, or does not exist for this kind of object
+    except (TypeError, ReferenceError):
+        return False
+    return True
 
 
 def _notes() -> tuple:
@@ -317,6 +402,7 @@ def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room
 
 _CLASSES = (
     CANDELA_OT_select_culprit,
+    CANDELA_RENDER_PT_frame_notes,  # first: panels stand in this order
     CANDELA_RENDER_PT_sampling,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_parameters,
@@ -327,11 +413,13 @@ _CLASSES = (
     ),
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_frame,
-    CANDELA_RENDER_PT_frame_notes,
+    CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,
     CANDELA_LIGHT_PT_beam_shape,
     CANDELA_LIGHT_PT_shadow,
     CANDELA_OBJECT_PT_ray_visibility,
+    CANDELA_WORLD_PT_ray_visibility,
+    CANDELA_MATERIAL_PT_settings,
     CANDELA_OBJECT_PT_shadow_terminator,
 )
 

@@ -10,8 +10,10 @@ import numpy as np
 
 from ..compare import pictures
 from ..frame.pass_graph import FAMILY, RESULT, SERVICE, SUM, in_words, sockets
+from ..frame.technique import OF_A_PICTURE, identifier
 from ..techniques import REGISTRY
 from .pass_tree import TREE, checked, forget_result, graph_of, origin, preview, result
+from .properties import block_of
 
 IMAGE = "image"  # the kind of socket that takes or gives any picture
 _COLORS = {
@@ -101,8 +103,10 @@ def _technique_node(technique) -> type:
 
     def draw_settings(self, context, layout):
         column = layout.column()
-        for param in technique.params:
-            column.prop(context.scene.candela, f"{technique.name}_{param.name}")
+        for param in technique.params_of(*OF_A_PICTURE):
+            block = block_of(param.scope, context.scene)
+            if block is not None and not param.many:
+                column.prop(block.candela, identifier(technique.name, param.name))
         if shown:
             column.prop(self, "shown")
 

@@ -97,6 +97,9 @@ def mark_links(tree) -> None:
             link.is_valid = made not in wrong
 
 
+SHOWN = ("film.lens", "film.combined")  # the picture, as an eye sees it or else as it is
+
+
 def fill(tree, graph: PassGraph, columns: dict[str, int]) -> None:
     """Replace the tree's nodes by those of `graph`, placed by column, with one that shows the picture."""
     tree.nodes.clear()
@@ -113,11 +116,10 @@ def fill(tree, graph: PassGraph, columns: dict[str, int]) -> None:
     output = tree.nodes.new("CandelaPassOutput")
     output.select = False
     output.location = 360 * (max(columns.values(), default=0) + 1), 0
-    for node in reversed(list(made.values())):
-        picture = _socket(node.outputs, "film.combined")
-        if picture is not None:
-            tree.links.new(output.inputs[0], picture)
-            break
+    pictures = [_socket(node.outputs, name) for name in SHOWN for node in reversed(list(made.values()))]
+    picture = next((socket for socket in pictures if socket is not None), None)
+    if picture is not None:
+        tree.links.new(output.inputs[0], picture)
 
 
 def _socket(found, identifier: str):

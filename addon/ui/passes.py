@@ -8,6 +8,8 @@ import bpy
 import numpy as np
 
 from ..frame.light_paths import LIGHT_PATHS
+from ..frame.technique import CAMERA
+from .properties import block_of
 
 
 @dataclass(frozen=True)
@@ -74,9 +76,20 @@ PASSES = tuple(
 )
 
 
-def wanted_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
-    """The passes that a view layer asks for."""
-    return [render_pass for render_pass in PASSES if _ticked(layer, render_pass.switch)]
+# The picture as an eye sees it, beside a Combined that stays as it is; written where glare is on.
+GLARE = RenderPass("", "Glare", "RGBA", "COLOR", "film.lens")
+
+
+def wanted_passes(layer: bpy.types.ViewLayer, scene: bpy.types.Scene | None = None) -> list[RenderPass]:
+    """The passes that a view layer asks for, and that of the scene's camera where it sees with an eye."""
+    wanted = [render_pass for render_pass in PASSES if _ticked(layer, render_pass.switch)]
+    return [*wanted, GLARE] if scene is not None and glare_is_on(scene) else wanted
+
+
+def glare_is_on(scene: bpy.types.Scene) -> bool:
+    """Whether pictures of the scene's camera are shown with glare."""
+    camera = block_of(CAMERA, scene)
+    return camera is not None and camera.candela.glare_mode != "OFF"
 
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.

@@ -2,6 +2,7 @@
 
 from . import (
     alpha_foliage,
+    caustics,
     colonnade_hall,
     cornell_box,
     door_ajar,
@@ -23,5 +24,8 @@ SCENES = {
     "door_ajar": ("Door Ajar", door_ajar.build),
     "sky_courtyard": ("Sky Courtyard", sky_courtyard.build),
     "emissive_lamp": ("Emissive Lamp", emissive_lamp.build),
+    "caustics_table": ("Caustics Table", caustics.build_table),
+    "caustics_pool": ("Caustics Pool", caustics.build_pool),
+    "caustics_rings": ("Caustics Rings", caustics.build_rings),
     "alpha_foliage": ("Alpha Foliage", alpha_foliage.build),
 }

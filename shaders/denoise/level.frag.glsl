@@ -20,6 +20,20 @@ bool noisy(vec4 light)
   return light.a > least * least;
 }
 
+#ifdef REFLECTIONS
+// How much two pixels' lobes show the same: by their means, which may differ by what their own samples do.
+float shown_alike(vec4 one, vec4 other)
+{
+  float n = float(count);
+  float bright = luminance(one.rgb) / n;
+  float other_bright = luminance(other.rgb) / n;
+  float spread = max(one.w / n - bright * bright, 0.0) + max(other.w / n - other_bright * other_bright, 0.0);
+  vec3 apart = (one.rgb - other.rgb) / n;
+  float allowed = 4.0 * spread / n + 1e-3 * (bright * other_bright + 1e-4);
+  return exp(-dot(apart, apart) / allowed);
+}
+#endif
+
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -31,6 +45,9 @@ void main()
     return;
   }
   float bright = luminance(own.rgb);
+#ifdef REFLECTIONS
+  vec4 shown_here = shown_sum_fetch(pixel);
+#endif
   vec3 taken = vec3(0.0);
   float weights = 0.0;
   float variance = 0.0;
@@ -49,6 +66,9 @@ void main()
       float allowed = 0.5 * tolerance * tolerance * (own.a + light.a) + EQUAL * EQUAL * abs(bright * other);
       float weight = binomial(abs(x)) * binomial(abs(y)) * alike(here, there, max(abs(x), abs(y)) * stride)
                      * exp(-(other - bright) * (other - bright) / max(allowed, 1e-37));
+#ifdef REFLECTIONS
+      weight *= shown_alike(shown_here, shown_sum_fetch(place));
+#endif
       taken += weight * (light.rgb - own.rgb);
       weights += weight;
       variance += weight * weight * light.a;

@@ -15,6 +15,7 @@ void main()
   Instance instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(safe_normalize(light_point.xyz - light_point.w * world_position), instance);
   point.ray = RAY_SHADOW;
+  point.refracts = glass_blocks != 0;  // what it lets through is a lobe then, and no transparency
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u));
   bits = hash3(uvec3(bits.x, uint(gl_PrimitiveID), uint(sample_index)));
   Closures c = closures_begin(point.normal, to_unit(bits.y), 0.0);

@@ -253,8 +253,10 @@ void main()
   indirect *= here.weight;
 #ifdef TRANSMISSION
   if (refracts) {
-    out_transmission_direct.rgb = direct;
-    out_transmission_indirect.rgb = indirect;
+    // How much of the world shows through is the nearest pixel's, by the lobes' weights.
+    float share = luminance(here.weight) / max(luminance(seen_there(nearest).weight), 1e-6);
+    out_transmission_direct = vec4(direct, light_transmission_direct_fetch(nearest).a * min(share, 4.0));
+    out_transmission_indirect = vec4(indirect, light_transmission_indirect_fetch(nearest).a * min(share, 4.0));
     return;
   }
 #endif

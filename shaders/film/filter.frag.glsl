@@ -10,6 +10,12 @@ float weight_of(int tap, bool inside, int own, vec4 first, float last)
   return inside ? around : ((tap - PIXELS == own) ? 1.0 : 0.0);
 }
 
+// Radiance behind media; alpha says how much is covered, and what media take away is.
+vec4 film_dimmed(vec4 seen, vec3 passing)
+{
+  return vec4(seen.rgb * passing, 1.0 - (1.0 - seen.a) * dot(passing, vec3(1.0 / 3.0)));
+}
+
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);

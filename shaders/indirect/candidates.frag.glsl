@@ -68,6 +68,9 @@ void main()
       out_next_radiance.w = met.normal.y;
     }
     roll = hash3(roll);
+#ifdef MIRRORS_OWNED
+    met.photons = false;  // they bring what a mirror sends to the picture, not to other surfaces
+#endif
     later += throughput * direct_reflected(met, -direction, 1, roll.x);
     later_shorter = (bounce < bounces) ? later : later_shorter;
   }

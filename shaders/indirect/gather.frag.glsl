@@ -1,5 +1,6 @@
 // Indirect light of this sample: virtual lights, bounded where they are near, and rays for what the bound leaves out
-// (near.glsl). With SHARED, regions of pixels have gathered the virtual lights (region_gather.comp.glsl).
+// (near.glsl). With SHARED, regions of pixels have gathered the virtual lights (region_gather.comp.glsl). Lobes up to
+// `shaded_roughness` see what rays meet with its own materials (hits/).
 #include "indirect/near.glsl"
 #ifndef SHARED
 #include "indirect/traced_gather.glsl"
@@ -37,7 +38,7 @@ void main()
     }
   }
 #ifdef GLOSSY
-  if (s.kind <= FRESNEL_F82 && max_component(s.glossy_weight) > 0.0) {
+  if (s.kind <= FRESNEL_F82 && s.glossy_roughness > shaded_roughness && max_component(s.glossy_weight) > 0.0) {
     Lobe lobe = lobe_begin(s, to_viewer);
     // Where the lobe is most of what is seen, on metal, it has the noise that is seen.
     int count = (luminance(s.glossy_weight * s.glossy_tint) > luminance(s.diffuse)) ? lobe_rays : 1;
@@ -48,7 +49,8 @@ void main()
       vec3 weight;
       roll = hash3(roll);
       vec3 direction = lobe_sample(lobe, vec2(u.x / float(count) + part, fract(u.y + 2.5 * part)), weight);
-      if (max_component(weight) > 0.0 && dot(direction, s.geometric_normal) > 0.0) {
+      if (max_component(weight) > 0.0 && may_mirror(s, direction)) {
+        origin = ray_origin(s.position, side_of_ray(s, direction));
         out_glossy.rgb += weight * near_radiance(origin, direction, true, roll) / float(count);
       }
     }

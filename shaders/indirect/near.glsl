@@ -35,6 +35,10 @@ vec3 radiance_along(Walk walk, float reach, uvec3 roll)
         break;
       }
     }
+#ifdef MIRRORS_OWNED
+    // Photons bring what a mirror sends to a diffuse surface of the picture, and to no other.
+    walk.met.photons = walk.met.photons && walk.bounce == 1 && !walk.whole;
+#endif
     walk.whole = walk.has_met = false;
     roll = hash3(roll);
     sum += throughput * direct_reflected(walk.met, -walk.direction, 1, roll.x);

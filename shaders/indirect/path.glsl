@@ -7,6 +7,9 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "indirect/albedo.glsl"
+#ifdef MEDIA  // last: what it includes, too, would be missing where this is left out
+#include "media/media.glsl"
+#endif
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 
@@ -15,6 +18,9 @@ struct Vertex {
   vec3 normal;  // of the triangle, on the side that the ray came from, to which it sends light
   vec3 lit;     // the same, or on the other side: that from which light reaches it
   Reflection reflection;
+#ifdef MIRRORS_OWNED
+  bool photons;  // lamps' light that it mirrors arrives as photons of caustics
+#endif
 };
 
 // Pixel of the picture in which a point of a surface lies that faces the camera; false if there is none. What the pixel
@@ -77,7 +83,8 @@ Reflection reflection_at(ivec2 hit, vec3 position, vec3 normal)
     vec4 seen = surface_position_fetch(pixel);
     if (seen.w != 0.0 && distance(seen.xyz, position) < footprint) {
       Surface s = SURFACE_READ(pixel);
-      if (dot(s.geometric_normal, normal) > 0.9) {
+      // Of a holdout the picture has cut out what it reflects.
+      if (s.holdout < 1.0 && dot(s.geometric_normal, normal) > 0.9) {
         return surface_reflection(s, slant);
       }
     }
@@ -99,6 +106,10 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
     met.normal = -met.normal;
   }
   met.reflection = reflection_at(hit, met.position, met.normal);
+#ifdef MIRRORS_OWNED
+  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
+#endif
   met.lit = met.normal;
   float through = met.reflection.through;
   if (through > 0.0) {
@@ -186,7 +197,17 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
       if ((light.flags & LIGHT_SHADOW) != 0) {
         visibility = light_visibility(light, origin, chosen_direction, salt + uint(chosen));
       }
-      sum += chosen_light * reflection_of(met.reflection, normal, chosen_direction, viewer)
+#ifdef MEDIA
+      float reach = min(light_distance(light, origin, chosen_direction), FARTHEST_MEDIUM);
+      chosen_light *= media_transmittance(origin, chosen_direction, reach, salt);
+#endif
+      Reflection reflection = met.reflection;
+#ifdef MIRRORS_OWNED
+      if (met.photons && (light.flags & LIGHT_GLASS_BLOCKS) != 0) {
+        reflection.straight = reflection.grazing = vec3(0.0);
+      }
+#endif
+      sum += chosen_light * reflection_of(reflection, normal, chosen_direction, viewer)
              * (visibility * total / chosen_share);
     }
   }
@@ -195,13 +216,13 @@ vec3 direct_reflected(Vertex met, vec3 viewer, int light_rays, uint salt)
 
 // How densely cosine-distributed directions of a surface fall on a point of another, per m2. `outer` is the normal of the
 // surface's triangle, on the side of `origin`; a point that the surface's own ray has met is `known` to be seen.
-float direction_density(vec3 origin, vec3 normal, vec3 outer, vec3 point, vec3 point_normal, bool known, uvec3 salt)
+float direction_density(vec3 origin, vec3 normal, vec3 outer, vec3 point, vec3 normal_there, bool known, uvec3 salt)
 {
   // What a ray has met is where that ray saw it: in a corner the offset of a ray's start may lie beyond the ray's own.
-  vec3 path = (known ? point : ray_origin(point, point_normal)) - origin;
+  vec3 path = (known ? point : ray_origin(point, normal_there)) - origin;
   float squared = max(dot(path, path), 1e-30);
   vec3 direction = path * inversesqrt(squared);
-  float cosines = max(dot(normal, direction), 0.0) * max(-dot(point_normal, direction), 0.0);
+  float cosines = max(dot(normal, direction), 0.0) * max(-dot(normal_there, direction), 0.0);
   if (cosines <= 0.0 || dot(direction, outer) <= 0.0) {
     return 0.0;
   }

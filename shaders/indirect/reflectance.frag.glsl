@@ -5,6 +5,15 @@
 #include "lib/brdf.glsl"
 #include "indirect/albedo.glsl"
 
+// 1: a smooth mirror or glass, whose light photons of caustics bring where a technique owns it.
+float mirrors_photons(Surface s, Reflection r)
+{
+  bool glass = s.kind == LOBE_REFRACTION;
+  bool mirror = s.kind < LOBE_REFRACTION && luminance(r.grazing) > 0.0 && s.glossy_roughness <= SMOOTH_MIRROR
+                && luminance(r.straight) >= luminance(r.diffuse);
+  return (glass || mirror) ? 1.0 : 0.0;
+}
+
 void main()
 {
   int band = int(gl_FragCoord.y) / rows;
@@ -17,7 +26,7 @@ void main()
       if (surface_position_fetch(pixel).w != 0.0) {
         Surface s = SURFACE_READ(pixel);
         Reflection r = surface_reflection(s, view_cosine);
-        sum += (band == 0) ? vec4(surface_albedo(s, view_cosine), 0.0)
+        sum += (band == 0) ? vec4(surface_albedo(s, view_cosine), mirrors_photons(s, r))
              : (band == 1) ? vec4(r.diffuse, r.through * luminance(r.diffuse))
              : (band == 2) ? vec4(r.straight, r.alpha)
                            : vec4(r.grazing, r.rough);

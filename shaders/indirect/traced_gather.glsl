@@ -76,6 +76,9 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
       traced = chosen;
     }
     vec3 arriving = light.intensity * (bounded * step_size / chosen_share * visible);
+#ifdef MEDIA
+    arriving *= media_transmittance(origin, direction, distance(light.position, origin), salt);
+#endif
     sum += arriving * (reflected ? surface_diffuse_reflection(s, to_viewer, direction)
                                  : vec3(max(dot(s.normal, direction), 0.0)));
   }

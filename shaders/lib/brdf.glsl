@@ -4,6 +4,9 @@
 #include "lib/math.glsl"
 #include "lib/energy.glsl"
 #include "lib/gbuffer.glsl"
+#ifdef HAS_SURFACE_EDIT
+#include "edit/rotation.glsl"
+#endif
 
 // Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model. That term depends on
 // the colour: the albedo without the weight of a mix and what a layer leaves.
@@ -114,6 +117,14 @@ Lobe lobe_begin(Surface s, vec3 view)
   lobe.view = lobe_to_local(lobe, view);
   float roughness = lobe_roughness(lobe.alpha);
   lobe.scale = s.glossy_weight * multiscatter_scale(s.kind, lobe.tint, lobe.edge, lobe.ior, roughness, lobe.view.z);
+#ifdef HAS_SURFACE_EDIT
+  // The view has its place in the lobe; where light comes from turns with the edit.
+  if (surface_is_edited(s)) {
+    lobe.tangent = quaternion_turned(s.edit, lobe.tangent);
+    lobe.bitangent = quaternion_turned(s.edit, lobe.bitangent);
+    lobe.normal = quaternion_turned(s.edit, lobe.normal);
+  }
+#endif
   return lobe;
 }
 

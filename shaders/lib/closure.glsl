@@ -86,7 +86,22 @@ struct Closures {
   float glossy_chance;    // that the lobe that is kept was to be
   float even_share;       // of that chance, which all lobes have alike
   float random;           // uniform 0..1, reused by rescaling
+#ifdef SUBSURFACE
+  vec3 scatter;           // of the diffuse albedo, the part whose light entered elsewhere
+  vec3 scatter_length;    // SCATTER_* length of its profile, m, times the albedo
+  vec3 scatter_color;     // albedo that decides the profile's shape, times the albedo
+  float scatter_most;     // albedo of the one that the next two are of
+  int scatter_method;     // SCATTER_*
+  float scatter_entry;    // cosine at which the view's ray enters
+  float map_length;       // painted: factor of the length
+  vec4 map_entry;         // painted: tint of light that enters, and how much of it scatters
+#endif
 };
+
+// Cycles' methods of subsurface scattering; what a length is: Burley's d, else the mean free path of an isotropic walk.
+#define SCATTER_BURLEY 0
+#define SCATTER_WALK 1
+#define SCATTER_SKIN 2
 
 // `even_share`: of a lobe's chance to be kept, which all lobes have alike. Without, a faint lobe beside a strong one would be
 // kept in one sample of hundreds, and its own pass, and the highlights of lamps in it, would be noise.
@@ -119,6 +134,16 @@ Closures closures_begin(vec3 normal, float random_number, float even_share)
   c.glossy_chance = 1.0;
   c.even_share = even_share;
   c.random = random_number;
+#ifdef SUBSURFACE
+  c.scatter = vec3(0.0);
+  c.scatter_length = vec3(0.0);
+  c.scatter_color = vec3(0.0);
+  c.scatter_most = 0.0;
+  c.scatter_method = SCATTER_BURLEY;
+  c.scatter_entry = 1.0;
+  c.map_length = 1.0;
+  c.map_entry = vec4(1.0);
+#endif
   return c;
 }
 
@@ -179,6 +204,12 @@ bool closure_glossy_choose(inout Closures c, vec3 weight, float importance)
 bool closure_glossy(inout Closures c, vec3 weight, float importance, int kind, vec3 tint, vec3 edge, float ior,
                     float roughness, float anisotropy, vec3 tangent, vec3 normal)
 {
+#ifdef ONE_LOBE
+  // Of a light that meets the surface: what is bent (1) or mirrored (2) alone, so that all photons take one path.
+  if (kind > LOBE_REFRACTION || (kind == LOBE_REFRACTION) != (wanted_lobe == 1)) {
+    return false;
+  }
+#endif
   bool chosen = closure_glossy_choose(c, weight, importance);
   if (chosen) {
     c.kind = kind;
@@ -209,6 +240,28 @@ void closure_transparent(inout Closures c, vec3 weight)
 vec3 finite_or_black(vec3 color)
 {
   return (is_finite(color.x) && is_finite(color.y) && is_finite(color.z)) ? color : vec3(0.0);
+}
+
+// The chance with which a layer lets the rays of a sample pass, and the share of the light that does, grey. Where a lobe is
+// added to what lets all pass both are more than 1 together: the layer is then drawn as often as they are to each other,
+// and who passes it carries the more light (LEAST_DRAWN: of a faint lobe too, or its highlights were few and bright).
+#define LEAST_DRAWN 0.25
+
+float layer_share(Closures c)
+{
+  return clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+}
+
+float layer_chance(Closures c)
+{
+  float through = layer_share(c);
+#ifdef ADDED_LOBES
+  float drawn = c.diffuse_sum / 3.0 + c.glossy_sum;
+  if (drawn > 0.0 && through + drawn > 1.001) {
+    through /= through + max(drawn, LEAST_DRAWN);
+  }
+#endif
+  return through;
 }
 
 void closures_end(inout Closures c)

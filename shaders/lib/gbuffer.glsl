@@ -40,12 +40,20 @@ struct Surface {
   float tangent_angle;    // of the tangent in the frame of orthonormal_basis(glossy_normal), 0..1 half turns
   vec3 glossy_normal;
   int distribution;       // of the lobe's microfacets: DISTRIBUTION_*
+#ifdef HAS_SURFACE_EDIT
+  vec4 edit;              // quaternion that turns its frame (edit/); 0: none
+#endif
 };
 
-#define SURFACE_READ(pixel) \
+#define SURFACE_DECODED(pixel) \
   surface_decode(surface_position_fetch(pixel), surface_normal_fetch(pixel), \
                  surface_diffuse_fetch(pixel), surface_tint_fetch(pixel), \
                  surface_lobe_fetch(pixel), surface_emission_fetch(pixel))
+#ifdef HAS_SURFACE_EDIT
+#define SURFACE_READ(pixel) surface_edited(SURFACE_DECODED(pixel), surface_edit_fetch(pixel))
+#else
+#define SURFACE_READ(pixel) SURFACE_DECODED(pixel)
+#endif
 
 // Alpha squared of microfacets that deviate from the normal as the bumped one does.
 float bump_squared(vec3 normal, vec3 bumped)
@@ -223,5 +231,37 @@ Surface surface_decode(vec4 position, vec4 normal, vec4 diffuse, vec4 tint, vec4
   s.emission = emission.xyz;
   s.glossy_roughness = (s.kind == LOBE_TRANSLUCENT) ? 1.0 : emission.w;
   s.sink = (s.kind == LOBE_TRANSLUCENT) ? emission.w : 0.0;
+#ifdef HAS_SURFACE_EDIT
+  s.edit = vec4(0.0);
+#endif
   return s;
+}
+
+#ifdef HAS_SURFACE_EDIT
+Surface surface_edited(Surface s, vec4 edit)
+{
+  s.edit = edit;
+  return s;
+}
+#endif
+
+bool surface_is_edited(Surface s)
+{
+#ifdef HAS_SURFACE_EDIT
+  return dot(s.edit, s.edit) > 0.0;
+#else
+  return false;
+#endif
+}
+
+// Whether what comes from `direction` may be mirrored: from above the triangle, or where an edit has turned it.
+bool may_mirror(Surface s, vec3 direction)
+{
+  return dot(direction, s.geometric_normal) > 0.0 || surface_is_edited(s);
+}
+
+// The side of the triangle on which a ray along `direction` starts: edits may turn it below.
+vec3 side_of_ray(Surface s, vec3 direction)
+{
+  return (surface_is_edited(s) && dot(direction, s.geometric_normal) < 0.0) ? -s.geometric_normal : s.geometric_normal;
 }

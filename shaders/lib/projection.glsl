@@ -7,3 +7,9 @@ vec4 project(vec3 p, vec4 to_x, vec4 to_y, vec4 to_w, vec4 to_q, float nearest)
   float w = dot(to_w, h);
   return vec4(dot(to_x, h), dot(to_y, h), w - 2.0 * nearest * dot(to_q, h), w);
 }
+
+// Whether a projection turns its picture around, as a camera of negative scale does: what faces it then runs clockwise.
+bool projection_mirrors(vec4 to_x, vec4 to_y, vec4 to_w, vec4 to_q, float nearest)
+{
+  return dot(cross(to_x.xyz, to_y.xyz), to_q.xyz - to_w.xyz) < 0.0;
+}

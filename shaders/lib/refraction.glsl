@@ -39,6 +39,19 @@ Interface interface_begin(vec3 normal, vec3 view, float roughness, float ior, ve
   return surface;
 }
 
+// Turned by the edit of what the picture shows: light is bent from elsewhere.
+Interface interface_edited(Interface surface, Surface s)
+{
+#ifdef HAS_SURFACE_EDIT
+  if (surface_is_edited(s)) {
+    surface.tangent = quaternion_turned(s.edit, surface.tangent);
+    surface.bitangent = quaternion_turned(s.edit, surface.bitangent);
+    surface.normal = quaternion_turned(s.edit, surface.normal);
+  }
+#endif
+  return surface;
+}
+
 vec3 interface_to_world(Interface surface, vec3 v)
 {
   return safe_normalize(v.x * surface.tangent + v.y * surface.bitangent + v.z * surface.normal);
@@ -94,9 +107,10 @@ vec3 interface_value(Interface surface, vec3 light_world, out float density)
   return color * (facet / (1.0 + lambda_view + ggx_lambda(light, alpha)));
 }
 
-// A direction drawn from the interface by visible normals, mirrored or bent by `choice`; `weight` =
-// f |cos| / density for it. Zero weight where it would leave on the wrong side.
-vec3 interface_sample(Interface surface, vec2 u, float choice, out vec3 weight)
+// As interface_sample, where `strata` numbers, one in each of as many parts of 0..1, choose for one photon after the other:
+// chances are whole numbers of them, so that each path is drawn as often as it should be. 0: choices are free. Below 0 there
+// is one choice for all: what the photon does not do is lost.
+vec3 interface_sample_strata(Interface surface, vec2 u, float choice, float strata, out vec3 weight)
 {
   vec3 view = surface.view;
   vec3 h = vec3(0.0, 0.0, 1.0);
@@ -107,7 +121,15 @@ vec3 interface_sample(Interface surface, vec2 u, float choice, out vec3 weight)
   float view_h = dot(view, h);
   vec3 mirrored = interface_reflectance(surface, view_h);
   float chance = interface_mirror_chance(surface, mirrored);
+  if (strata > 0.0 && chance < 1.0) {
+    chance = min(ceil(chance * strata), strata - 1.0) / strata;
+  }
   bool passes = choice >= chance;
+  float passing = max(1.0 - chance, 1e-6);
+  float mirroring = max(chance, 1e-6);
+  if (strata < 0.0) {
+    passing = mirroring = 1.0;
+  }
   float squared = 1.0 - (1.0 - view_h * view_h) / (surface.ior * surface.ior);
   vec3 bent = (view_h / surface.ior - sqrt(max(squared, 0.0))) * h - view / surface.ior;
   vec3 light = passes ? bent : 2.0 * view_h * h - view;
@@ -116,9 +138,16 @@ vec3 interface_sample(Interface surface, vec2 u, float choice, out vec3 weight)
     vec2 alpha = vec2(surface.alpha);
     float lambda_view = smooth_surface ? 0.0 : ggx_lambda(view, alpha);
     float lambda_light = smooth_surface ? 0.0 : ggx_lambda(light, alpha);
-    vec3 color = passes ? surface.transmitted * (1.0 - mirrored) / max(1.0 - chance, 1e-6) :
-                          surface.reflected * mirrored / max(chance, 1e-6);
+    vec3 color = passes ? surface.transmitted * (1.0 - mirrored) / passing :
+                          surface.reflected * mirrored / mirroring;
     weight = color * ((1.0 + lambda_view) / (1.0 + lambda_view + lambda_light));
   }
   return interface_to_world(surface, light);
+}
+
+// A direction drawn from the interface by visible normals, mirrored or bent by `choice`; `weight` =
+// f |cos| / density for it. Zero weight where it would leave on the wrong side.
+vec3 interface_sample(Interface surface, vec2 u, float choice, out vec3 weight)
+{
+  return interface_sample_strata(surface, u, choice, 0.0, weight);
 }

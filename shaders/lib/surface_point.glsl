@@ -1,8 +1,9 @@
-// What a material knows about the point that it shades. Filled by surface/point.glsl, read by the nodes of material/.
+// What a material knows about the point that it shades. Filled by surface/point.glsl and hits/point.glsl, read by the nodes of material/.
 
 #define RAY_CAMERA 0  // the viewer looks at the point
 #define RAY_SHADOW 1  // light asks whether the point lets it pass
 #define RAY_LIGHT 2   // a surface is lit by the point, which belongs to the world
+#define RAY_GLOSSY 3  // a surface reflects the point, or bends the way to it
 
 struct SurfacePoint {
   vec3 position;          // world space, metres, relative to the render origin

@@ -20,6 +20,9 @@
 #ifdef KNOWN_IRRADIANCE
 #include "lib/known_irradiance.glsl"
 #endif
+#ifdef MEDIA
+#include "media/light.glsl"
+#endif
 
 // Irradiance in closed form times the closure towards the light's middle: exact for Lambert's.
 vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
@@ -120,8 +123,8 @@ void main()
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       towards = whole ? towards : direction;
       // None between a surface and the mirror's normal that was bent up from it (reflecting_normal).
-      bool in_front = s.bump > 0.0 || dot(direction, s.normal) > 0.0;
-      if (on_glossy && in_front && (s.lift > 0.0 || dot(direction, s.geometric_normal) > 0.0)) {
+      bool in_front = s.bump > 0.0 || dot(direction, s.normal) > 0.0 || surface_is_edited(s);
+      if (on_glossy && in_front && (s.lift > 0.0 || may_mirror(s, direction))) {
         float lobe_density;
         vec3 reflected = lobe_reflection(lobe, direction, lobe_density);
         if (traced && density > 0.0 && (light.flags & LIGHT_TRACED) != 0) {
@@ -148,6 +151,11 @@ void main()
         vec3 start = light_start(s.position, side * s.normal, facing, lift, towards, facing);
         visibility = light_visibility(light, pixel, start, facing);
       }
+#ifdef MEDIA
+      vec3 passing = light_through_media(light, pixel, s.position, towards);
+      from_diffuse *= passing;
+      from_glossy *= passing;
+#endif
       diffuse += from_diffuse * visibility;
       glossy += from_glossy * visibility;
 #ifdef KNOWN_IRRADIANCE

@@ -11,5 +11,5 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   light_sample(light, origin, direction, density);
   float reach = 0.9999 * light_distance(light, origin, direction);
   uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 17);
-  return clear_to_light(origin, direction, reach, salt.x);
+  return clear_to_light(origin, direction, reach, salt.x, (light.flags & LIGHT_GLASS_BLOCKS) != 0);
 }

@@ -2,10 +2,17 @@
 // a light, the world or a surface. At each interface the lights of this sample are asked directly (one traced), and the
 // walk goes on by the interface's lobe; what both can find is weighted by the power heuristic.
 //
+// Where rays that meet surfaces are followed by themselves (hits/), FIRST_ALONE is defined: what light of lamps
+// and the world the first interface lets arrive is all that is left to do here.
+//
 // What the first interface lets arrive is direct; all else is indirect, as in Cycles' passes.
 #include "lib/refraction.glsl"
+#include "light/sources.glsl"
+#include "trace/rays.glsl"
+#ifndef FIRST_ALONE
 #define PART 256  // virtual lights that a surface behind glass looks at: no filter spreads their noise
 #include "indirect/near.glsl"
+#endif
 #include "lib/environment.glsl"
 
 // Share of a technique of density `density` against another one of density `other`.
@@ -50,7 +57,11 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   Light light = light_read(kept);
   vec3 side = (dot(kept_direction, geometric_normal) < 0.0) ? -geometric_normal : geometric_normal;
   vec3 origin = ray_origin(position, side);
+#ifdef FIRST_ALONE
+  float reach = light_distance(light, origin, kept_direction) * 0.9999;
+#else
   float reach = light_reach(light, origin, kept_direction);
+#endif
   ivec2 hit;
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
                  && trace_layers(origin, kept_direction, reach, reach, salt, true, true, hit) < reach;
@@ -58,10 +69,10 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
 }
 
 // What a ray of the walk finds before `limit` in lights and world. `lobe_density` 0: only the walk can find it.
-vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit)
+vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, bool with_world)
 {
   vec3 sum = vec3(0.0);
-  if (limit >= 1e29 && world_transmission != 0) {
+  if (limit >= 1e29 && with_world) {
     vec3 radiance = environment_radiance(direction);
     if (lobe_density > 0.0) {
       radiance *= power_share(lobe_density, world_samples * environment_density(direction));
@@ -80,6 +91,7 @@ vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit)
   return sum;
 }
 
+#ifndef FIRST_ALONE
 // What a surface behind glass reflects: exactly where it stands behind the glass in the picture, too, else the mean of its
 // material. `behind` holds places and reflectances of all that is not transparent.
 vec3 albedo_behind(ivec2 hit, vec3 position, vec3 normal)
@@ -95,6 +107,7 @@ vec3 albedo_behind(ivec2 hit, vec3 position, vec3 normal)
   }
   return mean_albedo(hit);
 }
+#endif
 
 void main()
 {
@@ -115,9 +128,13 @@ void main()
   float choice = shuffled(film_view.sample_index, salt.zx);
   Interface surface = interface_begin(s.glossy_normal, to_viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
                                       s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
+  surface = interface_edited(surface, s);
   vec3 position = s.position;
   vec3 geometric_normal = s.geometric_normal;
   vec3 throughput = vec3(1.0);
+  // With a transparent film, and glass that is said to be, the picture has a hole where clear glass shows the world: the
+  // alpha channels hold how large.
+  bool clear = s.glossy_roughness <= clear_roughness;
   for (int step = 0; step <= interfaces; step++) {
     vec3 gained = throughput * light_through(surface, position, geometric_normal, choice, roll.x);
     vec3 weight;
@@ -127,7 +144,9 @@ void main()
     // Interpolated normals and triangle may differ on which side a direction leaves.
     bool passes = dot(direction, surface.normal) < 0.0;
     float side = dot(direction, geometric_normal);
-    throughput *= (passes == (side < 0.0)) ? weight : vec3(0.0);
+    throughput *= (passes == (side < 0.0) || (step == 0 && surface_is_edited(s))) ? weight : vec3(0.0);
+    clear = clear && passes;
+    float hole = 0.0;
     float t = 1e29;
     ivec2 hit;
     vec3 origin = ray_origin(position, passes ? -geometric_normal : geometric_normal);
@@ -135,9 +154,11 @@ void main()
     vec3 normal = vec3(0.0);
     if (goes_on) {
       t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, false, hit);
-      gained += throughput * light_found(origin, direction, lobe_density, t);
+      gained += throughput * light_found(origin, direction, lobe_density, t, world_transmission != 0 && !clear);
+      hole = (clear && t >= 1e29) ? dot(throughput, vec3(1.0 / 3.0)) : 0.0;
       goes_on = t < 1e29;
     }
+#ifndef FIRST_ALONE
     if (goes_on) {
       vec3 emission = triangle_emission(hit, direction, normal);
       float light_density = luminance(abs(emission)) * t * t
@@ -145,16 +166,20 @@ void main()
       gained += throughput * emission
                 * ((lobe_density > 0.0) ? power_share(lobe_density, emissive_points * light_density) : 1.0);
     }
+#endif
     if (step == 0) {
-      out_direct.rgb += gained;
+      out_direct += vec4(gained, hole);
     }
     else {
-      out_indirect.rgb += gained;
+      out_indirect += vec4(gained, hole);
     }
     if (!goes_on) {
       break;
     }
 
+#ifdef FIRST_ALONE
+    break;
+#else
     position = origin + t * direction;
     roll = hash3(roll + uvec3(uint(step), 0u, 0u));
     int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
@@ -180,6 +205,9 @@ void main()
       rest.met.reflection.straight = vec3(0.0);
       rest.met.reflection.grazing = vec3(0.0);
       rest.met.reflection.alpha = 1.0;
+#ifdef MIRRORS_OWNED
+      rest.met.photons = false;
+#endif
       out_indirect.rgb += throughput * radiance_along(rest, glossy_radius, roll);
       break;
     }
@@ -190,11 +218,13 @@ void main()
     if (shape.z > 1.5) {
       scale = glass_multiscatter(glass.rgb, -dot(smooth_normal, direction), shape.x, ior);
     }
+    clear = clear && shape.x <= clear_roughness;
     surface = interface_begin(smooth_normal, -direction, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
                               scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
     roll = hash3(roll);
     u = vec2(to_unit(roll.x), to_unit(roll.y));
     choice = to_unit(roll.z);
     roll = hash3(roll);
+#endif
   }
 }

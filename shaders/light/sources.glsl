@@ -31,6 +31,7 @@
 #define LIGHT_TRANSMISSION 256
 #define LIGHT_SIDED 512
 #define LIGHT_EVEN 1024
+#define LIGHT_GLASS_BLOCKS 2048
 
 // What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/sources/lights.py). What
 // is left out some drivers would compute and mask.

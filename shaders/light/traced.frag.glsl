@@ -7,6 +7,10 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 
+#ifdef MEDIA
+#include "media/media.glsl"
+#endif
+
 // Share of the lobe's samples against `light_samples` of density `light_density` (power heuristic, beta = 2).
 float lobe_share(float lobe_density, float light_density, float light_samples)
 {
@@ -75,7 +79,7 @@ void main()
   for (int k = 0; k < count; k++) {
     vec3 weight;
     vec3 direction = lobe_sample(lobe, vec2((u.x + float(k)) / float(count), u.y), weight);
-    if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
+    if (max_component(weight) <= 0.0 || !may_mirror(s, direction)) {
       continue;
     }
     float density = 0.0;
@@ -97,6 +101,7 @@ void main()
   uint layers = salt.z + uint(film_view.sample_index);
   ivec2 hit;
   if (kept_importance > 0.0) {
+    origin = ray_origin(s.position, side_of_ray(s, kept_direction));
     // Whatever stands before the nearest source blocks all of them.
     float blocked = trace_until(origin, kept_direction, kept_span.y, kept_span.x, layers, hit);
     if (blocked >= kept_span.x) {
@@ -104,13 +109,17 @@ void main()
       float limit = (blocked < kept_span.y) ? blocked : 1e29;
       vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
       out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
+#ifdef MEDIA
+      float reach = (kept_span.x < 1e28) ? kept_span.x : FARTHEST_MEDIUM;
+      out_glossy.rgb *= media_transmittance(origin, kept_direction, reach, salt.x);
+#endif
     }
   }
-  if (emissive_power > 0.0) {
+  if (emissive_power > 0.0 && s.glossy_roughness > shaded_roughness) {
     // Emissive triangles are only known once a ray meets them, so they cannot be weighed beforehand: a ray of their own.
     vec3 weight;
     vec3 direction = lobe_sample(lobe, u, weight);
-    if (max_component(weight) <= 0.0 || dot(direction, s.geometric_normal) <= 0.0) {
+    if (max_component(weight) <= 0.0 || !may_mirror(s, direction)) {
       return;
     }
     float t = trace_nearest(origin, direction, 1e29, layers, hit);
@@ -126,6 +135,9 @@ void main()
         float ratio = emissive_points * light_density / max(lobe_density, 1e-30);
         share = 1.0 / (1.0 + ratio * ratio);
       }
+#ifdef MEDIA
+      weight *= media_transmittance(origin, direction, t, salt.y);
+#endif
       out_glossy.rgb += weight * emission * share;
     }
   }

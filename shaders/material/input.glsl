@@ -20,7 +20,7 @@ void input_color_attribute(vec4 stored, out vec3 color, out float alpha)
 
 void input_uv(vec4 stored, out vec3 uv)
 {
-  uv = vec3(stored.xy, 0.0);
+  uv = stored.xyz;  // of a map 0, but other attributes may be named, too
 }
 
 void input_instancer_uv(SurfacePoint point, out vec3 uv)
@@ -125,7 +125,8 @@ void input_camera(SurfacePoint point, out vec3 view, out float depth, out float 
   distance = length(p);
 }
 
-// The camera looks at everything that is drawn, light asks casters for their transparency: no other ray has a surface.
+// The camera looks at everything that is drawn, light asks casters for their transparency, and rays of lobes and through
+// glass meet the rest (hits/): those all count as reflected.
 void input_light_path(SurfacePoint point, out float camera_ray, out float shadow_ray, out float diffuse_ray,
                       out float glossy_ray, out float singular_ray, out float reflection_ray,
                       out float transmission_ray, out float volume_ray, out float ray_length, out float ray_depth,
@@ -135,9 +136,9 @@ void input_light_path(SurfacePoint point, out float camera_ray, out float shadow
   camera_ray = (point.ray == RAY_CAMERA) ? 1.0 : 0.0;
   shadow_ray = (point.ray == RAY_SHADOW) ? 1.0 : 0.0;
   diffuse_ray = 0.0;
-  glossy_ray = 0.0;
+  glossy_ray = (point.ray == RAY_GLOSSY) ? 1.0 : 0.0;
   singular_ray = 0.0;
-  reflection_ray = 0.0;
+  reflection_ray = glossy_ray;
   transmission_ray = 0.0;
   volume_ray = 0.0;
   ray_length = length(point.position - material_scene.camera_position.xyz);
@@ -147,6 +148,26 @@ void input_light_path(SurfacePoint point, out float camera_ray, out float shadow
   transparent_depth = 0.0;
   transmission_depth = 0.0;
   portal_depth = 0.0;
+}
+
+// On strands alone: what addon/snapshot/strands.py stores with their corners. Elsewhere the first number is 0.
+void input_strand(SurfacePoint point, vec4 strand, vec4 way, out float is_strand, out float intercept, out float extent,
+                  out float thickness, out vec3 tangent_normal, out float random)
+{
+  is_strand = strand.x;
+  intercept = strand.y;
+  extent = strand.z;
+  thickness = strand.w * strand.x;
+  vec3 along = safe_normalize(world_from_object(point, way.xyz));
+  tangent_normal = safe_normalize(point.incoming - along * dot(point.incoming, along)) * strand.x;
+  random = way.w * strand.x;
+}
+
+void input_point(SurfacePoint point, vec4 place, vec4 mark, out vec3 position, out float radius, out float random)
+{
+  position = (world_from_object(point, place.xyz) + object_place(point) + material_scene.origin.xyz) * mark.x;
+  radius = place.w * mark.x;
+  random = mark.y;
 }
 
 void input_color(vec3 chosen, out vec3 color)

@@ -5,6 +5,10 @@
 #include "lib/color.glsl"
 #include "lib/energy.glsl"
 
+#ifdef SUBSURFACE
+#include "subsurface/closure.glsl"
+#endif
+
 #define MOST_IOR 1e5  // of an index of refraction: it mirrors all but a hundred-thousandth, and more would leave float32
 
 // A layer with less weight than this is not worth a lobe.
@@ -103,9 +107,72 @@ vec3 add_sheen(inout Closures closures, SurfacePoint point, vec3 weight, float r
   return albedo;
 }
 
+// Hair. Of light that meets a fibre about HAIR_MIRRORED is reflected at its surface; the rest crosses the inside, on average
+// 1.57 radii long, and leaves it for the most part. What it absorbs follows from a colour, by the fit of Chiang et al. 2016
+// for the colour of many strands together, or from pigments.
+#define HAIR_MIRRORED 0.08
+#define HAIR_PATH 1.57
+
+vec3 hair_absorption(vec3 color, float roughness)
+{
+  float b = roughness;
+  float fit = 5.969 + b * (-0.215 + b * (2.532 + b * (-10.73 + b * (5.574 + b * 0.245))));
+  vec3 root = log(clamp(color, vec3(1e-5), vec3(1.0))) / fit;
+  return root * root;
+}
+
+void shader_hair(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, int kind, float melanin,
+                 float redness, vec3 tint, vec3 coefficient, float roughness, vec3 normal)
+{
+  vec3 absorption = max(coefficient, vec3(0.0));
+  if (kind == 0) {
+    absorption = hair_absorption(color, roughness);
+  }
+  else if (kind == 1) {
+    float amount = -log(max(1.0 - clamp(melanin, 0.0, 1.0), 1e-4));
+    float red = clamp(redness, 0.0, 1.0);
+    absorption = amount * mix(vec3(0.506, 0.841, 1.653), vec3(0.343, 0.733, 1.924), red)
+                 + hair_absorption(tint, roughness);
+  }
+  vec3 passing = exp(-HAIR_PATH * absorption);
+  vec3 albedo = weight * (HAIR_MIRRORED + (1.0 - HAIR_MIRRORED) * passing);
+  vec3 n = unit_or(normal, point.normal);
+  closure_diffuse(closures, 0.5 * albedo, vec3(1.0), 0.0, n);
+  add_soft(closures, LOBE_TRANSLUCENT, 0.5 * albedo, 1.0, 0.0, vec3(1.0), n);
+}
+
 void shader_diffuse(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
 {
   closure_diffuse(closures, weight, max(color, vec3(0.0)), clamp(roughness, 0.0, 1.0), unit_or(normal, point.normal));
+}
+
+// Diffuse where it is lit; the pass of light below surfaces spreads it (subsurface/closure.glsl). `radius` in metres.
+void add_subsurface(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, vec3 radius, float ior,
+                    float roughness, float anisotropy, vec3 normal, int method)
+{
+#ifdef SUBSURFACE
+  closure_subsurface(closures, weight, color, radius, ior, roughness, anisotropy, view_cosine(point, normal),
+                     method);
+#endif
+}
+
+// Maps that an artist paints (materials/translucency.py): of the pass of light below surfaces alone.
+void shader_translucency_maps(inout Closures closures, SurfacePoint point, vec3 weight, float blur, vec3 tint,
+                              float translucency)
+{
+#ifdef SUBSURFACE
+  closures.map_length = exp2(6.0 * (clamp(blur, 0.0, 1.0) - 0.5));
+  closures.map_entry = vec4(max(tint, vec3(0.0)), clamp(translucency, 0.0, 1.0));
+#endif
+}
+
+void shader_subsurface(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float scale, vec3 radius,
+                       float ior, float roughness, float anisotropy, vec3 normal, int method)
+{
+  vec3 n = unit_or(normal, point.normal);
+  vec3 base = max(color, vec3(0.0));
+  add_subsurface(closures, point, weight, base, radius * scale, ior, roughness, anisotropy, n, method);
+  closure_diffuse(closures, weight, base, 0.0, n);
 }
 
 void shader_sheen(inout Closures closures, SurfacePoint point, vec3 weight, vec3 color, float roughness, vec3 normal)
@@ -312,11 +379,13 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
 }
 
 // Principled BSDF, from the top layer down: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.
-// Not drawn: thin film. Drawn simpler: light passes thin walls straight on, subsurface is diffuse.
+// Not drawn: thin film. Drawn simpler: light passes thin walls straight on.
 void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight, vec3 base_color, float metallic,
                        float roughness, float ior, float alpha, vec3 normal, float diffuse_roughness,
                        float specular_level, vec3 specular_tint, float anisotropy, float rotation, vec3 tangent,
-                       float transmission, float thin_wall, float subsurface, float subsurface_anisotropy,
+                       float transmission, float thin_wall, float subsurface, vec3 subsurface_radius,
+                       float subsurface_scale, float subsurface_ior, float subsurface_anisotropy,
+                       int subsurface_method,
                        float coat_weight, float coat_roughness, float coat_ior, vec3 coat_tint,
                        vec3 coat_normal, float sheen_weight, float sheen_roughness, vec3 sheen_tint,
                        vec3 emission_color, float emission_strength, int distribution)
@@ -377,6 +446,10 @@ void shader_principled(inout Closures closures, SurfacePoint point, vec3 weight,
     float forward = clamp(subsurface, 0.0, 1.0) * 0.5 * (1.0 + clamp(subsurface_anisotropy, -1.0, 1.0));
     add_soft(closures, LOBE_TRANSLUCENT, w * base * forward, 1.0, 0.0, vec3(1.0), n);
     w *= 1.0 - forward;
+  }
+  else if (subsurface > SMALLEST_WEIGHT) {
+    add_subsurface(closures, point, w * clamp(subsurface, 0.0, 1.0), base, subsurface_radius * subsurface_scale,
+                   (subsurface_method == 2) ? subsurface_ior : specular_ior, r, subsurface_anisotropy, n, subsurface_method);
   }
   closure_diffuse(closures, w, base, clamp(diffuse_roughness, 0.0, 1.0), n);
 }

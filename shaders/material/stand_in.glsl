@@ -19,24 +19,6 @@ void no_wire(out float share)
   share = 0.0;
 }
 
-void no_strand(out float is_strand, out float intercept, out float extent, out float thickness, out vec3 normal,
-               out float random)
-{
-  is_strand = 0.0;
-  intercept = 0.0;
-  extent = 0.0;
-  thickness = 0.0;
-  normal = vec3(0.0);
-  random = 0.0;
-}
-
-void no_point(out vec3 position, out float radius, out float random)
-{
-  position = vec3(0.0);
-  radius = 0.0;
-  random = 0.0;
-}
-
 void no_volume(out vec3 color, out float density, out float flame, out float temperature)
 {
   color = vec3(0.0);

@@ -14,6 +14,9 @@ vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
       break;
     }
     roll = hash3(roll);
+#ifdef MIRRORS_OWNED
+    met.photons = met.photons && bounce == 0;
+#endif
     sum += throughput * direct_reflected(met, -direction, 1, roll.x);
     float choice = to_unit(roll.z);
     roll = hash3(roll);

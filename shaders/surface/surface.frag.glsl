@@ -6,6 +6,7 @@
 #include "lib/instance.glsl"
 #include "generated/material"
 #include "surface/point.glsl"
+#include "surface/store.glsl"
 
 // Pictures of few samples are about all light together, and lobes in proportion to their light serve that best.
 #define FIRST_EVEN 16
@@ -26,11 +27,15 @@ void main()
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
   uvec3 layer = hash3(uvec3(bits.x, uint(gl_PrimitiveID), bits.y));
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
+#ifdef ONE_LOBE
+  Closures c = closures_begin(point.normal, lobe_choice, 0.0);
+#else
   Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z), even_share);
+#endif
   evaluate_material(point, c);
   closures_end(c);
 
-  float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+  float through = layer_chance(c);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
   bool passes = (transparent_mode == 0) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
   if (transparent_mode != 1 && passes) {
@@ -38,30 +43,14 @@ void main()
   }
   float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
   float holdout = clamp(c.holdout * covered, 0.0, 1.0);
-  if ((instance.flags & FLAG_HOLDOUT) != 0) {
+  // It cuts its hole in what the camera sees; other views ask for what the object reflects, which lights others.
+  if ((instance.flags & FLAG_HOLDOUT) != 0 && film_view.visibility == FLAG_CAMERA) {
     holdout = 1.0;
     covered = 0.0;
   }
 
-  vec3 tangent;
-  vec3 bitangent;
-  orthonormal_basis(c.glossy_normal, tangent, bitangent);
-  float half_turns = 0.0;
-  if (dot(c.glossy_tangent, c.glossy_tangent) > 0.0) {
-    half_turns = fract(atan(dot(c.glossy_tangent, bitangent), dot(c.glossy_tangent, tangent)) / PI + 1.0);
-  }
-
-  bool displaced = dot(c.base_normal, point.mesh_normal) < 0.9999;
-  out_position = vec4(world_position, bump_encode(holdout, c.base_normal, c.diffuse_normal, displaced));
   vec2 lift = (instance_terminator(instance_flat.x) > 0.0) ? smooth_lift(instance, point.backfacing) : vec2(0.0);
-  float rough = floor(clamp(c.diffuse_roughness, 0.0, 1.0) * 255.0 + 0.5) / 255.0;  // as it will be read
-  out_normal = vec4(diffuse_normal_encode(c.diffuse_normal, c.diffuse_weight * covered, rough),
-                    lift_encode(octahedral_encode(point.geometric_normal), lift.x));
-  out_diffuse = vec4(c.diffuse * covered, pack_three(vec3(c.diffuse_roughness, c.glossy_anisotropy, half_turns), 255.0));
-  out_tint = tint_encode(c.kind, c.glossy_weight * covered, c.glossy_tint, c.glossy_ior);
-  out_lobe = vec4(octahedral_encode(c.glossy_normal), float(c.kind) * 2097152.0 + pack_three(c.glossy_edge, 127.0),
-                  ior_encode(c.glossy_ior, c.distribution));
-  out_emission = vec4(c.emission * covered, (c.kind == LOBE_TRANSLUCENT) ? lift.y : c.glossy_roughness);
+  store_closures(c, point, covered, holdout, lift);
   if (index_shown >= 0) {
     out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
   }

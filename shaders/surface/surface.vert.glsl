@@ -15,7 +15,7 @@ void main()
   // Of lengths along normals, a transform by cofactors makes those in world space times its determinant.
   normal_heights.x = dot(world_position - instance_origin(instance), world_normal);
   normal_heights.yz = (instance_volume(instance) * unit) * envelope;
-  instance_flat = ivec2(id, instance.mirrored ? 1 : 0);
+  instance_flat = ivec2(id, (instance.mirrored != projection_mirrors(PROJECTION)) ? 1 : 0);
   copy_attributes();
   gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
 }

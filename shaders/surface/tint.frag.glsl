@@ -27,7 +27,11 @@ void main()
   Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);
   closures_end(c);
+#ifdef ADDED_LOBES
+  float mean = layer_chance(c);
+#else
   float mean = dot(c.transparency, vec3(1.0 / 3.0));
+#endif
   vec3 color = c.transparency / max(mean, 1e-20);
   if (mean <= 0.0 || min(color.x, min(color.y, color.z)) < 0.0) {
     discard;

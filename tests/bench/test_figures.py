@@ -1,10 +1,11 @@
 """Figures of the benchmark, from invented curves whose answers are known."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from bench import again, figures, markdown, page, plots
+from bench import again, ages, figures, markdown, page, plots
 from bench.figures import Point, Results, against, bias_floor, error_after, seconds_for, staircase, without_noise
 
 
@@ -123,22 +124,44 @@ def test_generated_part_replaces_only_what_stands_between_the_marks(tmp_path):
     path, begin = tmp_path / "page.md", markdown.begin("command")
     path.write_text(f"before\n{begin}\nold\n{markdown.END}\nafter\n")
     markdown.put_between(path, "command", "new")
-    assert path.read_text() == f"before\n{begin}\n\nnew\n\n{markdown.END}\nafter\n"
+    made = ages.now()
+    assert path.read_text() == f"before\n{begin}\n\n{made}\n\nnew\n\n{markdown.END}\nafter\n"
+    markdown.put_between(path, "command", "plain", stamped=False)
+    assert path.read_text() == f"before\n{begin}\n\nplain\n\n{markdown.END}\nafter\n"
     path.write_text("nothing")
     with pytest.raises(ValueError, match=r"page\.md lacks the marks"):
         markdown.put_between(path, "command", "new")
 
 
 def test_readme_shows_the_means_of_every_peer():
+    """With their number of scenes, denoised against denoised first; of fewer than five scenes none is shown."""
     part = page.readme_part(results())
-    assert "| EEVEE, ray traced, over Candela | 10 × | 10 × |" in part
+    assert "| EEVEE, ray traced, over Candela | – (1 scene) | – (1 scene) |" in part
     assert "| EEVEE, over Candela" not in part
+    data = results()
+    many = replace(
+        data, cells=[{**cell, "scene": f"room {k}"} for k in range(5) for cell in data.cells],
+        references={f"room {k}": data.references["room"] for k in range(5)},
+    )  # fmt: skip
+    rows = [line for line in page.readme_part(many).splitlines() if "over Candela" in line]
+    assert rows[0].startswith("| Cycles, denoised, over Candela | 10 × (5 scenes) | 10 × (5 scenes) |")
+    assert page.mean_of([2.0] * 6, 2) == "2.0 × (6 scenes, 2 of them bounds)"
+
+
+def test_a_repetition_of_another_run_is_left_out(tmp_path, capsys):
+    (tmp_path / "again.json").write_text('{"run": "a", "rows": [{"scene": "room"}]}')
+    assert page.repeated_rows(tmp_path / "bench.json", {"run": "a"}) == [{"scene": "room"}]
+    assert page.repeated_rows(tmp_path / "bench.json", {"run": "b"}) == []
+    assert "repeats another run" in capsys.readouterr().out
+    (tmp_path / "again.json").write_text('{"rows": [{"scene": "room"}]}')
+    assert page.repeated_rows(tmp_path / "bench.json", {}) == []
 
 
 @pytest.mark.parametrize("path", [page.README, page.PERFORMANCE], ids=lambda path: path.name)
 def test_pages_have_the_marks(path):
     text = path.read_text(encoding="utf-8")
-    assert text.count(markdown.begin(page.COMMAND)) == text.count(markdown.END) == 1
+    assert text.count(markdown.begin(page.COMMAND)) == 1
+    assert text.count(markdown.END) == text.count("<!-- written by")
 
 
 def test_what_denoising_brings_is_told_where_both_were_measured():

@@ -148,3 +148,15 @@ def test_the_table_keeps_surface_rows_apart():
     ).splitlines()
     assert [line.split()[0] for line in lines] == ["path", "Combined", "surface", "Normal"]
     assert "1.1000" in lines[1]
+
+
+def test_exactly_a_thousandth_of_the_pixels_is_trimmed():
+    """4000 pixels: the four worst are dropped, and the fifth counts."""
+    reference = grey(1.0, 50, 80)
+    for worst, left in ((4, 0), (5, 1)):
+        x = reference.copy()
+        x[0, :worst] = 11.0
+        trimmed = compare_radiance("Combined", x, reference).relmse_trimmed
+        assert trimmed == pytest.approx(left * 100 / 1.01 / 3996, rel=1e-5)
+    every = compare_radiance("Combined", reference + np.float32(1.0), reference)
+    assert every.relmse_trimmed == pytest.approx(every.relmse, rel=1e-6)

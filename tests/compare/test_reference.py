@@ -1,6 +1,7 @@
 """Renders through Blender: pass names, Cycles as a reference, settings put back, the cache."""
 
 import os
+import time
 
 import bpy
 import numpy as np
@@ -320,8 +321,22 @@ def test_the_oldest_references_make_room(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["2.npz", "3.npz"]
 
 
+def test_what_another_process_writes_is_left_alone(tmp_path):
+    """Entries in the making are not counted and not deleted, unless their process was ended long ago."""
+    for name, age in ((".writing_now.npz", 0), (".writing_then.npz", 2 * cache.ABANDONED_S), ("old.npz", 60)):
+        (tmp_path / name).write_bytes(bytes(100))
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
+    (tmp_path / "new.npz").write_bytes(bytes(100))
+    cache.make_room(tmp_path, limit=150)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".writing_now.npz", "new.npz"]
+
+
 def test_where_references_are_kept(monkeypatch, tmp_path):
     monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
     assert reference.cache_folder() == tmp_path
     monkeypatch.delenv("CANDELA_CACHE")
-    assert reference.cache_folder().parts == ("out", "cache")
+    monkeypatch.setattr(reference.sys, "platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert reference.cache_folder() == tmp_path / "candela" / "references"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert reference.cache_folder().is_relative_to(reference.Path.home())

@@ -227,3 +227,39 @@ def test_names_in_the_registry_are_unique_and_all_writers_of_an_image_agree_on_i
     for write in (write for one in registry for write in one.writes):
         assert formats.setdefault(write.name, (write.format, write.accumulates)) == (write.format, write.accumulates)
         assert write.description
+
+
+def test_of_a_pass_tree_the_first_one_fills_a_slot():
+    both = [technique("maps", slot="shadow"), technique("volumes", slot="shadow")]
+    plan = make_plan(both, None, Settings(passes=("volumes", "maps")))
+    assert names(plan) == ["volumes"]
+    (row,) = plan.skipped
+    assert (row.name, row.reason) == ("maps", "the shadow slot is filled by Volumes")
+
+
+def test_a_plan_tells_what_runs_who_fills_a_slot_and_who_writes_last():
+    registry = [
+        technique("maps", slot="shadow"), technique("volumes", slot="shadow"),
+        technique("light", writes=("sum",)), technique("glare", reads=("sum",), writes=("picture",)),
+    ]  # fmt: skip
+    plan = make_plan(registry, None, Settings())
+    assert plan.runs("maps") and plan.runs("light") and not plan.runs("volumes") and not plan.runs("nothing")
+    assert plan.slots_of(registry[0]) == ["shadow"] and plan.slots_of(registry[2]) == []
+    assert plan.last_writer("sum") is registry[2] and plan.last_writer("nothing") is None
+
+
+def test_of_those_that_claim_a_scene_the_first_one_is_taken_and_the_reason_does_not_say_that_it_was_set():
+    registry = [technique(name, slot="shadow") for name in ("maps", "volumes", "wedges")]
+    for one in registry[1:]:
+        one.claims = lambda snapshot, settings: True
+    plan = make_plan(registry, None, Settings())
+    assert names(plan) == ["volumes"]
+    assert [row.reason for row in plan.skipped] == ["the shadow slot is filled by Volumes"] * 2
+    asked = make_plan(registry, None, Settings(slots={"shadow": "wedges"}))
+    assert [row.reason for row in asked.skipped] == ["the shadow slot is set to Wedges"] * 2
+
+
+def test_who_asks_for_what_it_provides_itself_does_not_wait_for_itself():
+    both = technique("both")
+    both.provides = both.requests = (Settings,)
+    assert names(make_plan([both], None, Settings())) == ["both"]

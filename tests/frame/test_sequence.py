@@ -112,3 +112,8 @@ def test_lens_and_lots_cover_the_plane_together_with_what_they_choose():
         for axis in (0, 1):
             cells = occupancy(np.stack([other, light[:, axis]], axis=1), (4, 4))
             assert cells.min() > 0 and cells.max() <= 16  # 4 on average; of one dimension 240 of 256 are empty
+
+
+def test_the_film_begins_in_its_middle_and_the_lens_in_the_apertures():
+    assert sequence.point(0, FILM) == (0.5, 0.5) == sequence.point(0, FILM, seed=7)
+    assert sequence.point(0, sequence.LENS) == (0.0, 0.0)

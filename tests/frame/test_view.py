@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.sampling import sequence
 from addon.scene.view import VIEW, View
 from addon.snapshot.scene import Camera, Film
 
@@ -115,3 +116,13 @@ def test_a_world_of_any_distance_from_the_origin_gives_the_same_rows(kind):
     a, b = (view.values(0, 0, (0.0, 0.0), 1.0) for view in (near, far))
     for row in ("row_x", "row_y", "row_w", "row_q", "eye"):
         np.testing.assert_allclose(a[row], b[row], atol=1e-9)
+
+
+def test_shaders_get_the_sequences_numbers_of_the_sample_itself():
+    """Bits of one sample too many would be as even and end up in no picture's mean; here they are named."""
+    view = view_of("PERSPECTIVE", FRAMES["centred"], BORDERS["whole"])
+    for sample in (0, 1, 5, 63, 64):
+        fields = view.values(sample, 0, (0.0, 0.0), 1.0)
+        for name, dimension in (("bits_x", 0), ("bits_y", 1), ("bits_z", 5), ("bits_w", 6)):
+            expected = sequence.bits(np.array(sample), dimension)
+            assert np.uint32(np.int32(fields[name])) == np.uint32(expected)

@@ -10,9 +10,13 @@ import addon
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
 from addon.materials import nodes
+from addon.materials.compiled import Attribute
 from addon.materials.compiler import compile_material, default_graph
-from addon.scene import materials
+from addon.materials.graph import Graph, Input, Node
+from addon.materials.volume_program import CompiledVolume, compile_volume
+from addon.scene import materials, media
 from addon.scene.world_tree import background_program, bake_program
+from addon.surfaces.hits import hit_program
 
 
 def _found(kind: type) -> list:
@@ -27,6 +31,16 @@ def _found(kind: type) -> list:
     return list(values.values())
 
 
+def fog() -> CompiledVolume:
+    """A Principled Volume whose density is an attribute."""
+    inputs = {
+        "Color": Input("COLOR", (0.5, 0.5, 0.5, 1.0)), "Density": Input("FLOAT", 1.0),
+        "Density Attribute": Input("STRING", "density"),
+    }  # fmt: skip
+    node = Node("Fog", "Fog", "ShaderNodeVolumePrincipled", inputs, {"Volume": "SHADER"})
+    return compile_volume("fog", Graph({"Fog": node}, volume=("Fog", "Volume")))
+
+
 def structs() -> list[Struct]:
     """Every struct that a shader reads; of the materials' blocks, two lengths."""
     used = {id(struct): struct for program in programs() for struct, _ in program.blocks}
@@ -38,6 +52,9 @@ def programs() -> list[Program]:
     plain = compile_material("plain", default_graph())
     files = sorted({entry.include for entry in nodes.REGISTRY if entry.include})
     made = [*_found(Program), materials._tint_program(plain), bake_program(plain), background_program(plain)]
+    made += [materials._scatter_program(plain), materials._glow_program(plain), materials._emission_map_program(plain)]
+    made += [materials._lobe_program(plain), hit_program(plain), media.bake_program(fog(), ("density",))]
+    made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
     for length, file in enumerate(files, len(plain.values)):  # blocks of several lengths among the structs
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)

@@ -191,6 +191,17 @@ def test_a_mirror_normal_is_bent_until_its_reflection_leaves_the_surface(evaluat
     assert reflected[2] == pytest.approx(min(0.9 * 0.8, 0.01), abs=1e-4)
 
 
+@pytest.mark.parametrize(("convention", "up"), [("OPENGL", 1.0), ("DIRECTX", -1.0)])
+def test_green_of_a_normal_map_runs_upwards_or_downwards(evaluate, convention, up):
+    """Colour (0.5, 1, 0.5) is the bitangent itself, or its opposite."""
+    mapped = node("Map", "ShaderNodeNormalMap", {"Normal": "VECTOR"},
+                  properties={"space": "TANGENT", "uv_map": "", "convention": convention},
+                  Strength=1.0, Color=(0.5, 1.0, 0.5, 1.0))  # fmt: skip
+    material = compile_material("Test", graph(mapped, diffuse(Normal=("Map", "Normal")), surface=("Diffuse", "BSDF")))
+    normal = evaluate(material, points(1, attributes=[(1.0, 0.0, 0.0, 1.0)]))["diffuse_normal"][0]
+    assert normal == pytest.approx((0.0, up, 0.0), abs=1e-6)
+
+
 def test_mapping_turns_by_euler_angles(evaluate):
     turn = node("Map", "ShaderNodeMapping", {"Vector": "VECTOR"}, properties={"vector_type": "POINT"},
                 Vector=(1.0, 0.0, 0.0), Location=(0.1, 0.2, 0.3), Rotation=(0.0, 0.0, mathematics.pi / 2),
@@ -206,6 +217,10 @@ CYCLES_NODES = [
     ("ShaderNodeMapping", {"vector_type": kind},
      {0: (0.7, 0.3, 0.2), 1: (0.1, 0.2, 0.3), 2: (0.3, 0.5, 0.7), 3: (1.5, 0.8, 2.0)})
     for kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL")
+] + [
+    ("ShaderNodeVectorRotate", {"rotation_type": "EULER_XYZ", "invert": invert},
+     {0: (0.7, 0.5, 0.9), 1: (0.1, 0.2, 0.3), 4: (0.3, -0.2, 0.5)})
+    for invert in (False, True)
 ] + [
     ("ShaderNodeInvert", {}, {0: 0.7, 1: (0.2, 0.5, 0.9, 1)}),
     ("ShaderNodeGamma", {}, {0: (0.2, 0.5, 0.9, 1), 1: 2.2}),

@@ -106,29 +106,41 @@ def test_a_missing_image_is_magenta_and_named(stage, tmp_path):
     assert "missing" in note.text
 
 
-def test_an_unsupported_colour_space_is_named(stage):
-    image, _ = generated()
-    image.colorspace_settings.name = "Filmic sRGB"
-    shown(stage, image)
-    (note,) = stage.take().notes
-    assert "Filmic sRGB" in note.text
-
-
-def test_udim_tiles_beyond_the_first_are_named(stage):
-    image = bpy.data.images.new("tiles", 4, 4, tiled=True)
-    image.tiles.new(1002)
+def test_other_colour_spaces_are_converted_before_filtering(stage):
+    image, values = generated()
+    image.colorspace_settings.name = "Linear Rec.2020" if bpy.app.version >= (5, 0) else "Filmic sRGB"
+    image.pixels.foreach_set(values.reshape(-1))
     shown(stage, image)
     snapshot = stage.take()
-    assert only_image(snapshot).pixels.shape == (4, 4, 4)
-    assert "UDIM" in snapshot.notes[0].text
+    assert not snapshot.notes
+    taken = only_image(snapshot)
+    assert taken.encoding == "LINEAR"
+    assert np.allclose(taken.pixels[..., 3], values[..., 3], atol=1e-6)
+    assert not np.allclose(taken.pixels[..., :3], values[..., :3], atol=1e-3)
 
 
-def test_a_sequence_is_named(stage, tmp_path):
+def test_tiles_of_a_udim_image_lie_in_one(stage, tmp_path):
+    path, _ = saved(tmp_path, "tile.1001.png")
+    saved(tmp_path, "tile.1002.png")
+    image = bpy.data.images.load(path)
+    image.source, image.filepath_raw = "TILED", str(tmp_path / "tile.<UDIM>.png")
+    image.reload()
+    if len(image.tiles) < 2:
+        image.tiles.new(1002)
+    shown(stage, image)
+    snapshot = stage.take()
+    assert not snapshot.notes
+    assert [tile[0] for tile in only_image(snapshot).tiles] == [1001, 1002]
+
+
+def test_a_frame_that_a_sequence_lacks_is_named(stage, tmp_path):
     path, _ = saved(tmp_path, "frame0001.png")
     image = bpy.data.images.load(path)
     image.source = "SEQUENCE"
-    shown(stage, image)
-    assert "sequences" in stage.take().notes[0].text
+    user = shown(stage, image).image_user
+    user.frame_duration, user.frame_offset = 1, 6
+    (note,) = stage.take().notes
+    assert "frame 7" in note.text
 
 
 def test_an_unchanged_image_is_not_read_again(stage, tmp_path):

@@ -5,6 +5,7 @@ import pytest
 
 from addon.compare.passes import OTHER_NAMES
 from addon.compare.reference import render_passes
+from addon.ui.passes import divide_by_color
 
 SIZE = (48, 40)
 SPAN = 4.0
@@ -99,3 +100,10 @@ def test_indices_change_no_picture_and_are_drawn_only_where_asked_for(asked):
     assert asked.ledger.row("film").counters["passes"] == drawn - 2
     for name in ("combined", "normal", "depth"):
         np.testing.assert_array_equal(with_them[name], without[name])
+
+
+def test_light_over_colour_takes_the_mean_of_other_channels_where_there_is_none():
+    light = np.array([[[0.2, 0.6, 0.5], [0.3, 0.0, 0.0], [0.1, 0.2, 0.3]]], np.float32)
+    color = np.array([[[0.4, 0.2, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]], np.float32)
+    expected = [[[0.5, 3.0, 1.75], [0.0, 0.0, 0.0], [0.1, 0.2, 0.3]]]
+    np.testing.assert_allclose(divide_by_color(light, color), expected, rtol=1e-6)

@@ -1,10 +1,17 @@
 """Denoising: less error, the same light, nothing where there is no noise, and nothing of it where it is not wanted."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
 from addon.frame import ledger
+from addon.gfx import images, passes
+from addon.gfx.struct import Block
+from addon.scene.view import VIEW, View
+from addon.snapshot.scene import Camera, Film
+from addon.techniques.denoise import LEVEL, Denoise
 
 SIZE = (64, 48)
 
@@ -122,3 +129,55 @@ def test_fireflies_of_glossy_indirect_light_are_spread_and_none_of_it_is_lost(st
     plain, filtered = (paths_of(stage, strength, 16, 2)["glossy_indirect"] for strength in (0.0, 1.0))
     assert filtered.mean() == pytest.approx(plain.mean(), rel=0.01)
     assert np.mean((filtered - truth) ** 2) < 0.6 * np.mean((plain - truth) ** 2)
+
+
+def test_the_edge_of_a_penumbra_stays_where_it_is(stage):
+    """Pixels exchange what may be noise. Light that differs by more is shade: the mean over seeds keeps its slope."""
+    lit_room(stage, 0.4)
+    stage.blocker((-0.5, -0.5), (0.5, 0.5), 0.4)
+    truth = paths_of(stage, 0.0, 256, 0, seed=9)["diffuse_direct"][..., 0]
+    denoised = np.mean([paths_of(stage, 1.0, 16, 0, seed)["diffuse_direct"][..., 0] for seed in range(4)], axis=0)
+    slope = np.abs(np.diff(truth, axis=1))
+    steep = slope > np.quantile(slope, 0.97)
+    kept = np.abs(np.diff(denoised, axis=1))[steep].mean() / slope[steep].mean()
+    assert 0.9 < kept < 1.1, kept
+
+
+@pytest.mark.parametrize("apart", ["turned", "behind"])
+def test_noise_goes_from_pixel_to_pixel_of_one_surface_alone(gpu_context, apart):
+    """One level on two halves of a picture, 1 and 2 with much variance: all may mix, and do so within a half."""
+    size = width, height = 32, 16
+    rows, columns = np.mgrid[0:height, 0:width].astype(np.float32)
+    right = columns >= width / 2
+    position = np.stack([(columns - 16) / 16, (rows - 8) / 16, np.zeros_like(rows) - 4, np.ones_like(rows)], axis=-1)
+    normal = np.zeros((height, width, 4), np.float32) + np.float32([0, 0, 1, 1])
+    if apart == "turned":
+        normal[right] = (1, 0, 0, 1)
+    else:
+        position[right, 2] -= 3
+    light = np.where(right, 2.0, 1.0)[..., None] + 0.5 * ((rows + columns) % 2)[..., None] * np.ones(4)
+    light[..., 3] = 4.0
+    frame = (-0.25, 0.25, -0.125, 0.125)
+    view = View(Camera(np.eye(4), "PERSPECTIVE", frame, 0.1, 100.0), Film(*size, (0, 0, *size)), np.zeros(3))
+    block = Block(VIEW, **view.values(0, 0, (0.0, 0.0), 10.0))
+    pixels = {"surface_position": position, "normal_sum": normal, "light_in": light}
+    with images.borrowed(*size, "RGBA32F") as target:
+        passes.fullscreen(
+            LEVEL, target, blocks={"film_view": block},
+            textures={name: images.upload(np.ascontiguousarray(p, np.float32)) for name, p in pixels.items()},
+            constants={"stride": 1, "tolerance": 3.0, "sharpness": 32.0},
+        )  # fmt: skip
+        out = images.read(target.colors[0])[..., 0]
+    for half, mean in ((out[:, :16], 1.25), (out[:, 16:], 2.25)):
+        assert half.mean() == pytest.approx(mean, abs=0.01)
+        assert np.abs(half[4:-4, 4:-4] - mean).max() < 0.1
+
+
+@pytest.mark.parametrize("count", range(2, 34))
+def test_of_an_unknown_number_of_samples_about_half_are_kept(count):
+    """From a third to two thirds of them, and never all."""
+    settings = SimpleNamespace(settings=SimpleNamespace(time_limit=5.0))
+    half, name = Denoise()._half(settings, "diffuse_direct", count)
+    kept = [1 << k for k in range(8) if 1 << k <= count][-2:]
+    assert half == kept[-1 if name.endswith("_half") else -2]
+    assert count / 3 <= half <= 2 * count / 3 + 1e-9 or count == 2

@@ -340,3 +340,8 @@ def test_a_small_lamp_far_away_is_seen_as_round_as_a_near_one(stage):
     lamp.data.energy, lamp.data.shadow_soft_size = lamp.data.energy, radius
     near = stage.render(64, (32, 32))["emission"][..., 0]
     np.testing.assert_allclose(seen.sum(), near.sum(), rtol=0.02)
+
+
+def test_an_area_light_that_faces_away_gives_nothing(floor):
+    floor.light("AREA", (0, 0, 2), (np.pi, 0, 0), size=0.5)
+    assert floor.render(2)["diffuse_direct"].max() == 0

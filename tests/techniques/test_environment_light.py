@@ -215,3 +215,14 @@ def test_rays_by_tiles_have_the_mean_of_shared_directions(stage, monkeypatch):
     np.testing.assert_allclose(by_rays.mean(axis=(0, 1)), shared.mean(axis=(0, 1)), rtol=0.01)
     halves = [picture.reshape(4, 12, 4, 16, 3).mean(axis=(1, 3)) for picture in (by_rays, shared)]
     np.testing.assert_allclose(halves[0], halves[1], rtol=0.06)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, -2.0])
+def test_the_camera_sees_the_texel_that_it_looks_at(stage, turn):
+    """Azimuth grows from +X towards +Y, against the image's u."""
+    direction, _ = directions(32, 64)
+    azimuth = np.arctan2(direction[..., 1], direction[..., 0])
+    sky(stage, np.stack([2 + np.cos(azimuth), 2 + np.sin(azimuth), 0 * azimuth], axis=-1))
+    stage.camera((0, 0, 0), (np.pi / 2, 0, turn - np.pi / 2), angle=0.05)
+    seen = stage.render(size=(8, 8))["environment"].mean(axis=(0, 1))
+    assert seen == pytest.approx((2 + np.cos(turn), 2 + np.sin(turn), 0), abs=0.02)

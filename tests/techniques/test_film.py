@@ -149,3 +149,32 @@ def test_a_light_is_hidden_by_what_stands_before_it(stage):
     x, y = places((32, 32), SPAN)
     assert (found[x < 0] == 0).all()
     np.testing.assert_allclose(found[(x > 0) & (np.hypot(x, y) < 0.45)], 100 / (4 * np.pi**2 * 0.25), rtol=1e-4)
+
+
+def test_exposure_scales_light_and_leaves_alpha(stage):
+    stage.floor()
+    stage.light("POINT", (0, 0, 2))
+    stage.rectangle((-0.5, -0.5), (0.5, 0.5), 0.5, material=emission(stage, 3.0))
+    stage.camera_above(SPAN)
+    once = stage.render()
+    exposure = stage.scene.cycles if hasattr(stage.scene, "cycles") else stage.scene.view_settings
+    name = "film_exposure" if hasattr(exposure, "film_exposure") else "exposure"
+    setattr(exposure, name, 4.0)
+    try:
+        bright = stage.render()
+    finally:
+        exposure.property_unset(name)
+    np.testing.assert_allclose(bright["combined"][..., :3], 4 * once["combined"][..., :3], rtol=1e-5)
+    np.testing.assert_array_equal(bright["combined"][..., 3], once["combined"][..., 3])
+
+
+def test_the_ledger_counts_what_was_drawn(stage):
+    """Two triangles in each of two samples; passes of every technique that draws."""
+    stage.floor()
+    stage.light("POINT", (0, 0, 2))
+    stage.camera_above(SPAN)
+    stage.render(2)
+    rows = {row.name: row.counters for row in stage.ledger.rows if row.state == "ran"}
+    assert rows["surfaces"]["triangles"] in (4, 6)  # receivers may be drawn apart
+    assert rows["film"]["passes"] >= 4 and rows["direct_light"]["passes"] >= 2
+    assert rows["film"]["points"] % 2 == 0 and rows["film"]["points"] > 0

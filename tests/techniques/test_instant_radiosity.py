@@ -323,3 +323,15 @@ def test_where_an_orthographic_camera_stands_changes_nothing(stage):
     assert near.mean() > 0.0
     np.testing.assert_allclose(far.mean(), near.mean(), rtol=0.01)
     assert np.sqrt(((far - near) ** 2).mean()) < 0.05 * near.mean()
+
+
+def test_no_light_is_passed_on_through_a_wall(stage, render):
+    """A board in the sun of a lamp, and a high wall between it and half of the floor."""
+    stage.floor(material=stage.diffuse(0.5))
+    stage.mesh([(0, -20, 0), (0, 20, 0), (0, 20, 20), (0, -20, 20)], [(0, 1, 2, 3)], material=stage.diffuse(0.0))
+    stage.mesh([(1.5, -1, 0), (1.5, 1, 0), (1.5, 1, 1), (1.5, -1, 1)], [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    stage.light("POINT", (0.7, 0, 0.5), energy=100)
+    stage.camera_above(3.0, height=30.0)
+    light = render(1, samples=8)["diffuse_indirect"][..., 0]
+    half = light.shape[1] // 2
+    assert light[:, : half - 2].max() < 0.01 * light[:, half + 2 :].mean()

@@ -11,6 +11,7 @@ from addon.frame.ledger import RAN, REUSED, SKIPPED
 from addon.gfx import context, images, library
 from addon.lighting import ray_costs
 from addon.lighting.point_maps import PointMaps
+from addon.techniques.surfaces import Surfaces
 
 
 @pytest.fixture
@@ -224,8 +225,8 @@ def test_error_leaves_no_half_made_frame(room, monkeypatch):
     def broken(self, frame):
         raise KeyError("half made")
 
-    monkeypatch.setattr(PointMaps, "prepare", broken, raising=False)
-    monkeypatch.setattr(PointMaps, "key", lambda *_: object())
+    monkeypatch.setattr(Surfaces, "prepare", broken, raising=False)
+    monkeypatch.setattr(Surfaces, "key", lambda *_: object())
     with pytest.raises(RuntimeError, match="half made"):
         room.render(1)
     monkeypatch.undo()
@@ -264,3 +265,15 @@ def test_passes_that_are_not_written_are_named(room):
         layer.use_pass_uv = layer.use_pass_shadow = False
     (note,) = (note for note in room.ledger.notes if note.subject == f"View layer '{layer.name}'")
     assert "UV, Shadow" in note.text
+
+
+def test_sums_begin_at_zero_in_every_picture(room):
+    """Images come from a pool and hold what another picture left there."""
+    room.world((0.2, 0.3, 0.4))
+    first = room.render(2, seed=1)
+    for image in room.renderer.frame.images.values():
+        images.Target((image,)).clear((7.0, 7.0, 7.0, 7.0)) if image.format == "RGBA32F" else None
+    room.render(2, seed=2)
+    again = room.render(2, seed=1)
+    for name, pixels in first.items():
+        np.testing.assert_array_equal(again[name], pixels, err_msg=name)

@@ -65,6 +65,10 @@ def no_source_to_shadow(stage):
     no_emission(stage)
 
 
+def no_glare(stage):
+    stage.scene.camera.data.candela.glare_mode = "OFF"
+
+
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
@@ -87,7 +91,11 @@ WITHOUT = {
     "clustered_visibility": no_bounces,
     "imperfect_shadow_maps": no_bounces,
     "ssdo": no_bounces,
+    "caustics_mapping": no_glass,
+    "screen_space_photons": no_glass,
     "denoise": dark,
+    "eye": no_glare,
+    "glare": no_glare,
 }
 
 
@@ -123,6 +131,9 @@ def bound(monkeypatch):
 
 
 def choose(stage, technique):
+    if technique.name in ("eye", "glare"):
+        stage.scene.camera.data.candela.glare_mode = "CONVOLUTION"
+        stage.scene.camera.data.candela.glare_white = 0.01
     for slot in technique.fills:
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 

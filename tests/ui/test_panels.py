@@ -1,5 +1,6 @@
 """The panels: made from the declarations, shown among Blender's own, and gone without a trace."""
 
+import contextlib
 from types import SimpleNamespace
 
 import bpy
@@ -78,9 +79,10 @@ def published():
 def test_every_slot_and_parameter_has_a_place(scene):
     shown = drawn(panels.CANDELA_RENDER_PT_techniques)
     for technique in REGISTRY:
-        if technique.params:
+        if technique.params_of(SCENE):
             shown += drawn(getattr(bpy.types, f"CANDELA_RENDER_PT_{technique.name}"))
-    shown = [name for name in shown if not hasattr(scene.render, name)]  # Blender's own, in the panel of the film
+    others = scene.render, getattr(scene, "cycles", None)  # settings of Blender's, in the panel of the film
+    shown = [name for name in shown if not any(hasattr(other, name) for other in others)]
     assert sorted(shown) == sorted(
         ["pass_tree"]
         + [f"slot_{slot}" for slot in slots()]
@@ -92,7 +94,7 @@ def test_parameters_are_those_of_the_techniques_in_question(scene):
     """With Auto, of all; with a technique in the slot, of none of its rivals."""
 
     def shown():
-        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params}
+        made = {t: getattr(bpy.types, f"CANDELA_RENDER_PT_{t.name}") for t in REGISTRY if t.params_of(SCENE)}
         return {technique for technique, panel in made.items() if panel.poll(Context())}
 
     assert shown() == {technique for technique in REGISTRY if technique.params_of(SCENE)}
@@ -120,8 +122,86 @@ def test_frame_panel_shows_states_times_and_reasons(scene, published):
     ]
     published(ledger.Ledger(rows, {"sync": 0.02, "passes": 2.6}, samples=16))
     text = " ".join(drawn(panels.CANDELA_RENDER_PT_frame))
-    for part in ("16 samples", "sync 20.0 ms", "12.3 ms", "2.5 s", "skipped", "no material is glossy"):
+    for part in ("16 samples", "sync 20.0 ms", "12.3 ms", "2.5 s"):
         assert part in text
+    assert "no material is glossy" not in text  # folded away, so that nothing is buried under it
+    assert panels.CANDELA_RENDER_PT_frame_skipped.poll(Context())
+    assert "DEFAULT_CLOSED" in panels.CANDELA_RENDER_PT_frame_skipped.bl_options
+    text = " ".join(drawn(panels.CANDELA_RENDER_PT_frame_skipped))
+    assert "skipped" in text and "no material is glossy" in text
+
+
+def test_warnings_come_first_and_by_weight(scene, published):
+    """Before all other panels, with their number in the header; what is missing before what differs a little."""
+    slight, missing = Note("Material 'A'", "The thin film is approximated."), Note("Object 'B'", "smoke is not drawn.")
+    published(ledger.Ledger(notes=(slight, missing)))
+    shown = [text for text in drawn(panels.CANDELA_RENDER_PT_frame_notes) if "'" in text]
+    assert "smoke" in shown[0] and "thin film" in shown[1]
+    layout = Layout()
+    panels.CANDELA_RENDER_PT_frame_notes.draw_header(SimpleNamespace(layout=layout), Context())
+    assert layout.shown == ["2"]
+    own = [panel for panel in panels._CLASSES if issubclass(panel, bpy.types.Panel) and panel.bl_context == "render"]
+    assert own[0] is panels.CANDELA_RENDER_PT_frame_notes
+
+
+def test_icons_of_materials_leave_the_last_picture_alone(scene, published):
+    from addon import engine
+
+    assert not engine.session(scene, "preview").renderer.publishes
+    assert engine.session(scene, "final").renderer.publishes
+
+
+def test_unregistering_leaves_the_extensions_own_panels_their_engine(registered):
+    """They are registered again with the same classes when the extension is enabled once more."""
+    blender_panels.withdraw(ENGINE)
+    try:
+        assert panels.CANDELA_RENDER_PT_sampling.poll(Context())
+        assert all(ENGINE in made.COMPAT_ENGINES for made in panels._CLASSES if hasattr(made, "COMPAT_ENGINES"))
+    finally:
+        blender_panels.show(ENGINE)
+
+
+# Settings that the snapshot reads (addon/snapshot), by the context of the panels that must hold them.
+READ = {
+    "data": (
+        *("use_dof", "focus_distance", "focus_object", "aperture_fstop", "aperture_blades", "aperture_rotation"),
+        *("aperture_ratio", "lens", "ortho_scale", "shift_x", "shift_y", "sensor_fit", "sensor_width", "clip_start"),
+        *("clip_end", "energy", "exposure", "use_temperature", "normalize", "use_soft_falloff", "shadow_soft_size"),
+        *("spot_size", "spot_blend", "shape", "size_y", "spread", "angle", "use_shadow"),
+    ),
+    "world": ("mist_settings", "Surface", "Volume", "cycles_visibility"),
+    "material": ("pass_index", "Volume", "Displacement", "Surface", "use_transparent_shadow"),
+    "object": (
+        *("pass_index", "color", "is_holdout", "shadow_terminator_geometry_offset", "visible_transmission"),
+        *("visible_volume_scatter", "visible_camera"),
+    ),
+    "render": (
+        *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
+        "use_simplify",
+    ),
+    "output": ("resolution_x", "use_border", "pixel_aspect_x"),
+    "view_layer": ("material_override", "use_solid", "use_strand", "use_pass_mist", "samples"),
+    "particle": ("root_radius", "tip_radius", "radius_scale", "use_close_tip"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("context", READ)
+def test_every_setting_that_is_read_stands_in_some_panel(registered, context):
+    import inspect
+
+    text = ""
+    for panel in bpy.types.Panel.__subclasses__():
+        engines = getattr(panel, "COMPAT_ENGINES", None)
+        where = getattr(panel, "bl_context", "")
+        if where != context or (engines is not None and ENGINE not in engines):
+            continue
+        for part in panel.__mro__:
+            if part.__module__ != "bpy_types" and part is not object:
+                with contextlib.suppress(OSError, TypeError):
+                    text += inspect.getsource(part)
+    text += " ".join(switch.switch for switch in PASSES) if context == "view_layer" else ""
+    missing = [name for name in READ[context] if name not in text]
+    assert not missing
 
 
 def test_frame_panel_before_the_first_render(scene, published):

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from addon.compare.exr import read_exr
+from addon.snapshot.exr import read_exr
 
 pytestmark = pytest.mark.window
 

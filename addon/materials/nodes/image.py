@@ -132,6 +132,35 @@ void material_image{k}_sky(vec3 direction, SurfacePoint point, float sun_is_lamp
 }}
 """
 
+
+def part_functions(k: int, part: int, place: tuple[int, int, int, int]) -> str:
+    """The functions of one part of sampler `k`, which lies at x, y and is so wide and high."""
+    x, y, width, height = place
+    text = IMAGE_FUNCTIONS.format(k=f"{k}_{part}")
+    text = text.replace(f"material_image{k}_{part}_fetch(at)", f"material_image{k}_fetch(at + ivec2({x}, {y}))")
+    return text.replace(f"material_image{k}_{part}_size()", f"ivec2({width}, {height})")
+
+
+def tiled_functions(k: int, tiles: tuple[tuple[int, int, int, int, int], ...]) -> str:
+    """Of a UDIM image in sampler `k`: coordinates say which of its `tiles` (Image.tiles) is shown, and where in it."""
+    parts = "\n".join(part_functions(k, n, place) for n, (_, *place) in enumerate(tiles))
+    choices = "".join(
+        f"  if (tile == ivec2({(number - 1001) % 10}, {(number - 1001) // 10})) {{\n"
+        f"    return material_image{k}_{n}_at(place, interpolation, extension, flags, alpha_used);\n  }}\n"
+        for n, (number, *_) in enumerate(tiles)
+    )
+    at = f"""\
+vec4 material_image{k}_at(vec2 coordinate, int interpolation, int extension, int flags, bool alpha_used)
+{{
+  ivec2 tile = ivec2(floor(clamp(coordinate, vec2(-8.0), vec2(64.0))));
+  vec2 place = coordinate - floor(coordinate);
+{choices}  return vec4(1.0, 0.0, 1.0, 1.0);
+}}
+"""
+    own = IMAGE_FUNCTIONS.format(k=k)
+    return parts + "\n" + at + own[own.index(f"void material_image{k}_flat") :]
+
+
 MISSING_COLOR = (1.0, 0.0, 1.0)  # where an image cannot be read
 
 INTERPOLATION = Choice("interpolation", {"Linear": 0, "Closest": 1, "Cubic": 2, "Smart": 2})  # INTERPOLATION_*

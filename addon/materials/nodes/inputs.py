@@ -5,6 +5,7 @@ from __future__ import annotations
 from .entry import POINT, Attribute, Entry, Rows, Setting, Socket
 
 SURFACE = "material/input.glsl"
+STRAND, WAY, PLACE, MARK = ".strand", ".strand_way", ".point", ".point_mark"  # and snapshot/strands.py
 POINTINESS, ISLAND = ".pointiness", ".island"  # attributes that snapshot/shape.py makes
 
 GENERATED = Attribute("GENERATED", output="Generated")
@@ -85,6 +86,27 @@ ENTRIES = (
         (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
         SURFACE,
         when={"attribute_type": "GEOMETRY"},
+    ),
+    Entry(
+        "ShaderNodeHairInfo",
+        "input_strand",
+        (POINT, Attribute("NAMED", name=STRAND), Attribute("NAMED", name=WAY)),
+        (
+            ("Is Strand", "FLOAT"),
+            ("Intercept", "FLOAT"),
+            ("Length", "FLOAT"),
+            ("Thickness", "FLOAT"),
+            ("Tangent Normal", "VECTOR"),
+            ("Random", "FLOAT"),
+        ),
+        SURFACE,
+    ),
+    Entry(
+        "ShaderNodePointInfo",
+        "input_point",
+        (POINT, Attribute("NAMED", name=PLACE), Attribute("NAMED", name=MARK)),
+        (("Position", "VECTOR"), ("Radius", "FLOAT"), ("Random", "FLOAT")),
+        SURFACE,
     ),
     Entry(
         "ShaderNodeNewGeometry",

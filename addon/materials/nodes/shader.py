@@ -14,6 +14,8 @@ Sources: Cycles' Principled closure; Blender manual, "Principled BSDF" (4.5, 5.2
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..estimate import Estimate, Interface, Summary, constant
 from .entry import Approximation, Choice, Entry, Expression, Socket
 
@@ -25,8 +27,10 @@ BECKMANN_GLASS = (("distribution", ("BECKMANN",), "Glass of Beckmann's distribut
 NORMAL = Socket("Normal", "VECTOR", implicit="point.normal")
 TANGENT = Socket("Tangent", "VECTOR", implicit="@RADIAL", only_with="Anisotropy")
 
-# Its albedo is then the colour itself; Cycles' random walk gives up to 7 % less seen from the front.
-SUBSURFACE = "Subsurface scattering is drawn as diffuse."
+# METHOD_* of shaders/subsurface/closure.glsl.
+SUBSURFACE_METHODS = {"BURLEY": 0, "RANDOM_WALK": 1, "RANDOM_WALK_SKIN": 2, "RANDOM_WALK_LEGACY": 3}
+# About the longest scale of the profile over the radius: by these the points of light below surfaces are spread.
+SUBSURFACE_REACH = {"BURLEY": 0.24, "RANDOM_WALK": 3.0, "RANDOM_WALK_SKIN": 0.6, "RANDOM_WALK_LEGACY": 0.24}
 THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
 
 
@@ -112,7 +116,21 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
         ),
         tinted=tinted,
         glass=glass,
+        scatter=0.0
+        if thin or not (sockets["Subsurface Weight"].high > 0.0).any()
+        else _reach(sockets, "Subsurface Radius", "Subsurface Scale", "subsurface_method"),
     )
+
+
+def _reach(sockets: dict[str, Estimate], radius: str, scale: str, method: str) -> float:
+    """About how far light spreads below the surface, m: the widest channel's longest scale."""
+    widest = float(np.abs(sockets[radius].mean * sockets[scale].mean).max())
+    reach = SUBSURFACE_REACH.get(sockets.properties.get(method, "RANDOM_WALK"), 0.2) * widest
+    return reach if np.isfinite(reach) else 0.0
+
+
+def _subsurface(sockets: dict[str, Estimate]) -> Summary:
+    return Summary(diffuse=True, scatter=_reach(sockets, "Radius", "Scale", "falloff"))
 
 
 PRINCIPLED = Entry(
@@ -134,7 +152,11 @@ PRINCIPLED = Entry(
         Socket("Transmission Weight", "FLOAT", layer=True),
         Socket("Thin Wall", "FLOAT", layer=True),
         Socket("Subsurface Weight", "FLOAT", layer=True),
+        Socket("Subsurface Radius", "VECTOR", (1.0, 0.2, 0.1)),
+        Socket("Subsurface Scale", "FLOAT", 0.05),
+        Socket("Subsurface IOR", "FLOAT", 1.4),
         Socket("Subsurface Anisotropy", "FLOAT"),
+        Choice("subsurface_method", SUBSURFACE_METHODS, missing=1),
         Socket("Coat Weight", "FLOAT", layer=True),
         Socket("Coat Roughness", "FLOAT", 0.03),
         Socket("Coat IOR", "FLOAT", 1.5),
@@ -149,7 +171,6 @@ PRINCIPLED = Entry(
     ),
     include="material/shader.glsl",
     approximations=(
-        Approximation("Subsurface Weight", 0.0, SUBSURFACE),
         Approximation("Thin Wall", 0.0, "Light passes thin walls straight on, without roughness."),
         THIN_FILM,
     ),
@@ -216,6 +237,23 @@ ENTRIES = (
         "shader_translucent",
         (Socket("Color", "COLOR", GREY), NORMAL),
         include="material/shader.glsl",
+        summary=_soft_diffuse,
+    ),
+    Entry(
+        "ShaderNodeBsdfHairPrincipled",
+        "shader_hair",
+        (
+            Socket("Color", "COLOR", (0.017513, 0.005763, 0.002059)),
+            Choice("parametrization", {"COLOR": 0, "MELANIN": 1, "ABSORPTION": 2}),
+            Socket("Melanin", "FLOAT", 0.8),
+            Socket("Melanin Redness", "FLOAT", 1.0),
+            Socket("Tint", "COLOR", WHITE),
+            Socket("Absorption Coefficient", "VECTOR", (0.245531, 0.52, 1.365)),
+            Socket("Radial Roughness", "FLOAT", 0.3),
+            NORMAL,
+        ),
+        include="material/shader.glsl",
+        note="Drawn as a diffuse strand of the fibre's colour, that lets half of its light through; no highlights.",
         summary=_soft_diffuse,
     ),
     Entry(
@@ -294,18 +332,34 @@ ENTRIES = (
             f"ShaderNode{name}",
             "shader_inside",
             include="material/shader.glsl",
-            note="Read as coefficients (materials/volume.py); drawn where it absorbs inside glass.",
+            note="Drawn as a volume; in the place of a surface it is left out.",
             summary=lambda sockets: Summary(),
         )
         for name in ("VolumeAbsorption", "VolumeScatter", "VolumePrincipled", "VolumeCoefficients")
     ),
     Entry(
         "ShaderNodeSubsurfaceScattering",
-        "shader_diffuse",
-        (Socket("Color", "COLOR", GREY), Expression("0.0"), NORMAL),
+        "shader_subsurface",
+        (
+            Socket("Color", "COLOR", GREY),
+            Socket("Scale", "FLOAT", 0.05),
+            Socket("Radius", "VECTOR", (1.0, 0.2, 0.1)),
+            Socket("IOR", "FLOAT", 1.4),
+            Socket("Roughness", "FLOAT", 1.0),
+            Socket("Anisotropy", "FLOAT"),
+            NORMAL,
+            Choice("falloff", SUBSURFACE_METHODS, missing=1),
+        ),
         include="material/shader.glsl",
-        note=SUBSURFACE,
-        summary=_diffuse,
+        summary=_subsurface,
+    ),
+    # Painted translucency: not a node of Blender's, see materials/translucency.py.
+    Entry(
+        "CandelaTranslucency",
+        "shader_translucency_maps",
+        (Socket("Blur", "FLOAT", 0.5), Socket("Tint", "COLOR", WHITE), Socket("Translucency", "FLOAT", 1.0)),
+        include="material/shader.glsl",
+        summary=lambda sockets: Summary(),
     ),
 )
 

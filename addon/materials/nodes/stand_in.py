@@ -84,22 +84,6 @@ ENTRIES = (
         note="Attributes of objects, instancers and view layers are not read; all outputs are 0.",
     ),
     Entry(
-        "ShaderNodeHairInfo",
-        "no_strand",
-        outputs=(
-            *_floats("Is Strand", "Intercept", "Length", "Thickness"),
-            ("Tangent Normal", "VECTOR"),
-            ("Random", "FLOAT"),
-        ),
-        include=SOURCE,
-    ),
-    Entry(
-        "ShaderNodePointInfo",
-        "no_point",
-        outputs=(("Position", "VECTOR"), *_floats("Radius", "Random")),
-        include=SOURCE,
-    ),
-    Entry(
         "ShaderNodeVolumeInfo",
         "no_volume",
         outputs=(("Color", "COLOR"), *_floats("Density", "Flame", "Temperature")),

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.compare.exr import ExrError, read_exr
 from addon.compare.reference import overridden
+from addon.snapshot.exr import ExrError, read_exr
 
 WIDTH, HEIGHT = 21, 37  # more rows than two ZIP chunks hold, and no multiple of anything
 

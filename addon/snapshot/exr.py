@@ -98,18 +98,23 @@ def _read_headers(data: bytes, at: int, multipart: bool) -> tuple[list[Part], in
     """All headers and where the chunk tables begin. Several headers end with an empty one."""
     parts = []
     while True:
-        attributes: dict[str, bytes] = {}
-        while data[at] != 0:
-            name, at = _text(data, at)
-            _, at = _text(data, at)  # the attribute's type; the ones needed here have only one
-            (size,) = struct.unpack_from("<I", data, at)
-            attributes[name] = data[at + 4 : at + 4 + size]
-            at += 4 + size
-        at += 1
+        attributes, at = read_attributes(data, at)
         if attributes:
-            parts.append(_part(attributes))
+            parts.append(_part({name: value for name, (_, value) in attributes.items()}))
         if not multipart or not attributes:
             return parts, at
+
+
+def read_attributes(data: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]], int]:
+    """Type and value of each attribute of the header that begins at `at`, and where the header ends."""
+    attributes = {}
+    while data[at] != 0:
+        name, at = _text(data, at)
+        kind, at = _text(data, at)
+        (size,) = struct.unpack_from("<I", data, at)
+        attributes[name] = kind, data[at + 4 : at + 4 + size]
+        at += 4 + size
+    return attributes, at + 1
 
 
 def _part(attributes: dict[str, bytes]) -> Part:

@@ -1,0 +1,59 @@
+"""The verb `merge`: one picture, or one for each frame, of the slices that several machines have rendered.
+
+It opens the same scene with the same options, and ends the picture as the render of all samples does: denoising,
+passes, metadata and file format are those of `render`. Slices of another scene, another number of samples, another
+size or another Blender are refused, and so is a picture of which samples are missing or there twice.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .. import engine
+from ..compare.reference import scene_hash
+from ..frame.slices import merged
+from . import slices, verbs
+from .refused import USAGE, Refused
+
+
+def merge(options: argparse.Namespace) -> None:
+    """The verb."""
+    frames, output, file = options.frames, options.output, options.file
+    if frames is None:
+        _merge(options, options.slices, output, file)
+        return
+    if not all("#" in path.name for path in options.slices):
+        raise Refused("With --frames the names of slices need #### in place of the frame's number.", USAGE)
+    found = {frame: [verbs.numbered(path, frame, True) for path in options.slices] for frame in frames}
+    missing = [path.name for paths in found.values() for path in paths if not path.is_file()]
+    if missing:
+        raise Refused(f"Slices are missing: {', '.join(missing)}.")
+    for frame, paths in found.items():
+        _merge(options, paths, verbs.numbered(output, frame, True), file)
+
+
+def _merge(options: argparse.Namespace, paths: list[Path], output: Path, file: Path | None) -> None:
+    parts = [slices.read_header(path) for path in paths]
+    slices.of_one_picture(parts)
+    about = parts[0].about
+    said = about["options"]
+    job = verbs.open_job(
+        argparse.Namespace(
+            **{
+                **vars(options), "file": file or Path(about["file"]), "output": output, "frames": None,
+                "samples": str(about["total"]), "frame": about["frame"], "size": said["size"], "scene": said["scene"],
+                "view_layer": said["view_layer"], "assignments": said["assignments"],
+            }
+        )
+    )  # fmt: skip
+    if scene_hash(job.scene) != about["scene_hash"]:
+        raise Refused(f"{job.options.file} is not the file of which these are slices: it has been changed since.")
+    read = [slices.read_sums(part) for part in parts]
+    try:
+        engine.given.update({layer: merged([found[layer] for found in read]) for layer in about["layers"]})
+        verbs.render(job)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    finally:
+        engine.given.clear()

@@ -1,0 +1,131 @@
+"""Slices of a picture as files.
+
+A slice is a multilayer EXR: per view layer the sums that `frame/slices.py` takes, under "LAYER.sum NAME", beside
+"LAYER.Combined", the picture of its own samples, which any viewer shows. What a merge must know stands in the header as
+JSON, in the attribute `candela`: which samples, of which scene (a hash of all that it is made of), and the options of
+the command line.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..compare.exr_write import read_about, write_exr
+from ..compare.reference import scene_hash
+from ..frame import slices
+from ..snapshot.exr import ExrError, read_exr
+from .refused import USAGE, Refused
+
+ABOUT = "candela"
+SUM = "sum "
+ALIKE = ("scene_hash", "frame", "total", "options", "blender", "layers")  # what slices of one picture have in common
+
+
+@dataclass(frozen=True)
+class Part:
+    """A slice's file: what its header says, and its sums by view layer once they are read."""
+
+    path: Path
+    about: dict
+
+
+def bounds(text: str, total: int) -> tuple[int, int]:
+    """First sample and number of samples of slice "K/N", N of them as equal as can be. ValueError with a sentence."""
+    number, _, of = text.partition("/")
+    try:
+        k, n = int(number), int(of)
+    except ValueError:
+        k = n = 0
+    if not 1 <= k <= n:
+        raise ValueError(f"'{text}' is no slice: K/N is, such as 1/4, with K from 1 to N.")
+    if n > total:
+        raise ValueError(f"{total} samples cannot be split into {n} slices.")
+    first, end = total * (k - 1) // n, total * k // n
+    return first, end - first
+
+
+def about_slice(job) -> dict:
+    """What a slice's header says; the same for all slices of a picture but for `first` and `count`."""
+    options = job.options
+    return {
+        "scene_hash": scene_hash(job.scene),
+        "file": str(options.file.resolve()),
+        "frame": job.scene.frame_current,
+        "total": job.scene.candela.samples,
+        "blender": bpy.app.version_string,
+        "options": {
+            "size": options.size,
+            "scene": job.scene.name,
+            "view_layer": options.view_layer,
+            "assignments": sorted(options.assignments),
+        },
+    }
+
+
+def write(path: Path, about: dict, taken: dict[str, slices.Slice]) -> None:
+    """The file of a slice. Its samples are those of its view layers, which all have the same."""
+    one = next(iter(taken.values()))
+    layers = {}
+    for layer, found in taken.items():
+        layers[f"{layer}.Combined"] = (
+            found.images["film.combined"] if "film.combined" in found.images else _shown(found)
+        )
+        layers |= {f"{layer}.{SUM}{name}": pixels for name, pixels in found.images.items() if name != "film.combined"}
+    about = about | {"first": one.first, "count": one.count, "layers": sorted(taken)}
+    write_exr(path, layers, {ABOUT: json.dumps(about)})
+
+
+def _shown(found: slices.Slice) -> np.ndarray:
+    """The mean of a slice's light, for viewers."""
+    light = [
+        p for name, p in found.images.items() if name.startswith(("film.", "radiance.")) and name not in slices.FIRST
+    ]
+    total = np.sum(light, axis=0) / found.count
+    total[..., 3] = np.clip(found.images["radiance.environment"][..., 3] / found.count, 0.0, 1.0)
+    return total.astype(np.float32)
+
+
+def read_header(path: Path) -> Part:
+    """Raises Refused where the file is no slice."""
+    try:
+        return Part(path, json.loads(read_about(path)[ABOUT]))
+    except FileNotFoundError:
+        raise Refused(f"There is no file {path}.") from None
+    except ExrError as error:
+        raise Refused(str(error)) from None
+    except (KeyError, json.JSONDecodeError):
+        raise Refused(f"{path} is no slice of Candela: `render --slice K/N --output NAME.exr` writes them.") from None
+
+
+def read_sums(part: Part) -> dict[str, slices.Slice]:
+    """A file's slice of each view layer. Raises Refused."""
+    try:
+        layers = read_exr(part.path)
+    except (ExrError, OSError) as error:
+        raise Refused(f"{part.path} could not be read: {error}".rstrip(".") + ".") from None
+    about, found = part.about, {}
+    for layer in about["layers"]:
+        prefix = f"{layer}.{SUM}"
+        sums = {name.removeprefix(prefix): pixels for name, pixels in layers.items() if name.startswith(prefix)}
+        found[layer] = slices.Slice(about["first"], about["count"], about["total"], sums)
+    return found
+
+
+def of_one_picture(parts: list[Part]) -> None:
+    """Raise Refused where slices are of different pictures."""
+    first = parts[0]
+    for part in parts[1:]:
+        for name in ALIKE:
+            if part.about.get(name) != first.about.get(name):
+                what = {"scene_hash": "scene (its contents differ)", "total": "number of samples"}.get(name, name)
+                raise Refused(f"{first.path.name} and {part.path.name} are slices of different pictures: {what}.")
+
+
+def check_output(path: Path) -> None:
+    if path.suffix.lower() != ".exr":
+        raise Refused(f"A slice is written as .exr, and {path.name} does not end so.", USAGE)

@@ -1,0 +1,58 @@
+"""Colours of wavelengths: what each of them adds to a picture's red, green and blue for light of equal energy.
+
+The colour matching functions are the fits of Wyman, Sloan and Shirley 2013 ("Simple analytic approximations to the CIE
+XYZ color matching functions"); XYZ to linear Rec. 709 by IEC 61966-2-1. A diffraction pattern of one wavelength holds
+for others scaled by their ratio, and its area grows as its square: `table` contains the factor (575 nm / wavelength)^2
+that keeps its energy.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+SHORTEST, RANGE, BASE = 380.0, 390.0, 575.0  # nm
+LARGEST_LOOKUP = BASE / SHORTEST  # how much further out than a pixel the shortest wavelength is looked up
+ENTRIES = 512
+TO_REC709 = np.array([
+    [3.2404542, -1.5371385, -0.4985314],
+    [-0.9692660, 1.8760108, 0.0415560],
+    [0.0556434, -0.2040259, 1.0572252],
+])  # fmt: skip
+_X = ((1.056, 599.8, 0.0264, 0.0323), (0.362, 442.0, 0.0624, 0.0374), (-0.065, 501.1, 0.0490, 0.0382))
+_Y = ((0.821, 568.8, 0.0213, 0.0247), (0.286, 530.9, 0.0613, 0.0322))
+_Z = ((1.217, 437.0, 0.0845, 0.0278), (0.681, 459.0, 0.0385, 0.0725))
+
+
+def wavelength(share) -> np.ndarray:
+    """Nanometres at a share in [0, 1] of the range."""
+    return SHORTEST + RANGE * np.asarray(share, np.float64)
+
+
+def xyz(nanometres) -> np.ndarray:
+    """(..., 3) values of the colour matching functions."""
+    nanometres = np.asarray(nanometres, np.float64)[..., None]
+
+    def lobes(fits) -> np.ndarray:
+        height, middle, left, right = np.array(fits).T
+        away = (nanometres - middle) * np.where(nanometres < middle, left, right)
+        return (height * np.exp(-0.5 * away**2)).sum(-1)
+
+    return np.stack([lobes(fits) for fits in (_X, _Y, _Z)], axis=-1)
+
+
+@cache
+def table() -> np.ndarray:
+    """(ENTRIES, 4) float32 at the middles of equal steps of the range: linear RGB with the factor of the area, and
+    575 nm over the wavelength."""
+    nanometres = wavelength((np.arange(ENTRIES) + 0.5) / ENTRIES)
+    scale = BASE / nanometres
+    rgb = xyz(nanometres) @ TO_REC709.T
+    rgb = rgb / rgb.sum(axis=0) * ENTRIES  # white light of equal energy is this picture's white
+    return np.concatenate([rgb * (scale**2)[:, None], scale[:, None]], axis=1).astype(np.float32)
+
+
+def entry(number, count: int) -> np.ndarray:
+    """Entry of the table for wavelength `number` of `count`."""
+    return ((np.asarray(number) + 0.5) / count * ENTRIES).astype(int)

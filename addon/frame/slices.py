@@ -1,0 +1,93 @@
+"""Slices: samples of one picture that several machines render, and their sums put together again.
+
+A slice holds samples `sample_offset` … of a picture of `samples`. Sums over all slices are those of the whole picture,
+but for the order in which floats were added. What is taken from a finished slice:
+
+    sums      light by path, colours, coverage, normals: added up
+    first     depth, positions and indices, which every slice has from the picture's first sample: of any slice
+    last      surface.position of the last sample, from which Denoise tells surfaces: of the last slice
+    halves    what Denoise compares: sums of the first half of the samples, of the slice in which that half ends
+
+What techniques learn from sample to sample (how open the sky is above a pixel, environment_light.py) begins anew in
+each slice: there the merged picture has other noise of the same mean, and no rounding tells it from the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gfx import images
+from .run import Frame
+
+HALF = "_half"
+LAST = ("surface.position",)
+FIRST = ("film.depth", "film.position", "film.index")
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Samples `first` … `first + count - 1` of `total`, and the frame's images by name, (H, W, 4) float32."""
+
+    first: int
+    count: int
+    total: int
+    images: dict[str, np.ndarray]
+
+    @property
+    def end(self) -> int:
+        return self.first + self.count
+
+
+def taken(frame: Frame) -> Slice:
+    """What a merge needs of a frame whose samples are drawn."""
+    sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
+    wanted = {frame.shown.get(name, name) for name in sums} | set(FIRST) | set(LAST)
+    wanted |= {name for name in frame.images if name.endswith(HALF)}
+    read = {name: images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}
+    settings = frame.settings
+    return Slice(settings.sample_offset, frame.samples_done, settings.samples, read)
+
+
+def merged(slices: Sequence[Slice]) -> dict[str, np.ndarray]:
+    """The images of the whole picture. ValueError with a sentence where the slices are not exactly its samples."""
+    slices = sorted(slices, key=lambda one: one.first)
+    total, place = slices[0].total, 0
+    for one in slices:
+        if one.total != total:
+            raise ValueError(f"The slices are of pictures of {total} and of {one.total} samples.")
+        if one.images.keys() != slices[0].images.keys():
+            odd = ", ".join(sorted(one.images.keys() ^ slices[0].images.keys()))
+            raise ValueError(f"The slices hold different passes: {odd} are not in all of them.")
+        for name, pixels in one.images.items():
+            if pixels.shape != slices[0].images[name].shape:
+                size, other = (f"{p.shape[1]} × {p.shape[0]}" for p in (slices[0].images[name], pixels))
+                raise ValueError(f"The slices are of different sizes: {size} and {other} pixels.")
+        if one.first < place:
+            raise ValueError(f"Samples {one.first} to {min(place, one.end) - 1} are in more than one slice.")
+        if one.first > place:
+            raise ValueError(f"Samples {place} to {one.first - 1} of {total} are missing.")
+        place = one.end
+    if place < total:
+        raise ValueError(f"Samples {place} to {total - 1} of {total} are missing.")
+    return {name: _merged(name, slices) for name in slices[0].images}
+
+
+def _merged(name: str, slices: Sequence[Slice]) -> np.ndarray:
+    if name in FIRST:
+        return slices[0].images[name]
+    if name in LAST:
+        return slices[-1].images[name]
+    half = slices[0].total // 2
+    if not name.endswith(HALF):
+        return _sum([one.images[name] for one in slices])
+    path = name.rpartition(".")[2].removesuffix(HALF)
+    before = [one.images[f"film.{path}"] for one in slices if one.end < half and f"film.{path}" in one.images]
+    return _sum(before + [one.images[name] for one in slices if one.first < half <= one.end])
+
+
+def _sum(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """In doubles, so that the order does not count."""
+    return np.sum(parts, axis=0, dtype=np.float64).astype(np.float32)

@@ -1,0 +1,177 @@
+"""What throws caustics: the materials, objects and lights whose light a technique of the slot `caustics` carries.
+
+A material is a caster if it bends light (glass, of any roughness) or mirrors it with no diffuse part to speak of
+(Glossy, Metallic, or Principled with metallic from METALLIC on) and is smooth: roughness up to SMOOTH, known from the
+socket's own value. What a varnish over a diffuse surface mirrors stays with indirect light.
+
+A light is answered for if it casts shadows, diffuse surfaces see it, and from the casters it looks at most WIDEST wide;
+the caustic of a wider one differs little from its straight shadow. Shadow rays of the lights answered for take glass as
+opaque: what passes it arrives as photons. All glass counts there, so a pane beside a lens is a caster, too. A scene in
+which all glass is flat panes and nothing else throws caustics is left to straight light, which is right for panes.
+
+Blender's switches: with Reflective or Refractive caustics off (Cycles' Light Paths), reflected or refracted light is
+left out, but for glass with Shadow Caustics: objects set to cast them, under lights set to give them. Where the Cycles
+add-on is off, the switches do not exist and all is on. Whether an object is to receive such caustics is not followed:
+all surfaces do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
+from ..frame.run import Frame
+from ..materials.compiler import may_refract
+from ..materials.graph import Graph, Node
+from ..snapshot.scene import Instance, Light, Mesh, Snapshot
+from ..sources import lights
+from .light_views import groups
+
+SLOT = "caustics"
+SMOOTH = 0.25  # roughness
+METALLIC = 0.5
+WIDEST = 0.6  # tangent of half the angle of a light, seen from the casters
+FLAT = 0.999  # cosine between normals of a pane's faces
+_MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
+
+
+def mirror_roughness(graph: Graph) -> float | None:
+    """Roughness of a material that mirrors photons; None if it does not."""
+    found = [
+        rough
+        for node in graph.nodes.values()
+        if (node.type in _MIRRORS or (node.type == "ShaderNodeBsdfPrincipled" and _value(node, "Metallic") >= METALLIC))
+        for rough in [_value(node, "Roughness", 1.0)]
+        if rough <= SMOOTH
+    ]
+    return min(found, default=None)
+
+
+def _value(node: Node, name: str, unknown: float = 0.0) -> float:
+    socket = node.inputs.get(name)
+    if socket is None or socket.link is not None or socket.value is None:
+        return unknown
+    return float(np.ravel(socket.value)[0])
+
+
+@dataclass(frozen=True)
+class Casters:
+    """What throws caustics in a scene: materials by number, and boxes of the objects that show them."""
+
+    refracting: frozenset[int]
+    mirrors: dict[int, float]  # roughness by material
+    low: np.ndarray  # (K, 3) world space
+    high: np.ndarray
+    lights: frozenset[str]  # keys of the lights that are answered for
+
+    @property
+    def materials(self) -> frozenset[int]:
+        return self.refracting | frozenset(self.mirrors)
+
+
+def casters_of(snapshot: Snapshot) -> Casters | str:
+    """The casters, or, as a sentence, why there are none."""
+    film = snapshot.film
+    glass, mirrors = set(), {}
+    for number in {slot for instance in snapshot.instances for slot in instance.materials}:
+        graph = snapshot.materials[number].graph
+        if may_refract(graph):
+            glass.add(number)
+        rough = mirror_roughness(graph)
+        if rough is not None and film.caustics_reflective:
+            mirrors[number] = rough
+    by_flags = not film.caustics_refractive
+    if by_flags and not any(one.caustics_caster for one in snapshot.instances):
+        glass = set()
+    if not glass and not mirrors:
+        if film.caustics_reflective and film.caustics_refractive:
+            return "no material is glass or a smooth mirror"
+        return "caustics are switched off in the scene's Light Paths, or nothing else throws any"
+    shown = [
+        one
+        for one in snapshot.instances
+        if one.visibility.diffuse and snapshot.meshes[one.mesh].triangle_count and np.isfinite(one.matrix).all()
+        if not glass.union(mirrors).isdisjoint(one.materials)
+    ]
+    if by_flags:
+        shown = [one for one in shown if one.caustics_caster or not set(mirrors).isdisjoint(one.materials)]
+    if not shown:
+        return "no object that throws caustics is visible to light from surfaces"
+    if not mirrors and all(_is_pane(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown}):
+        return "all glass is flat panes, which light passes straight"
+    boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
+    low, high = groups(boxes[:, 0], boxes[:, 1])
+    given = [light for light in snapshot.lights if light.cast_shadow and np.any(light.strength)]
+    given = [light for light in given if light.visibility.diffuse and (light.caustics or not by_flags or mirrors)]
+    if not given:
+        return "no lamp that casts shadows lights them: light of the world and of meshes passes straight"
+    answered = [light for light in given if _width(light, low, high) <= WIDEST]
+    if not answered:
+        return "all lamps are so wide, seen from what would throw caustics, that these look like straight light"
+    return Casters(frozenset(glass), mirrors, low, high, frozenset(light.key for light in answered))
+
+
+class Answered:
+    """The casters of a picture that a technique answers for; None where none does."""
+
+    def __init__(self):
+        self.casters: Casters | None = None
+        self.known = False
+
+
+def of(frame: Frame) -> Casters | None:
+    """The casters that a technique of this picture answers for; None where the slot is empty."""
+    shared = frame.shared(Answered)
+    if not shared.known:
+        found = casters_of(frame.snapshot) if frame.owned(LIGHT_SPECULAR_DIFFUSE) else None
+        shared.casters, shared.known = found if isinstance(found, Casters) else None, True
+    return shared.casters
+
+
+def answered(frame: Frame, emitter: lights.Emitter) -> bool:
+    """Whether light of this lamp that passes casters arrives by the slot: to its shadows glass is opaque."""
+    found = of(frame)
+    return found is not None and emitter.light is not None and emitter.light.key in found.lights
+
+
+def _box(instance: Instance, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    centre, half = (mesh.bounds_min + mesh.bounds_max) / 2, (mesh.bounds_max - mesh.bounds_min) / 2
+    world = instance.matrix[:3, :3] @ centre + instance.matrix[:3, 3]
+    reach = np.abs(instance.matrix[:3, :3]) @ half
+    return world - reach, world + reach
+
+
+def _width(light: Light, low: np.ndarray, high: np.ndarray) -> float:
+    """Tangent of half the light's angle, seen from the nearest of the casters' boxes."""
+    if light.kind == "SUN":
+        return float(np.tan(min(light.angle / 2, 1.5)))
+    scale = np.linalg.norm(light.matrix[:3, :3], axis=0)
+    if light.kind == "AREA":
+        reach = float(np.hypot(light.size[0] * scale[0], light.size[1] * scale[1])) / 2
+    else:
+        reach = light.radius
+    gap = np.linalg.norm(np.clip(light.matrix[:3, 3], low, high) - light.matrix[:3, 3], axis=1)
+    middle = np.linalg.norm((low + high) / 2 - light.matrix[:3, 3], axis=1)
+    # Beside a caster a lamp is wide, but so it is for all that is near: the middle counts.
+    return float(reach / max(np.maximum(gap, 0.5 * middle).min(), 1e-30))
+
+
+def _is_pane(mesh: Mesh) -> bool:
+    """Whether a mesh is a slab between two flat faces, by area; its rim does not count."""
+    corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]].astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    if not area.sum() > 0:
+        return False
+    axis = across[np.argmax(area)] / area.max()
+    cosine = across @ axis / np.maximum(area, 1e-300)
+    front, back = area[cosine > FLAT].sum(), area[cosine < -FLAT].sum()
+    return bool(front + back > 0.8 * area.sum() and abs(front - back) < 0.1 * (front + back))
+
+
+def boxes_of(frame: Frame, found: Casters) -> Iterable[tuple[np.ndarray, np.ndarray]]:
+    """The casters' boxes relative to the render origin."""
+    return zip(found.low - frame.geometry.origin, found.high - frame.geometry.origin)

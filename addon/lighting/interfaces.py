@@ -1,0 +1,33 @@
+"""How materials bend and mirror what meets them where no shader of theirs can run: means, three texels a material.
+
+0  colour of what passes glass, once; index of refraction
+1  roughness; share of the material that is glass; losses at the interface (0 none but total reflection, 1
+   Fresnel's, 2 with multiple scattering given back); whether what is mirrored has the colour, too
+2  what the inside absorbs, 1/m; whether the material is a mirror that passes photons on
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..materials.compiled import CompiledMaterial
+
+
+def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, float] | None = None) -> np.ndarray:
+    """(N, 3, 4) float32 rows of the materials; `mirrors`: roughness of those that mirror photons."""
+    table = np.zeros((len(compiled), 3, 4), np.float32)
+    for number, (row, material) in enumerate(zip(table, compiled)):
+        if material.glass:
+            glass = material.glass
+            row[0] = *glass.color, glass.ior
+            losses = 0.0 if not glass.fresnel else 2.0 if glass.multiple else 1.0
+            row[1] = glass.roughness, glass.share, losses, glass.mirrors_color
+        if material.medium:
+            row[2, :3] = np.clip(material.medium.absorption, 0.0, 1e30)
+        if mirrors and number in mirrors:
+            row[2, 3] = 1.0
+            if not material.glass:
+                row[1, 0] = mirrors[number]
+    return table

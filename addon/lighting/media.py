@@ -1,0 +1,74 @@
+"""The service of the media of a scene: what they let pass, for passes that draw light or look along a view.
+
+A pass that asks how much light arrives from somewhere is compiled with `attenuated`, which adds the media's images and
+MEDIA to it, and binds `MediaService.bindings`. Without a medium nothing of this is compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+
+from ..frame.run import Frame
+from ..frame.technique import Service
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..gfx.struct import Block
+from ..scene.media import ATTENUATION_TEXTURES, Media
+from ..scene.view import VIEW
+from ..sources import lights
+
+VIEW_PROGRAM = passes.fullscreen_program(
+    "media along the view",
+    "media/view.frag.glsl",
+    textures=(("RGBA32F", "surface_position"), *ATTENUATION_TEXTURES),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+    constants=(("INT", "light_count"),),
+    outputs=(("VEC4", "out_through"),),
+)
+
+
+@dataclass
+class MediaService(Service):
+    """Media of the frame, ready to be asked."""
+
+    name = "media"
+    media: Media
+
+    @contextmanager
+    def passing(
+        self, frame: Frame, surfaces: dict[str, images.Image], seen: Block, count: int
+    ) -> Iterator[images.Image]:
+        """An image of what passes between the eye and the `surfaces` (by their bindings), or infinity. `seen`: lamps
+        that the camera sees, `count` of them."""
+        with images.borrowed(*frame.size, "RGBA32F") as target:
+            passes.fullscreen(
+                VIEW_PROGRAM, target,
+                textures={"surface_position": surfaces["surface_position"], **self.media.attenuation()},
+                blocks={"film_view": frame.view_block, "sources": seen}, constants={"light_count": count},
+            )  # fmt: skip
+            yield target.colors[0]
+
+    @property
+    def bindings(self) -> dict[str, images.Image]:
+        """Textures of passes made by `attenuated`."""
+        return self.media.attenuation()
+
+
+@dataclass(frozen=True)
+class MediaEmission(Service):
+    """What media emit along each pixel's view ray in this sample, to be seen as emission of surfaces is."""
+
+    name = "emission of media"
+    image: str  # name of the frame's image
+
+
+@cache
+def attenuated(program: Program) -> Program:
+    """The same pass for a scene with media."""
+    return replace(
+        program, name=f"{program.name}, media", textures=(*program.textures, *ATTENUATION_TEXTURES),
+        defines=(*program.defines, ("MEDIA", "1")),
+    )  # fmt: skip

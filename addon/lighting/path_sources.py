@@ -1,0 +1,104 @@
+"""Points on light sources for surfaces that no map is fitted to: those that rays meet, and glass.
+
+Each sample draws one point on each lamp (where there are many, on some of them by chance), some on emissive
+triangles and some directions of the world, the same ones for all pixels; who lights surfaces by them traces what stands
+between. A ray of a lobe may find the same light: shaders weigh both by the power heuristic, with the rates that the
+rows and the constants tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Service
+from ..materials.compiler import may_emit
+from ..sources import lights
+from .emissive_triangles import PATHS, EmissiveTriangles
+
+SHOWN = "reflection.shown"  # image: how much surfaces reflect that reflections show, summed up over samples
+
+
+@dataclass(frozen=True)
+class ShadedLobes(Service):
+    """Lobes up to `roughness`, and glass, show surfaces with their own materials: others leave them out."""
+
+    name = "shaded_lobes"
+    roughness: float
+
+
+def shaded_roughness(frame: Frame) -> float:
+    """Up to where lobes are shaded so; -1 where none are."""
+    lobes = frame.service(ShadedLobes)
+    return lobes.roughness if lobes else -1.0
+
+
+class PathSources:
+    """Light sources that surfaces lit by any of these paths (names of Visibility) may see."""
+
+    def __init__(self, paths: Sequence[str], use: str, directions: int = 2, emissive_points: int = 2):
+        self.paths, self.use = tuple(paths), use
+        self.directions, self.emissive_points = directions, emissive_points
+        self.most_lamps = lights.MOST_LIGHTS - directions - emissive_points
+        self._sources = lights.Sources()
+        self._emitters: list[lights.Emitter] = []
+        self._triangles: EmissiveTriangles | None = None
+        self.world_flags = 0  # of lights.py: which paths see the world
+
+    def begin(self, frame: Frame) -> None:
+        """Once per picture, before `rows`."""
+        wanted = sum(PATHS[path] for path in self.paths)
+        self._emitters = [emitter for emitter in frame.emitters if emitter.flags & wanted]
+        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        self._triangles = None
+        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
+            triangles = EmissiveTriangles(frame, self.paths)
+            self._triangles = triangles if triangles.power > 0 else None
+        seen = frame.snapshot.world.visibility
+        self.world_flags = sum(PATHS[path] * getattr(seen, path) for path in self.paths)
+        if frame.environment.power <= 0:
+            self.world_flags = 0
+
+    @property
+    def emissive_power(self) -> float:
+        """Of all triangles, W/sr: luminance times area. 0 where none emits."""
+        return self._triangles.power if self._triangles else 0.0
+
+    def rows(self, frame: Frame) -> list[np.ndarray]:
+        """Points of this sample, for lights.Sources. More lamps than fit are drawn by chance, and count more: both as
+        points and where a ray meets them."""
+        rows = []
+        count = len(self._emitters)
+        chosen = np.arange(count)
+        if count > self.most_lamps:
+            chosen = (np.arange(self.most_lamps) + frame.lot(f"{self.use}/choose")) * count / self.most_lamps
+            chosen = chosen.astype(int)
+        for number in chosen:
+            emitter = self._emitters[number]
+            sample = emitter.sample(*frame.random_volume(f"{self.use}/light"))
+            weight = max(count / self.most_lamps, 1.0)
+            rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), weight))
+        if self._triangles is not None:
+            for k in range(self.emissive_points):
+                index = frame.sample * self.emissive_points + k
+                drawn = frame.random_volume_at(index, f"{self.use}/emissive")
+                rows.append(self._triangles.row(drawn, self.emissive_points, lights.SHADOW_FLAG))
+        if self.world_flags:
+            seen = lights.SHADOW_FLAG + self.world_flags
+            for k in range(self.directions):
+                index = frame.sample * self.directions + k
+                direction, radiance, density = frame.environment.draw(*frame.random_at(index, f"{self.use}/world"))
+                light = radiance / density
+                rows.append(lights.direction_row(direction, light, density, seen, 0, 1, self.directions))
+        return rows
+
+    def block(self, rows: list[np.ndarray]):
+        """The uniform block `sources` with these rows."""
+        return self._sources.set(rows)
+
+    def release(self) -> None:
+        self._sources.release()
+        self._emitters, self._triangles = [], None

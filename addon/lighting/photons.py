@@ -1,0 +1,261 @@
+"""Photons of caustics: bundles of light that specular surfaces send to diffuse ones, as records in images.
+
+The texels of a light's view of the casters (light_views.py) are photons of the flux
+
+    Phi = E(P) * A,   E irradiance across the light's direction at P,  A = d_omega |P - light|^2, or a texel's area
+
+which meet a material's own lobe at P: refracted or mirrored, one grid for each. From there a ray goes on through the
+hierarchy of all triangles, from interface to interface with the means of their materials (interfaces.py), until it
+meets a surface that is no caster. There each photon stands for an ellipse, by its neighbours of the same path (photon
+differentials on a grid, Kim, Ray Tracing Gems 2019):
+
+    Sigma = k^2 / 2 * sum over neighbours (x' - x)(x' - x)^T  +  (blur^2 + least^2) I
+    E(x)  = Phi * 2 max(0, 1 - q) / (pi sqrt(det Sigma)),   q = x^T Sigma^-1 x
+
+All photons of a sample share the point of the light, the numbers that a rough lobe draws from, and those that choose
+between mirrored and bent at later interfaces (in proportion to Fresnel's reflectance). So the photons of a sample are
+one smooth map, which needs few of them, and the mean over the samples is the integral over light, lobes and paths. The
+grid is shifted below a texel in each sample and k falls with their number, so that the mean converges. `blur` is what
+the light's extent and the lobe's width, which the samples share out, leave to each: at one sample all of it.
+
+| cost | per sample, view and lobe |
+|---|---|
+| draws | the surfaces that the view sees, into six images |
+| rays | per photon 1 for each interface on its way, and 1 |
+| passes | 2 of the grid's side squared; bytes 10 x 16 per texel |
+
+Bias: footprints blur by about their size, and none of it remains as samples grow. Interfaces behind the first have
+their material's mean colour, index and roughness, and none of its bumps. Light of one interaction with a diffuse
+surface between is left to indirect light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import images, passes
+from ..gfx.struct import Block, Struct
+from ..scene import acceleration
+from ..scene.view import VIEW
+from ..sources import lights
+from ..surfaces.draw import SURFACE_TEXTURES
+from ..surfaces.reflectance import Reflectance
+from . import caustic_casters
+from .interfaces import interface_table
+from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
+
+FOUND = ("photon_points", "photon_normals", "photon_fluxes")
+EMISSION = Struct(
+    "Emission",
+    ("vec4", "box_low"),  # of the casters that the view is about
+    ("vec4", "box_high"),  # w: widest roughness of a mirror that throws caustics
+    ("vec4", "lobe"),  # two numbers that all photons of the sample draw their lobes from, two for later interfaces
+    # What a sample leaves to blur: of the light's extent, of lobes; z: 0 in a picture of one sample; w: samples in
+    # all, 0 unknown, -1 one.
+    ("vec4", "spread"),
+    ("vec4", "absorbed"),  # by insides, 1/m, in the mean
+    ("int", "interfaces"),  # at most, after the first
+    ("int", "bends"),  # 1: photons of the refracted lobe
+)
+PHOTONS = passes.fullscreen_program(
+    "photons",
+    "caustics/photon.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES,
+        *(("RGBA32F", name) for name in ("energy_table", "reflectance", "interface_table")),
+    ),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
+    constants=(("FLOAT", "offset_size"), ("INT", "photon_roll")),
+    outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
+)  # fmt: skip
+MAP = (("RGBA32F", "receiver_position"), ("RGBA32F", "receiver_normal"))
+BEHIND = tuple(("RGBA32F", f"behind_{name}") for name in ("position", "normal", "tint", "lobe", "emission"))
+LOOKUPS = passes.fullscreen_program(
+    "photons by look-ups",
+    "caustics/lookup.frag.glsl",
+    textures=(*SURFACE_TEXTURES, *BEHIND, *MAP, ("RGBA32F", "energy_table")),
+    blocks=((VIEW, "film_view"), (VIEW, "map_view"), (lights.SOURCES, "sources"), (EMISSION, "photon_light")),
+    outputs=(("VEC4", "out_point"), ("VEC4", "out_normal"), ("VEC4", "out_flux")),
+)
+FOOTPRINTS = passes.fullscreen_program(
+    "photon footprints",
+    "caustics/footprint.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in FOUND),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "widening"), ("FLOAT", "least_pixels"), ("FLOAT", "longest")),
+    outputs=(("VEC4", "out_centre"), ("VEC4", "out_first"), ("VEC4", "out_second"), ("VEC4", "out_value")),
+)
+WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
+FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
+LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
+
+
+@dataclass(frozen=True)
+class LitView:
+    """A light's view of casters in one sample."""
+
+    emitter: lights.Emitter
+    sample: np.ndarray  # the point of the light that it looks from
+    view: LightView
+    lobes: tuple[int, ...]  # that photons may take there
+    index: int  # of the sample
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Photons of one view and lobe: images of FOUND, `side` along both sides."""
+
+    found: tuple[images.Image, ...]
+    side: int
+
+
+class Photons:
+    """Finds the photons of each sample. A technique owns one."""
+
+    def __init__(self):
+        self.buffers, self._behind = LightBuffers(), LightBuffers()
+        self._sources = lights.Sources()
+        self._interfaces: images.Image | None = None
+        self._emission: Block | None = None
+        self._found: images.Target | None = None
+        self._footprints: images.Target | None = None
+
+    def begin(self, frame: Frame, casters: caustic_casters.Casters) -> None:
+        """Before the first sample of a frame."""
+        frame.kept(Reflectance).update(frame)
+        self._interfaces = images.upload(interface_table(frame.materials.compiled, casters.mirrors))
+        inner = [frame.materials.compiled[k].medium for k in casters.refracting]
+        absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
+        self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
+
+    def views(self, frame: Frame, casters: caustic_casters.Casters, side: int, index: int) -> Iterator[LitView]:
+        """Views of all lights that are answered for, `side` photons along each side, in the sample number `index`."""
+        lobes = ()
+        if casters.refracting:
+            lobes += (REFRACTED,)
+        if frame.snapshot.film.caustics_reflective:
+            lobes += (REFLECTED,)
+        for emitter in frame.emitters:
+            if emitter.light.key not in casters.lights:
+                continue
+            alone = frame.settings.whole and frame.settings.samples == 1
+            sample = emitter.middle() if alone else emitter.sample(*frame.random_volume_at(index, "light"))
+            shift = frame.random_at(index, "caustics/grid")
+            for low, high in caustic_casters.boxes_of(frame, casters):
+                for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
+                    yield LitView(emitter, sample, view, lobes, index)
+
+    def traced(
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
+        count: int,
+    ) -> Iterator[Bundle]:  # fmt: skip
+        """Photons of a view by rays, over up to `interfaces` after the first; `count` samples share the light, or have
+        up to now. Each bundle is valid until the next."""
+        target = self._target("_found", light.view.side, len(FOUND))
+        for block, bound in self._drawn(frame, technique, casters, light, count, interfaces):
+            passes.fullscreen(
+                PHOTONS,
+                target,
+                textures={
+                    **frame.hierarchy("transmission").textures, **bound["textures"],
+                    "reflectance": frame.kept(Reflectance).image, "interface_table": self._interfaces,
+                },
+                blocks={"film_view": block, **bound["blocks"]},
+                constants={"offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index},
+            )  # fmt: skip
+            yield self._bundle(frame, technique, target)
+
+    def looked_up(
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, map_block: Block,
+        receivers: dict[str, images.Image], count: int,
+    ) -> Iterator[Bundle]:  # fmt: skip
+        """The same by look-ups in what the light's views show: the casters' nearest and farthest surfaces, and
+        `receivers`, images of MAP in the view `map_block`."""
+        target = self._target("_found", light.view.side, len(FOUND))
+        behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
+        for block, bound in self._drawn(frame, technique, casters, light, count, 1):
+            passes.fullscreen(
+                LOOKUPS,
+                target,
+                textures={
+                    **bound["textures"], **{name: behind[name] for _, name in BEHIND}, **receivers,
+                },
+                blocks={"film_view": block, "map_view": map_block, **bound["blocks"]},
+            )  # fmt: skip
+            yield self._bundle(frame, technique, target)
+
+    def _drawn(self, frame, technique, casters, light: LitView, count: int, interfaces: int):
+        """Draws the casters' nearest surfaces by each lobe, and yields what programs that find photons bind."""
+        emitter, view = light.emitter, light.view
+        share = float(count) ** -0.5
+        wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
+        u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
+        strata = float(count) if frame.settings.whole and count > 1 else 0.0
+        if count == 1:
+            u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
+        sources = self._sources.set([emitter.row(light.sample, 0, 0)])
+        choice = frame.random_volume_at(light.index, "caustics/interface")[2]
+        drawn = self.buffers.draw(frame, technique, view, casters.materials, light.lobes, choice)
+        for lobe, block, surfaces in drawn:
+            values = {
+                "box_low": (*view.low, 0.0), "box_high": (*view.high, caustic_casters.SMOOTH),
+                "lobe": (*u, *later), "spread": (share * wide, share, float(count > 1), strata),
+                "absorbed": (*self._absorbed, 0.0),
+                "interfaces": interfaces, "bends": int(lobe == REFRACTED),
+            }  # fmt: skip
+            if self._emission is None:
+                self._emission = Block(EMISSION, **values)
+            else:
+                self._emission.update(**values)
+            textures = {**surfaces, "energy_table": frame.materials.energy_table}
+            yield block, {"textures": textures, "blocks": {"sources": sources, "photon_light": self._emission}}
+
+    def _bundle(self, frame: Frame, technique: Technique, target: images.Target) -> Bundle:
+        frame.count(technique, "passes")
+        frame.count(technique, "photons", target.size[0] ** 2)
+        return Bundle(target.colors, target.size[0])
+
+    def footprints(
+        self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, count: int, least_pixels: float
+    ) -> tuple[images.Image, ...]:
+        """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
+        fall = FALL_KNOWN if frame.settings.whole else FALL_GROWING
+        target = self._target("_footprints", bundle.side, 4)
+        passes.fullscreen(
+            FOOTPRINTS,
+            target,
+            textures=dict(zip(FOUND, bundle.found)),
+            blocks={"film_view": onto},
+            constants={
+                "widening": WIDENING * float(max(count, 1)) ** fall, "least_pixels": least_pixels,
+                "longest": LONGEST,
+            },
+        )  # fmt: skip
+        frame.count(technique, "passes")
+        return target.colors
+
+    def _target(self, name: str, side: int, count: int) -> images.Target:
+        target = getattr(self, name)
+        if target is None or target.size != (side, side):
+            self._give(target)
+            target = images.Target(tuple(images.pool.take(side, side, "RGBA32F") for _ in range(count)))
+            setattr(self, name, target)
+        return target
+
+    @staticmethod
+    def _give(target: images.Target | None) -> None:
+        for image in target.colors if target is not None else ():
+            images.pool.give(image)
+
+    def release(self) -> None:
+        self._give(self._found)
+        self._give(self._footprints)
+        self._found = self._footprints = self._interfaces = self._emission = None
+        self.buffers.release()
+        self._behind.release()
+        self._sources.release()

@@ -1,0 +1,104 @@
+"""Direct light at points of surfaces: the light loop's program over images of points, with rays as visibility.
+
+What the camera does not see (the far side of an ear, the inside of a niche) is lit by the same points of lamps, of the
+world and of emissive meshes for all of it, drawn here with numbers of their own. In pictures of few samples each source
+has several, so that a picture of one sample is smooth.
+
+| cost | per sample |
+|---|---|
+| rays | a point: one for each point of a light source |
+| passes | 1 over the points for each 64 points of light sources |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..gfx import images, passes
+from ..materials.compiler import may_emit
+from ..sources import lights
+from .emissive_triangles import EmissiveTriangles
+from .loop import lighting
+from .visibility import RAYS, ray_bindings
+
+FEW_POINTS = 16  # on each lamp, of the world and of emissive meshes, in a picture of few samples
+OTHER_POINTS = 4  # of the world and of emissive meshes, in each sample at least
+LIGHTING = lighting(RAYS, False)
+
+
+class PointLight:
+    """Lights images of points. A technique owns one, calls `begin` once a picture and `add` in each sample."""
+
+    def __init__(self, use: str):
+        self._use = use  # of the sequence
+        self._sources = lights.Sources()
+        self._emissive: EmissiveTriangles | None = None
+
+    def begin(self, frame: Frame) -> None:
+        """Find the meshes that emit."""
+        used = {material for instance in frame.snapshot.instances for material in instance.materials}
+        self._emissive = None
+        if any(may_emit(frame.snapshot.materials[material].graph) for material in used):
+            triangles = EmissiveTriangles(frame, ("diffuse",))
+            self._emissive = triangles if triangles.power > 0.0 else None
+
+    def add(self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target) -> tuple[int, int]:
+        """Add this sample's diffuse and glossy direct light on `surfaces` (by the names of SURFACE_IMAGES) to the two
+        images of `target`. Returns the numbers of passes and of rays a point."""
+        rows = [*self._lamps(frame), *self._world(frame), *self._emitted(frame)]
+        textures, constants = ray_bindings(frame)
+        bound = {f"surface_{name}": image for name, image in surfaces.items()}
+        for first in range(0, len(rows), lights.MOST_LIGHTS):
+            some = rows[first : first + lights.MOST_LIGHTS]
+            passes.fullscreen(
+                LIGHTING, target, blend="ADDITIVE_PREMULT",
+                textures={**bound, **textures, "energy_table": frame.materials.energy_table},
+                blocks={"film_view": frame.view_block, "sources": self._sources.set(some)},
+                constants={"light_count": len(some), "traced_roughness": -1.0, **constants},
+            )  # fmt: skip
+        return -(-len(rows) // lights.MOST_LIGHTS), len(rows)
+
+    def _lamps(self, frame: Frame) -> Iterator[np.ndarray]:
+        """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power."""
+        settings = frame.settings
+        emitters = [one for one in frame.emitters if one.flags & lights.DIFFUSE_FLAG]
+        chosen = [(emitter, 1.0) for emitter in emitters]
+        if len(chosen) > FEW_POINTS:
+            power = np.array([emitter.power for emitter in emitters])
+            chance = np.minimum(FEW_POINTS * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
+            edges = np.concatenate([[0.0], np.cumsum(chance)])
+            marks = np.arange(FEW_POINTS) + frame.lot(f"{self._use}/choose")
+            picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
+            chosen = [(emitters[k], 1.0 / chance[k]) for k in picked]
+        for emitter, weight in chosen:
+            each = max(FEW_POINTS // settings.samples, 1) if emitter.extended else 1
+            for number in range(frame.sample * each, (frame.sample + 1) * each):
+                sample = emitter.sample(*frame.random_volume_at(number, f"{self._use}/light"))
+                shadowed = int(emitter.light.cast_shadow)
+                yield emitter.row(sample, 0, shadowed, weight, each, each * settings.samples / weight)
+
+    def _world(self, frame: Frame) -> Iterator[np.ndarray]:
+        world = frame.snapshot.world
+        if not frame.environment.power > 0 or not world.visibility.diffuse:
+            return
+        each = max(FEW_POINTS // frame.settings.samples, OTHER_POINTS)
+        numbers = range(frame.sample * each, (frame.sample + 1) * each)
+        drawn = np.array([frame.random_at(number, f"{self._use}/world") for number in numbers])
+        flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
+        for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
+            yield lights.direction_row(direction, radiance / density, density, flags, 0, 1, each)
+
+    def _emitted(self, frame: Frame) -> Iterator[np.ndarray]:
+        if self._emissive is None:
+            return
+        each = max(FEW_POINTS // frame.settings.samples, OTHER_POINTS)
+        for number in range(frame.sample * each, (frame.sample + 1) * each):
+            numbers = frame.random_volume_at(number, f"{self._use}/emissive")
+            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=frame.settings.samples)
+
+    def release(self) -> None:
+        self._sources.release()
+        self._emissive = None

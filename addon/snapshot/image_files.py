@@ -1,0 +1,134 @@
+"""Pixels of image files that `Image.pixels` does not give: frames of sequences, tiles of UDIM images, layers of EXR
+files, and 8-bit images in colour spaces that no shader decodes.
+
+Blender 5.2 reads files without a data-block (`imbuf`). Before, and where a colour space has to be applied, a data-block
+is made for the moment.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .exr import ExrError, read_exr
+
+FIRST_TILE = 1001  # UDIM
+
+
+def frame_of(user, frame: int) -> int:
+    """The frame of a sequence that an ImageUser shows at a frame of the scene, by Blender's rules."""
+    length = user.frame_duration
+    shown = frame - user.frame_start + 1
+    if length <= 0:
+        return 0
+    if user.use_cyclic:
+        shown = shown % length or length
+    return min(max(shown, 0), length) + user.frame_offset
+
+
+def sequence_path(path: str, frame: int) -> str:
+    """The file of another frame: the last number in the file's name is replaced, with as many digits."""
+    folder, name = os.path.split(path)
+    stem, dot, ending = name.rpartition(".")
+    found = re.search(r"(\d+)(?!.*\d)", stem)
+    if found is None:
+        return path
+    number = str(frame).zfill(len(found.group(1)))
+    return str(Path(folder) / f"{stem[: found.start()]}{number}{stem[found.end() :]}{dot}{ending}")
+
+
+def tile_path(path: str, number: int) -> str:
+    """The file of a UDIM tile."""
+    index = number - FIRST_TILE
+    return path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{index % 10 + 1}_v{index // 10 + 1}")
+
+
+def read_file(path: str, space: str) -> np.ndarray | None:
+    """(H, W, channels) float32 as Blender stores it, bottom row first; None where there is no such image."""
+    if not Path(path).is_file():
+        return None
+    try:
+        import imbuf
+
+        buffer = imbuf.load(path)
+        if getattr(buffer, "buffer_type", "") == "BYTE":
+            with buffer.with_buffer() as pixels:
+                return np.array(pixels, np.float32) / 255.0
+    except (ImportError, AttributeError, OSError, RuntimeError, TypeError, ValueError):
+        pass
+    return _by_data_block(path, space)
+
+
+def read_layer(path: str, layer: int, number: int) -> np.ndarray | str:
+    """Pass `number` of a layer of a multilayer EXR file, in Blender's order; or the sentence that says why not."""
+    try:
+        found = read_exr(path)
+    except (ExrError, OSError) as error:
+        return f"the multilayer file cannot be read and is drawn magenta: {error}"
+    layers: dict[str, list[str]] = {}
+    for name in found:
+        owner, _, own = name.rpartition(".")
+        own_passes = layers.setdefault(owner, [])
+        own_passes.insert(0, name) if own == "Combined" else own_passes.append(name)
+    every = [*layers.values()]
+    if not 0 <= layer < len(every) or not 0 <= number < len(every[layer]):
+        return "the layer or pass that a node shows is not in the file; it is drawn magenta."
+    return found[every[layer][number]]
+
+
+def to_scene_linear(pixels: np.ndarray, space: str) -> np.ndarray:
+    """Colours (H, W, 4) of a colour space of Blender's configuration, scene-linear: a file of them is loaded so."""
+    with tempfile.TemporaryDirectory(prefix="candela_") as folder:
+        path = Path(folder) / "colors.exr"
+        path.write_bytes(_exr_bytes(pixels[..., :3]))
+        found = _by_data_block(str(path), space)
+    if found is None or found.shape[:2] != pixels.shape[:2]:
+        return pixels
+    return np.concatenate([found[..., :3], pixels[..., 3:]], axis=2)
+
+
+def _by_data_block(path: str, space: str) -> np.ndarray | None:
+    try:
+        image = bpy.data.images.load(path)
+    except RuntimeError:
+        return None
+    try:
+        image.colorspace_settings.name = space
+        width, height = image.size
+        count = len(image.pixels)
+        if not width * height * count:
+            return None
+        flat = np.empty(count, np.float32)
+        image.pixels.foreach_get(flat)
+        return flat.reshape(height, width, -1)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _exr_bytes(pixels: np.ndarray) -> bytes:
+    """An uncompressed OpenEXR file of (H, W, 3) colours, bottom row first."""
+    height, width = pixels.shape[:2]
+
+    def attribute(name: str, kind: str, value: bytes) -> bytes:
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+
+    channels = b"".join(name + b"\0" + struct.pack("<iB3xii", 2, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
+    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    head = struct.pack("<II", 20000630, 2) + b"".join((
+        attribute("channels", "chlist", channels), attribute("compression", "compression", b"\0"),
+        attribute("dataWindow", "box2i", box), attribute("displayWindow", "box2i", box),
+        attribute("lineOrder", "lineOrder", b"\0"), attribute("pixelAspectRatio", "float", struct.pack("<f", 1.0)),
+        attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
+        attribute("screenWindowWidth", "float", struct.pack("<f", 1.0)),
+    )) + b"\0"  # fmt: skip
+    line = 8 + 12 * width
+    first = len(head) + 8 * height
+    table = struct.pack(f"<{height}Q", *(first + line * k for k in range(height)))
+    rows = np.ascontiguousarray(pixels[::-1, :, ::-1].transpose(0, 2, 1), np.float32)
+    return head + table + b"".join(struct.pack("<ii", y, 12 * width) + rows[y].tobytes() for y in range(height))

@@ -1,0 +1,175 @@
+"""OpenVDB objects: their grids as dense arrays, read through Blender's own `openvdb` module.
+
+A volume that modifiers made has no file: Blender writes it to a temporary one, which is read and removed. Grids of one
+object that share the first one's voxels are laid over a common box; others are read at its voxels' centres. Grids
+longer than MOST_VOXELS on a side are averaged by whole factors first.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .cache import SnapshotCache, next_version
+from .instances import visibility_of
+from .scene import Note, Volume, VolumeInstance
+
+MOST_VOXELS = 192  # on a side
+MOST_GRIDS = 6  # of one object
+
+
+def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], shown=None) -> tuple[VolumeInstance, ...]:
+    """All instances of volume objects. Reads files only when they, or the objects, have changed."""
+    if not len(bpy.data.volumes):
+        return ()
+    found, used = [], set()
+    for instance in depsgraph.object_instances:
+        thing = instance.object
+        if thing.type != "VOLUME" or not instance.show_self or (shown is not None and not shown(thing)):
+            continue
+        matrix = np.array(instance.matrix_world, np.float64)
+        if not np.isfinite(matrix).all():
+            continue
+        owner = instance.instance_object if instance.is_instance else thing
+        name = owner.original.name
+        volume = _volume(thing.data, name, cache, notes)
+        if volume is None:
+            continue
+        used.add(volume.key)
+        slots = thing.material_slots
+        material = shading.index_of(slots[0].material if len(slots) else None)
+        ids = "-".join(str(number) for number in instance.persistent_id)
+        key = f"{name} {len(found)} {ids}"
+        density = _density(thing.data, matrix)
+        found.append(VolumeInstance(name, volume, matrix, material, visibility_of(owner), key, density))
+    for key in set(cache.volumes) - used:
+        del cache.volumes[key]
+    return tuple(found)
+
+
+def _density(data, matrix: np.ndarray) -> float:
+    """Coefficients are per unit of the object's space, unless it says that they are per metre."""
+    if data.render.space != "OBJECT":
+        return 1.0
+    scale = float(np.linalg.norm(matrix[:3, :3] @ np.full(3, 3**-0.5)))
+    return 1.0 / scale if scale > 0 else 1.0
+
+
+def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume | None:
+    subject = f"Object '{name}'"
+    try:
+        data.grids.load()
+    except RuntimeError as error:
+        notes.append(Note(subject, f"its volume cannot be read: {error}."))
+        return None
+    path = bpy.path.abspath(data.grids.frame_filepath or "", library=data.library)
+    file = bool(path) and Path(path).is_file()
+    key = f"volume {path}" if file else f"volume {name} {(data.original or data).session_uid}"
+    stat = Path(path).stat() if file else None
+    state = (path, stat.st_mtime_ns, stat.st_size) if file else (data.session_uid,)
+    known = cache.volumes.get(key)
+    if known is not None and known[0] == state:
+        return known[1]
+    grids = None
+    try:
+        if file:
+            grids = _grids(path)
+        elif len(data.grids):
+            with tempfile.TemporaryDirectory(prefix="candela_") as folder:
+                made = str(Path(folder) / "volume.vdb")
+                data.grids.save(filepath=made)
+                grids = _grids(made)
+    except Exception as error:  # a foreign library reads a foreign file
+        notes.append(Note(subject, f"its volume cannot be read: {error}."))
+    if not grids:
+        notes.append(Note(subject, "its volume has no grid with active voxels and is not drawn."))
+        return None
+    arrays, low, to_object = grids
+    volume = Volume(key, next_version(), arrays, low, to_object)
+    cache.volumes[key] = state, volume
+    return volume
+
+
+def openvdb():
+    """Blender's module. The wheel keeps it beside Blender's other modules, off the path."""
+    try:
+        import openvdb as module
+    except ImportError:
+        version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
+        places = [Path(bpy.utils.resource_path(kind)) / "python" / "lib" for kind in ("LOCAL", "SYSTEM")]
+        places = [place / version / "site-packages" for place in places]
+        sys.path += [str(place) for place in places if place.is_dir() and str(place) not in sys.path]
+        import openvdb as module
+    return module
+
+
+def _grids(path: str):
+    """(arrays by name, lowest voxel, (3, 4) from voxel indices to object space); None without active voxels."""
+    grids, _ = openvdb().readAll(path)
+    grids = [grid for grid in grids if hasattr(grid, "copyToArray") and grid.activeVoxelCount()][:MOST_GRIDS]
+    if not grids:
+        return None
+    first = next((grid for grid in grids if grid.name == "density"), grids[0])
+    rows = _rows(first)
+    boxes = [grid.evalActiveVoxelBoundingBox() for grid in grids if np.allclose(_rows(grid), rows, rtol=1e-5)]
+    low = np.min([box[0] for box in boxes], axis=0)
+    high = np.max([box[1] for box in boxes], axis=0)
+    size = high - low + 1
+    factor = int(max(-(-size.max() // MOST_VOXELS), 1))
+    arrays = {}
+    for grid in grids:
+        vector = isinstance(grid.background, tuple)
+        if np.allclose(_rows(grid), rows, rtol=1e-5):
+            dense = np.zeros((*size, 3) if vector else tuple(size), np.float32)
+            grid.copyToArray(dense, ijk=tuple(int(x) for x in low))
+        else:
+            dense = _resampled(grid, rows, low, size, vector)
+        dense = np.nan_to_num(dense, nan=0.0, posinf=0.0, neginf=0.0)
+        arrays[grid.name] = _coarser(dense, factor)
+    return arrays, *_frame(rows, low, factor)
+
+
+def _frame(rows: np.ndarray, low: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest voxel and map of voxel indices where `factor` voxels along each axis became one."""
+    if factor == 1:
+        return low.astype(np.float64), rows
+    scaled = rows.copy()
+    scaled[:, 3] += rows[:, :3] @ (low + (factor - 1) / 2)
+    scaled[:, :3] *= factor
+    return np.zeros(3), scaled
+
+
+def _coarser(dense: np.ndarray, factor: int) -> np.ndarray:
+    if factor == 1:
+        return dense
+    pad = [(0, -side % factor) for side in dense.shape[:3]] + [(0, 0)] * (dense.ndim - 3)
+    dense = np.pad(dense, pad)
+    x, y, z = (side // factor for side in dense.shape[:3])
+    return dense.reshape(x, factor, y, factor, z, factor, *dense.shape[3:]).mean(axis=(1, 3, 5), dtype=np.float32)
+
+
+def _rows(grid) -> np.ndarray:
+    """(3, 4) from voxel indices to object space."""
+    corner = np.array(grid.transform.indexToWorld((0, 0, 0)))
+    axes = [np.array(grid.transform.indexToWorld(tuple(unit))) - corner for unit in np.eye(3, dtype=int).tolist()]
+    return np.column_stack([*axes, corner])
+
+
+def _resampled(grid, rows: np.ndarray, low: np.ndarray, size: np.ndarray, vector: bool) -> np.ndarray:
+    """At the voxels' centres of another grid, the nearest voxel."""
+    box = grid.evalActiveVoxelBoundingBox()
+    own_low, own_size = np.array(box[0]), np.array(box[1]) - np.array(box[0]) + 1
+    dense = np.zeros((*own_size, 3) if vector else tuple(own_size), np.float32)
+    grid.copyToArray(dense, ijk=tuple(int(x) for x in own_low))
+    own = _rows(grid)
+    places = np.stack(np.meshgrid(*(np.arange(side) + start for side, start in zip(size, low)), indexing="ij"), axis=-1)
+    world = places @ rows[:, :3].T + rows[:, 3]
+    index = np.rint((world - own[:, 3]) @ np.linalg.inv(own[:, :3]).T).astype(int) - own_low
+    inside = ((index >= 0) & (index < own_size)).all(axis=-1)
+    index = np.clip(index, 0, own_size - 1)
+    values = dense[index[..., 0], index[..., 1], index[..., 2]]
+    return np.where(inside[..., None] if vector else inside, values, 0.0).astype(np.float32)

@@ -1,0 +1,348 @@
+"""Shading of hits: what rays meet, as closures of the materials there, laid out like the surface images.
+
+A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record of
+some numbers per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates,
+normals. For each material among them one pass over the screen runs *its own* program at its records (textures,
+procedurals, bumps, vertex colours, emission, alpha) into six images as those of surfaces/draw.py, masked by depth: the
+trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
+reads surface images (lighting, indirect light) then reads hits.
+
+Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
+of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
+attributes by that number, made when it is first met. Derivatives are those of the ray's footprint, for bumps.
+
+    rays (origin, direction)  --trace-->  Records  --shade-->  closures
+
+| cost | per round of rays |
+|---|---|
+| passes | 1 trace, 1 that flags the materials met, 1 for each of those |
+| readback | one flag for each material of the scene |
+| bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
+| per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
+
+A material that no ray meets costs nothing. One with more than MOST_IMAGES images is its mean reflectance instead.
+
+Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
+Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..materials.compiled import CompiledMaterial
+from ..scene import acceleration
+from ..scene.acceleration import Hierarchy
+from ..scene.geometry import corner_attribute
+from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, values_struct
+from ..scene.view import VIEW
+from ..snapshot.scene import Mesh
+from .draw import refracts
+from .reflectance import Reflectance
+
+MOST_IMAGES = 9  # of a material: 16 textures less those of records
+MOST_MATERIALS = 8000  # that depth tells apart, see trace.frag.glsl
+ROW = 256  # of lists by material
+RECORDS = ("place", "triangle", "normals", "passed")
+RECORD_TEXTURES = tuple(("RGBA32F", f"hit_{name}") for name in RECORDS[:3])
+RAYS = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"))
+# `where` of passes.fullscreen with the depth of records: rays that met something, and all rays.
+MET, ANY_RAY = "LESS", "LESS_EQUAL"
+TRACE = passes.fullscreen_program(
+    "trace hits",
+    "hits/trace.frag.glsl",
+    textures=(*acceleration.HIERARCHY_TEXTURES, *RAYS, ("RG32F", "trace_owners"), ("RGBA32F", "absorption")),
+    blocks=((VIEW, "film_view"),),
+    constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("INT", "first_leaf"), ("FLOAT", "spread")),
+    outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
+    writes_depth=True,
+)
+MATERIALS_MET = Program(
+    name="materials met",
+    compute="hits/met.comp.glsl",
+    textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material")),
+    images=(("met", "R32UI", "UINT_2D", "WRITE"),),
+)
+MASKED = {
+    "vertex": "hits/material.vert.glsl",
+    "inputs": passes.FULLSCREEN_INPUTS,
+    "varyings": passes.FULLSCREEN_VARYINGS,
+    "outputs": tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
+    "defines": CAMERA_DEFINES,
+}
+MEAN = Program(
+    name="mean of a hit",
+    fragment="hits/mean.frag.glsl",
+    textures=(*RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "reflectance")),
+    blocks=((VIEW, "film_view"),),
+    constants=(("FLOAT", "material_depth"), ("INT", "material_number")),
+    **MASKED,
+)
+
+
+def depth_of(material: int) -> float:
+    """Of records of a material; exact in a float."""
+    return 0.5 + (material + 1) / 16384
+
+
+def hit_program(compiled: CompiledMaterial) -> Program:
+    """Evaluates a material where rays met it."""
+    if compiled.program_key not in _programs:
+        _programs[compiled.program_key] = _hit_program(compiled)
+    return _programs[compiled.program_key]
+
+
+def _hit_program(compiled: CompiledMaterial) -> Program:
+    listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
+    return Program(
+        name=f"hits {compiled.program_key[:8]}",
+        fragment="hits/surface.frag.glsl",
+        textures=(
+            *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
+            *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+        ),
+        blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
+        constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth")),
+        snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
+        **MASKED,
+    )  # fmt: skip
+
+
+def _fill(count: int) -> str:
+    """`fill_attributes` for records, of `count` attributes."""
+    head = "void fill_attributes(inout SurfacePoint point, Instance instance, vec4 record)\n{\n"
+    if not count:
+        return head + "}\n"
+    lines = [
+        f"  int base = int(record.y) * {3 * (count + 1)};",
+        "  vec3 corner = corner_texel(base).xyz;",
+        f"  vec3 e1 = turned_by(instance, corner_texel(base + {count + 1}).xyz - corner);",
+        f"  vec3 e2 = turned_by(instance, corner_texel(base + {2 * (count + 1)}).xyz - corner);",
+        "  vec2 steps_x = edge_steps(point.position_dx, e1, e2);",
+        "  vec2 steps_y = edge_steps(point.position_dy, e1, e2);",
+        "  vec4 first;", "  vec4 along_first;", "  vec4 along_second;",
+    ]  # fmt: skip
+    for k in range(count):
+        lines += [
+            f"  first = corner_texel(base + {1 + k});",
+            f"  along_first = corner_texel(base + {count + 2 + k}) - first;",
+            f"  along_second = corner_texel(base + {2 * count + 3 + k}) - first;",
+            f"  point.attributes[{k}] = first + record.z * along_first + record.w * along_second;",
+            f"  point.attributes_dx[{k}] = steps_x.x * along_first + steps_x.y * along_second;",
+            f"  point.attributes_dy[{k}] = steps_y.x * along_first + steps_y.y * along_second;",
+        ]
+    return '#include "hits/attributes.glsl"\n' + head + "\n".join(lines) + "\n}\n"
+
+
+@dataclass(frozen=True)
+class Records:
+    """What rays of a round met: RECORDS, the number of the material, and that as depth."""
+
+    target: images.Target
+
+    @classmethod
+    def take(cls, size: tuple[int, int]) -> Records:
+        """Images of the pool, undefined."""
+        colors = [images.pool.take(*size, "RGBA32F") for _ in RECORDS] + [images.pool.take(*size, "R32F")]
+        return cls(images.Target(tuple(colors), images.pool.take(*size, "DEPTH_COMPONENT32F")))
+
+    @property
+    def images(self) -> dict[str, images.Image]:
+        return {f"hit_{name}": image for name, image in zip((*RECORDS, "material"), self.target.colors)}
+
+    def give(self) -> None:
+        """Back to the pool."""
+        for image in (*self.target.colors, self.target.depth):
+            images.pool.give(image)
+
+
+def take_closures(size: tuple[int, int], depth: images.Image) -> images.Target:
+    """Six images of the pool for closures, with the depth of the records that they are of."""
+    return images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in SURFACE_IMAGES), depth)
+
+
+def closure_bindings(closures: images.Target) -> dict[str, images.Image]:
+    """Closures of hits under the names that shaders/lib/gbuffer.glsl reads."""
+    return {f"surface_{name}": image for name, image in zip(SURFACE_IMAGES, closures.colors)}
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Triangles of one material in one mesh."""
+
+    mesh: Mesh
+    slots: tuple[int, ...]
+    first: int  # number of the first one among those of the material
+
+
+class Hits:
+    """The triangles of a scene as its rays find them. One for each renderer: `frame.kept(Hits)`."""
+
+    def __init__(self):
+        self._owners: dict[object, images.Image] = {}  # by hierarchy and instances
+        self._kinds: dict[int, list[_Kind]] = {}  # by material
+        self._numbers: dict[tuple, np.ndarray] = {}  # by mesh, version and slots: of each triangle
+        self._numbers_key: object = None
+        self._attributes: dict[int, tuple[object, images.Image]] = {}
+        self._absorption: tuple[object, images.Image] | None = None
+
+    def trace(
+        self, frame: Frame, technique: Technique, rays: tuple[images.Image, images.Image], records: Records,
+        path: str = "glossy", number: int = 0,
+    ) -> set[int]:  # fmt: skip
+        """Follow rays (RGBA32F origin, w: width of the footprint, m; unit direction, 0: no ray) of a path to what
+        they meet, and return the materials there. `number` below 20 tells rounds of a sample apart."""
+        hierarchy = frame.hierarchy(path)
+        owners = self._owners_of(frame, hierarchy)
+        passes.fullscreen(
+            TRACE,
+            records.target,
+            textures={
+                **hierarchy.textures, "ray_origin": rays[0], "ray_direction": rays[1],
+                "trace_owners": owners, "absorption": self._absorption_of(frame),
+            },
+            blocks={"film_view": frame.view_block},
+            constants={
+                "ray_number": number, "glass_bends": int(refracts(frame)), "first_leaf": hierarchy.first_leaf,
+                "spread": pixel_spread(frame),
+            },
+        )  # fmt: skip
+        frame.count(technique, "passes")
+        return self._met(frame, records)
+
+    def shade(
+        self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
+        closures: images.Target, number: int = 0,
+    ) -> None:  # fmt: skip
+        """Evaluate these materials at the records into `closures` (take_closures), which is cleared before."""
+        images.Target(closures.colors).clear()
+        shared = {f"hit_{name}": records.images[f"hit_{name}"] for name in RECORDS[:3]}
+        shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
+        for material in sorted(materials):
+            compiled = frame.materials.compiled[material]
+            constants: dict[str, object] = {"material_depth": depth_of(material)}
+            if len(compiled.images) > MOST_IMAGES:
+                program, blocks = MEAN, {}
+                textures = shared | {"reflectance": self._mean_reflectance(frame)}
+                constants["material_number"] = material
+            else:
+                program = hit_program(compiled)
+                bound = frame.materials.bindings(material, frame.geometry.instances)
+                textures, blocks = shared | bound["textures"], bound["blocks"]
+                if compiled.attributes:
+                    textures["hit_attributes"] = self._attributes_of(material, compiled)
+                constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}
+            passes.fullscreen(
+                program, closures, where="EQUAL", textures=textures,
+                blocks={**blocks, "film_view": frame.view_block}, constants=constants,
+            )  # fmt: skip
+            frame.count(technique, "materials")
+            frame.count(technique, "passes")
+
+    # What stands behind triangles -----------------------------------------------------------------------------------
+
+    def _owners_of(self, frame: Frame, hierarchy: Hierarchy) -> images.Image:
+        key = (hierarchy.leaves, hierarchy.instances, frame.geometry.changes)
+        if key not in self._owners:
+            self._number(frame)
+            rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}
+            meshes, parts = frame.geometry.placed[1], []
+            shown = [one for one in hierarchy.instances if meshes[one.mesh].triangle_count]
+            for kind, group in groupby(shown, lambda one: (one.mesh, meshes[one.mesh].version, one.materials)):
+                numbers, copies = self._numbers[kind], [rows[id(one)] for one in group]
+                of_copies = np.empty((len(copies), len(numbers), 2), np.float32)
+                of_copies[:, :, 0], of_copies[:, :, 1] = np.array(copies)[:, None], numbers
+                parts.append(of_copies.reshape(-1, 2))
+            found = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
+            slots = hierarchy.slots
+            height = max(-(-(int(slots.max(initial=0)) + 1) // images.LIST_WIDTH), 1)
+            listed = np.zeros((height * images.LIST_WIDTH, 2), np.float32)
+            listed[slots[slots >= 0]] = found[slots >= 0]
+            image = images.upload(listed.reshape(height, images.LIST_WIDTH, 2), "RG32F")
+            self._owners = dict([*self._owners.items()][-3:]) | {key: image}
+        return self._owners[key]
+
+    def _number(self, frame: Frame) -> None:
+        """Number the triangles of each material over all meshes that show it."""
+        instances, meshes, _ = frame.geometry.placed
+        wanted = dict.fromkeys((one.mesh, meshes[one.mesh].version, one.materials) for one in instances)
+        if self._numbers_key == tuple(wanted):
+            return
+        counts: dict[int, int] = {}
+        self._numbers, self._kinds = {}, {}
+        for key, _, slots in wanted:
+            mesh = meshes[key]
+            of_triangle = mesh.triangle_materials(slots)
+            numbers = np.zeros(len(of_triangle))
+            for material in np.unique(of_triangle):
+                own = of_triangle == material
+                first = counts.get(int(material), 0)
+                numbers[own] = first + np.arange(own.sum())
+                counts[int(material)] = first + int(own.sum())
+                self._kinds.setdefault(int(material), []).append(_Kind(mesh, slots, first))
+            self._numbers[key, mesh.version, slots] = numbers
+        self._numbers_key = tuple(wanted)
+
+    def _attributes_of(self, material: int, compiled: CompiledMaterial) -> images.Image:
+        """Places and attributes of the corners of all triangles of a material, by their number."""
+        kinds = self._kinds[material]
+        key = (compiled.attributes, tuple((kind.mesh.key, kind.mesh.version, kind.slots) for kind in kinds))
+        known = self._attributes.get(material)
+        if known is None or known[0] != key:
+            rows = []
+            for kind in kinds:
+                mesh = kind.mesh
+                corners = mesh.triangle_corners[mesh.triangle_materials(kind.slots) == material]
+                places = np.zeros((len(mesh.corner_vertices), 4), np.float32)
+                places[:, :3] = mesh.positions[mesh.corner_vertices]
+                values = [places, *(corner_attribute(mesh, attribute) for attribute in compiled.attributes)]
+                rows.append(np.stack(values, axis=1)[corners].reshape(-1, 4))
+            known = self._attributes[material] = (key, images.upload_list(np.concatenate(rows)))
+        return known[1]
+
+    def _absorption_of(self, frame: Frame) -> images.Image:
+        """What insides of solids absorb, per metre, by material."""
+        media = [material.medium if material.glass else None for material in frame.materials.compiled]
+        key = tuple(medium and medium.key for medium in media)
+        if self._absorption is None or self._absorption[0] != key:
+            table = np.zeros((-(-max(len(media), 1) // ROW) * ROW, 4), np.float32)
+            for row, medium in zip(table, media):
+                row[:3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
+            self._absorption = (key, images.upload(table.reshape(-1, ROW, 4)))
+        return self._absorption[1]
+
+    @staticmethod
+    def _mean_reflectance(frame: Frame) -> images.Image:
+        frame.kept(Reflectance).update(frame)
+        return frame.kept(Reflectance).image
+
+    def release(self) -> None:
+        """Drop GPU resources."""
+        self.__init__()
+
+    @staticmethod
+    def _met(frame: Frame, records: Records) -> set[int]:
+        height = -(-max(len(frame.materials.compiled), 1) // ROW)
+        met = images.pool.take(ROW, height, "R32UI")
+        met.texture.clear(format="UINT", value=(0,))
+        textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
+        passes.compute(MATERIALS_MET, frame.size, textures=textures, images={"met": met})
+        found = set(np.flatnonzero(images.read(met)).tolist())
+        images.pool.give(met)
+        return found
+
+
+def pixel_spread(frame: Frame) -> float:
+    """How much wider a pixel's footprint is a metre farther away; of an orthographic camera it stays."""
+    left, right, _, _ = frame.view.frame()
+    return 0.0 if frame.snapshot.camera.kind == "ORTHOGRAPHIC" else (right - left) / frame.size[0]
+
+
+_programs: dict[str, Program] = {}  # by topology

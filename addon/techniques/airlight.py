@@ -1,0 +1,313 @@
+"""Airlight: light of every lamp, the world and shining meshes that media scatter once towards the eye, with shadows.
+
+    L(v) = integral over the view ray of  T(eye, x) sum over lights of  sigma_s(x) p(x, w, v) T(x, y) V(x, y) L(y) dw
+
+A row of lights is a point of this sample on each of them, shared by all pixels; each row takes some places x on each
+pixel's ray. Half of the places are drawn around the point, in equal steps of the angle under which it sees the ray
+(equiangular sampling, Kulla & Fajardo 2012), half in proportion to transmittance times scattering, both weighted by the
+balance heuristic: the first ends the singularity at a lamp in fog, the second serves dense media. V are rays of the
+hierarchy, T is that of media.py. What media emit is integrated in closed form over the same bins.
+
+Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
+spread their light over opacity to pixels whose rays end equally far away. Others take a quarter as many at every pixel,
+and converge.
+
+| cost | per sample |
+|---|---|
+| passes | 1, and 1 at full size where it is spread |
+| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights |
+| memory | 3 images; 2 of a quarter where it is spread |
+
+Sources: Kulla & Fajardo, "Importance sampling techniques for path tracing in participating media", EGSR 2012; Veach &
+Guibas 1995 (balance heuristic).
+
+Bias: in pictures below FEW samples shafts are as wide as four pixels at least. Phase functions of several shaders mixed
+at one place are one of their mean anisotropy. Mirrors and glass show no airlight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+
+from ..frame.light_paths import LIGHT_SPECULAR_MEDIUM
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique, Write
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..lighting.emissive_triangles import EmissiveTriangles
+from ..lighting.media import MediaEmission, MediaService
+from ..materials.compiler import may_emit
+from ..materials.graph import Graph
+from ..scene import acceleration
+from ..scene.media import ATTENUATION_TEXTURES, MEDIA_TEXTURES, has_media
+from ..scene.view import VIEW
+from ..snapshot.scene import Snapshot
+from ..sources import lights
+from ..sources.environment import WORLD
+from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
+from ..surfaces.reflectance import Reflectance
+
+FEW = 8  # samples: below, light of media is found at a quarter of the pixels
+COARSE = 2  # pixels of one known pixel's side then
+WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
+MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
+MOST_LAMPS = 16  # in a sample
+SENDING = (
+    "ShaderNodeVolumeScatter",
+    "ShaderNodeVolumePrincipled",
+    "ShaderNodeVolumeCoefficients",
+    "ShaderNodeEmission",
+)
+
+
+LIT_TEXTURES = (*acceleration.HIERARCHY_TEXTURES, *MEDIA_TEXTURES)
+WORLD_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_map"))
+CONSTANTS = (
+    ("INT", "light_count"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size"), ("FLOAT", "world_rows"),
+    ("INT", "glass_blocks"),  # what it bends or mirrors arrives as beams
+)  # fmt: skip
+
+
+@cache
+def airlight_program(stride: int, kinds: int, world: bool) -> Program:
+    """Finds the light of media at every `stride`-th pixel, for lights of these kinds (bits as in lights.LAMPS).
+    `world`: rays by the phase function look for it, too."""
+    return passes.fullscreen_program(
+        f"airlight, stride {stride}",
+        "media/airlight.frag.glsl",
+        textures=(*LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "surface_position")),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
+        constants=(*CONSTANTS, ("INT", "places")),
+        defines=_defines(stride, kinds, world),
+        outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
+    )
+
+
+@cache
+def indirect_program(stride: int, kinds: int, world: bool) -> Program:
+    """Finds the light that media scatter after other bounces, and that they bring to surfaces."""
+    return passes.fullscreen_program(
+        f"airlight after bounces, stride {stride}",
+        "media/indirect.frag.glsl",
+        textures=(
+            *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"), *SURFACE_TEXTURES,
+        ),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
+        constants=(*CONSTANTS, ("INT", "bounces")),
+        defines=_defines(stride, kinds, world),
+        outputs=(("VEC4", "out_indirect"), ("VEC4", "out_surface")),
+    )  # fmt: skip
+
+
+def _defines(stride: int, kinds: int, world: bool) -> tuple[tuple[str, str], ...]:
+    return ("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
+
+
+SPREAD, SPREAD_ON_SURFACES = (
+    passes.fullscreen_program(
+        f"airlight spread{', on surfaces' if on_surfaces else ''}",
+        "media/spread.frag.glsl",
+        textures=(
+            ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
+            *ATTENUATION_TEXTURES,
+            *((("RGBA32F", "surface_diffuse"),) if on_surfaces else ()),
+        ),
+        blocks=((VIEW, "film_view"),),
+        constants=(("IVEC2", "shown_pixel"),),
+        defines=(("STRIDE", str(COARSE)), *((("ON_SURFACES", "1"),) if on_surfaces else ())),
+        outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
+    )
+    for on_surfaces in (False, True)
+)  # fmt: skip
+PROGRAMS = tuple(made(stride, -1, True) for made in (airlight_program, indirect_program) for stride in (1, COARSE))
+
+
+class Airlight(Technique):
+    name = "airlight"
+    label = "Airlight"
+    fills = ("volume",)
+    params = (
+        Param(
+            "rays", "Rays", 4,
+            "Places on each pixel's ray that are asked what light reaches them, in a sample, shared by all lights",
+            1, 64, draft=2,
+        ),
+        Param(
+            "bounces", "Volume bounces", 8,
+            "How often light is scattered or reflected before a medium sends it to the eye, at most; 0: none but "
+            "that of lamps and world", 0, MOST_BOUNCES, draft=2,
+        ),
+    )  # fmt: skip
+    reads = SURFACES
+    provides = (MediaEmission,)
+    requests = (MediaService,)
+    writes = (
+        Write("radiance.volume_direct", "RGBA32F", "Light that media scatter once towards the eye", True),
+        Write("radiance.volume_indirect", "RGBA32F", "Light that media scatter after other bounces", True),
+        Write("radiance.volume_emission", "RGBA32F", "Light that media emit"),
+        Write("radiance.diffuse_indirect", "RGBA32F", "Light that media scatter onto diffuse surfaces", True),
+    )
+
+    def __init__(self):
+        self._sources = lights.Sources()
+        self._triangles: EmissiveTriangles | None = None
+        self._reflectance = Reflectance()
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if not has_media(snapshot):
+            return "the scene has no volume"
+        if not any(may_send(graph) for graph in volume_graphs(snapshot)):
+            return "the scene's volumes absorb alone: nothing in them scatters or shines"
+        return acceleration.too_many(snapshot)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        media = frame.service(MediaService)
+        if media is None:
+            return
+        rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
+        kinds = lights.kinds_of(emitters) | sum(
+            1 << kind for kind in {int(row[0, 0]) for row in rows} if kind >= lights.DIRECTION
+        )
+        coarse = frame.settings.samples < FEW
+        stride = COARSE if coarse else 1
+        world = self._lit_by_world
+        asked = {
+            "light_count": len(rows), "shown_pixel": (frame.sample % 2, frame.sample // 2 % 2) if coarse else (0, 0),
+            "offset_size": frame.offset_size, "world_rows": float(WORLD_DIRECTIONS),
+            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)),
+        }  # fmt: skip
+        textures = {**frame.hierarchy("volume").textures, **media.media.textures}
+        blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
+        if world:
+            textures |= {
+                "environment_map": frame.environment.map,
+                "environment_density_map": frame.environment.density_map,
+            }
+            blocks["world_light"] = frame.environment.block
+        frame.target("radiance.volume_emission").clear()
+        rays = frame.settings.get(self, "rays") * stride * stride
+        places = places_of(rays, len(rows) + world)
+        yield from self._add(
+            frame, airlight_program(stride, kinds, world), ("radiance.volume_direct", "radiance.volume_emission"),
+            SPREAD if coarse else None, textures=textures | {"surface_position": frame.images["surface.position"]},
+            blocks=blocks, constants=asked | {"places": places},
+        )  # fmt: skip
+        frame.count(self, "light samples", len(rows))
+        bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
+        if bounces and media.media.scatters:
+            self._reflectance.update(frame)
+            names = "radiance.volume_indirect", "radiance.diffuse_indirect"
+            yield from self._add(
+                frame, indirect_program(stride, kinds, world), names,
+                SPREAD_ON_SURFACES if coarse else None,
+                textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
+                blocks=blocks, constants=asked | {"bounces": bounces},
+            )  # fmt: skip
+
+    def _add(self, frame: Frame, program: Program, names: tuple[str, str], spread: Program | None, **bindings):
+        """Draw a program's two outputs into sums, where it is asked at few pixels spread over all."""
+        target = frame.target(*names)
+        frame.count(self, "passes", 1 + (spread is not None))
+        if spread is None:
+            for band in frame.bands(self, names[0]):
+                passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
+                yield
+            return
+        size = tuple(-(-side // COARSE) for side in frame.size)
+        found = tuple(images.pool.take(*size, "RGBA32F") for _ in range(2))
+        passes.fullscreen(program, images.Target(found), **bindings)
+        yield
+        read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
+        passes.fullscreen(
+            spread, target, blend="ADDITIVE_PREMULT",
+            textures={
+                **read, "coarse_direct": found[0], "coarse_emission": found[1],
+                **{name: bindings["textures"][name] for _, name in ATTENUATION_TEXTURES},
+            },
+            blocks={"film_view": frame.view_block}, constants={"shown_pixel": bindings["constants"]["shown_pixel"]},
+        )  # fmt: skip
+        for image in found:
+            images.pool.give(image)
+
+    def begin(self, frame: Frame) -> None:
+        """Find what shines into the media."""
+        self._emitters = [one for one in frame.emitters if one.light.visibility.volume]
+        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        self._triangles = None
+        if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
+            triangles = EmissiveTriangles(frame, ("diffuse",))
+            self._triangles = triangles if triangles.power > 0 else None
+        self._world = frame.environment.power > 0 and frame.snapshot.world.visibility.volume
+        # Through fog without an end nothing comes from infinity.
+        media = frame.service(MediaService)
+        found = media.media.found if media is not None else []
+        self._endless = any(one.corners is None and not one.varies for one in found)
+        self._lit_by_world = self._world and not self._endless and any(one.scatters for one in found)
+        if media is not None:
+            frame.provide(MediaEmission("radiance.volume_emission"))
+
+    def _rows(self, frame: Frame) -> tuple[list[np.ndarray], list[lights.Emitter]]:
+        """Points of this sample on lamps, shining meshes and the world, and the lamps among them."""
+        emitters = [one for one in self._emitters if one.kind != lights.SUN or not self._endless]
+        count = len(emitters)
+        chosen = np.arange(count)
+        if count > MOST_LAMPS:
+            chosen = ((np.arange(MOST_LAMPS) + frame.lot("airlight/choose")) * count / MOST_LAMPS).astype(int)
+        rows = []
+        for number in chosen:
+            emitter = emitters[number]
+            sample = emitter.sample(*frame.random_volume("airlight/light"))
+            rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), max(count / MOST_LAMPS, 1.0)))
+        if self._triangles is not None:
+            for k in range(EMISSIVE_POINTS):
+                drawn = frame.random_volume_at(frame.sample * EMISSIVE_POINTS + k, "airlight/emissive")
+                samples = EMISSIVE_POINTS * frame.settings.samples
+                rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG, 1, samples))
+        if self._lit_by_world:
+            for k in range(WORLD_DIRECTIONS):
+                drawn = frame.random_at(frame.sample * WORLD_DIRECTIONS + k, "airlight/world")
+                direction, radiance, density = frame.environment.draw(*drawn)
+                rows.append(
+                    lights.direction_row(
+                        direction, radiance / density, density, lights.SHADOW_FLAG, 0, 1, WORLD_DIRECTIONS
+                    )
+                )
+        return rows, [emitters[number] for number in chosen]
+
+    def release(self) -> None:
+        self._sources.release()
+        self._reflectance.release()
+        self._triangles = None
+
+
+def places_of(rays: int, rows: int) -> int:
+    """Places on the ray for each row of lights: one, or an even number, half of them drawn in either way."""
+    each = rays // max(rows, 1)
+    return 1 if each < 2 else each - each % 2
+
+
+def volume_graphs(snapshot: Snapshot) -> list[Graph]:
+    """Trees of all volumes of the scene."""
+    used = {k for one in snapshot.instances for k in one.materials} | {one.material for one in snapshot.volumes}
+    graphs = [snapshot.materials[k].graph for k in sorted(used)]
+    world = [snapshot.world.volume] if snapshot.world.volume is not None else []
+    return world + [graph for graph in graphs if graph.volume is not None]
+
+
+def may_send(graph: Graph) -> bool:
+    """Whether a volume's tree may scatter or emit: cheap, by its nodes alone."""
+    waiting, seen = [graph.volume[0]], set()
+    while waiting:
+        key = waiting.pop()
+        node = graph.nodes.get(key)
+        if node is None or key in seen:
+            continue
+        seen.add(key)
+        if node.type in SENDING:
+            return True
+        waiting += [socket.link[0] for socket in node.inputs.values() if socket.link is not None]
+    return False

@@ -1,0 +1,169 @@
+"""Eye: what the observer's eye does to a point of light, at the scene's time.
+
+Provides the point spread function of a living eye (addon/eye): the pupil with its restlessness, particles and fibres of
+the lens, which the ciliary muscle moves, the vitreous body, which swings after each jump of the eye, lids and lashes;
+their diffraction pattern over 32 wavelengths and more, as a kernel over the picture's pixels. Nothing is computed until
+a technique of the `show` stage asks for it, and nothing again while neither the time nor the eye has changed.
+
+The state is a closed form of the time: frame 40 is the same whether it is rendered alone or after 39 others.
+
+| pattern of N x N | passes | bytes borrowed |
+|---|---|---|
+| aperture to colours | 11 (256), 11 (512), 13 (1024) | 60 N^2 |
+| kernel and its sums | 2 + 2 to 3 each | 16 per texel |
+
+The pupil follows the picture's own mean luminance, without the second or so that real ones take: a frame does not know
+the pictures before it. Bias and sources: addon/eye/point_spread.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..eye import optics, point_spread
+from ..eye.aperture import Aperture, Eye, aperture_at
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import CAMERA, Param, Service, Technique
+from ..snapshot.scene import Snapshot
+
+GLARE = "glare"  # the technique that asks for the point spread, and its choice of how
+OFF, CONVOLUTION, BILLBOARDS = "OFF", "CONVOLUTION", "BILLBOARDS"
+MODE = Param(
+    "mode", "Glare", OFF, "Show the picture as an eye sees it",
+    items=((OFF, "Off", 0), (CONVOLUTION, "Convolution", 1), (BILLBOARDS, "Billboards", 2)), scope=CAMERA,
+)  # fmt: skip
+LUMINANCE_STEP = 0.02  # decades; as much as noise of the first samples changes the mean, and 0.02 mm of a pupil
+DRAFT_SIDE = 256
+SIDES = tuple((str(side), f"{side} x {side}", side) for side in (128, 256, 512, 1024, 2048))
+
+
+class PointSpread(Service):
+    """The eye's aperture at the picture's time, and the kernel that it makes of a point of light."""
+
+    name = "point spread"
+
+    def __init__(self, technique: EyeModel):
+        self._technique = technique
+        self._pattern: tuple[object, point_spread.Pattern] | None = None
+        self._kernel: tuple[object, point_spread.Kernel] | None = None
+
+    def aperture(self, frame: Frame, luminance: float) -> Aperture:
+        """While the eye looks at a picture of this mean luminance, cd/m2."""
+        decades = np.round(np.log10(max(luminance, 1e-6)) / LUMINANCE_STEP) * LUMINANCE_STEP
+        seconds = frame.snapshot.moment.seconds
+        return aperture_at(
+            eye_of(frame.settings), seconds * frame.settings.get(self._technique, "speed"), 10.0**decades
+        )
+
+    def scale(self, frame: Frame, aperture: Aperture, degrees_per_pixel: float, magnification: float) -> optics.Scale:
+        """How the pattern lies on pixels of this size."""
+        defocus = frame.settings.get(self._technique, "defocus")
+        side = self._technique.side(frame.settings)
+        return optics.scale_of(side, degrees_per_pixel, magnification, aperture.diameter, defocus, max(frame.size))
+
+    def pattern(self, frame: Frame, aperture: Aperture) -> point_spread.Pattern:
+        """Of white light; drawn anew where the aperture differs. It is the service's own."""
+        settings, technique = frame.settings, self._technique
+        side, defocus = technique.side(settings), settings.get(technique, "defocus")
+        least = settings.get(technique, "wavelengths")
+        key = (side, defocus, least, aperture.diameter, aperture.closed, aperture.strokes.tobytes())
+        if self._pattern is None or self._pattern[0] != key:
+            self._drop()
+            self._pattern = (key, point_spread.make_pattern(aperture, side, defocus, least))
+            frame.count(technique, "passes", point_spread.pass_count(side))
+            frame.count(technique, "obstacles", len(aperture.strokes))
+        return self._pattern[1]
+
+    def kernel(self, frame: Frame, aperture: Aperture, scale: optics.Scale, sharp: bool) -> point_spread.Kernel:
+        """Over the picture's pixels; `sharp`: without the light that is not scattered. It is the service's own."""
+        pattern = self.pattern(frame, aperture)
+        key = (self._pattern[0], scale, sharp)
+        if self._kernel is None or self._kernel[0] != key:
+            if self._kernel is not None:
+                self._kernel[1].release()
+            self._kernel = (key, point_spread.make_kernel(pattern.colours, scale, sharp))
+        return self._kernel[1]
+
+    def leave(self, frame: Frame) -> None:
+        """Nobody will ask for a kernel of this picture."""
+        frame.leave(self._technique, "the picture has no light that would dazzle it")
+
+    def _drop(self) -> None:
+        for kept in (self._kernel, self._pattern):
+            if kept is not None:
+                kept[1].release()
+        self._kernel = self._pattern = None
+
+    def release(self) -> None:
+        self._drop()
+
+
+class EyeModel(Technique):
+    name = "eye"
+    label = "Eye"
+    params = (
+        Param("age", "Age", 30.0, "Years of the observer: old lenses scatter more, old pupils are smaller", 1.0, 110.0),
+        Param(
+            "pupil", "Pupil", 0.0,
+            "Mean diameter of the pupil in mm; 0: by the luminance of the picture (Scene Luminance)", 0.0, 8.5,
+        ),
+        Param("restlessness", "Hippus", 1.0, "How much the pupil changes by itself; 1: as measured", 0.0, 5.0),
+        Param("tremor", "Lens Tremor", 1.0, "How much the ciliary muscle moves the lens", 0.0, 10.0),
+        Param("movement", "Eye Movement", 1.0, "How much the vitreous body swings after the eye's jumps", 0.0, 10.0),
+        Param("speed", "Speed", 1.0, "Seconds of the eye in a second of the scene; 0: it stands still", 0.0, 10.0),
+        Param("scatter", "Scatter", 0.1, "Share of the pupil that particles cover, at 25 years", 0.0, 0.5, "FACTOR"),
+        Param(
+            "fibres", "Lens Fibres", 0.3,
+            "Opacity of the lens' radial fibres, which make a coloured ring where the pupil is wide",
+            0.0, 1.0, "FACTOR",
+        ),
+        Param("lashes", "Eyelashes", 1.0, "Opacity of the eyelashes", 0.0, 1.0, "FACTOR"),
+        Param("squint", "Squint", 0.0, "How far the lids are lastingly closed", 0.0, 1.0, "FACTOR"),
+        Param("blink", "Blink", 0.0, "For keyframes: 0 open, 1 shut; it darkens the picture", 0.0, 1.0, "FACTOR"),
+        Param(
+            "blinks_per_minute", "Blinks per Minute", 0.0, "Blinks that come by themselves; people have 10 to 20",
+            0.0, 60.0,
+        ),
+        Param("defocus", "Defocus", 0.25, "Residual defocus of the eye in dioptres: widens the core", 0.0, 1.0),
+        Param(
+            "side", "Pattern Size", "512",
+            "Texels of the diffraction pattern: with twice as many it reaches twice as far; drafts take 256 at most",
+            items=SIDES,
+        ),
+        Param("wavelengths", "Wavelengths", 32, "At least summed for each texel; further out more are taken", 8, 256),
+        Param("person", "Person", 0, "Another number gives another observer's eye", 0, 2**20),
+    )  # fmt: skip
+    params = tuple(replace(param, scope=CAMERA) for param in params)
+    provides = (PointSpread,)
+
+    def __init__(self):
+        self._service = PointSpread(self)
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if settings.value(GLARE, MODE) == OFF:
+            return "nothing asks for the eye's point spread"
+        return None
+
+    def side(self, settings: Settings) -> int:
+        """Of the pattern, texels."""
+        side = int(settings.get(self, "side"))
+        return min(side, DRAFT_SIDE) if settings.draft else side
+
+    def show(self, frame: Frame) -> None:
+        frame.provide(self._service)
+
+    def release(self) -> None:
+        self._service.release()
+
+
+def eye_of(settings: Settings) -> Eye:
+    """The observer as set."""
+    names = (
+        "age", "pupil", "restlessness", "tremor", "movement", "scatter", "fibres", "lashes", "squint", "blink",
+        "blinks_per_minute",
+    )  # fmt: skip
+    values = {param.name: settings.value(EyeModel.name, param) for param in EyeModel.params}
+    return Eye(seed=values["person"], **{name: values[name] for name in names})

@@ -1,0 +1,317 @@
+"""Image-space subsurface scattering: light that enters skin, wax or marble at one place and leaves it at another.
+
+    L(x) = albedo / pi * integral over the object's surface of  R(|x - y|) E(y) dA(y)
+
+R is the profile of the material's own method, per channel (kernels/diffusion.py): Christensen-Burley's, or that of the
+random walk. E is found where Shah, Konttinen and Pattanaik (2009) find it, at points seen by rasterisation, and at
+points of the mesh, which also know what the camera does not see. A smooth window of a few point distances divides R:
+
+- **near**: pixels of the object around, at taps on a spiral, with all the light that the picture's techniques have
+  brought there. The mean over taps is divided by that of the profile, so that it is smooth in one sample. Where the
+  profile lies within a pixel, this is the local limit, albedo * E / pi.
+- **far**: points of the mesh (scene/scatter_points.py), another of each cell in every sample, lit by every lamp, the
+  world and emissive meshes by rays, and by indirect light (the virtual lights of the technique in that slot). Pixels
+  gather them row by row, leaving out rows beyond the profile's reach.
+
+Objects do not exchange light. Albedo and radius are those of the place where light leaves, as in Cycles. Burley's
+profile is summed over the surface as it is, thin or bent, in Cycles' measure. The walk's mean over points is divided by
+the profile's, what faces away counts as often as walks through slabs and spheres find it, and the total follows from
+the mean length of lines through the object. What the walk returns depends on the angle of view (Chandrasekhar).
+
+| cost | per sample |
+|---|---|
+| passes | 1 of the draws that scatter, 1 to 4 over the points, 2 over the picture |
+| rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light |
+| fetches per pixel | 5 per tap, 3 per point within reach, 1 per row |
+| bytes | 32 per pixel and 64 more while it runs; 384 a point |
+
+Bias: distances are straight lines through what may be air; the mean over taps is a ratio, and knows what is on screen
+only; the walk's profile is that of a plane; indirect light comes from pixels alone where its technique offers no
+virtual lights. Diffuse roughness and bumps act where light leaves. In mirrors and in indirect light it is diffuse.
+
+Fails: a range of many pixels on an object with more detail than points (`points`) smooths that detail away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..frame.light_paths import SUBSURFACE
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import MATERIAL, Param, Technique, Write
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..kernels import diffusion
+from ..lighting import repeated_light
+from ..lighting.point_light import LIGHTING, PointLight
+from ..lighting.visibility import RAYS, ray_bindings
+from ..materials import translucency
+from ..materials.compiler import may_scatter
+from ..scene import acceleration
+from ..scene.materials import SCATTER_IMAGES
+from ..scene.scatter_points import ROW, ScatterPoints
+from ..scene.view import VIEW
+from ..snapshot.scene import Snapshot
+from ..surfaces.draw import SURFACES, draw_scatter
+from .instant_radiosity import GATHER_CONSTANTS, GATHER_TEXTURES, PATH_BLOCKS, GatherBindings
+
+RANGE = 2.5  # distances between points: where pixels stop and points begin
+RAYS_INDIRECT = 4  # of a point in a sample
+IMAGES = tuple(f"surface.scatter_{name}" for name in SCATTER_IMAGES)
+
+POINT_TEXTURES = (("RGBA32F", "point_position"), ("RGBA32F", "point_normal"), ("RGBA32F", "point_entry"))
+PICTURE = (
+    "surface_position", "surface_normal", "surface_diffuse", "spread_length", "scatter_share", "spread_entry",
+    "light_direct",
+    "light_indirect",
+)  # fmt: skip
+GATHER = passes.fullscreen_program(
+    "subsurface gather",
+    "subsurface/gather.frag.glsl",
+    textures=tuple(
+        ("RGBA32F", name)
+        for name in (
+            "cells", "cell_direct", "cell_indirect", *PICTURE, "cell_bounds", "scatter_objects", "walk_lobes",
+            "whole_before", "cell_shapes",
+        )
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("INT", "first_object"), ("INT", "taps"), ("INT", "points_lit")),
+    defines=(("WALK_LOBES", "1"), ("RANGE", str(RANGE))),
+    outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect"), ("VEC4", "out_whole")),
+)  # fmt: skip
+APPLY = passes.fullscreen_program(
+    "subsurface apply",
+    "subsurface/apply.frag.glsl",
+    textures=(("RGBA32F", "scatter_share"), ("RGBA32F", "left_direct"), ("RGBA32F", "left_indirect")),
+    outputs=(("VEC4", "out_direct"), ("VEC4", "out_indirect")),
+)
+INDIRECT = passes.fullscreen_program(
+    "subsurface indirect",
+    "subsurface/indirect.frag.glsl",
+    textures=(*GATHER_TEXTURES, *POINT_TEXTURES),
+    blocks=PATH_BLOCKS,
+    constants=(*(one for one in GATHER_CONSTANTS if one[1] != "lobe_rays"), ("INT", "rays")),
+    outputs=(("VEC4", "out_indirect"),),
+)
+CHORD = passes.fullscreen_program(
+    "subsurface chord",
+    "subsurface/chord.frag.glsl",
+    textures=(*RAYS.textures, *POINT_TEXTURES),
+    blocks=((VIEW, "film_view"),),
+    constants=(*RAYS.constants, ("FLOAT", "longest")),
+    outputs=(("VEC4", "out_shape"),),
+)
+LIGHT = ("radiance.diffuse_direct", "radiance.diffuse_indirect")
+
+
+class ImageSpaceSubsurface(Technique):
+    name = "image_space_subsurface"
+    label = "Image-space subsurface"
+    fills = ("subsurface",)
+    params = (
+        Param(
+            "points", "Points", 4096,
+            "Most points on the surfaces of objects below which light scatters, that are lit in a sample", 64, 65536,
+            draft=512,
+        ),
+        Param("taps", "Taps", 24, "Pixels around each that light below its surface is taken from in a sample", 1, 256),
+        Param(
+            translucency.BLUR, "Blur Map", "", "Painted: how far light spreads below the surface; 0.5 as the material "
+            "says, 1 eight times as far, 0 an eighth", scope=MATERIAL, image=True,
+        ),
+        Param(
+            translucency.TINT, "Tint Map", "", "Painted: colour of light that enters here, below the skin",
+            scope=MATERIAL, image=True,
+        ),
+        Param(
+            translucency.TRANSLUCENCY, "Translucency Map", "", "Painted: where light scatters below the surface; black "
+            "is plain diffuse", scope=MATERIAL, image=True,
+        ),
+    )  # fmt: skip
+    reads = SURFACES
+    finishes = LIGHT
+    requests = (GatherBindings,)
+    owns = (SUBSURFACE,)
+    writes = (
+        Write(IMAGES[0], "RGBA32F", "How far light spreads below the surface, m; the albedo that says how"),
+        Write(IMAGES[1], "RGBA32F", "Share of the diffuse albedo that does; the object"),
+        Write(IMAGES[2], "RGBA32F", "Painted: tint of the light that enters; how translucent the surface is"),
+        *(Write(name, "RGBA32F", "What left the surface takes the place of what entered", True) for name in LIGHT),
+    )
+
+    def __init__(self):
+        self.points = ScatterPoints()
+        self._light = PointLight("subsurface")
+        self._lobes: images.Image | None = None
+        self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
+        self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
+        self._shapes: images.Image | None = None  # of cells: normal and mean length of lines through the object
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        shown = {material for instance in snapshot.instances for material in instance.materials}
+        if not any(may_scatter(snapshot.materials[material].graph) for material in shown):
+            return "no material scatters light below its surface"
+        return acceleration.too_many(snapshot)
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return GATHER, APPLY, CHORD, LIGHTING
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        if not self._materials or frame.receivers is None or not len(frame.receivers.distance):
+            frame.target(*IMAGES).clear()
+            return
+        # Light at other points of the film is taken from pixels: repeated, it would be light that enters there.
+        repeated_light.forbid(frame)
+        draw_scatter(frame, self, frame.target(*IMAGES), self.points.table, self._materials)
+        lit = self._lit_points(frame) if self.points.rows else None
+        yield
+        yield from self._gather(frame, lit)
+        for image in lit or ():
+            images.pool.give(image)
+
+    def begin(self, frame: Frame) -> None:
+        self._materials = {k for k, material in enumerate(frame.materials.compiled) if material.scatter > 0.0}
+        if not self._materials:
+            return
+        if self.points.update(frame, frame.settings.get(self, "points")) or self._shapes is None:
+            self._measure(frame)
+        if self._lobes is None:
+            self._lobes = images.upload(diffusion.table())
+        self._give_whole()
+        self._whole = [images.Target((images.pool.take(*frame.size, "RGBA32F"),)) for _ in range(2)]
+        self._whole[0].clear()
+        self._light.begin(frame)
+        frame.count(self, "points", self.points.rows * ROW)
+        frame.count(self, "objects", len(self.points.objects))
+
+    def _measure(self, frame: Frame) -> None:
+        """How thick objects are at their points."""
+        self._give_shapes()
+        if not self.points.rows:
+            return
+        self._shapes = images.pool.take(ROW, self.points.rows, "RGBA32F")
+        position, normal = self.points.surface(0)
+        textures, constants = ray_bindings(frame)
+        passes.fullscreen(
+            CHORD, images.Target((self._shapes,)),
+            textures={
+                **textures, "point_position": position, "point_normal": normal, "point_entry": self.points.entries(0),
+            },
+            blocks={"film_view": frame.view_block}, constants={**constants, "longest": 2.0 * frame.geometry.size},
+        )  # fmt: skip
+
+    # Light at points of the mesh --------------------------------------------------------------------------------------
+
+    def _lit_points(self, frame: Frame) -> tuple[images.Image, images.Image]:
+        """Direct and indirect light of this sample at the points, as surfaces of the painted tint
+        there reflect it."""
+        size = (ROW, self.points.rows)
+        direct, unused, indirect = (images.pool.take(*size, "RGBA32F") for _ in range(3))
+        position, normal = self.points.surface(frame.sample)
+        target = images.Target((direct, unused))
+        target.clear()
+        black = self._constant_images(size)[1]
+        tint = self.points.entries(frame.sample)
+        surfaces = {"position": position, "normal": normal, "diffuse": tint, "tint": black, "lobe": black}
+        drawn, rays = self._light.add(frame, {**surfaces, "emission": black}, target)
+        frame.count(self, "passes", drawn)
+        images.pool.give(unused)
+        frame.count(self, "rays", rays * ROW * self.points.rows)
+        self._light_indirectly(frame, position, normal, indirect)
+        return direct, indirect
+
+    def _light_indirectly(self, frame: Frame, position, normal, indirect: images.Image) -> None:
+        target = images.Target((indirect,))
+        provided = frame.service(GatherBindings)
+        if provided is None:
+            target.clear()
+            return
+        offered = provided.bindings
+        names = {name for _, name in GATHER_CONSTANTS} - {"lobe_rays"}
+        passes.fullscreen(
+            INDIRECT, target,
+            textures={
+                **{name: offered["textures"][name] for _, name in GATHER_TEXTURES},
+                "point_position": position, "point_normal": normal, "point_entry": self.points.entries(frame.sample),
+            },
+            blocks=offered["blocks"],
+            constants={**{name: offered["constants"][name] for name in names}, "rays": RAYS_INDIRECT},
+        )  # fmt: skip
+        frame.count(self, "passes")
+
+    def _constant_images(self, size: tuple[int, int]) -> tuple[images.Image, images.Image]:
+        """A white image and a black one."""
+        if size not in self._white:
+            self._give_white()
+            made = tuple(images.pool.take(*size, "RGBA32F") for _ in range(2))
+            images.Target(made[:1]).clear((1.0, 1.0, 1.0, 0.0))
+            images.Target(made[1:]).clear()
+            self._white[size] = made
+        return self._white[size]
+
+    # Light at pixels --------------------------------------------------------------------------------------------------
+
+    def _gather(self, frame: Frame, lit: tuple[images.Image, images.Image] | None) -> Iterator[None]:
+        shown = frame.images
+        nothing = self._constant_images((1, 1))[1] if lit is None else None
+        points = {
+            "cells": self.points.cells[frame.sample % len(self.points.cells)] if lit else nothing,
+            "cell_direct": lit[0] if lit else nothing,
+            "cell_indirect": lit[1] if lit else nothing,
+            "cell_bounds": self.points.bounds if lit else nothing,
+            "cell_shapes": self._shapes if lit else nothing,
+            "scatter_objects": self.points.table,
+            "walk_lobes": self._lobes,
+        }
+        picture = (
+            shown["surface.position"], shown["surface.normal"], shown["surface.diffuse"], shown[IMAGES[0]],
+            shown[IMAGES[1]], shown[IMAGES[2]], shown[LIGHT[0]], shown[LIGHT[1]],
+        )  # fmt: skip
+        left = [images.pool.take(*frame.size, "RGBA32F") for _ in LIGHT]
+        before, after = self._whole
+        target = images.Target((*left, after.colors[0]))
+        for rows in frame.bands(self):
+            passes.fullscreen(
+                GATHER, target, rows=rows,
+                textures={**dict(zip(PICTURE, picture)), **points, "whole_before": before.colors[0]},
+                blocks={"film_view": frame.view_block},
+                constants={
+                    "first_object": self.points.first_object, "taps": frame.settings.get(self, "taps"),
+                    "points_lit": int(lit is not None),
+                },
+            )  # fmt: skip
+            yield
+        passes.fullscreen(
+            APPLY, frame.target(*LIGHT),
+            textures={"scatter_share": shown[IMAGES[1]], "left_direct": left[0], "left_indirect": left[1]},
+        )  # fmt: skip
+        for image in left:
+            images.pool.give(image)
+        self._whole = [after, before]
+        frame.count(self, "passes", 2)
+
+    def _give_shapes(self) -> None:
+        if self._shapes is not None:
+            images.pool.give(self._shapes)
+        self._shapes = None
+
+    def _give_whole(self) -> None:
+        for target in self._whole:
+            images.pool.give(target.colors[0])
+        self._whole = []
+
+    def _give_white(self) -> None:
+        for made in self._white.values():
+            for image in made:
+                images.pool.give(image)
+        self._white = {}
+
+    def release(self) -> None:
+        self.points.release()
+        self._light.release()
+        self._give_whole()
+        self._give_white()
+        self._give_shapes()
+        self._lobes = None

@@ -1,0 +1,287 @@
+"""Reflection editing: mirrors, gloss, highlights and glass show what an artist wants them to, where they want it.
+
+Constraints of an object say that a place of it is to show another target than it would; regions say where that acts.
+In every pixel of the object the rotation of reflected directions is solved from them (surfaces/reflection_edits.py),
+and turns the frame of the surface's lobe after the view has been taken into it (shaders/lib/brdf.glsl): rays, points
+of lights and highlights then follow, while Fresnel's terms keep the angle that they had. Diffuse light and shadows
+never change, and pixels outside of all regions are what they are without this technique.
+
+| cost | per sample, of edited objects |
+|---|---|
+| draws | 1 per object |
+| arithmetic per pixel | 4 Jacobi sweeps of a 4x4 matrix per region, once more where it fades; 2 distances each |
+| bytes per pixel | 16 |
+| geodesic distances, once per change | a shortest-path search per region and constraint |
+
+Bias: directions are exact for the view in which a constraint was made; in other views they turn along with what the
+surface mirrors there. Surfaces that are seen in a mirror or through glass are shown without their edits. An edited
+direction that points into a solid shows its inside. Edits of more than 120 degrees fold over: the ledger tells the
+largest one. Drafts show glass without its edits.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import OBJECT, POINT, Param, Technique, Write, own_value
+from ..gfx import geometry, images, passes
+from ..gfx.library import Program
+from ..scene.materials import CAMERA_DEFINES, SURFACE_IMAGES
+from ..scene.view import VIEW
+from ..snapshot.scene import Instance, Mesh, Snapshot
+from ..surfaces import geodesic, reflection_edits
+from ..surfaces.draw import SURFACE_TEXTURES, SurfaceStages
+from ..surfaces.reflection_edits import MOST_CONSTRAINTS, MOST_LAYERS, MOST_REGIONS, Constraint, EditTable, Region
+
+REFLECTION, REFRACTION = "REFLECTION", "REFRACTION"
+KINDS = {
+    "EUCLIDEAN": reflection_edits.EUCLIDEAN, "GEODESIC": reflection_edits.GEODESIC,
+    "PAINTED": reflection_edits.PAINTED,
+}  # fmt: skip
+EDIT, EDIT_AT_POINT = "surface.edit", "surface.edit_at_point"
+CONSTRAINT = (
+    Param("enabled", "Enabled", True, "Whether the constraint acts"),
+    Param("point", "Point", (0.0, 0.0, 0.0), "Place of the surface that shows the target", handle=POINT),
+    Param("target", "Target", (0.0, 0.0, 1.0), "What is to be seen there, in the object's space", handle=POINT),
+    Param("viewer", "Viewer", (0.0, -5.0, 0.0), "Where the constraint was seen from when it was made"),
+    Param(
+        "of", "Of", REFLECTION, "Which light is turned",
+        items=((REFLECTION, "Reflection", 0), (REFRACTION, "Refraction", 1)),
+    ),
+    Param("triangle", "Triangle", -1, "Triangle that carries the point through deformation; -1: none", -1, 2**31 - 1),
+    Param("weights", "Weights", (1.0, 0.0, 0.0), "Where on that triangle the point is"),
+)  # fmt: skip
+REGION = (
+    Param("enabled", "Enabled", True, "Whether constraints act in the region"),
+    Param(
+        "kind", "Kind", "EUCLIDEAN", "How far a place is from the centre",
+        items=(("EUCLIDEAN", "Ball", 0), ("GEODESIC", "Along Surface", 1), ("PAINTED", "Painted", 2)),
+    ),
+    Param("centre", "Centre", (0.0, 0.0, 0.0), "Middle of the region", handle=POINT),
+    Param("radius", "Radius", 1.0, "How far the region reaches", 0.0, 1e6, "DISTANCE"),
+    Param("border", "Border", 0.25, "Over which width inside the radius edits fade", 0.0, 1e6, "DISTANCE"),
+)  # fmt: skip
+
+
+@cache
+def edit_program(layers: int) -> Program:
+    """Draws an edited object; `layers` of distances come with its vertices, four to an attribute."""
+    count = -(-layers // 4)
+    cases = "".join(
+        f"  if (k < {4 * k + 4}) {{\n    return varying_layers{k}[k - {4 * k}];\n  }}\n" for k in range(count)
+    )
+    copied = "".join(f"  varying_layers{k} = layers{k};\n" for k in range(count))
+    return Program(
+        name="edits of an object",
+        vertex="edit/surface.vert.glsl",
+        fragment="edit/surface.frag.glsl",
+        inputs=(("VEC3", "position"), *(("VEC4", f"layers{k}") for k in range(count))),
+        varyings=(
+            ("smooth", "VEC3", "world_position"), *(("smooth", "VEC4", f"varying_layers{k}") for k in range(count)),
+        ),
+        outputs=(("VEC4", "out_edit"),),
+        textures=(("RGBA32F", "instances"), *SURFACE_TEXTURES),
+        blocks=((VIEW, "film_view"), (reflection_edits.EDITS, "edits")),
+        constants=(("INT", "instance_row"), *reflection_edits.SOLVE_CONSTANTS),
+        defines=CAMERA_DEFINES,
+        snippets=(
+            ("generated/copied", f"void copy_distances()\n{{\n{copied}}}\n"),
+            ("generated/distances", f"float distance_layer(int k)\n{{\n{cases}  return 0.0;\n}}\n"),
+        ),
+    )  # fmt: skip
+
+
+PROGRAMS = (edit_program(0), edit_program(MOST_LAYERS))
+
+
+class _Edited:
+    """An object with its edits on the GPU."""
+
+    def __init__(self, row: int, batch: geometry.Batch, table: EditTable, layers: int, largest: float):
+        self.row, self.batch, self.table, self.layers, self.largest = row, batch, table, layers, largest
+
+
+class ReflectionEditing(Technique):
+    name = "reflection_editing"
+    label = "Reflection edits"
+    params = (
+        Param(
+            "freeze", "Freeze Reflections", False,
+            "Reflections are those of the view in which an object's first constraint was made", scope=OBJECT,
+        ),
+        Param("constraints", "Constraints", (), "What places are to show", scope=OBJECT, many=CONSTRAINT),
+        Param("regions", "Regions", (), "Where constraints act", scope=OBJECT, many=REGION),
+    )  # fmt: skip
+    reads = ("surface.position",)
+    writes = (
+        Write(EDIT, "RGBA32F", "Rotation of reflected directions as a quaternion; 0: none"),
+        Write(EDIT_AT_POINT, "RGBA32F", "The same at another point of the film"),
+        Write("surface.lobe", "RGBA32F", "Where lobes point: turned by the edit that goes with it", by_need=True),
+    )
+
+    def __init__(self):
+        self._edited: list[_Edited] = []
+        self._kept: dict[object, _Edited] = {}
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if not any(_edits(instance)[0] for instance in snapshot.instances):
+            return "no object has an edit of its reflections"
+        return None
+
+    def begin(self, frame: Frame) -> None:
+        rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}
+        kept: dict[object, _Edited] = {}
+        for instance in frame.snapshot.instances:
+            constraints, regions = _edits(instance)
+            mesh = frame.snapshot.meshes[instance.mesh]
+            if not constraints or not regions or not mesh.triangle_count:
+                continue
+            row = rows[id(instance)]
+            origin = tuple(frame.geometry.origin)
+            key = (instance.mesh, mesh.version, instance.matrix.tobytes(), instance.own, row, origin)
+            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row)
+        self._kept, self._edited = kept, list(kept.values())
+        frame.shared(SurfaceStages).apply.append(self._at_film_point)
+
+    def sample(self, frame: Frame) -> None:
+        self._edit(frame, {name: frame.images[f"surface.{name}"] for name in SURFACE_IMAGES}, EDIT)
+        folded = max((one.largest for one in self._edited), default=0.0)
+        frame.counters.setdefault(self.name, {})["largest angle, degrees"] = round(folded)
+        frame.count(self, "passes", len(self._edited))
+
+    def _at_film_point(self, frame: Frame, surfaces: images.Target) -> None:
+        self._edit(frame, dict(zip(SURFACE_IMAGES, surfaces.colors)), EDIT_AT_POINT)
+
+    def _edit(self, frame: Frame, surfaces: dict[str, images.Image], name: str) -> None:
+        """Solve the edits of these surfaces into an image that then stands beside their lobes."""
+        surfaces["lobe"].beside = {}
+        target = frame.target(name)
+        target.clear()
+        with passes.drawing(target, depth_test="NONE", depth_write=False):
+            for one in self._edited:
+                self._draw(frame, one, surfaces)
+        surfaces["lobe"].beside = {"surface_edit": frame.images[name]}
+
+    def _draw(self, frame: Frame, one: _Edited, surfaces: dict[str, images.Image]) -> None:
+        shader = passes.get(edit_program(one.layers))
+        shader.bind(
+            textures={
+                "instances": frame.geometry.instances,
+                **{f"surface_{name}": image for name, image in surfaces.items()},
+            },
+            blocks={"film_view": frame.view_block, "edits": one.table.block},
+            constants={"instance_row": one.row, **one.table.constants},
+        )
+        passes.draw(shader, one.batch)
+
+    def release(self) -> None:
+        self._edited, self._kept = [], {}
+
+
+def _edits(instance: Instance) -> tuple[list[dict], list[dict]]:
+    """Enabled constraints and regions of an object, as many as are solved."""
+    if not instance.own:
+        return [], []
+    constraints = [one for one in own_value(instance.own, ReflectionEditing, "constraints") if one["enabled"]]
+    regions = [one for one in own_value(instance.own, ReflectionEditing, "regions") if one["enabled"]]
+    return constraints[:MOST_CONSTRAINTS], regions[:MOST_REGIONS]
+
+
+def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int) -> _Edited:
+    matrix = instance.matrix.copy()
+    matrix[:3, 3] -= frame.geometry.origin
+    corners = mesh.corner_vertices[mesh.triangle_corners]
+    world = mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+    wanted_constraints, wanted_regions = _edits(instance)
+    layers: list[np.ndarray] = []
+    graph: list[geodesic.Neighbours] = []
+
+    def along(point: np.ndarray) -> int:
+        """A layer with distances from a point; -1 where there is no room for it."""
+        if len(layers) >= MOST_LAYERS:
+            return -1
+        if not graph:
+            graph.append(geodesic.neighbours(world, corners))
+        triangle, _ = geodesic.nearest(world, corners, point)
+        seeds = corners[triangle]
+        layers.append(geodesic.distances(graph[0], seeds, np.linalg.norm(world[seeds] - point, axis=1)))
+        return len(layers) - 1
+
+    found = [_constraint(frame, instance, mesh, matrix, world, corners, one) for one in wanted_constraints]
+    if any(one["kind"] == "GEODESIC" for one in wanted_regions):
+        found = [Constraint(one.place, one.before, one.after, one.normal, one.bent, along(one.place)) for one in found]
+    scale = abs(np.linalg.det(matrix[:3, :3])) ** (1 / 3)
+    regions, members = [], []
+    for one in wanted_regions:
+        kind, centre, layer = KINDS[one["kind"]], _moved(matrix, one["centre"]), -1
+        if kind == reflection_edits.GEODESIC:
+            layer = along(centre)
+            kind = kind if layer >= 0 else reflection_edits.EUCLIDEAN
+        elif kind == reflection_edits.PAINTED and len(layers) < MOST_LAYERS:
+            layer = len(layers)
+            layers.append(_painted(mesh))
+        region = Region(kind, centre, scale * one["radius"], scale * one["border"], layer)
+        regions.append(region)
+        members.append(sum(1 << n for n, c in enumerate(found) if _inside(region, c, layers, world, corners)))
+    frozen = None
+    if own_value(instance.own, ReflectionEditing, "freeze"):
+        frozen = _moved(matrix, wanted_constraints[0]["viewer"])
+    extent = float(np.linalg.norm(np.ptp(world, axis=0)))
+    table = reflection_edits.edit_table(found, regions, members, extent, frozen)
+    count = -(-len(layers) // 4)
+    packed = np.zeros((len(world), 4 * count), np.float32)
+    for k, layer in enumerate(layers):
+        packed[:, k] = layer
+    vertices = geometry.vertex_buffer(
+        position=mesh.positions, **{f"layers{k}": packed[:, 4 * k : 4 * k + 4] for k in range(count)}
+    )
+    batch = geometry.triangle_batch(vertices, corners)
+    return _Edited(row, batch, table, len(layers), max(one.angle for one in found))
+
+
+def _moved(matrix: np.ndarray, point) -> np.ndarray:
+    return matrix[:3, :3] @ np.asarray(point, float) + matrix[:3, 3]
+
+
+def _constraint(frame: Frame, instance, mesh: Mesh, matrix, world, corners, one: dict) -> Constraint:
+    point = _moved(matrix, one["point"])
+    triangle, weights = one["triangle"], np.asarray(one["weights"], float)
+    if 0 <= triangle < len(corners):
+        point = weights @ world[corners[triangle]]
+    else:
+        triangle, weights = geodesic.nearest(world, corners, point)
+    cofactors = np.linalg.det(matrix[:3, :3]) * np.linalg.pinv(matrix[:3, :3]).T
+    normal = reflection_edits.unit(cofactors @ (weights @ mesh.corner_normals[mesh.triangle_corners[triangle]]))
+    view = reflection_edits.unit(_moved(matrix, one["viewer"]) - point)
+    normal = normal if normal @ view >= 0 else -normal
+    bends = one["of"] == REFRACTION
+    if bends:
+        material = frame.materials.compiled[int(mesh.triangle_materials(instance.materials)[triangle])]
+        before = reflection_edits.bent(view, normal, material.glass.ior if material.glass else 1.0)
+    else:
+        before = reflection_edits.mirrored(view, normal)
+    after = _moved(matrix, one["target"]) - point
+    after = reflection_edits.unit(after) if np.linalg.norm(after) > 0 else before
+    return Constraint(point, before, after, normal, bends)
+
+
+def _painted(mesh: Mesh) -> np.ndarray:
+    """Weights of vertices: the luminance of the active colour attribute, where a material reads it; else 0."""
+    weights = np.zeros(len(mesh.positions))
+    colors = mesh.colors.get(mesh.active_color)
+    if colors is not None:
+        np.maximum.at(weights, mesh.corner_vertices, colors[:, :3].mean(axis=1))
+    return weights
+
+
+def _inside(region: Region, one: Constraint, layers, world, corners) -> bool:
+    if region.layer >= 0:
+        triangle, weights = geodesic.nearest(world, corners, one.place)
+        value = weights @ layers[region.layer][corners[triangle]]
+    else:
+        value = np.linalg.norm(one.place - region.centre)
+    return bool(reflection_edits.influence(region, value) > 0.0)

@@ -1,0 +1,337 @@
+"""Shaded reflections: what mirrors, gloss and glass show of surfaces, shaded with their own materials.
+
+A ray of each pixel's lobe is followed to what it meets; there the material's own program runs (surfaces/hits.py), and
+light arrives as it does at pixels: of lamps, emissive surfaces and the world by points that this sample draws, one of
+which is traced, of other surfaces by virtual lights. Where what is met is itself a mirror or glass, the ray goes on:
+
+    L(v) = sum over k of  T_k ( emission + what lights and virtual lights bring there ),  T_k = product of f cos / p
+
+Both a ray and a point may find the same light: they are weighted by the power heuristic (Veach 1997). What the first
+surface reflects of lamps and the world is left to traced_glossy.py, and what it lets pass of them to
+traced_refraction.py, whose walks by mean colours this technique replaces. Of several lobes of a surface one is kept per
+sample, so a pane shows both its reflection and the view.
+
+| cost | per sample and bounce |
+|---|---|
+| rays | 1 per pixel that still has one, 1 to lights, 2 to 4 for light of other surfaces |
+| passes | 4, and 1 for each material that was met (masked by depth) |
+| readback | one flag for each material of the scene |
+| bytes per pixel | 250 while it runs, of the pool |
+
+Rougher lobes than `roughness` see means (instant_radiosity.py), and so do drafts, pictures whose indirect light is not
+by virtual lights of that technique, and scenes above 4 million triangles.
+
+Bias: that of hits.py and of virtual lights; light behind the last bounce is left out. Textures are not filtered by the
+width of a lobe, but by the samples that a picture takes of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique, Write
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..lighting.light_rates import EmissivePoints
+from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
+from ..lighting.virtual_lights import PATH_TEXTURES
+from ..lighting.visibility import TracedLobes, traced_roughness
+from ..materials.compiler import may_refract
+from ..scene import acceleration
+from ..scene.materials import may_be_glossy
+from ..scene.view import VIEW
+from ..snapshot.scene import Snapshot
+from ..sources import lights
+from ..sources.environment import WORLD
+from ..surfaces.draw import (
+    ANY_SURFACE,
+    LIT_SURFACES,
+    MARKS,
+    SOFT_DEFINES,
+    SURFACE_TEXTURES,
+    refracts,
+    surface_bindings,
+)
+from ..surfaces.hits import ANY_RAY, MET, Hits, Records, closure_bindings, take_closures
+from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
+
+WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
+EMISSIVE_POINTS = 4
+GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
+STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
+REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "ray_number"))
+MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
+ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
+ORDERS = ("direct", "indirect")
+
+
+@cache
+def scatter_program(onward: bool) -> Program:
+    before = ("met_direction", "met_path", "hit_place", "hit_passed") if onward else ()
+    return passes.fullscreen_program(
+        "rays onward" if onward else "rays of lobes",
+        "hits/scatter.frag.glsl",
+        textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *(("RGBA32F", name) for name in before)),
+        blocks=((VIEW, "film_view"),),
+        constants=(*REACH, ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size")),
+        defines=(("ONWARD", "1"),) if onward else (),
+        outputs=(("VEC4", "out_origin"), ("VEC4", "out_direction"), ("VEC4", "out_path")),
+    )
+
+
+def _outputs(transmission: bool, orders: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    paths = ("glossy", "transmission") if transmission else ("glossy",)
+    return tuple(("VEC4", f"out_{path}_{order}") for path in paths for order in orders)
+
+
+@cache
+def found_program(transmission: bool) -> Program:
+    return passes.fullscreen_program(
+        "light found by rays",
+        "hits/found.frag.glsl",
+        textures=(
+            *STATE, *(("RGBA32F", name) for name in ("surface_position", "surface_emission", "hit_passed")),
+            ("RGBA32F", "environment_map"), ("R32F", "environment_density_map"),
+        ),
+        blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
+        constants=(
+            ("INT", "light_count"), ("INT", "world_glossy"), ("INT", "world_transmission"), ("FLOAT", "world_samples"),
+            ("VEC4", "emissive"), ("INT", "ray_number"),
+        ),
+        defines=(("TRANSMISSION", "1"),) if transmission else (),
+        outputs=_outputs(transmission, ORDERS),
+    )  # fmt: skip
+
+
+@cache
+def received_program(transmission: bool, soft_lobes: bool) -> Program:
+    return passes.fullscreen_program(
+        "light at hits",
+        "hits/received.frag.glsl",
+        textures=(
+            *PATH_TEXTURES, ("RGBA32F", "virtual_lights"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"),
+            ("RGBA32F", "hit_passed"),
+        ),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+        constants=(("INT", "light_count"), ("FLOAT", "offset_size"), ("INT", "repeats"), *REACH, *NEAR_CONSTANTS),
+        defines=((("TRANSMISSION", "1"),) if transmission else ()) + SOFT_DEFINES[soft_lobes],
+        outputs=_outputs(transmission, ("indirect",)),
+    )  # fmt: skip
+
+
+GUIDE = passes.fullscreen_program(
+    "what reflections show",
+    "hits/guide.frag.glsl",
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "met_path")),
+    constants=(("FLOAT", "shaded_roughness"),),
+    outputs=(("VEC4", "out_shown"),),
+)
+PROGRAMS = (
+    *(scatter_program(onward) for onward in (False, True)),
+    *(found_program(transmission) for transmission in (False, True)),
+    *(received_program(True, soft) for soft in (False, True)),
+)
+
+
+class ShadedReflections(Technique):
+    name = "shaded_reflections"
+    label = "Shaded reflections"
+    params = (
+        Param(
+            "bounces", "Mirror bounces", 8,
+            "How many mirrors in a row show what they reflect; 0: reflections show mean colours", 0, 16, draft=0,
+        ),
+        Param(
+            "roughness", "Roughness", 0.6,
+            "Lobes up to this roughness show surfaces with their own materials; rougher ones their mean colours", 0.0,
+            1.0,
+        ),
+    )  # fmt: skip
+    reads = LIT_SURFACES
+    writes = (
+        *(
+            Write(f"radiance.glossy_{order}", "RGBA32F", f"Light that glossy surfaces receive, {order}", True)
+            for order in ORDERS
+        ),
+        Write(SHOWN, "RGBA32F", "How much surfaces reflect that reflections show; its luminance squared", True),
+        *(
+            Write(f"radiance.transmission_{order}", "RGBA32F", f"Light through glass, {order}", True, by_need=True)
+            for order in ORDERS
+        ),
+    )
+    provides = (ShadedLobes,)
+    requests = (GatherBindings, EmissivePoints, TracedLobes)
+
+    def __init__(self):
+        self._sources = PathSources(
+            ("glossy", "transmission", "diffuse"), "hits", WORLD_DIRECTIONS, EMISSIVE_POINTS
+        )  # fmt: skip
+        self._active = False
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if not snapshot.instances:
+            return "the scene has no surface"
+        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        if not may_be_glossy(snapshot) and not any(may_refract(snapshot.materials[slot].graph) for slot in used):
+            return "no material mirrors or bends light"
+        if settings.bounces == 0:
+            return "the scene's bounces are set to 0"
+        if settings.get(self, "bounces") == 0:
+            return "drafts show mean colours in reflections" if settings.draft else "its bounces are set to 0"
+        return acceleration.too_many(snapshot)
+
+    def begin(self, frame: Frame) -> None:
+        """Tell the techniques that gather indirect light and walk through glass what this one takes over."""
+        gathers = any(GatherBindings in technique.provides for technique in frame.plan.techniques)
+        self._active = gathers or not frame.plan.fills("indirect")
+        if self._active:
+            frame.provide(ShadedLobes(frame.settings.get(self, "roughness")))
+            self._sources.begin(frame)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        if not self._active or frame.receivers is None or not len(frame.receivers.distance):
+            return
+        hits, transmission = frame.kept(Hits), refracts(frame)
+        rows = self._sources.rows(frame)
+        sources = self._sources.block(rows)
+        mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)
+        glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
+        interfaces = frame.settings.get(glass, "interfaces") if glass else 0
+        reach = {"mirrors": mirrors, "interfaces": interfaces, "shaded_roughness": shaded_roughness(frame)}
+        onward_roughness = min(reach["shaded_roughness"], ONWARD_ROUGHNESS)
+        rounds = max(mirrors, interfaces + 1 if transmission else 0)
+
+        rays, onward = self._take(frame), self._take(frame)
+        records = Records.take(frame.size)
+        closures = take_closures(frame.size, records.target.depth)
+        try:
+            self._scatter(frame, rays, reach, 0, frame.images[MARKS], surface_bindings(frame), {})
+            yield
+            for number in range(rounds):
+                round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
+                met = hits.trace(frame, self, rays.colors[:2], records, number=number)
+                yield
+                hits.shade(frame, self, rays.colors[1], records, met, closures, number)
+                yield
+                self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                if not met:
+                    break
+                self._add_guide(frame, rays, records, closures, round_)
+                self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                yield
+                if number + 1 < rounds:
+                    before = {
+                        "met_direction": rays.colors[1], "met_path": rays.colors[2],
+                        "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
+                    }  # fmt: skip
+                    bound = closure_bindings(closures)
+                    self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
+                    rays, onward = onward, rays
+        finally:  # also where a viewport drops the sample
+            for image in (*rays.colors, *onward.colors, *closures.colors):
+                images.pool.give(image)
+            records.give()
+        frame.count(self, "light samples", len(rows))
+
+    @staticmethod
+    def _take(frame: Frame) -> images.Target:
+        return images.Target(tuple(images.pool.take(*frame.size, "RGBA32F") for _ in STATE))
+
+    def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before) -> None:
+        """Rays of the lobes of `surfaces`, into `rays`."""
+        rays.clear()
+        passes.fullscreen(
+            scatter_program(bool(before)),
+            images.Target(rays.colors, depth),
+            where=MET if before else ANY_SURFACE,
+            textures={**surfaces, "energy_table": frame.materials.energy_table, **before},
+            blocks={"film_view": frame.view_block},
+            constants={
+                **reach, "ray_number": number, "offset_size": frame.offset_size,
+                "traced_roughness": traced_roughness(frame),
+            },
+        )  # fmt: skip
+        frame.count(self, "passes")
+
+    def _add_found(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
+        world = self._sources.world_flags
+        emissive = frame.service(EmissivePoints) or EmissivePoints()
+        bound = closure_bindings(closures)
+        passes.fullscreen(
+            found_program(transmission),
+            _target(frame, transmission, ORDERS, records.target.depth),
+            blend="ADDITIVE_PREMULT",
+            where=ANY_RAY,
+            textures={
+                **_state(rays), "surface_position": bound["surface_position"],
+                "surface_emission": bound["surface_emission"], "hit_passed": records.images["hit_passed"],
+                "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
+            },
+            blocks={"film_view": frame.view_block, "world_light": frame.environment.block, "sources": sources},
+            constants={
+                "light_count": count, "world_samples": float(WORLD_DIRECTIONS),
+                "world_glossy": int(bool(world & lights.GLOSSY_FLAG)),
+                "world_transmission": int(bool(world & lights.TRANSMISSION_FLAG)),
+                "emissive": self._emissive(emissive.power, emissive.count, reach["ray_number"]),
+                "ray_number": reach["ray_number"],
+            },
+        )  # fmt: skip
+        frame.count(self, "passes")
+
+    def _emissive(self, power: float, points: float, number: int) -> tuple[float, float, float, float]:
+        """Power of emissive surfaces and points drawn on them in a sample: for glossy surfaces that the camera sees,
+        and for all others."""
+        others = float(EMISSIVE_POINTS) if number else GLASS_POINTS
+        return power, points, self._sources.emissive_power, others
+
+    def _add_guide(self, frame, rays, records, closures, reach) -> None:
+        if frame.settings.samples > 1:
+            passes.fullscreen(
+                GUIDE,
+                images.Target((frame.images[SHOWN],), records.target.depth),
+                blend="ADDITIVE_PREMULT",
+                where=MET,
+                textures={**closure_bindings(closures), "met_path": rays.colors[2]},
+                constants={"shaded_roughness": reach["shaded_roughness"]},
+            )
+            frame.count(self, "passes")
+
+    def _add_received(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
+        hierarchy = frame.hierarchy("diffuse")
+        repeats = max(-(-MORE_RAYS // frame.settings.samples), 1) if reach["ray_number"] < 2 else 1
+        provided = frame.service(GatherBindings)
+        near = {name: 0 for _, name in NEAR_CONSTANTS}
+        nothing = frame.materials.energy_table
+        textures = {"virtual_lights": nothing, "reflectance": nothing}
+        if provided is not None:
+            near = {name: provided.bindings["constants"][name] for name in near}
+            textures = {name: provided.bindings["textures"][name] for name in textures}
+        passes.fullscreen(
+            received_program(transmission, frame.materials.soft),
+            _target(frame, transmission, ("indirect",), records.target.depth),
+            blend="ADDITIVE_PREMULT",
+            where=MET,
+            textures={
+                **closure_bindings(closures), **hierarchy.textures, **textures,
+                "energy_table": frame.materials.energy_table, "ray_direction": rays.colors[1],
+                "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
+            },
+            blocks={"film_view": frame.view_block, "sources": sources},
+            constants={**near, **reach, "light_count": count, "offset_size": frame.offset_size, "repeats": repeats},
+        )  # fmt: skip
+        frame.count(self, "passes")
+
+    def release(self) -> None:
+        self._sources.release()
+
+
+def _state(rays: images.Target) -> dict[str, images.Image]:
+    return {name: image for (_, name), image in zip(STATE, rays.colors)}
+
+
+def _target(frame: Frame, transmission: bool, orders: tuple[str, ...], depth: images.Image) -> images.Target:
+    paths = ("glossy", "transmission") if transmission else ("glossy",)
+    return images.Target(tuple(frame.images[f"radiance.{path}_{order}"] for path in paths for order in orders), depth)

@@ -1,0 +1,180 @@
+"""Temporal glare: the picture as a living eye sees it, with needles, halo and veil around what is bright.
+
+    lens = I - s w H + s (H * kernel)     H what exceeds white, kernel the eye's tail (addon/techniques/eye.py)
+
+The linear picture, once its samples are summed up, is scattered by the point spread function of an eye that moves with
+the scene's time (addon/eye/scatter.py): by Fourier transforms, or by billboards. Its core is left out, so that what is
+below white stays as sharp as it was; what the tail takes from a pixel it brings to others. `film.combined` stays
+linear and free of it, the result is an image and a render pass of its own, and what viewports show.
+
+Skipped where nobody would see it, by the rule of the source: where no pixel is ten times as bright as white, or where
+the veil, all that is scattered over the tail's area, stays below half a step of a display of 8 bits. The picture is
+then the same to the bit; what was done is one reduction and one texel read back.
+
+| 1024 x 1024, pattern 512, convolved at full size | passes | fetches per pixel |
+|---|---|---|
+| measure | 4 | 1 |
+| point spread, when the time or the eye changes | 16 to 18 | (addon/eye/point_spread.py) |
+| scatter | 20 | 2.25 x (1 + 27 + 4 + 27) + 2 |
+
+Bytes: 48 per padded texel (1536 x 1536 for 1024 x 1024) borrowed.
+
+Bias: light below white is not scattered (its veil is missing), what lies beyond the picture's borders casts no glare
+into it, the kernel is the same all over the picture. Fails for pictures whose light was clipped before.
+
+Source: Ritschel, Ihrke, Frisvad, Coppens, Myszkowski and Seidel, "Temporal glare", Eurographics 2009. The split into
+core and tail, the threshold and the placement by magnification are ours.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import replace
+
+import numpy as np
+
+from ..eye import scatter
+from ..eye.aperture import Aperture
+from ..eye.optics import Scale
+from ..film.resolve import COMBINED
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import CAMERA, Param, Technique, Write
+from ..gfx import passes
+from ..snapshot.scene import Camera, Snapshot
+from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
+
+LENS = "film.lens"
+RESOLUTIONS = (("FULL", "Full", 1), ("HALF", "Half", 2), ("QUARTER", "Quarter", 4))
+LEAST_CONTRAST = 10.0  # of the brightest pixel to white, below which nobody sees glare
+LEAST_VEIL = 0.5 / 255.0  # of white
+ORTHOGRAPHIC_DEGREES = 39.6  # of a lens of 50 mm before a sensor of 36 mm
+
+
+class TemporalGlare(Technique):
+    name = GLARE
+    label = "Temporal Glare"
+    params = (
+        MODE,
+        Param("strength", "Strength", 1.0, "How much of what the eye scatters is shown; 1: as it is", 0.0, 10.0),
+        Param("white", "White", 1.0, "Light that displays show as white; what exceeds it glares", 0.0, 1e4),
+        Param(
+            "luminance", "Scene Luminance", 100.0,
+            "Luminance of the picture's value 1 in cd/m², by which the pupil adapts", 1e-4, 1e8,
+        ),
+        Param(
+            "magnification", "Size", 10.0,
+            "Angular magnification of the glare; 10 puts the ring of the eye's 2000 fibres, of which 200 are drawn, at"
+            " its 3 degrees", 0.1, 100.0,
+        ),
+        Param("sharp", "Keep Sharp", True, "Leave out the core of the glare, which only blurs bright pixels"),
+        Param(
+            "resolution", "Resolution", "FULL", "Pixels in which light is convolved; in larger ones needles are softer",
+            items=RESOLUTIONS,
+        ),
+    )  # fmt: skip
+    params = tuple(replace(param, scope=CAMERA) for param in params)
+    reads = (COMBINED,)
+    writes = (Write(LENS, "RGBA32F", "The picture as the eye sees it, premultiplied by alpha"),)
+    requests = (PointSpread,)
+
+    def __init__(self):
+        self._scatter = scatter.Scatter()
+        self._shown_for, self._shown, self._reason = (
+            lambda: None,
+            (),
+            None,
+        )  # the picture that film.lens is of, and why not
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        if settings.get(self, "mode") == OFF:
+            return "glare is off for this camera"
+        if not settings.get(self, "strength"):
+            return "its strength is 0"
+        return None
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple:
+        return scatter.MEASURE, scatter.BLOCKS  # what else there is may never be needed
+
+    def show(self, frame: Frame) -> None:
+        now = (frame.samples_done, frame.shown_with)
+        if self._shown_for() is not frame or self._shown != now:
+            self._reason = self._show(frame)
+            self._shown_for, self._shown = weakref.ref(frame), now
+        if self._reason is None:
+            frame.picture = LENS
+        else:
+            frame.leave(self, self._reason)
+            service = frame.service(PointSpread)
+            if service is not None:
+                service.leave(frame)
+
+    def _show(self, frame: Frame) -> str | None:
+        """Draw the lens' image; or why not, as a sentence."""
+        service = frame.service(PointSpread)
+        if service is None:  # a pass tree without an eye
+            return self._unseen(frame, "no eye brings a point spread: add the pass Eye to the tree")
+        picture = frame.images[COMBINED]
+        white, strength, magnification, luminance, sharp = (
+            frame.settings.get(self, name) for name in ("white", "strength", "magnification", "luminance", "sharp")
+        )
+        factor = {name: number for name, _, number in RESOLUTIONS}[frame.settings.get(self, "resolution")]
+        billboards = frame.settings.get(self, "mode") == BILLBOARDS
+        factor = 1 if billboards else factor
+        measured = scatter.measure(picture, white)
+        frame.count(self, "passes", scatter.measure_passes(picture))
+        aperture = service.aperture(frame, luminance * measured.mean)
+        scale = service.scale(frame, aperture, factor * _pixel_angle(frame), magnification)
+        reason = needless(measured, aperture, scale, strength, white, factor)
+        if reason and aperture.light == 1.0:
+            return self._unseen(frame, reason)
+        target = frame.target(LENS)
+        if reason or aperture.light == 0.0:  # lids move, and there is nothing, or nobody, to be dazzled
+            frame.count(self, "passes", scatter.dim(picture, target, aperture.light))
+        else:
+            kernel = service.kernel(frame, aperture, scale, sharp)
+            how = {"white": white, "strength": strength, "dimming": aperture.light}
+            if billboards:
+                done = self._scatter.billboards(picture, kernel, target, **how)
+            else:
+                done = self._scatter.convolve(picture, kernel, target, factor=factor, **how)
+            frame.count(self, "passes", done)
+        return None
+
+    def _unseen(self, frame: Frame, reason: str) -> str:
+        """The picture is shown as it is; a render pass of the lens has to be the same."""
+        if frame.settings.whole:
+            passes.copy(frame.images[COMBINED], frame.target(LENS))
+        return reason
+
+    def release(self) -> None:
+        self._scatter.release()
+
+
+def needless(
+    measured: scatter.Brightness, aperture: Aperture, scale: Scale, strength: float, white: float, factor: int
+) -> str | None:
+    """Why nobody would see glare, as a sentence; None where somebody may."""
+    if measured.most < LEAST_CONTRAST * white or measured.excess == 0.0:
+        return f"no pixel is {LEAST_CONTRAST:.0f} times as bright as white"
+    # By Babinet's principle the share of light that leaves the straight way is that of the pupil that is covered; the
+    # pupil's edge diffracts 2 / (pi x) of it beyond the core, x in units of the Airy disc's first zero over 3.83.
+    edge = 2.0 / (np.pi * 3.83 * max(scale.core * scale.per_pixel / (12.2 / aperture.diameter), 1.0))
+    tail = min(strength * (aperture.obstructed + edge), 1.0)
+    veil = tail * measured.excess / (np.pi * (factor * scale.reach) ** 2)
+    if veil < LEAST_VEIL * white:
+        return f"its veil would be {veil / max(white, 1e-30):.1e} of white, below half a step of a display"
+    return None
+
+
+def _pixel_angle(frame: Frame) -> float:
+    film = frame.snapshot.film
+    return degrees_per_pixel(frame.snapshot.camera, film.width, film.height)
+
+
+def degrees_per_pixel(camera: Camera, width: int, height: int) -> float:
+    """In the middle of a picture of that many pixels; orthographic views have none, and take that of a common lens."""
+    _, _, bottom, top = camera.frame
+    if camera.kind == "ORTHOGRAPHIC":
+        return ORTHOGRAPHIC_DEGREES / max(width, height)
+    return float(np.degrees((top - bottom) / height))

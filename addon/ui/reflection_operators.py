@@ -1,0 +1,170 @@
+"""Operators for edits of reflections: place a constraint by script or by a click on a surface, go back to its view."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from bpy_extras import view3d_utils
+from mathutils import Vector
+
+from ..techniques.reflection_editing import ReflectionEditing
+from . import ENGINE
+from .scoped_panels import active_entry
+
+CONSTRAINTS, REGIONS = "reflection_editing_constraints", "reflection_editing_regions"
+PANEL = f"CANDELA_OBJECT_PT_{ReflectionEditing.name}"
+LARGE = math.radians(120.0)
+
+
+def place(context, edited, point: Vector, normal: Vector, viewer: Vector):
+    """Add a constraint at a point of an object's surface (world space) that changes nothing yet: its target is what is
+    mirrored there. A first one gets a region around the whole object. Returns the constraint."""
+    view = (viewer - point).normalized()
+    mirrored = (2.0 * view.dot(normal) * normal - view).normalized()
+    start = point + 1e-4 * max(edited.dimensions.length, 1e-6) * normal
+    hit, target, *_ = context.scene.ray_cast(context.evaluated_depsgraph_get(), start, mirrored)
+    if not hit:
+        target = point + 2.0 * max(edited.dimensions.length, 1.0) * mirrored
+    inverse, settings = edited.matrix_world.inverted_safe(), edited.candela
+    entries = getattr(settings, CONSTRAINTS)
+    entry = entries.add()
+    entry.name = f"Constraint {len(entries)}"
+    entry.point, entry.target, entry.viewer = inverse @ point, inverse @ target, inverse @ viewer
+    setattr(settings, f"{CONSTRAINTS}_active", len(entries) - 1)
+    regions = getattr(settings, REGIONS)
+    if not regions:
+        region = regions.add()
+        region.name = "Region 1"
+        corners = [Vector(corner) for corner in edited.bound_box]
+        region.centre = sum(corners, Vector()) / 8
+        region.radius = 1.01 * max((corner - region.centre).length for corner in corners)
+        region.border = 0.0
+    edited.update_tag()
+    return entry
+
+
+def angle_of(entry, edited) -> float:
+    """Radians by which a constraint turns what its point mirrors; 0 where it has no surface."""
+    point, viewer, target = (Vector(getattr(entry, name)) for name in ("point", "viewer", "target"))
+    found, _, normal, _ = edited.closest_point_on_mesh(point)
+    if not found or entry.of != "REFLECTION" or not (target - point).length or not (viewer - point).length:
+        return 0.0
+    view = (viewer - point).normalized()
+    mirrored = 2.0 * view.dot(normal) * normal - view
+    return mirrored.angle(target - point, 0.0)
+
+
+class _OfAnObject:
+    @classmethod
+    def poll(cls, context):
+        return context.engine == ENGINE and context.object is not None and context.object.type == "MESH"
+
+
+class CANDELA_OT_place_reflection(_OfAnObject, bpy.types.Operator):
+    """Add a constraint to the active object at the point of its surface nearest to a place, as seen from a viewer"""
+
+    bl_idname = "candela.place_reflection"
+    bl_label = "Place Reflection"
+    bl_options = {"REGISTER", "UNDO"}
+
+    location: bpy.props.FloatVectorProperty(name="Location", description="In world space", subtype="XYZ")
+    viewer: bpy.props.FloatVectorProperty(name="Viewer", description="In world space", subtype="XYZ")
+
+    def execute(self, context):
+        edited = context.object
+        inverse = edited.matrix_world.inverted_safe()
+        found, point, normal, _ = edited.closest_point_on_mesh(inverse @ Vector(self.location))
+        if not found:
+            self.report({"ERROR"}, f"'{edited.name}' has no surface to place a constraint on.")
+            return {"CANCELLED"}
+        normal = (inverse.to_3x3().transposed() @ normal).normalized()
+        place(context, edited, edited.matrix_world @ point, normal, Vector(self.viewer))
+        return {"FINISHED"}
+
+
+class CANDELA_OT_pick_reflection(_OfAnObject, bpy.types.Operator):
+    """Click on a surface: what is seen there becomes a constraint, whose target can then be dragged"""
+
+    bl_idname = "candela.pick_reflection"
+    bl_label = "Pick Reflection"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def invoke(self, context, event):
+        if context.area is None or context.area.type != "VIEW_3D":
+            self.report({"ERROR"}, "Pick in a 3D viewport.")
+            return {"CANCELLED"}
+        context.window_manager.modal_handler_add(self)
+        context.workspace.status_text_set("Click on the surface that is to show something else. Escape: cancel.")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type in {"RIGHTMOUSE", "ESC"}:
+            context.workspace.status_text_set(None)
+            return {"CANCELLED"}
+        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+            return {"PASS_THROUGH"}
+        context.workspace.status_text_set(None)
+        place_on_window = (event.mouse_region_x, event.mouse_region_y)
+        region, view = context.region, context.region_data
+        start = view3d_utils.region_2d_to_origin_3d(region, view, place_on_window)
+        direction = view3d_utils.region_2d_to_vector_3d(region, view, place_on_window)
+        graph = context.evaluated_depsgraph_get()
+        hit, point, normal, _, met, _ = context.scene.ray_cast(graph, start, direction)
+        if not hit:
+            self.report({"WARNING"}, "There is no surface.")
+            return {"CANCELLED"}
+        edited = met.original if met.original else met
+        context.view_layer.objects.active = edited
+        normal = normal if normal.dot(direction) < 0 else -normal
+        place(context, edited, point, normal, start)
+        return {"FINISHED"}
+
+
+class CANDELA_OT_return_to_view(_OfAnObject, bpy.types.Operator):
+    """Look from where the active constraint was made"""
+
+    bl_idname = "candela.return_to_view"
+    bl_label = "Return to View"
+
+    def execute(self, context):
+        entry = active_entry(context.object.candela, CONSTRAINTS)
+        view = getattr(context.space_data, "region_3d", None)
+        if entry is None or view is None:
+            self.report({"ERROR"}, "There is no constraint, or no 3D viewport.")
+            return {"CANCELLED"}
+        matrix = context.object.matrix_world
+        point, viewer = matrix @ Vector(entry.point), matrix @ Vector(entry.viewer)
+        view.view_perspective = "PERSP"
+        view.view_location = point
+        view.view_distance = (viewer - point).length
+        view.view_rotation = (viewer - point).to_track_quat("Z", "Y")
+        return {"FINISHED"}
+
+
+def _draw(self, context):
+    edited = context.object
+    row = self.layout.row(align=True)
+    row.operator("candela.pick_reflection", icon="EYEDROPPER")
+    row.operator("candela.return_to_view", icon="LOOP_BACK")
+    entry = active_entry(edited.candela, CONSTRAINTS)
+    if entry is not None and edited.type == "MESH" and edited.mode == "OBJECT":
+        turned = angle_of(entry, edited)
+        icon = "ERROR" if turned > LARGE else "NONE"
+        text = f"Turns reflections by {math.degrees(turned):.0f}°"
+        self.layout.label(text=f"{text}: beyond 120° they fold over" if turned > LARGE else text, icon=icon)
+
+
+_CLASSES = (CANDELA_OT_place_reflection, CANDELA_OT_pick_reflection, CANDELA_OT_return_to_view)
+
+
+def register() -> None:
+    for made in _CLASSES:
+        bpy.utils.register_class(made)
+    getattr(bpy.types, PANEL).append(_draw)
+
+
+def unregister() -> None:
+    getattr(bpy.types, PANEL).remove(_draw)
+    for made in reversed(_CLASSES):
+        bpy.utils.unregister_class(made)

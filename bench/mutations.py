@@ -1,0 +1,166 @@
+"""Small wrongs that tests must notice: `python -m bench mutations`.
+
+bench/mutations.toml lists them as data: a file, a piece of its text that occurs once, what stands there instead, and
+the fast tests that should fail then. Each is applied alone to a copy of the working tree, where its tests run until the
+first one fails. What is printed:
+
+- survivors: no test failed, so nobody would have noticed; the exit code is 1;
+- stale ones: the text is not there any more (or not once), so that the entry says nothing until it is mended;
+- equivalents: entries with a `reason` why nothing can be noticed; they are listed and not run.
+
+Before anything is changed the tests must pass on the copy: a test that always fails notices nothing. That run is made
+once per set of tests and kept for the time of the command. Results go to out/mutations.json, as far as they came.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.cells import ROOT
+from bench.markdown import write_whole
+
+LIST = ROOT / "bench" / "mutations.toml"
+RESULTS = ROOT / "out" / "mutations.json"
+KILLED, SURVIVED, STALE, BROKEN, EQUIVALENT = "killed", "survived", "stale", "tests fail without it", "equivalent"
+SECONDS = 240  # for the tests of one wrong; longer than that counts as noticed: something hangs
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One wrong: `old` becomes `new` in `file`; `tests` are arguments for pytest. `reason`: why it is equivalent."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...] = ()
+    reason: str = ""
+
+    def applied(self, text: str) -> str | None:
+        """The text with the wrong in it; None where the place is not there, or not once."""
+        return text.replace(self.old, self.new) if text.count(self.old) == 1 else None
+
+
+def read(path: Path = LIST) -> list[Mutation]:
+    """The list. ValueError with a sentence where an entry cannot be meant."""
+    found = [
+        Mutation(**{**one, "tests": tuple(one.get("tests", ()))})
+        for one in tomllib.loads(path.read_text("utf-8"))["mutation"]
+    ]
+    names = [one.name for one in found]
+    for one in found:
+        if names.count(one.name) > 1:
+            raise ValueError(f"Two mutations are called '{one.name}'.")
+        if one.old == one.new:
+            raise ValueError(f"Mutation '{one.name}' changes nothing.")
+        if not one.tests and not one.reason:
+            raise ValueError(f"Mutation '{one.name}' names no tests, and no reason why none can notice it.")
+    return found
+
+
+def is_stale(mutation: Mutation, root: Path = ROOT) -> bool:
+    path = root / mutation.file
+    return not path.is_file() or mutation.applied(path.read_text("utf-8")) is None
+
+
+def copy_of_tree(folder: Path) -> None:
+    """What git tracks or would track, as it stands in the working tree."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT, check=True, capture_output=True, text=True,
+    ).stdout  # fmt: skip
+    for name in filter(None, listed.split("\0")):
+        source, place = ROOT / name, folder / name
+        if source.is_file():
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(source.read_bytes())
+
+
+def failing(folder: Path, tests: tuple[str, ...]) -> str:
+    """The first test that fails in the copy, or an empty string."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not timing", *tests]
+    environment = {name: value for name, value in os.environ.items() if name != "OCIO"}
+    try:
+        done = subprocess.run(
+            command, cwd=folder, check=False, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL,
+            env={**environment, "PYTHONDONTWRITEBYTECODE": "1"},
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return f"no end after {SECONDS} s"
+    if done.returncode == 0:
+        return ""
+    lines = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return lines[0] if lines else (done.stdout + done.stderr).strip().splitlines()[-1]
+
+
+def judge(mutation: Mutation, folder: Path, sound: dict[tuple[str, ...], str]) -> tuple[str, str]:
+    """What becomes of a mutation, and by which test or why."""
+    if mutation.reason:
+        return EQUIVALENT, mutation.reason
+    if is_stale(mutation, folder):
+        return STALE, f"its text does not stand once in {mutation.file}"
+    if mutation.tests not in sound:
+        sound[mutation.tests] = failing(folder, mutation.tests)
+    if sound[mutation.tests]:
+        return BROKEN, sound[mutation.tests]
+    path = folder / mutation.file
+    right = path.read_text("utf-8")
+    path.write_text(mutation.applied(right), encoding="utf-8")
+    try:
+        by = failing(folder, mutation.tests)
+    finally:
+        path.write_text(right, encoding="utf-8")
+    return (KILLED, by) if by else (SURVIVED, "")
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--only", metavar="TEXT", nargs="+", help="mutations whose name or file has one of these texts")
+    parser.add_argument("--part", metavar="K/N", default="1/1", help="every Nth mutation, from the Kth on")
+    parser.add_argument("--list", action="store_true", help="print the mutations and end")
+
+
+def chosen(options: argparse.Namespace) -> list[Mutation]:
+    first, _, step = options.part.partition("/")
+    found = [
+        one for one in read() if not options.only or any(text in f"{one.name} {one.file}" for text in options.only)
+    ]
+    return found[int(first) - 1 :: int(step or 1)]
+
+
+def command(options: argparse.Namespace) -> int:
+    wanted = chosen(options)
+    if options.list:
+        for one in wanted:
+            print(f"{one.name:<52} {'stale' if is_stale(one) else '':<6} {one.file}")
+        return 0
+    before = json.loads(RESULTS.read_text("utf-8")) if RESULTS.exists() else {}
+    RESULTS.parent.mkdir(exist_ok=True)
+    sound: dict[tuple[str, ...], str] = {}
+    with tempfile.TemporaryDirectory(prefix="candela_mutations_") as folder:
+        copy_of_tree(Path(folder))
+        for one in wanted:
+            started = time.monotonic()
+            state, by = judge(one, Path(folder), sound)
+            before[one.name] = {"state": state, "by": by}
+            print(f"{state:<9} {one.name:<52} {time.monotonic() - started:5.0f} s  {by}"[:200], flush=True)
+            write_whole(RESULTS, json.dumps(before, indent=1, ensure_ascii=False) + "\n")
+    states = {one.name: before[one.name]["state"] for one in wanted}
+    left = [name for name, state in states.items() if state in (SURVIVED, BROKEN)]
+    stale = [name for name, state in states.items() if state == STALE]
+    killed, equal = (sum(state == one for state in states.values()) for one in (KILLED, EQUIVALENT))
+    print(f"{killed} of {len(states)} noticed, {equal} equivalent, {len(stale)} stale, {len(left)} survived")
+    for name in left:
+        print(f"  survived: {name}")
+    return 1 if left else 0

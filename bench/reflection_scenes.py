@@ -1,0 +1,212 @@
+"""Scenes for the benchmark of reflections (`bench/reflections.py`): each is hard for another reason.
+
+| scene | what is hard |
+|---|---|
+| corridor | a mirror shows textured walls that stand behind the camera |
+| roughness map | gloss of a chequered roughness over a tiled floor |
+| glass ball | a smooth ball bends the view of a metal ball and of tiles |
+| two mirrors | each shows the other: eight bounces of a patterned box |
+| car paint | a coat over coloured metal under lamps of three sizes |
+| window pane | glass that shows a room behind it and what stands before it |
+| water | a wavy surface that mirrors a picture and bends the view of the ground |
+
+Light comes from areas and a dim world, so that a reference of a thousand samples is one: no caustics of small lamps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+
+def _material(name: str, color=(0.8, 0.8, 0.8, 1), tiles: float = 0.0, other=(0.1, 0.1, 0.1, 1), **inputs):
+    """A Principled material; with `tiles` its colour is a chequer of so many tiles over the UV map."""
+    made = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0):
+        made.use_nodes = True
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    nodes.clear()
+    shader, output = nodes.new("ShaderNodeBsdfPrincipled"), nodes.new("ShaderNodeOutputMaterial")
+    links.new(shader.outputs[0], output.inputs["Surface"])
+    shader.inputs["Base Color"].default_value = color
+    for key, value in inputs.items():
+        shader.inputs[key.replace("_", " ")].default_value = value
+    if tiles:
+        links.new(_chequer(made, tiles, color, other), shader.inputs["Base Color"])
+    return made
+
+
+def _chequer(material, tiles: float, color, other):
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    place, chequer = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeTexChecker")
+    links.new(place.outputs["UV"], chequer.inputs["Vector"])
+    chequer.inputs["Scale"].default_value = tiles
+    chequer.inputs["Color1"].default_value, chequer.inputs["Color2"].default_value = color, other
+    return chequer.outputs["Color"]
+
+
+def _plane(material, location, turn=(0, 0, 0), scale=(1, 1, 1)):
+    """A square of two metres with a UV map."""
+    mesh = bpy.data.meshes.new("Plane")
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    layer = mesh.uv_layers.new(name="UVMap")
+    for corner, uv in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
+        layer.uv[corner].vector = uv
+    return _placed(mesh, material, location, turn, scale)
+
+
+def _cube(material, location, size):
+    bpy.ops.mesh.primitive_cube_add(size=size, location=location)
+    bpy.context.object.data.materials.append(material)
+    return bpy.context.object
+
+
+def _ball(material, location, radius):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=48, ring_count=24)
+    bpy.context.object.data.materials.append(material)
+    bpy.context.object.data.shade_smooth()
+    return bpy.context.object
+
+
+def _placed(mesh, material, location, turn, scale):
+    mesh.materials.append(material)
+    made = bpy.data.objects.new(mesh.name, mesh)
+    made.location, made.rotation_euler, made.scale = location, turn, scale
+    bpy.context.scene.collection.objects.link(made)
+    return made
+
+
+def _area(location, energy, size, target=(0, 0, 0.5)):
+    data = bpy.data.lights.new("Area", "AREA")
+    data.energy, data.size = energy, size
+    made = bpy.data.objects.new("Area", data)
+    made.location = location
+    made.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(made)
+
+
+def _look(location, target, lens=35.0):
+    data = bpy.data.cameras.new("Camera")
+    data.lens = lens
+    made = bpy.data.objects.new("Camera", data)
+    made.location = location
+    made.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(made)
+    bpy.context.scene.camera = made
+
+
+def _world(color):
+    world = bpy.data.worlds.new("World")
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (*color, 1)
+    bpy.context.scene.world = world
+
+
+TURNED = np.pi / 2
+MIRROR = {"Metallic": 1.0, "Roughness": 0.0}
+
+
+def corridor() -> None:
+    _world((0.1, 0.12, 0.15))
+    _plane(_material("Floor", (0.7, 0.6, 0.5, 1), 12, (0.2, 0.15, 0.1, 1)), (0, 0, 0), scale=(2, 6, 1))
+    _plane(_material("Left", (0.8, 0.2, 0.1, 1), 10, (0.8, 0.8, 0.7, 1)), (-2, 0, 1.5), (0, TURNED, 0), (1.5, 6, 1))
+    _plane(_material("Right", (0.1, 0.3, 0.8, 1), 10, (0.8, 0.8, 0.7, 1)), (2, 0, 1.5), (0, -TURNED, 0), (1.5, 6, 1))
+    _plane(_material("Back", (0.1, 0.6, 0.2, 1), 6, (0.9, 0.9, 0.3, 1)), (0, -6, 1.5), (-TURNED, 0, 0), (2, 1.5, 1))
+    _plane(_material("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR), (0, 3, 1.5), (TURNED, 0, 0), (1.8, 1.4, 1))
+    _ball(_material("Ball", (0.8, 0.7, 0.2, 1), Roughness=0.6), (-0.8, -3.5, 0.6), 0.6)
+    _area((0, -1, 4), 150, 3, (0, -1, 0))
+    _look((0.4, -1.5, 1.4), (0, 3, 1.3))
+
+
+def roughness_map() -> None:
+    _world((0.25, 0.28, 0.35))
+    _plane(_material("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.15, 0.1, 0.25, 1)), (0, 0, 0), scale=(4, 4, 1))
+    metal = _material("Metal", (0.9, 0.85, 0.8, 1), Metallic=1.0)
+    shader = next(node for node in metal.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    rough = _chequer(metal, 8, (0.05, 0.05, 0.05, 1), (0.4, 0.4, 0.4, 1))
+    metal.node_tree.links.new(rough, shader.inputs["Roughness"])
+    _ball(metal, (0, 0, 1.0), 1.0)
+    _area((-2, -3, 4), 200, 2)
+    _look((0, -5, 1.8), (0, 0, 0.9), 50)
+
+
+def glass_ball() -> None:
+    _world((0.4, 0.45, 0.5))
+    _plane(_material("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.2, 0.3, 0.2, 1)), (0, 0, 0), scale=(4, 4, 1))
+    _ball(_material("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.45, Transmission_Weight=1.0), (-0.3, -1.2, 0.7), 0.7)
+    _ball(_material("Copper", (0.9, 0.5, 0.3, 1), Metallic=1.0, Roughness=0.25), (0.5, 0.8, 0.9), 0.9)
+    _area((-2, -2, 4), 60, 3)
+    _look((0, -5, 1.6), (0, 0, 0.7), 50)
+
+
+def two_mirrors() -> None:
+    _world((0.05, 0.05, 0.06))
+    _plane(_material("Floor", (0.7, 0.7, 0.7, 1), 8, (0.3, 0.3, 0.35, 1)), (0, 0, 0), scale=(3, 2, 1))
+    mirror = _material("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR)
+    _plane(mirror, (0, 1.5, 1.2), (TURNED, 0, 0), (2, 1.1, 1))
+    _plane(mirror, (0, -1.5, 1.2), (-TURNED, 0, 0), (2, 1.1, 1))
+    _cube(_material("Box", (0.8, 0.2, 0.1, 1), 4, (0.9, 0.8, 0.3, 1), Roughness=0.7), (-0.5, 0.4, 0.4), 0.8)
+    _area((0, 0, 4), 120, 2, (0, 0, 0))
+    _look((1.4, -1.2, 1.5), (-0.6, 1.5, 1.0), 24)
+
+
+def car_paint() -> None:
+    _world((0.15, 0.17, 0.2))
+    _plane(_material("Floor", (0.4, 0.4, 0.4, 1), 10, (0.2, 0.2, 0.2, 1)), (0, 0, 0), scale=(5, 5, 1))
+    paint = _material("Paint", (0.6, 0.02, 0.03, 1), Metallic=0.8, Roughness=0.45, Coat_Weight=1.0, Coat_Roughness=0.03)
+    ball = _ball(paint, (0, 0, 0.8), 0.8)
+    ball.scale = (1.6, 1.0, 1.0)
+    for x, size in ((-2, 0.3), (0, 1.0), (2, 2.0)):
+        _area((x, -2, 3.5), 80, size)
+    _look((0.5, -5, 1.8), (0, 0, 0.7), 50)
+
+
+def window_pane() -> None:
+    _world((0.5, 0.55, 0.65))
+    _plane(_material("Ground", (0.5, 0.5, 0.45, 1), 20, (0.3, 0.35, 0.25, 1)), (0, 0, 0), scale=(6, 6, 1))
+    glass = _material("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.5, Transmission_Weight=1.0)
+    pane = _cube(glass, (0, 0, 1.2), 1)
+    pane.scale = (3, 0.04, 2.2)
+    _cube(_material("Red", (0.8, 0.1, 0.1, 1), 4, (0.9, 0.7, 0.7, 1)), (-0.7, 1.5, 0.5), 1.0)
+    _cube(_material("Yellow", (0.9, 0.7, 0.1, 1), 4, (0.3, 0.2, 0.1, 1)), (1.5, -2.2, 0.6), 1.2)
+    _look((-1.6, -3.5, 1.6), (0.2, 0, 1.0), 35)
+
+
+def water() -> None:
+    _world((0.4, 0.5, 0.7))
+    _plane(_material("Ground", (0.8, 0.7, 0.5, 1), 12, (0.5, 0.4, 0.3, 1)), (0, 0, -0.6), scale=(5, 5, 1))
+    _plane(_material("Picture", (0.9, 0.2, 0.1, 1), 6, (0.9, 0.9, 0.8, 1)), (0, 4, 1.5), (TURNED, 0, 0), (3, 1.8, 1))
+    water_like = _material("Water", (1, 1, 1, 1), Roughness=0.0, IOR=1.33, Transmission_Weight=1.0)
+    nodes, links = water_like.node_tree.nodes, water_like.node_tree.links
+    waves, bump, place = (nodes.new(f"ShaderNode{name}") for name in ("TexNoise", "Bump", "TexCoord"))
+    waves.inputs["Scale"].default_value = 1.5
+    bump.inputs["Strength"].default_value = 0.2
+    links.new(place.outputs["Object"], waves.inputs["Vector"])
+    links.new(waves.outputs[0], bump.inputs["Height"])
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    links.new(bump.outputs["Normal"], shader.inputs["Normal"])
+    _plane(water_like, (0, 0, 0), scale=(5, 5, 1))
+    _look((0, -4, 1.2), (0, 2, 0.2), 35)
+
+
+SCENES: dict[str, Callable[[], None]] = {
+    "corridor": corridor,
+    "roughness map": roughness_map,
+    "glass ball": glass_ball,
+    "two mirrors": two_mirrors,
+    "car paint": car_paint,
+    "window pane": window_pane,
+    "water": water,
+}
+
+
+def make(name: str) -> bpy.types.Scene:
+    """The scene of this name in an empty file."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    SCENES[name]()
+    return bpy.context.scene

@@ -1,0 +1,272 @@
+"""Light below surfaces beside Cycles and EEVEE: `python -m bench subsurface --page docs/subsurface.md`.
+
+Seven scenes, made here: a slab under a pattern, a sphere lit from behind, Suzanne as skin and as wax under two area
+lights, a leaf, a candle, a marble tile, a sphere under the world alone; each with the profiles that Cycles has. The
+error is relMSE of Combined (no speculars: it is diffuse light) against the mean of two renders by Cycles, with the
+noise of that mean (a quarter of what the two differ by) taken off, and the mean beside Cycles'. Seconds are those of a
+second render, when everything is compiled.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from . import markdown
+from .quick import size_of, table
+
+METHODS = ("BURLEY", "RANDOM_WALK_SKIN", "RANDOM_WALK")
+# Radii of the random walk are mean free paths, a twelfth of what looks alike with the others.
+WALK_SCALE = 1.0 / (4.0 * np.pi)
+ENTRANTS = (("CANDELA", 1), ("CANDELA", 4), ("CANDELA", 64), ("BLENDER_EEVEE", 16), ("CYCLES", 4), ("CYCLES", 16))
+HEAD = ("scene", "method", "renderer", "relMSE", "mean / Cycles", "s", "noise of the reference")
+
+
+def material(method: str, color, radius, scale: float):
+    """A Principled material without speculars."""
+    import bpy
+
+    made = bpy.data.materials.new("Scattering")
+    if bpy.app.version < (5, 0):
+        made.use_nodes = True
+    node = next(one for one in made.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    node.subsurface_method = method
+    scale *= WALK_SCALE if method == "RANDOM_WALK" else 1.0
+    values = {
+        "Base Color": (*color, 1), "Subsurface Weight": 1.0, "Subsurface Radius": radius, "Subsurface Scale": scale,
+        "Specular IOR Level": 0.0,
+    }  # fmt: skip
+    for name, value in values.items():
+        node.inputs[name].default_value = value
+    return made
+
+
+def _link(name: str, data, location=(0, 0, 0), turn=(0, 0, 0)):
+    import bpy
+
+    made = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(made)
+    made.location, made.rotation_euler = location, turn
+    return made
+
+
+def light(kind: str, location=(0, 0, 0), turn=(0, 0, 0), **settings):
+    import bpy
+
+    data = bpy.data.lights.new(kind, kind)
+    for name, value in settings.items():
+        setattr(data, name, value)
+    return _link(kind, data, location, turn)
+
+
+def camera(location, turn, angle=0.6, span=0.0) -> None:
+    import bpy
+
+    data = bpy.data.cameras.new("Camera")
+    data.angle = angle
+    if span:
+        data.type, data.ortho_scale = "ORTHO", span
+    bpy.context.scene.camera = _link("Camera", data, location, turn)
+
+
+def _shape(operator, shown, smooth=True, **placement):
+    import bpy
+
+    operator(**placement)
+    made = bpy.context.object
+    for polygon in made.data.polygons:
+        polygon.use_smooth = smooth
+    made.data.materials.append(shown)
+    return made
+
+
+def _world(strength: float) -> None:
+    import bpy
+
+    made = bpy.data.worlds.new("World")
+    if bpy.app.version < (5, 0):
+        made.use_nodes = True
+    node = next(one for one in made.node_tree.nodes if one.type == "BACKGROUND")
+    node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (1, 1, 1, 1), strength
+    bpy.context.scene.world = made
+
+
+SKIN = ((0.8, 0.55, 0.45), (1.0, 0.35, 0.2))
+WAX = ((0.85, 0.75, 0.5), (1.0, 0.8, 0.5))
+MARBLE = ((0.83, 0.79, 0.75), (1.0, 0.8, 0.7))
+LEAF = ((0.3, 0.6, 0.15), (0.6, 1.0, 0.4))
+
+
+def slab(method: str) -> None:
+    import bpy
+
+    _shape(bpy.ops.mesh.primitive_cube_add, material(method, *MARBLE, 0.5), False, size=6, location=(0, 0, -3))
+    black = bpy.data.materials.new("Bars")
+    for x in (-1.5, -0.5, 0.5, 1.5):
+        bar = _shape(bpy.ops.mesh.primitive_cube_add, black, False, size=1, location=(x, 0, 1), scale=(0.5, 8, 0.1))
+        bar.visible_camera = False
+        bar.visible_diffuse = False
+    light("SUN", energy=3.0, angle=0.0)
+    camera((0, 0, 8), (0, 0, 0), span=3.5)
+
+
+def sphere_from_behind(method: str) -> None:
+    import bpy
+
+    _shape(bpy.ops.mesh.primitive_uv_sphere_add, material(method, *WAX, 1.0), segments=64, ring_count=32)
+    light("SUN", turn=(1.2, 0, 2.4), energy=6.0, angle=0.1)
+    camera((0, -4, 0), (np.pi / 2, 0, 0))
+
+
+def _suzanne(shown) -> None:
+    import bpy
+
+    made = _shape(bpy.ops.mesh.primitive_monkey_add, shown, size=2)
+    made.modifiers.new("Subdivision", "SUBSURF").render_levels = 1
+    light("AREA", (3, -3, 3), (0.9, 0, 0.8), energy=300, size=1.0)
+    light("AREA", (-3, 2, 2), (1.1, 0, 4.1), energy=300, size=1.0)
+    camera((0, -4, 0), (np.pi / 2, 0, 0), 0.75)
+
+
+def suzanne_as_skin(method: str) -> None:
+    _suzanne(material(method, *SKIN, 0.15))
+
+
+def suzanne_as_wax(method: str) -> None:
+    _suzanne(material(method, *WAX, 0.6))
+
+
+def leaf(method: str) -> None:
+    import bpy
+
+    made = _shape(bpy.ops.mesh.primitive_grid_add, material(method, *LEAF, 0.3), size=2, x_subdivisions=8)
+    for vertex in made.data.vertices:
+        vertex.co.z = 0.25 * vertex.co.x**2
+        vertex.co.y *= 1.0 - 0.6 * abs(vertex.co.x)
+    made.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.03
+    made.rotation_euler = (1.2, 0, 0.3)
+    light("SUN", turn=(-1.9, 0.3, 0), energy=6.0, angle=0.05)
+    camera((0, -4, 0), (np.pi / 2, 0, 0))
+
+
+def candle(method: str) -> None:
+    import bpy
+
+    shown = material(method, *WAX, 0.8)
+    _shape(bpy.ops.mesh.primitive_cylinder_add, shown, vertices=64, radius=0.6, depth=2.0, location=(0, 0, -0.4))
+    glow = bpy.data.materials.new("Flame")
+    if bpy.app.version < (5, 0):
+        glow.use_nodes = True
+    node = next(one for one in glow.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    node.inputs["Emission Color"].default_value = (1, 0.7, 0.4, 1)
+    node.inputs["Emission Strength"].default_value = 60.0
+    _shape(bpy.ops.mesh.primitive_uv_sphere_add, glow, radius=0.12, segments=16, ring_count=8, location=(0, 0, 0.9))
+    camera((0, -4.5, 0.8), (np.pi / 2 - 0.18, 0, 0))
+
+
+def marble_tile(method: str) -> None:
+    import bpy
+
+    shown = material(method, *MARBLE, 0.3)
+    _shape(bpy.ops.mesh.primitive_cube_add, shown, False, size=2, scale=(1, 1, 0.1), location=(0, 0, -0.1))
+    light("POINT", (0.4, 0.2, 0.5), energy=15.0, shadow_soft_size=0.02)
+    camera((0, -2.4, 2.6), (0.72, 0, 0))
+
+
+def under_the_world(method: str) -> None:
+    import bpy
+
+    _shape(bpy.ops.mesh.primitive_uv_sphere_add, material(method, *SKIN, 0.5), segments=64, ring_count=32)
+    _world(1.0)
+    camera((0, -4, 0), (np.pi / 2, 0, 0))
+
+
+SCENES: dict[str, Callable[[str], None]] = {
+    "slab under bars": slab, "sphere from behind": sphere_from_behind, "Suzanne, skin": suzanne_as_skin,
+    "Suzanne, wax": suzanne_as_wax, "leaf": leaf, "candle": candle, "marble tile": marble_tile,
+    "world alone": under_the_world,
+}  # fmt: skip
+
+
+def clear() -> None:
+    import bpy
+
+    bpy.data.batch_remove([*bpy.data.objects, *bpy.data.meshes, *bpy.data.lights, *bpy.data.cameras])
+    bpy.data.batch_remove([*bpy.data.materials, *bpy.data.worlds])
+
+
+def lines(name: str, method: str, size, reference: int, pictures: Path | None) -> list[tuple[str, ...]]:
+    """Rows of the table for one scene and method."""
+    import bpy
+
+    from addon.compare.png import png
+    from addon.compare.reference import render_passes
+
+    def shown(engine: str, samples: int, seed: int = 0):
+        passes = render_passes(bpy.context.scene, engine, samples, seed, size=size, bounces=2)
+        return passes.images["combined"][..., :3].astype(np.float64), passes.seconds
+
+    clear()
+    SCENES[name](method)
+    bpy.context.scene.cycles.use_denoising = False
+    first, second = (shown("CYCLES", reference, seed)[0] for seed in (11, 12))
+    right = (first + second) / 2
+    bright = (right @ [0.2126, 0.7152, 0.0722])[..., None]
+    scale = bright**2 + (0.1 * bright.mean()) ** 2
+    noise = float((((first - second) / 2) ** 2 / scale).mean())
+    rows, beside = [], [right]
+    for engine, samples in ENTRANTS:
+        shown(engine, samples)
+        picture, seconds = shown(engine, samples, 1)
+        error = max(float(((picture - right) ** 2 / scale).mean()) - noise, 0.0)
+        label = f"{engine.removeprefix('BLENDER_').title() if engine != 'BLENDER_EEVEE' else 'EEVEE'} {samples}"
+        mean = picture.mean() / max(right.mean(), 1e-30)
+        rows.append((name, method, label, f"{error:.4f}", f"{mean:.3f}", f"{seconds:.2f}", f"{noise:.4f}"))
+        if (engine, samples) in (("CANDELA", 1), ("CANDELA", 64), ("BLENDER_EEVEE", 16)):
+            beside.append(picture)
+    if pictures is not None:
+        row = np.concatenate([beside[1], beside[2], beside[0], beside[3]], axis=1)
+        shades = (np.clip(row, 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)[::-1]
+        pictures.mkdir(parents=True, exist_ok=True)
+        file = pictures / f"{name.replace(' ', '_').replace(',', '')}_{method.lower()}.png"
+        file.write_bytes(png(np.ascontiguousarray(shades)))
+    return rows
+
+
+def page(rows: list[tuple[str, ...]], size: tuple[int, int], reference: int) -> str:
+    """The rows as a part of the documentation."""
+    return "\n".join([
+        f"Pictures of {size[0]} x {size[1]} pixels, two bounces, against two renders of {reference} samples by Cycles",
+        "whose noise is taken off the errors. A number behind a renderer's name: samples.", "",
+        markdown.table([HEAD, *rows]),
+    ])  # fmt: skip
+
+
+COMMAND = "python -m bench subsurface --page docs/subsurface.md"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=list(SCENES), metavar="NAME")
+    parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS, metavar="METHOD")
+    parser.add_argument("--size", type=size_of, default=(96, 96), metavar="WxH", help="default 96x96")
+    parser.add_argument("--reference", type=int, default=512, metavar="N", help="of each of two (default 512)")
+    parser.add_argument("--page", type=Path, metavar="PATH", help="write the table between its marks, too")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write rows of pictures there")
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+
+    addon.register()
+    rows: list[tuple[str, ...]] = []
+    for name in options.scenes:
+        for method in options.methods:
+            added = lines(name, method, options.size, options.reference, options.pictures)
+            print(table([HEAD, *added]), flush=True)
+            rows += added
+            if options.page:
+                markdown.put_between(options.page, COMMAND, page(rows, options.size, options.reference))
+    return 0

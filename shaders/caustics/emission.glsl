@@ -1,0 +1,25 @@
+// What a texel of a light's view stands for, and how wide lobes are; `film_view` is the light's view.
+
+// Flux through a texel at a place that it shows, W: what arrives across the light's direction times the texel's area there.
+vec3 texel_flux(vec3 position, out vec3 direction, out float away, out float area)
+{
+  bool parallel = film_view.eye.w > 0.5;
+  vec3 way = position - film_view.eye.xyz;
+  away = parallel ? dot(way, -film_view.backward.xyz) : length(way);
+  direction = parallel ? -film_view.backward.xyz : way / max(away, 1e-30);
+  area = (film_view.frame.y - film_view.frame.x) * (film_view.frame.w - film_view.frame.z)
+         / (film_view.film.x * film_view.film.y);
+  if (!parallel) {
+    float ahead = dot(direction, -film_view.backward.xyz);
+    area *= ahead * ahead * ahead * away * away;
+  }
+  vec3 towards;
+  float density;
+  return light_sample(light_read(0), position, towards, density) * area;
+}
+
+// Half width of a lobe of microfacets as a tangent, about its mirrored or bent direction.
+float lobe_width(float alpha, bool bent, float ior)
+{
+  return alpha * (bent ? abs(1.0 - 1.0 / max(ior, 1e-3)) : 2.0);
+}

@@ -1,0 +1,162 @@
+// Photons of a light's view: what the lobe of a caster does with the light of a texel, and where that ends.
+//
+// `film_view` is the light's view. Neighbouring texels take the same numbers for lobes and interfaces, so that they stay a
+// bundle; see addon/lighting/photons.py.
+//
+//   point   xyz where the photon ends; w: its path and the material there as a number above 0; 0: none
+//   normal  xyz of the triangle, towards the photon; w: blur that light and lobes leave to it, m
+//   flux    rgb, W; w: how far neighbours would be if nothing had bent them, m
+#include "lib/gbuffer.glsl"
+#include "lib/refraction.glsl"
+#include "light/sources.glsl"
+#include "trace/rays.glsl"
+#include "caustics/emission.glsl"
+
+#define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
+#define PATHS 8192.0
+
+// Fractional parts of multiples of two irrational numbers: other numbers for each interface, the same for all photons. In
+// a picture of one sample they are the same, too: each photon takes the likelier way.
+vec2 numbers_of(vec2 first, int interface_number)
+{
+  return fract(first + float(interface_number) * photon_light.spread.z * vec2(0.754877666, 0.569840291));
+}
+
+// What a smooth mirror behind the first interface reflects, by the means of its material.
+vec3 mirror_color(int material, float cosine)
+{
+  ivec2 place = ivec2(material & 15, material >> 4);
+  int rows = reflectance_size().y / REFLECTANCE_BANDS;
+  vec3 straight = reflectance_fetch(place + ivec2(0, 2 * rows)).rgb;
+  vec3 grazing = reflectance_fetch(place + ivec2(0, 3 * rows)).rgb;
+  return mix(straight, grazing, pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0));
+}
+
+void main()
+{
+  out_point = vec4(0.0);
+  out_normal = vec4(0.0);
+  out_flux = vec4(0.0);
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  vec4 place = surface_position_fetch(texel);
+  bool inside = all(greaterThanEqual(place.xyz, photon_light.box_low.xyz)) && all(lessThanEqual(place.xyz, photon_light.box_high.xyz));
+  if (place.w == 0.0 || !inside || max_component(surface_tint_fetch(texel).rgb) <= 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(texel);
+  bool bends = photon_light.bends != 0;
+  // A smooth mirror, or the face of glass; what a diffuse surface mirrors beside its own light stays with others.
+  bool wanted = bends ? s.kind == LOBE_REFRACTION : s.kind < LOBE_REFRACTION;
+  if (!wanted || (!bends && s.glossy_roughness > photon_light.box_high.w)) {
+    return;
+  }
+
+  bool parallel = film_view.eye.w > 0.5;
+  float away;
+  float area;
+  vec3 direction;
+  vec3 flux = texel_flux(s.position, direction, away, area);
+  if (!(max_component(abs(flux)) > 0.0)) {
+    return;
+  }
+  float width = sqrt(area);
+
+  // The first interface, with its material's own lobe.
+  vec2 u = photon_light.lobe.xy;
+  vec3 weight;
+  vec3 onward;
+  vec3 geometric_normal = s.geometric_normal;
+  float lobe_spread;
+  if (bends) {
+    Interface surface = interface_begin(s.glossy_normal, -direction, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
+                                        s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
+    onward = interface_sample(surface, u, 1.0, weight);
+    lobe_spread = interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, true, s.glossy_ior);
+  }
+  else {
+    Lobe lobe = lobe_begin(s, -direction);
+    onward = lobe_sample(lobe, u, weight);
+    lobe_spread = lobe_is_mirror(lobe) ? 0.0 : lobe_width(sqrt(lobe.alpha.x * lobe.alpha.y), false, 1.0);
+  }
+  bool passes = bends;
+  if (passes != (dot(onward, geometric_normal) < 0.0)) {
+    return;
+  }
+  flux *= weight;
+  float path = bends ? 1.0 : 2.0;
+  vec3 position = s.position;
+  float travelled = 0.0;
+  float blur_squared = 0.0;
+  uint salt = uint(photon_roll);
+  for (int step = 0; step <= photon_light.interfaces; step++) {
+    ivec2 hit;
+    vec3 origin = ray_origin(position, passes ? -geometric_normal : geometric_normal);
+    float t = trace_layers(origin, onward, 1e29, 0.0, salt + uint(step), true, false, hit);
+    if (t >= 1e29) {
+      return;
+    }
+    position = origin + t * onward;
+    travelled += t;
+    blur_squared += lobe_spread * lobe_spread * t * t;
+    vec3 normal = triangle_normal(hit);
+    int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+    vec4 glass = interface_table_fetch(ivec2(0, material));
+    vec4 shape = interface_table_fetch(ivec2(1, material));
+    vec4 body = interface_table_fetch(ivec2(2, material));
+    vec3 smooth_normal = triangle_shading_normal(hit, position);
+    normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
+    bool leaves = dot(normal, onward) > 0.0;
+    vec2 numbers = numbers_of(photon_light.lobe.zw, step);
+    bool is_glass = shape.y > 0.0 && numbers.x <= shape.y;
+    bool mirrors = !is_glass && body.w > 0.5;
+    if (!is_glass && !mirrors) {
+      // The end. Light spreads by the light's extent as by its distance; parallel light by its angle.
+      float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
+      float lobes = photon_light.spread.y * photon_light.spread.y * blur_squared;
+      out_point = vec4(position, 1.0 + mod(path * 37.0 + float(material), PATHS));
+      out_normal = vec4((dot(normal, onward) > 0.0) ? -normal : normal, sqrt(light_spread * light_spread + lobes));
+      out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
+      return;
+    }
+    if (leaves && is_glass) {
+      flux *= exp(-body.rgb * t);
+    }
+    geometric_normal = leaves ? -normal : normal;
+    smooth_normal = leaves ? -smooth_normal : smooth_normal;
+    smooth_normal = (dot(smooth_normal, onward) < 0.0) ? smooth_normal : geometric_normal;
+    vec2 drawn = numbers_of(photon_light.lobe.xy, step + 1);
+    if (is_glass) {
+      float ior = leaves ? 1.0 / glass.w : glass.w;
+      vec3 scale = vec3(1.0);
+      if (shape.z > 1.5) {
+        scale = glass_multiscatter(glass.rgb, -dot(smooth_normal, onward), shape.x, ior);
+      }
+      Interface surface = interface_begin(smooth_normal, -onward, shape.x, ior, vec3(dielectric_f0(ior)), shape.z > 0.5,
+                                          scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
+      onward = interface_sample_strata(surface, drawn, numbers.y, photon_light.spread.w, weight);
+      passes = dot(onward, smooth_normal) < 0.0;
+      lobe_spread = max(lobe_spread, interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, passes, ior));
+    }
+    else {
+      float alpha = shape.x * shape.x;
+      vec3 tangent;
+      vec3 bitangent;
+      orthonormal_basis(smooth_normal, tangent, bitangent);
+      vec3 view = vec3(dot(-onward, tangent), dot(-onward, bitangent), max(dot(-onward, smooth_normal), 1e-6));
+      vec3 h = vec3(0.0, 0.0, 1.0);
+      if (alpha * alpha > MIRROR_ALPHA) {
+        h = visible_normal(view, vec2(alpha), drawn);
+        lobe_spread = max(lobe_spread, lobe_width(alpha, false, 1.0));
+      }
+      weight = mirror_color(material, dot(view, h));
+      vec3 mirrored = 2.0 * dot(view, h) * h - view;
+      onward = safe_normalize(mirrored.x * tangent + mirrored.y * bitangent + mirrored.z * smooth_normal);
+      passes = false;
+    }
+    if (passes != (dot(onward, geometric_normal) < 0.0)) {
+      return;
+    }
+    flux *= weight;
+    path = mod(path * 3.0 + (passes ? 1.0 : 2.0), PATHS);
+  }
+}

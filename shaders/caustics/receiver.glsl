@@ -1,0 +1,16 @@
+// Irradiance that the photon of a record brings to a place, W/m2: by its footprint, on the same surface alone.
+#include "splat/footprint.glsl"
+
+vec3 photon_irradiance(vec3 position, vec3 normal, float pixel)
+{
+  vec3 offset = position - splat_centre.xyz;
+  vec3 facing = vec3(splat_first.w, splat_second.w, splat_value.w);
+  float reach = sqrt(max(dot(splat_first.xyz, splat_first.xyz), 0.0));
+  float off_plane = abs(dot(offset, facing));
+  if (dot(normal, facing) < 0.6 || off_plane > 0.25 * reach + pixel) {
+    return vec3(0.0);
+  }
+  // On a curved surface the footprint lies along it.
+  vec3 along = offset - dot(offset, facing) * facing;
+  return splat_value.rgb * footprint_weight(splat_first.xyz, splat_second.xyz, along);
+}

@@ -1,0 +1,41 @@
+// The rotation of what an edited object mirrors or bends, as a quaternion, where the picture shows it.
+#include "lib/gbuffer.glsl"
+#include "generated/distances"
+#include "edit/solve.glsl"
+
+// Where the middle of a lobe comes from.
+vec3 reflected_or_bent(Surface s, vec3 viewer, bool bent)
+{
+  float cosine = dot(viewer, s.glossy_normal);
+  if (!bent) {
+    return safe_normalize(2.0 * cosine * s.glossy_normal - viewer);
+  }
+  float squared = 1.0 - (1.0 - cosine * cosine) / (s.glossy_ior * s.glossy_ior);
+  return safe_normalize((cosine / s.glossy_ior - sqrt(max(squared, 0.0))) * s.glossy_normal - viewer / s.glossy_ior);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 seen = surface_position_fetch(pixel);
+  vec3 to_eye = film_view.eye.xyz - seen.xyz;
+  // Interpolated positions of one point differ by some units of the last place between two programs.
+  if (seen.w == 0.0 || distance(seen.xyz, world_position) > 1e-5 * (length(to_eye) + length(seen.xyz))
+      || max_component(surface_tint_fetch(pixel).rgb) <= 0.0) {
+    discard;
+  }
+  bool orthographic = film_view.eye.w > 0.5;
+  vec3 viewer = orthographic ? film_view.backward.xyz : safe_normalize(to_eye);
+  Surface s = SURFACE_READ(pixel);
+  bool bent = s.kind == LOBE_REFRACTION;
+  vec3 r = reflected_or_bent(s, viewer, bent);
+  vec3 meant = r;
+  if (edits.frozen.w > 0.5) {
+    meant = reflected_or_bent(s, safe_normalize(edits.frozen.xyz - seen.xyz), bent);
+  }
+  vec4 q = edited_rotation(seen.xyz, meant, bent);
+  if (dot(q, q) == 0.0) {
+    discard;
+  }
+  out_edit = (edits.frozen.w > 0.5) ? quaternion_product(q, quaternion_between(r, meant)) : q;
+}

@@ -1,0 +1,73 @@
+// Light that rays find by themselves: emission of what they met, and, behind the first surface, lamps and the world. The
+// first surface's own lamps and world are left to light/traced.frag.glsl and light/refraction.frag.glsl.
+#include "lib/random.glsl"
+#include "lib/environment.glsl"
+#include "light/sources.glsl"
+#include "hits/path.glsl"
+
+// What a ray finds before `limit` in lights and the world. `lobe_density` 0: only rays can find it.
+vec3 light_found(vec3 origin, vec3 direction, bool bent, float lobe_density, float limit)
+{
+  vec3 sum = vec3(0.0);
+  if (limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
+    vec3 radiance = environment_radiance(direction);
+    if (lobe_density > 0.0) {
+      radiance *= power_share(lobe_density, world_samples * environment_density(direction));
+    }
+    sum += radiance;
+  }
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    float hit_distance;
+    float density;
+    vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
+    if (hit_distance <= limit && (light.flags & (bent ? LIGHT_TRANSMISSION : LIGHT_GLOSSY)) != 0) {
+      sum += radiance * ((lobe_density > 0.0) ? power_share(lobe_density, light.rate * density) : 1.0);
+    }
+  }
+  return sum;
+}
+
+void main()
+{
+  out_glossy_direct = vec4(0.0);
+  out_glossy_indirect = vec4(0.0);
+#ifdef TRANSMISSION
+  out_transmission_direct = vec4(0.0);
+  out_transmission_indirect = vec4(0.0);
+#endif
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 path = met_path_fetch(pixel);
+  int code = int(path.w + 0.5);
+  if (code == 0) {
+    return;
+  }
+  vec3 start = ray_origin_fetch(pixel).xyz;
+  vec4 along = ray_direction_fetch(pixel);
+  vec4 met = surface_position_fetch(pixel);
+  vec4 passed = hit_passed_fetch(pixel);
+  float limit = (met.w != 0.0) ? dot(met.xyz - start, along.xyz) : 1e29;
+  bool glossy = path_is_glossy(code);
+  vec3 sum = vec3(0.0);
+  if (ray_number > 0) {
+    sum += light_found(start, along.xyz, path_is_bent(code), along.w, limit);
+  }
+  if (met.w != 0.0 && along.w >= 0.0) {
+    vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample
+    vec3 emission = surface_emission_fetch(pixel).rgb;
+    float share = (along.w > 0.0 && others.x > 0.0) ? power_share(along.w, others.y * passed.w / others.x) : 1.0;
+    sum += emission * share;
+  }
+  vec4 light = vec4(path.rgb * passed.rgb * sum, 0.0);
+  light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
+  if (glossy) {
+    out_glossy_direct = (ray_number > 0) ? vec4(0.0) : light;
+    out_glossy_indirect = (ray_number > 0) ? light : vec4(0.0);
+  }
+#ifdef TRANSMISSION
+  else {
+    out_transmission_direct = (ray_number > 0) ? vec4(0.0) : light;
+    out_transmission_indirect = (ray_number > 0) ? light : vec4(0.0);
+  }
+#endif
+}

@@ -1,0 +1,11 @@
+// Which materials rays have met: a flag for each.
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 size = hit_place_size();
+  if (pixel.x >= size.x || pixel.y >= size.y || hit_place_fetch(pixel).w == 0.0) {
+    return;
+  }
+  int material_index = int(hit_material_fetch(pixel).r + 0.5);
+  imageStore(met, ivec2(material_index & 255, material_index >> 8), uvec4(1u));
+}

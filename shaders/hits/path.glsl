@@ -1,0 +1,22 @@
+// What a path is that rays of lobes follow, besides the ray: `path` holds its throughput and, in w, a code.
+#define PATH_GLOSSY 1        // the surface that the camera sees mirrors it
+#define PATH_TRANSMISSION 2  // or bends it
+#define PATH_BENT 4          // added where the last surface did so
+#define FOUND_ELSEWHERE -1.0 // in place of a ray's density: light samples have all that it finds of emission
+
+bool path_is_glossy(int code)
+{
+  return (code & 3) == PATH_GLOSSY;
+}
+
+bool path_is_bent(int code)
+{
+  return (code & PATH_BENT) != 0;
+}
+
+// Share of a technique of density `density` against another one of density `other` (power heuristic).
+float power_share(float density, float other)
+{
+  float ratio = other / max(density, 1e-30);
+  return 1.0 / (1.0 + ratio * ratio);
+}

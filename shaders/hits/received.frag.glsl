@@ -1,0 +1,168 @@
+// Light that arrives at what rays have met and that is sent on along them: of this sample's points on lights, one of which
+// is traced, and of virtual lights and near surfaces (indirect/near.glsl). What a lobe sends that a ray follows is left to
+// that ray but for its share of the points.
+#define PART 128  // virtual lights that a hit looks at
+#include "indirect/near.glsl"
+#include "lib/refraction.glsl"
+#ifdef SOFT_LOBES
+#include "lib/soft_lobe.glsl"
+#endif
+#include "hits/path.glsl"
+
+struct Receiver {
+  Surface surface;
+  vec3 viewer;
+  bool shines;     // has a lobe of microfacets that light samples can find
+  bool bends;
+  bool followed;   // by a ray
+  Lobe lobe;
+  Interface glass;
+};
+
+// Radiance towards the viewer by a source if nothing blocks it.
+vec3 reflected_light(Receiver r, Light light, vec3 arriving, vec3 direction, float density)
+{
+  vec3 sum = vec3(0.0);
+  if ((light.flags & LIGHT_DIFFUSE) != 0) {
+    sum += surface_diffuse_reflection(r.surface, r.viewer, direction);
+  }
+  float lobe_density = 0.0;
+  vec3 of_lobe = vec3(0.0);
+  if (r.shines && (light.flags & LIGHT_GLOSSY) != 0 && dot(direction, r.surface.geometric_normal) > 0.0) {
+    of_lobe = lobe_reflection(r.lobe, direction, lobe_density);
+  }
+  if (r.bends && (light.flags & LIGHT_TRANSMISSION) != 0) {
+    of_lobe = interface_value(r.glass, direction, lobe_density);
+  }
+  if (r.followed && density > 0.0) {
+    of_lobe *= power_share(light.rate * density, lobe_density);
+  }
+  sum += of_lobe;
+#ifdef SOFT_LOBES
+  SoftLobe soft = soft_lobe_begin(r.surface, r.viewer);
+  if (soft.exists && (light.flags & (soft.glossy ? LIGHT_GLOSSY : LIGHT_DIFFUSE)) != 0) {
+    sum += soft_reflection(soft, direction);
+  }
+#endif
+  return sum * arriving;
+}
+
+vec3 direct_light(Receiver r, uint salt)
+{
+  float total = 0.0;
+  float chosen_share = 0.0;
+  int chosen = -1;
+  vec3 chosen_light = vec3(0.0);
+  vec3 chosen_direction = r.surface.normal;
+  uint roll = salt;
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    vec3 direction;
+    float density;
+    vec3 arriving = light_sample(light, r.surface.position, direction, density);
+    vec3 reflected = reflected_light(r, light, arriving, direction, density);
+    float share = luminance(abs(reflected));
+    if (!(share > 0.0) || !is_finite(share)) {
+      continue;
+    }
+    total += share;
+    if (draw_passing(share, total, roll)) {
+      chosen_share = share;
+      chosen = i;
+      chosen_light = reflected;
+      chosen_direction = direction;
+    }
+  }
+  if (!(total > DARK) || chosen < 0) {
+    return vec3(0.0);
+  }
+  Light light = light_read(chosen);
+  vec3 side = r.surface.geometric_normal;
+  bool behind = (r.bends || r.surface.kind == LOBE_TRANSLUCENT) && dot(chosen_direction, side) < 0.0;
+  vec3 origin = ray_origin(r.surface.position, behind ? -side : side);
+  float reach = light_reach(light, origin, chosen_direction);
+  ivec2 hit;
+  bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
+                 && trace_layers(origin, chosen_direction, reach, reach, salt, r.bends, true, hit) < reach;
+  return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);
+}
+
+// Light of other surfaces: by virtual lights, and by a short ray for what those leave out.
+vec3 indirect_light(Receiver r, uvec3 roll)
+{
+  vec3 sum = vec3(0.0);
+  Reflection reflection = surface_reflection(r.surface, max(dot(r.surface.geometric_normal, r.viewer), 0.0));
+  if (r.followed || r.bends) {
+    reflection.straight = reflection.grazing = vec3(0.0);
+  }
+  vec3 lit = r.surface.normal;
+  vec3 side = r.surface.geometric_normal;
+  if (reflection.through > 0.0) {
+    bool passes = to_unit(hash3(roll).x) < reflection.through;
+    lit = passes ? -lit : lit;
+    side = passes ? -side : side;
+  }
+  if (max_component(reflection.diffuse + reflection.grazing) <= 0.0) {
+    return sum;
+  }
+  vec3 from;
+  vec3 arriving = virtual_irradiance(r.surface.position, lit, glossy_radius, true, roll.z, from);
+  sum += arriving * reflection_of(reflection, lit, from, r.viewer);
+  Walk walk;
+  walk.direction = cosine_direction(lit, vec2(to_unit(roll.x), to_unit(roll.y)));
+  vec3 weight = PI * reflection_of(reflection, lit, walk.direction, r.viewer);
+  if (dot(walk.direction, side) > 0.0 && max_component(weight) > 0.0) {
+    walk.origin = ray_origin(r.surface.position, side);
+    walk.bounce = 1;
+    walk.whole = false;
+    walk.has_met = false;
+    sum += weight * radiance_along(walk, glossy_radius, hash3(roll));
+  }
+  return sum;
+}
+
+void main()
+{
+  out_glossy_indirect = vec4(0.0);
+#ifdef TRANSMISSION
+  out_transmission_indirect = vec4(0.0);
+#endif
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 path = met_path_fetch(pixel);
+  int code = int(path.w + 0.5);
+  if (code == 0 || surface_position_fetch(pixel).w == 0.0) {
+    return;
+  }
+  Receiver r;
+  r.surface = SURFACE_READ(pixel);
+  r.viewer = -ray_direction_fetch(pixel).xyz;
+  bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
+  r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
+  r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
+  r.followed = has_lobe && (r.bends ? ray_number < interfaces :
+                                      r.surface.glossy_roughness <= shaded_roughness && ray_number + 1 < mirrors);
+  r.lobe = lobe_begin(r.surface, r.viewer);
+  r.shines = r.shines && !lobe_is_mirror(r.lobe);
+  r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
+                            r.surface.glossy_tint, r.surface.glossy_edge.x > 0.5, r.surface.glossy_weight, vec3(0.0));
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 101 + ray_number);
+  vec3 sum = vec3(0.0);
+  for (int k = 0; k < repeats; k++) {
+    sum += direct_light(r, roll.x);
+    roll = hash3(roll);
+    if (glossy_radius > 0.0 && ray_number + 1 < bounces) {
+      sum += indirect_light(r, roll);
+    }
+  }
+  sum /= float(repeats);
+  vec4 light = vec4(path.rgb * hit_passed_fetch(pixel).rgb * sum, 0.0);
+  light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
+  if (path_is_glossy(code)) {
+    out_glossy_indirect = light;
+  }
+#ifdef TRANSMISSION
+  else {
+    out_transmission_indirect = light;
+  }
+#endif
+}

@@ -1,0 +1,70 @@
+// Rays of the lobes that surfaces have kept: mirrored up to `shaded_roughness`, or bent. Of what the camera sees, or, with
+// ONWARD, of what rays have met.
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "lib/refraction.glsl"
+#include "trace/origin.glsl"
+#include "hits/path.glsl"
+
+void main()
+{
+  out_origin = vec4(0.0);
+  out_direction = vec4(0.0);
+  out_path = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 tint = surface_tint_fetch(pixel);
+  if (surface_position_fetch(pixel).w == 0.0 || max_component(tint.rgb) <= 0.0) {
+    return;
+  }
+  Surface s = SURFACE_READ(pixel);
+#ifdef ONWARD
+  vec3 viewer = -met_direction_fetch(pixel).xyz;
+  float width = hit_place_fetch(pixel).w;
+  vec4 before = met_path_fetch(pixel);
+  vec3 throughput = before.rgb * hit_passed_fetch(pixel).rgb;
+  int code = int(before.w + 0.5) & 3;
+  if (code == 0) {
+    return;
+  }
+#else
+  bool orthographic = film_view.eye.w > 0.5;
+  vec3 path = film_view.eye.xyz - s.position;
+  vec3 viewer = orthographic ? film_view.backward.xyz : safe_normalize(path);
+  float width = (film_view.frame.y - film_view.frame.x) / film_view.film.x * (orthographic ? 1.0 : length(path));
+  vec3 throughput = vec3(1.0);
+  int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
+#endif
+  uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
+  vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
+  vec3 weight = vec3(0.0);
+  vec3 direction = vec3(0.0);
+  float density = 0.0;
+  if (s.kind == LOBE_REFRACTION && ray_number <= interfaces) {
+    Interface surface = interface_begin(s.glossy_normal, viewer, s.glossy_roughness, s.glossy_ior, s.glossy_tint,
+                                        s.glossy_edge.x > 0.5, s.glossy_weight, vec3(0.0));
+    surface = interface_edited(surface, s);
+    direction = interface_sample(surface, u, 1.0, weight);
+    interface_value(surface, direction, density);
+    weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
+    code += PATH_BENT;
+  }
+  else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && ray_number < mirrors) {
+    Lobe lobe = lobe_begin(s, viewer);
+    direction = lobe_sample(lobe, u, weight);
+    lobe_reflection(lobe, direction, density);
+    weight *= may_mirror(s, direction) ? 1.0 : 0.0;
+#ifndef ONWARD
+    density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
+#endif
+  }
+  throughput *= weight;
+  float most = max_component(throughput);
+  if (!(most > 1e-4) || !is_finite(most)) {
+    return;
+  }
+  vec3 side = ((code & PATH_BENT) != 0) ? -s.geometric_normal : side_of_ray(s, direction);
+  side = (dot(side, direction) < 0.0 && surface_is_edited(s)) ? -side : side;
+  out_origin = vec4(ray_origin(s.position, side), width);
+  out_direction = vec4(direction, density);
+  out_path = vec4(throughput, float(code));
+}

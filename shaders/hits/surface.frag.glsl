@@ -1,0 +1,29 @@
+// Evaluates one material where rays have met it, into closures laid out as those of the surface pass.
+//
+// What is transparent has been passed at random on the way, as opaque as its triangle is there (trace/hierarchy.glsl): what
+// is met stands for all rays that were not.
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/instance.glsl"
+#include "generated/material"
+#include "hits/point.glsl"
+#include "surface/store.glsl"
+
+#define FIRST_EVEN 16  // as in surface/surface.frag.glsl
+#define EVEN_SHARE 0.125
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  int id = int(hit_triangle_fetch(pixel).x);
+  SurfacePoint point = hit_point(pixel, instance_read(id), id);
+  point.refracts = glass_bends != 0;
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 81 + ray_number);
+  float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
+  Closures c = closures_begin(point.normal, to_unit(roll.x), even_share);
+  evaluate_material(point, c);
+  closures_end(c);
+  float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);
+  store_closures(c, point, 1.0 / max(1.0 - through, 1e-2), 0.0, vec2(0.0));
+}

@@ -1,0 +1,64 @@
+// Follows rays to the first surface that each meets, and leaves records of what that is (addon/surfaces/hits.py):
+//
+//   place      position; w: width of the ray's footprint there, m, 0 where nothing is met
+//   triangle   row of the instance, number of the triangle among those of its material, barycentric coordinates of the
+//              second and third corner
+//   normals    octahedral normal of the triangle by its winding (xy) and shading normal outwards (zw)
+//   passed     what the inside of a solid that is left here has let pass; w: luminance of the mean radiance that the
+//              triangle emits, times distance squared over cosine: a density per steradian times the power of all
+//   material   its number
+//
+// Depth: 0 where there is no ray, 0.5 where one meets nothing, above where one does, by material.
+#include "trace/hierarchy.glsl"
+
+vec4 owner_texel(int index)
+{
+  return trace_owners_fetch(ivec2(index & 2047, index >> 11));
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  out_place = vec4(0.0);
+  out_triangle = vec4(0.0);
+  out_normals = vec4(0.0);
+  out_passed = vec4(1.0, 1.0, 1.0, 0.0);
+  out_material = 0.0;
+  gl_FragDepth = 0.0;
+  vec4 start = ray_origin_fetch(pixel);
+  vec3 direction = ray_direction_fetch(pixel).xyz;
+  if (dot(direction, direction) == 0.0) {
+    return;
+  }
+  gl_FragDepth = 0.5;
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 61 + ray_number);
+  ivec2 hit;
+  float t = trace_layers(start.xyz, direction, 1e29, 0.0, roll.x, glass_bends != 0, false, hit);
+  if (t >= 1e29) {
+    return;
+  }
+  int base = hit.x * LEAF_TEXELS;
+  int k = hit.y;
+  vec2 along = triangle_place(hit, start.xyz + t * direction);
+  vec3 corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
+  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
+  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  // By the plane of the triangle: a long ray's own end lies beside it.
+  vec3 position = corner + along.x * e1 + along.y * e2;
+  vec3 normal = safe_normalize(cross(e1, e2));
+  vec3 shading = triangle_shading_normal(hit, position);
+  int material_index = int(leaf_texel(base + MATERIAL_TEXEL)[k] + 0.5);
+  vec4 owner = owner_texel((hit.x - first_leaf) * 4 + k);
+  out_place = vec4(position, max(start.w + spread * t, 1e-30));
+  out_triangle = vec4(owner.xy, along);
+  out_normals = vec4(octahedral_encode(normal), octahedral_encode(shading));
+  vec3 ignored;
+  vec3 emission = triangle_emission(hit, direction, ignored);
+  out_passed.w = luminance(abs(emission)) * t * t / max(abs(dot(normal, direction)), 1e-6);
+  vec3 outwards = (dot(normal, shading) < 0.0) ? -normal : normal;
+  if (dot(outwards, direction) > 0.0) {
+    out_passed.rgb = exp(-absorption_fetch(ivec2(material_index & 255, material_index >> 8)).rgb * t);
+  }
+  out_material = float(material_index);
+  gl_FragDepth = 0.5 + float(material_index + 1) * (1.0 / 16384.0);
+}

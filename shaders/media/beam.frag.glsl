@@ -1,0 +1,49 @@
+// A beam's light at a pixel: flux times scattering times a kernel over the distance between light ray and view ray.
+//
+// A ray of flux F deposits in a view ray that it passes at an angle gamma the radiance F sigma_s p T T k(u) / sin gamma, u
+// the distance of the two lines and k a tent of area 1 (photon beams with a 1-D kernel, Jarosz et al. 2011): nothing in it
+// depends on how many rays or pixels there are.
+#include "media/bins.glsl"
+#include "media/view_ray.glsl"
+
+#define LEAST_SINE 0.05
+
+void main()
+{
+  out_volume = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
+  vec3 way = beam_end.xyz - beam_start.xyz;
+  float reach = max(length(way), 1e-20);
+  vec3 direction = way / reach;
+  vec3 between = beam_start.xyz - ray.origin;
+  float cosine = dot(direction, ray.direction);
+  float sine_squared = max(1.0 - cosine * cosine, 1e-8);
+  float along_beam = (dot(between, ray.direction) * cosine - dot(between, direction)) / sine_squared;
+  along_beam = clamp(along_beam, 0.0, reach);
+  vec3 position = beam_start.xyz + along_beam * direction;
+  float along_view = dot(position - ray.origin, ray.direction);
+  if (along_view <= 0.0 || along_view >= ray.limit) {
+    discard;
+  }
+  float off = length(position - ray.origin - along_view * ray.direction);
+  float pixel_size = abs(film_view.frame.y - film_view.frame.x) / film_view.film.x;
+  pixel_size *= (film_view.eye.w > 0.5) ? 1.0 : along_view * max(-dot(ray.direction, film_view.backward.xyz), 1e-3);
+  float wide = clamp(beam_flux.w, beam_pixels * pixel_size, beam_most_pixels * pixel_size);
+  float tent = max(1.0 - off / wide, 0.0) / wide;
+  if (!(tent > 0.0)) {
+    discard;
+  }
+  uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 47).x + floatBitsToUint(along_beam);
+  // Back along the view: what is around the place, and what is left of its light at the eye.
+  Crossings c = media_crossings(position, -ray.direction);
+  uint inside = media_at_start(c);
+  vec3 scattered = media_scattered(inside, position, direction, -ray.direction, seed);
+  if (!(max_component(scattered) > 0.0)) {
+    discard;
+  }
+  vec3 passing = media_transmittance(position, -ray.direction, along_view, seed)
+                 * media_transmittance(beam_start.xyz, direction, along_beam, seed + 1u);
+  vec3 light = beam_flux.rgb * scattered * passing * (tent / max(sqrt(sine_squared), LEAST_SINE));
+  out_volume = vec4((is_finite(light.x) && is_finite(light.y) && is_finite(light.z)) ? light : vec3(0.0), 0.0);
+}

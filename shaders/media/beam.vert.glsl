@@ -1,0 +1,39 @@
+// A stretch of a light ray as a quad on the screen, wide enough for its kernel. Empty ones are clipped.
+vec4 beam_clip(vec3 position)
+{
+  vec4 place = vec4(position, 1.0);
+  return vec4(dot(film_view.row_x, place), dot(film_view.row_y, place), 0.0, dot(film_view.row_w, place));
+}
+
+void main()
+{
+  ivec2 texel = ivec2(gl_InstanceID % ray_side, gl_InstanceID / ray_side);
+  beam_start = beam_starts_fetch(texel);
+  beam_end = beam_ends_fetch(texel);
+  beam_flux = beam_fluxes_fetch(texel);
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (beam_start.w > 0.0 && max(max(beam_flux.x, beam_flux.y), beam_flux.z) > 0.0) {
+    vec4 a = beam_clip(beam_start.xyz);
+    vec4 b = beam_clip(beam_end.xyz);
+    float near = (film_view.eye.w > 0.5) ? -1e30 : max(film_view.film.z, 1e-20);  // clipped before it is divided
+    bool seen = max(a.w, b.w) > near;
+    if (seen) {
+      vec4 first = (a.w < near) ? mix(a, b, (near - a.w) / (b.w - a.w)) : a;
+      vec4 last = (b.w < near) ? mix(b, a, (near - b.w) / (a.w - b.w)) : b;
+      vec2 p = first.xy / first.w;
+      vec2 q = last.xy / last.w;
+      vec2 pixels = film_view.film.xy;
+      vec2 along = (q - p) * 0.5 * pixels;
+      float length_ = length(along);
+      vec2 unit = (length_ > 1e-6) ? along / length_ : vec2(1.0, 0.0);
+      vec2 across = vec2(-unit.y, unit.x);
+      // Half a pixel more than the kernel; the wider end of the beam for both.
+      float scale = 0.5 * pixels.x / max(abs(film_view.frame.y - film_view.frame.x) * 0.5, 1e-20);
+      float nearest = (film_view.eye.w > 0.5) ? 1.0 : max(min(first.w, last.w), 1e-6);
+      float wide = min(max(beam_pixels, beam_flux.w * scale / nearest), beam_most_pixels) + 1.0;
+      vec2 place = (corner.x < 0.0) ? p - unit * wide * 2.0 / pixels : q + unit * wide * 2.0 / pixels;
+      place += corner.y * across * wide * 2.0 / pixels;
+      gl_Position = vec4(place, 0.5, 1.0);
+    }
+  }
+}

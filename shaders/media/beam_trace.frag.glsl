@@ -1,0 +1,168 @@
+// Light rays through specular objects, one per texel: the stretches of each that lie in media after an interface.
+//
+// Rays of a lamp fill the cone around its casters evenly (a sun's, a disc across its direction). At smooth interfaces a ray
+// is mirrored or bent by lot, by Fresnel's reflectance; what is diffuse ends it. Two stretches are kept, each as its ends,
+// its flux in watts, and half the distance to the ray of the next texel as it would be had nothing bent them.
+#include "media/media.glsl"
+#include "light/sources.glsl"
+#include "trace/rays.glsl"
+
+#define INTERFACES 10
+#define LEAST_BEAM 1e-3  // of light: where media have taken more, a beam that leaves the scene ends
+
+float dielectric(float cosine, float ior)
+{
+  float g_squared = ior * ior - 1.0 + cosine * cosine;
+  if (g_squared <= 0.0) {
+    return 1.0;
+  }
+  float g = sqrt(g_squared);
+  float a = (g - cosine) / (g + cosine);
+  float b = ((g + cosine) * cosine - 1.0) / ((g - cosine) * cosine + 1.0);
+  return 0.5 * a * a * (1.0 + b * b);
+}
+
+void main()
+{
+  out_start0 = vec4(0.0);
+  out_end0 = vec4(0.0);
+  out_flux0 = vec4(0.0);
+  out_start1 = vec4(0.0);
+  out_end1 = vec4(0.0);
+  out_flux1 = vec4(0.0);
+  Light light = light_read(light_number);
+  float rays = float(ray_side * ray_side);
+  vec2 u = (floor(gl_FragCoord.xy) + beam_jitter) / float(ray_side);
+  vec3 to_casters = casters.xyz - light.point;
+  vec3 position = light.point;
+  vec3 direction;
+  vec3 flux;
+  float spread;     // of neighbouring rays, as a tangent
+  float width = 0.0;
+  uint salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(film_view.sample_index) + 1024u * uint(film_view.seed))).x;
+  if (LIGHT_IS(light, LIGHT_SUN)) {
+    direction = -light.point;
+    vec3 tangent;
+    vec3 bitangent;
+    orthonormal_basis(direction, tangent, bitangent);
+    float radius = casters.w * sqrt(u.x);
+    float turn = 2.0 * PI * u.y;
+    position = casters.xyz - 2.0 * scene_size * direction + radius * (cos(turn) * tangent + sin(turn) * bitangent);
+    float area = PI * casters.w * casters.w / rays;
+    flux = light.radiance * ((light.radius > 0.0) ? light.area : 1.0) * area;
+    width = 0.5 * sqrt(area);
+    spread = 0.0;
+  }
+  else {
+    bool is_round = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
+    if (is_round) {
+      position = light.centre + light.point;
+      to_casters = casters.xyz - position;
+    }
+    float away = max(length(to_casters), 1e-20);
+    float sine = min(casters.w / away, 1.0);
+    float least = (casters.w >= away) ? -1.0 : sqrt(1.0 - sine * sine);
+    vec3 axis = to_casters / away;
+    vec3 tangent;
+    vec3 bitangent;
+    orthonormal_basis(axis, tangent, bitangent);
+    float cosine = 1.0 - u.x * (1.0 - least);
+    float across = sqrt(max(1.0 - cosine * cosine, 0.0));
+    float turn = 2.0 * PI * u.y;
+    direction = safe_normalize(cosine * axis + across * (cos(turn) * tangent + sin(turn) * bitangent));
+    float solid_angle = 2.0 * PI * (1.0 - least) / rays;
+    flux = light.radiance * solid_angle;
+    if (light.radius > 0.0 || !is_round) {
+      flux *= light.area;
+    }
+    if (!is_round) {
+      float cos_light = dot(direction, light.axis);
+      cos_light = (LIGHT_IS(light, LIGHT_SURFACE) && (light.flags & LIGHT_SIDED) == 0) ? abs(cos_light) : cos_light;
+      flux *= (cos_light > 0.0) ? cos_light * spread_attenuation(light.spread, cos_light) : 0.0;
+    }
+    if ((light.flags & LIGHT_SPOT) != 0) {
+      flux *= spot_attenuation(light, direction);
+    }
+    spread = 0.5 * sqrt(solid_angle);
+  }
+  uint seed = salt;
+  bool inside_glass = false;
+  bool bent = false;
+  int kept = 0;
+  float travelled = 0.0;
+  for (int i = 0; i < INTERFACES; i++) {
+    if (!(max_component(flux) > 0.0)) {
+      return;
+    }
+    ivec2 hit;
+    float t = trace_layers(position, direction, 1e29, 0.0, salt + uint(i), true, false, hit);
+    bool missed = hit.x < 0;
+    if (missed && !bent) {
+      return;  // straight light is not this technique's
+    }
+    float reach = missed ? 4.0 * scene_size : t;
+    if (bent && !inside_glass && kept < 2) {
+      vec4 start = vec4(position, 1.0);
+      vec4 end = vec4(position + reach * direction, 1.0);
+      vec4 carried = vec4(flux, width + spread * travelled);
+      if (kept == 0) {
+        out_start0 = start;
+        out_end0 = end;
+        out_flux0 = carried;
+      }
+      else {
+        out_start1 = start;
+        out_end1 = end;
+        out_flux1 = carried;
+      }
+      kept++;
+    }
+    if (missed) {
+      return;
+    }
+    if (!inside_glass) {
+      flux *= media_transmittance(position, direction, t, seed + uint(i));
+    }
+    travelled += t;
+    position += t * direction;
+    int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+    vec4 glass = beam_table_fetch(ivec2(0, material));
+    vec4 kind = beam_table_fetch(ivec2(1, material));
+    vec3 normal = triangle_normal(hit);
+    bool leaves = dot(normal, direction) > 0.0;
+    vec3 smooth_normal = triangle_shading_normal(hit, position);
+    smooth_normal = (dot(normal, smooth_normal) < 0.0) ? -smooth_normal : smooth_normal;
+    vec3 facing = leaves ? -normal : normal;
+    smooth_normal = leaves ? -smooth_normal : smooth_normal;
+    smooth_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : facing;
+    if (kind.x > 0.5 && kind.x < 1.5) {  // glass
+      if (leaves) {
+        flux *= exp(-min(kind.yzw * t, vec3(80.0)));
+      }
+      float ior = leaves ? 1.0 / glass.w : glass.w;
+      float cosine = -dot(smooth_normal, direction);
+      float reflectance = dielectric(cosine, ior);
+      bool mirrored = media_random(seed) < reflectance;
+      if (mirrored) {
+        direction = safe_normalize(direction + 2.0 * cosine * smooth_normal);
+      }
+      else {
+        float eta = 1.0 / ior;
+        float root = sqrt(max(1.0 - eta * eta * (1.0 - cosine * cosine), 0.0));
+        direction = safe_normalize(eta * direction + (eta * cosine - root) * smooth_normal);
+        flux *= glass.rgb;
+        inside_glass = !leaves;
+      }
+      position = ray_origin(position, mirrored ? facing : -facing);
+    }
+    else if (kind.x > 1.5) {  // a mirror
+      flux *= glass.rgb;
+      direction = safe_normalize(direction - 2.0 * dot(direction, smooth_normal) * smooth_normal);
+      position = ray_origin(position, facing);
+    }
+    else {
+      return;
+    }
+    bent = true;
+  }
+}

@@ -1,0 +1,166 @@
+// Where a ray crosses the boundaries of media: all crossings along the whole ray, sorted, and in which media it starts.
+//
+// The tree is that of addon/scene/acceleration.py over the meshes that bound media alone; a triangle's material number
+// is that of its medium. Nothing is known of a ray's start: a medium is around it if the first crossing of its boundary
+// leads out. So rays may start anywhere, on boundaries too, without any state from other rays.
+#include "lib/math.glsl"
+
+#define MOST_CROSSINGS 12
+
+struct Crossings {
+  int count;
+  float t[MOST_CROSSINGS];
+  int medium[MOST_CROSSINGS];  // m + 1 where the ray enters medium m, -(m + 1) where it leaves it
+};
+
+#ifdef MEDIA_BOUNDED
+#define MEDIA_NODE 4   // texels of a node and of a leaf, as in addon/scene/acceleration.py
+#define MEDIA_LEAF 17
+#define MEDIA_DEEPEST 32
+
+// The first row of the image is the table of media, whose last texel says where the leaves begin.
+vec4 media_node_texel(int index)
+{
+  return media_table_fetch(ivec2(index & 2047, 1 + (index >> 11)));
+}
+
+vec4 media_leaf_texel(int index)
+{
+  return media_table_fetch(ivec2(index & 2047, index >> 11));
+}
+
+uint media_boxes_met(int base, vec3 origin, vec3 inverse)
+{
+  vec4 frame = media_node_texel(base);
+  uint exponents = uint(frame.w);
+  vec3 step_size = vec3(uintBitsToFloat((exponents & 255u) << 23u), uintBitsToFloat((exponents & 65280u) << 15u),
+                        uintBitsToFloat((exponents & 16711680u) << 7u));
+  uvec4 low = uvec4(media_node_texel(base + 1));
+  uvec4 high = uvec4(media_node_texel(base + 2));
+  vec3 slope = step_size * inverse;
+  vec3 start = (frame.xyz - origin) * inverse;
+  vec4 x0 = vec4(low & 255u) * slope.x + start.x;
+  vec4 y0 = vec4((low >> 8u) & 255u) * slope.y + start.y;
+  vec4 z0 = vec4(low >> 16u) * slope.z + start.z;
+  vec4 x1 = vec4(high & 255u) * slope.x + start.x;
+  vec4 y1 = vec4((high >> 8u) & 255u) * slope.y + start.y;
+  vec4 z1 = vec4(high >> 16u) * slope.z + start.z;
+  vec4 enter = max(max(inverse.x > 0.0 ? x0 : x1, inverse.y > 0.0 ? y0 : y1),
+                   max(inverse.z > 0.0 ? z0 : z1, vec4(0.0)));
+  vec4 leave = min(min(inverse.x > 0.0 ? x1 : x0, inverse.y > 0.0 ? y1 : y0), inverse.z > 0.0 ? z1 : z0);
+  bvec4 met = lessThanEqual(enter, leave * 1.000001);
+  return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
+}
+
+// The farthest ones are dropped where there are too many.
+void crossings_insert(inout Crossings c, float t, int medium)
+{
+  int place = min(c.count, MOST_CROSSINGS - 1);
+  if (c.count == MOST_CROSSINGS && t >= c.t[MOST_CROSSINGS - 1]) {
+    return;
+  }
+  c.count = min(c.count + 1, MOST_CROSSINGS);
+  for (int i = place; i > 0; i--) {
+    if (c.t[i - 1] <= t) {
+      break;
+    }
+    c.t[i] = c.t[i - 1];
+    c.medium[i] = c.medium[i - 1];
+    place = i - 1;
+  }
+  c.t[place] = t;
+  c.medium[place] = medium;
+}
+
+void media_leaf(int leaf, vec3 origin, vec3 direction, inout Crossings c)
+{
+  int base = int(media_table_fetch(ivec2(2047, 0)).x) + leaf * MEDIA_LEAF;
+  vec4 materials = media_leaf_texel(base + 13);
+  for (int k = 0; k < 4; k++) {
+    vec3 corner = vec3(media_leaf_texel(base)[k], media_leaf_texel(base + 1)[k], media_leaf_texel(base + 2)[k]);
+    vec3 e1 = vec3(media_leaf_texel(base + 3)[k], media_leaf_texel(base + 4)[k], media_leaf_texel(base + 5)[k]);
+    vec3 e2 = vec3(media_leaf_texel(base + 6)[k], media_leaf_texel(base + 7)[k], media_leaf_texel(base + 8)[k]);
+    vec3 p = cross(direction, e2);
+    float determinant = dot(e1, p);
+    if (determinant == 0.0) {
+      continue;
+    }
+    vec3 s = origin - corner;
+    float u = dot(s, p) / determinant;
+    vec3 q = cross(s, e1);
+    float v = dot(direction, q) / determinant;
+    float t = dot(e2, q) / determinant;
+    if (u >= -1e-6 && v >= -1e-6 && u + v <= 1.000001 && t > 0.0) {
+      int medium = int(materials[k] + 0.5) + 1;
+      crossings_insert(c, t, (determinant > 0.0) ? medium : -medium);  // seen from outside corners run anticlockwise
+    }
+  }
+}
+#endif
+
+Crossings media_crossings(vec3 origin, vec3 direction)
+{
+  Crossings c;
+  c.count = 0;
+  for (int i = 0; i < MOST_CROSSINGS; i++) {
+    c.t[i] = 1e30;
+    c.medium[i] = 0;
+  }
+#ifdef MEDIA_BOUNDED
+  vec3 inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
+  int pending[MEDIA_DEEPEST];
+  uint bits[MEDIA_DEEPEST];
+  int height = 0;
+  pending[0] = 0;
+  bits[0] = media_boxes_met(0, origin, inverse);
+  for (int round = 0; round < 4096 && height >= 0; round++) {
+    uint met = bits[height];
+    if (met == 0u) {
+      height--;
+      continue;
+    }
+    int child = findLSB(met);
+    bits[height] = met & (met - 1u);
+    vec4 links = media_node_texel(pending[height] * MEDIA_NODE + 3);
+    int nodes = int(links.z);
+    if (child >= nodes) {
+      media_leaf(int(links.y) + child - nodes, origin, direction, c);
+    }
+    else {
+      int node = int(links.x) + child;
+      uint below = media_boxes_met(node * MEDIA_NODE, origin, inverse);
+      if (below != 0u && height < MEDIA_DEEPEST - 1) {
+        height++;
+        pending[height] = node;
+        bits[height] = below;
+      }
+    }
+  }
+#endif
+  return c;
+}
+
+// Media around the ray's start, as bits; the world's medium is bit 0.
+uint media_at_start(Crossings c)
+{
+#ifdef MEDIA_WORLD
+  uint inside = 1u;
+#else
+  uint inside = 0u;
+#endif
+  uint seen = 1u;
+  for (int i = 0; i < c.count; i++) {
+    uint bit = 1u << uint(abs(c.medium[i]) - 1);
+    if ((seen & bit) == 0u && c.medium[i] < 0) {
+      inside |= bit;
+    }
+    seen |= bit;
+  }
+  return inside;
+}
+
+uint media_after(uint inside, int crossing)
+{
+  uint bit = 1u << uint(abs(crossing) - 1);
+  return (crossing > 0) ? (inside | bit) : (inside & ~bit);
+}

@@ -1,0 +1,133 @@
+// Media of the scene: what each does with light at a point, and what a ray loses on its way through them.
+//
+// `media_table` (addon/scene/media.py) holds MEDIUM_TEXELS per medium; what varies stands on grids of cells, three images
+// of one layout: extinction with anisotropy, scattering, emission. A grid is read at one cell, drawn around the point with
+// the weights of trilinear interpolation: a mean over samples is the interpolated value for an eighth of the fetches.
+// MEDIA_WORLD, MEDIA_BOUNDED, MEDIA_GRIDS say which kinds of media there are; others are not compiled.
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#include "media/boundary.glsl"
+
+#define MEDIUM_TEXELS 10
+#define MARCH_STEPS 32       // at most, of a ray through one medium's grid
+#define FARTHEST_MEDIUM 1e29
+
+struct Medium {
+  vec3 extinction;
+  float grid;  // above 0.5: coefficients stand on a grid
+  vec3 scattering;
+  float anisotropy;
+  vec3 emission;
+  int phase;
+  vec4 phase_values;
+};
+
+vec4 medium_texel(int medium, int k)
+{
+  return media_table_fetch(ivec2(medium * MEDIUM_TEXELS + k, 0));
+}
+
+Medium medium_read(int medium)
+{
+  vec4 a = medium_texel(medium, 0);
+  vec4 b = medium_texel(medium, 1);
+  vec4 c = medium_texel(medium, 2);
+  Medium m;
+  m.extinction = a.rgb;
+  m.grid = a.w;
+  m.scattering = b.rgb;
+  m.anisotropy = b.w;
+  m.emission = c.rgb;
+  m.phase = int(c.w);
+  m.phase_values = medium_texel(medium, 3);
+  return m;
+}
+
+float media_random(inout uint seed)
+{
+  seed = seed * 747796405u + 2891336453u;
+  uint word = ((seed >> ((seed >> 28u) + 4u)) ^ seed) * 277803737u;
+  return to_unit((word >> 22u) ^ word);
+}
+
+#ifdef MEDIA_GRIDS
+// The texel of a cell beside a point, drawn by the weights of interpolation.
+ivec2 medium_cell(int medium, vec3 position, inout uint seed)
+{
+  vec4 place = vec4(position, 1.0);
+  vec3 cell = vec3(dot(medium_texel(medium, 4), place), dot(medium_texel(medium, 5), place),
+                   dot(medium_texel(medium, 6), place));
+  vec4 layout_ = medium_texel(medium, 7);
+  vec3 roll = vec3(media_random(seed), media_random(seed), media_random(seed));
+  ivec3 size = ivec3(layout_.xyz);
+  ivec3 at = clamp(ivec3(floor(cell - 0.5 + roll)), ivec3(0), size - 1);
+  int index = (at.z * size.y + at.y) * size.x + at.x;
+  return ivec2(index & 2047, int(layout_.w) + (index >> 11));
+}
+
+float medium_cell_size(int medium)
+{
+  return medium_texel(medium, 8).x;
+}
+#endif
+
+vec3 medium_extinction(int medium, vec3 position, inout uint seed)
+{
+  vec4 a = medium_texel(medium, 0);
+#ifdef MEDIA_GRIDS
+  if (a.w > 0.5) {
+    return media_extinction_fetch(medium_cell(medium, position, seed)).rgb;
+  }
+#endif
+  return a.rgb;
+}
+
+// Optical depth of the media `inside` between two places of a ray.
+vec3 media_depth(uint inside, vec3 origin, vec3 direction, float from, float to, inout uint seed)
+{
+  vec3 depth = vec3(0.0);
+  while (inside != 0u) {
+    int medium = findLSB(inside);
+    inside &= inside - 1u;
+    vec4 even = medium_texel(medium, 0);
+#ifdef MEDIA_GRIDS
+    if (even.w > 0.5) {
+      float steps = clamp(ceil((to - from) / max(medium_cell_size(medium), 1e-30)), 1.0, float(MARCH_STEPS));
+      float step_length = (to - from) / steps;
+      vec3 sum = vec3(0.0);
+      for (int i = 0; i < int(steps); i++) {
+        float t = from + (float(i) + media_random(seed)) * step_length;
+        sum += media_extinction_fetch(medium_cell(medium, origin + t * direction, seed)).rgb;
+      }
+      depth += sum * step_length;
+      continue;
+    }
+#endif
+    depth += even.rgb * (to - from);
+  }
+  return depth;
+}
+
+// The share of light that passes from the ray's start to `limit`.
+vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
+{
+  uint seed = salt;
+  vec3 depth = vec3(0.0);
+#ifdef MEDIA_BOUNDED
+  Crossings c = media_crossings(origin, direction);
+  uint inside = media_at_start(c);
+  float from = 0.0;
+  for (int i = 0; i < c.count && from < limit; i++) {
+    float to = min(c.t[i], limit);
+    depth += media_depth(inside, origin, direction, from, to, seed);
+    inside = media_after(inside, c.medium[i]);
+    from = to;
+  }
+  if (from < limit) {
+    depth += media_depth(inside, origin, direction, from, limit, seed);
+  }
+#elif defined(MEDIA_WORLD)
+  depth = media_depth(1u, origin, direction, 0.0, limit, seed);
+#endif
+  return exp(-min(depth, vec3(1e30)));
+}

@@ -1,0 +1,55 @@
+// Light of media at every STRIDE-th pixel brought to all pixels: the mean over 4 x 4 of the known ones around, which have
+// all 16 numbers of the dither among them, of those whose ray ends about as far away and is hidden about as much.
+//
+// What is spread is light over opacity, which is known at each pixel: outlines of media and their detail stay sharp.
+#include "media/media.glsl"
+#include "media/view_ray.glsl"
+
+#define REACH 2.0
+
+float overlap(float place, float middle)
+{
+  return clamp(min(place + 0.5, middle + REACH) - max(place - 0.5, middle - REACH), 0.0, 1.0);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 size = coarse_direct_size();
+  ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
+  uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 45).x;
+  vec3 passing = media_transmittance(ray.origin, ray.direction, ray.limit, salt);
+  float opacity = 1.0 - dot(passing, vec3(1.0 / 3.0));
+  float own = min(ray.limit, 1e18);
+  vec2 middle = (vec2(pixel) - vec2(shown_pixel)) / float(STRIDE);
+  ivec2 corner = ivec2(floor(middle + 0.5));
+  vec4 direct = vec4(0.0);
+  vec4 emission = vec4(0.0);
+  float total = 0.0;
+  float known_opacity = 0.0;
+  for (int y = -2; y <= 2; y++) {
+    for (int x = -2; x <= 2; x++) {
+      ivec2 known = corner + ivec2(x, y);
+      ivec2 other = clamp(known, ivec2(0), size - 1);
+      vec4 found = coarse_direct_fetch(other);
+      vec4 second = coarse_emission_fetch(other);
+      float apart = abs(found.w - own) / max(max(found.w, own), 1e-30);
+      float hidden = abs(second.w - opacity) / max(max(second.w, opacity), 1e-6);
+      float like = max(1.0 - 8.0 * apart, 0.0) * max(1.0 - 2.0 * hidden, 0.0) + 1e-4;
+      float weight = like * overlap(float(known.x), middle.x) * overlap(float(known.y), middle.y);
+      direct += weight * found;
+      emission += weight * second;
+      known_opacity += weight * second.w;
+      total += weight;
+    }
+  }
+  float share = (known_opacity > 0.0) ? opacity / known_opacity : 0.0;
+  out_direct = vec4(direct.rgb * share, 0.0);
+#ifdef ON_SURFACES
+  out_emission = vec4(emission.rgb / max(total, 1e-30) * surface_diffuse_fetch(pixel).rgb, 0.0);
+#else
+  // Thin fire hides nothing and still shines.
+  float evenly = 1.0 / max(total, 1e-30);
+  out_emission = vec4(emission.rgb * ((opacity > 1e-3) ? share : evenly), 0.0);
+#endif
+}

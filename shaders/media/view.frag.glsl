@@ -1,0 +1,19 @@
+// What the media let pass of the light that comes along each pixel's view ray from the surface, or from infinity; where a
+// lamp is seen, which outshines what is behind it, from there.
+#include "media/media.glsl"
+#include "media/view_ray.glsl"
+#include "light/sources.glsl"
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
+  for (int i = 0; i < light_count; i++) {
+    float hit_distance;
+    float density;
+    vec3 radiance = light_hit(light_read(i), ray.origin, ray.direction, hit_distance, density);
+    ray.limit = (max_component(radiance) > 0.0) ? min(ray.limit, hit_distance) : ray.limit;
+  }
+  uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 41).x;
+  out_through = vec4(media_transmittance(ray.origin, ray.direction, ray.limit, salt), ray.hit ? 1.0 : 0.0);
+}

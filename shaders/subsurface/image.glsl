@@ -1,0 +1,28 @@
+// How a pixel's light below the surface is laid out in three images, written by surface/scatter.frag.glsl:
+//
+//   length  length of the profile per channel, m (Burley's d, or the walk's mean free path); w: albedo that decides the
+//           profile's shape, 8 bits a channel
+//   share   part of the diffuse albedo per channel whose light enters elsewhere; w: 0 none, else the object's number from 1
+//           on times 4, the method (SCATTER_*), and as a fraction the cosine at which the view's ray enters
+//   entry   painted: tint of the light that enters here; w: how translucent the surface is here
+#include "lib/math.glsl"
+
+float scatter_code(int object, int method, float entry)
+{
+  return float(object * 4 + method) + clamp(entry, 0.0, 1.0) * 0.99;
+}
+
+int scatter_object(float code)
+{
+  return int(floor(code * 0.25));
+}
+
+int scatter_method(float code)
+{
+  return int(floor(code)) - 4 * scatter_object(code);
+}
+
+float scatter_cosine(float code)
+{
+  return fract(code) / 0.99;
+}

@@ -1,0 +1,70 @@
+"""The list of small wrongs, and what is said of each."""
+
+import pytest
+
+from bench import mutations
+from bench.mutations import BROKEN, EQUIVALENT, KILLED, STALE, SURVIVED, Mutation
+
+SOURCE = "def double(x):\n    return 2 * x\n"
+NOTICES = "from source import double\n\n\ndef test_it():\n    assert double(3) == 6\n"
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A small program with a test that notices, one that does not, and one that always fails."""
+    (tmp_path / "source.py").write_text(SOURCE)
+    for name, text in (
+        ("notices", NOTICES),
+        ("sleeps", "def test_it():\n    pass\n"),
+        ("fails", "def test_it():\n    assert 0\n"),
+    ):
+        (tmp_path / f"test_{name}.py").write_text(text)
+    return tmp_path
+
+
+def wrong(test, old="2 * x", **values):
+    return Mutation("wrong", "source.py", old, "3 * x", (test,), **values)
+
+
+@pytest.mark.parametrize(
+    ("mutation", "state"),
+    [
+        (wrong("test_notices.py"), KILLED),
+        (wrong("test_sleeps.py"), SURVIVED),
+        (wrong("test_fails.py"), BROKEN),
+        (wrong("test_notices.py", old="x"), STALE),
+        (wrong("test_notices.py", old="nowhere"), STALE),
+        (wrong("test_notices.py", reason="it is the same"), EQUIVALENT),
+    ],
+)
+def test_what_becomes_of_a_wrong(tree, mutation, state):
+    assert mutations.judge(mutation, tree, {})[0] == state
+    assert (tree / "source.py").read_text() == SOURCE
+
+
+def test_forty_wrongs_stand_in_the_list_and_in_the_code():
+    """Those whose text has changed are named by the command; enough of them must apply for it to say something."""
+    found = mutations.read()
+    assert sum(not one.reason and not mutations.is_stale(one) for one in found) >= 40
+    assert len({one.file.split("/")[0] for one in found}) > 1 and len({one.file for one in found}) >= 20
+    assert all(len(one.reason) > 20 for one in found if one.reason)
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ('old = "a"\nnew = "a"\ntests = ["t"]', "changes nothing"),
+        ('old = "a"\nnew = "b"', "names no tests"),
+    ],
+)
+def test_an_entry_that_says_nothing_is_refused(tmp_path, entry, words):
+    path = tmp_path / "list.toml"
+    path.write_text(f'[[mutation]]\nname = "it"\nfile = "f"\n{entry}\n')
+    with pytest.raises(ValueError, match=words):
+        mutations.read(path)
+
+
+def test_the_working_tree_is_copied_without_what_git_ignores(tmp_path):
+    mutations.copy_of_tree(tmp_path)
+    assert (tmp_path / "bench" / "mutations.toml").is_file() and (tmp_path / "pyproject.toml").is_file()
+    assert not list(tmp_path.rglob("__pycache__")) and not (tmp_path / ".git").exists()

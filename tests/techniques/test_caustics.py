@@ -1,0 +1,336 @@
+"""Caustics on surfaces: closed forms, energy, and what may not happen."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.frame.ledger import RAN, SKIPPED
+from tests.techniques.conftest import places
+
+PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
+SIZE = (128, 128)
+
+
+def ball(stage, material, radius=0.5, place=(0, 0, 1), segments=96):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=radius, location=place)
+    made = bpy.context.object
+    made.data.materials.append(material)
+    for polygon in made.data.polygons:
+        polygon.use_smooth = True
+    made.visible_camera = False
+    return made
+
+
+def glass(stage, ior=1.5, **inputs):
+    return stage.material("ShaderNodeBsdfGlass", IOR=ior, **{"Roughness": 0.0, **inputs})
+
+
+def irradiance(stage, technique, samples=16, size=SIZE, path="diffuse_indirect", **settings):
+    """W/m2 on white surfaces that caustics bring, (H, W)."""
+    stage.scene.candela.slot_indirect = "OFF"
+    stage.scene.candela.slot_caustics = technique
+    for name, value in settings.items():
+        setattr(stage.scene.candela, f"{technique}_{name}", value)
+    images = stage.render(samples=samples, size=size, bounces=2)
+    assert technique == "OFF" or stage.ledger.row(technique).state == RAN, stage.ledger.text()
+    return images[path][..., 0] * np.pi
+
+
+def within(energy, radius, span, disc):
+    """Share of the light of a disc of radius `disc` that falls within `radius` of the middle; a pixel counts by the
+    part of it that lies there."""
+    size = energy.shape[::-1]
+    fine = 8
+    x, y = places((size[0] * fine, size[1] * fine), span)
+    part = (np.hypot(x, y) < radius).reshape(size[1], fine, size[0], fine).mean(axis=(1, 3))
+    return float((energy * part).sum() * (span / max(size)) ** 2 / (np.pi * disc**2))
+
+
+@pytest.fixture(params=[PHOTONS, MAPPING])
+def technique(request):
+    return request.param
+
+
+# The specification's table: unit glass ball of index 1.5 in parallel light, share of the light of its disc within the
+# radius r on a plane at X from the middle, two refractions with Fresnel's losses.
+BALL_LENS = {
+    1.25: {0.1: 0.651, 0.2: 0.723, 0.3: 0.763, 0.5: 0.802},
+    1.5: {0.1: 0.373, 0.2: 0.518, 0.3: 0.607, 0.5: 0.708},
+    2.0: {0.1: 0.068, 0.2: 0.190, 0.3: 0.302, 0.5: 0.468},
+    2.5: {0.1: 0.020, 0.2: 0.072, 0.3: 0.140, 0.5: 0.280},
+}
+
+
+def ball_lens(stage, technique, distance, span=1.2, **settings):
+    stage.floor()
+    ball(stage, glass(stage), place=(0, 0, 0.5 * distance), segments=192)
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(span)
+    return irradiance(stage, technique, samples=16, **settings)
+
+
+@pytest.mark.parametrize("distance", BALL_LENS)
+def test_ball_lens_has_the_light_of_the_table_in_each_ring(stage, distance):
+    energy = ball_lens(stage, PHOTONS, distance, span=0.6)
+    for radius, share in BALL_LENS[distance].items():
+        assert within(energy, 0.5 * radius, 0.6, 0.5) == pytest.approx(share, abs=0.01, rel=0.015)
+
+
+@pytest.mark.parametrize("distance", (2.0, 2.5))
+def test_ball_lens_by_look_ups_lacks_little_of_its_light(stage, distance):
+    """What neighbouring texels of the far side tell of its normals is coarser than rays: 5 % of the light."""
+    energy = ball_lens(stage, MAPPING, distance)
+    for radius, share in BALL_LENS[distance].items():
+        assert within(energy, 0.5 * radius, 1.2, 0.5) == pytest.approx(share, abs=0.02, rel=0.05)
+
+
+def test_ball_lens_by_a_map_and_rays_has_the_light_of_the_table(stage):
+    energy = ball_lens(stage, MAPPING, 2.0, by="RAYS")
+    for radius, share in BALL_LENS[2.0].items():
+        assert within(energy, 0.5 * radius, 1.2, 0.5) == pytest.approx(share, abs=0.01, rel=0.03)
+
+
+def test_plane_mirror_is_a_second_light(stage):
+    """Mirror of 1 m at z = 0, spot of 100 W at (-1, 0, 1): the wall at x = 1.5 is lit from (-1, 0, -1)."""
+    wall = stage.rectangle((-4, -4), (4, 4), material=stage.diffuse(), turn=(0, -np.pi / 2, 0), location=(1.5, 0, 0))
+    wall.name = "Wall"
+    stage.rectangle(
+        (-0.5, -0.5), (0.5, 0.5), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    )
+    lamp = stage.light("SPOT", location=(-1, 0, 1), energy=100.0, shadow_soft_size=0.0, spot_size=2.4, spot_blend=0.0)
+    lamp.rotation_euler = (0, -np.pi / 4, 0)
+    camera = stage.camera_above(5.0)
+    camera.location, camera.rotation_euler = (-5, 0, 2), (np.pi / 2, 0, -np.pi / 2)
+    energy = irradiance(stage, PHOTONS, samples=16, size=(64, 64))
+    y, z = places((64, 64), 5.0)
+    y, z = -y, z + 2.0
+    expected = 7.9577 * 2.5 / (2.5**2 + y**2 + (z + 1) ** 2) ** 1.5
+    inside = (z > 0.8) & (z < 3.6) & (np.abs(y) < 0.46 * (z + 1))
+    outside = (z < 0.5) | (z > 4.3) | (np.abs(y) > 0.56 * (z + 1) + 0.1)
+    ratio = energy[inside] / expected[inside]
+    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
+    assert ratio.std() < 0.05
+    assert energy[outside].max() < 0.02
+
+
+def nephroid(distance, radius=0.5, height=0.25, elevation=np.pi / 6):
+    """Irradiance on the axis of a mirror ring, in the sun's on the floor, at `distance` from its far wall."""
+    reach = height / np.tan(elevation)
+    sheet = radius / abs(radius - 2 * distance) if distance < reach else 0.0
+    if distance < radius / 2 and radius - distance <= reach:
+        cosine = radius / (2 * (radius - distance))
+        sheet += 2 * radius * cosine / abs(radius * cosine - 2 * (radius - distance))
+    return sheet
+
+
+@pytest.mark.parametrize("technique", (PHOTONS, MAPPING))
+def test_mirror_ring_has_the_nephroid(stage, technique):
+    """Ring of radius .5 and height .25 under a sun of 30 degrees that travels along +x, beside the closed
+    form on its axis: 1.25 to 4.58 where one sheet and two meet, 5.0 to 1.67 beyond the cusp."""
+    stage.floor()
+    count, radius, height = 512, 0.5, 0.25
+    turns = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    rim = [(radius * np.cos(t), radius * np.sin(t), z) for z in (0.0, height) for t in turns]
+    faces = [(k, (k + 1) % count, count + (k + 1) % count, count + k) for k in range(count)]
+    mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    ring = stage.mesh(rim, faces, material=mirror)
+    for polygon in ring.data.polygons:
+        polygon.use_smooth = True
+    ring.visible_camera = False
+    stage.light("SUN", turn=(0, -np.pi / 3, 0), angle=0.0)
+    stage.camera_above(1.2)
+    energy = irradiance(stage, technique, samples=64, size=(192, 192), grid=256) / np.sin(np.pi / 6)
+    x, y = places((192, 192), 1.2)
+    axis = energy[np.abs(y[:, 0]) < 0.008].mean(axis=0)
+    places_x = x[0]
+    for distance in (0.05, 0.1, 0.15, 0.3, 0.35, 0.4):
+        found = np.interp(radius - distance, places_x, axis)
+        print(technique, distance, nephroid(distance), found)
+        assert found == pytest.approx(nephroid(distance), rel=0.08)
+    assert np.interp(radius - 0.46, places_x, axis) < 0.1
+
+
+def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
+    """A sheet of index 1.33 under a sun at 30 degrees from its normal: E cos T on the floor below, evenly."""
+    stage.floor()
+    stage.rectangle((-4, -4), (4, 4), 0.5, material=glass(stage, 1.33)).visible_camera = False
+    stage.light("SUN", turn=(0, np.pi / 6, 0), angle=0.0)
+    stage.camera_above(1.0)
+    energy = irradiance(stage, PHOTONS, samples=4, size=(32, 32))
+    cosine, bent = np.cos(np.pi / 6), np.sqrt(1 - (0.5 / 1.33) ** 2)
+    s = (cosine - 1.33 * bent) / (cosine + 1.33 * bent)
+    p = (1.33 * cosine - bent) / (1.33 * cosine + bent)
+    expected = cosine * (1 - 0.5 * (s * s + p * p))
+    assert energy.mean() == pytest.approx(expected, rel=0.005)
+    assert energy == pytest.approx(expected, rel=0.03)
+
+
+def test_nothing_bent_puts_light_straight_behind_its_caster(stage, technique_name):
+    """Index 1: caustic and shadow together are the light without the ball."""
+    stage.floor()
+    ball(stage, glass(stage, 1.0))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(2.0)
+    images = both(stage, technique_name)
+    x, y = places((64, 64), 2.0)
+    away = np.abs(np.hypot(x, y) - 0.5) > 0.06
+    whole = images[away]
+    assert whole.mean() == pytest.approx(1.0, abs=0.01)
+    assert np.abs(whole - 1.0).max() < 0.06
+
+
+@pytest.fixture(params=(PHOTONS, MAPPING))
+def technique_name(request):
+    return request.param
+
+
+def both(stage, technique, samples=4, size=(64, 64)):
+    """Direct and caustic irradiance together."""
+    stage.scene.candela.slot_indirect = "OFF"
+    stage.scene.candela.slot_caustics = technique
+    images = stage.render(samples=samples, size=size, bounces=2)
+    return (images["diffuse_direct"] + images["diffuse_indirect"])[..., 0] * np.pi
+
+
+def test_total_is_the_same_for_coarse_and_fine_grids(stage, technique_name):
+    stage.floor()
+    ball(stage, glass(stage))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(4.0)
+    totals = [irradiance(stage, technique_name, samples=4, size=(64, 64), grid=side).sum() for side in (48, 96, 192)]
+    for total in totals:
+        assert float(total) == pytest.approx(float(totals[-1]), rel=0.015)
+
+
+def test_twice_the_power_is_twice_the_caustic(stage, technique_name):
+    stage.floor()
+    ball(stage, glass(stage))
+    lamp = stage.light("SUN", angle=0.0)
+    stage.camera_above(3.0)
+    once = irradiance(stage, technique_name, samples=1, size=(32, 32))
+    lamp.data.energy = 2.0
+    assert irradiance(stage, technique_name, samples=1, size=(32, 32)) == pytest.approx(2 * once, rel=1e-4, abs=1e-6)
+
+
+def test_glass_casts_a_full_shadow_where_its_light_arrives_as_photons(stage):
+    """And the grey one where the slot is off: nothing is counted twice, nothing is missing."""
+    stage.floor()
+    ball(stage, glass(stage))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(0.6)
+    dark = irradiance(stage, PHOTONS, samples=4, size=(16, 16), path="diffuse_direct")
+    assert dark.max() == pytest.approx(0.0, abs=1e-6)
+    grey = irradiance(stage, "OFF", samples=4, size=(16, 16), path="diffuse_direct")
+    assert 0.5 < grey[6:10, 6:10].mean() < 1.0
+    assert "the caustics slot is off" in stage.ledger.row(PHOTONS).reason
+
+
+def test_larger_lamps_make_softer_caustics(stage):
+    """A mirror shows the floor a disc of .2 m from 2 m away: edges are .2 m wide, in the mean of samples and in one."""
+    stage.floor()
+    mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    made = stage.rectangle((-0.4, -0.4), (0.4, 0.4), material=mirror, location=(0, 0, 2), turn=(0, -np.pi / 4, 0))
+    made.visible_camera = False
+    stage.light("SUN", turn=(0, np.pi / 2, 0), angle=0.2)
+    stage.camera_above(3.0)
+    many = irradiance(stage, PHOTONS, samples=64, size=(64, 64))
+    one = irradiance(stage, PHOTONS, samples=1, size=(64, 64))
+    assert one.sum() == pytest.approx(many.sum(), rel=0.03)
+    assert np.abs(one - many).mean() < 0.15 * many.mean()
+
+
+# What they are skipped for -------------------------------------------------------------------------------------------
+
+
+def reason(stage, name=PHOTONS):
+    stage.render(samples=1, size=(8, 8), bounces=2)
+    row = stage.ledger.row(name)
+    assert row.state == SKIPPED
+    return row.reason
+
+
+def test_scenes_without_casters_lamps_or_room_for_them_say_so(stage):
+    stage.floor()
+    lamp = stage.light("SUN", angle=0.0)
+    stage.camera_above(1.0)
+    assert "no material is glass or a smooth mirror" in reason(stage)
+    pane = stage.mesh(
+        [(x, y, z) for z in (0.5, 0.52) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))],
+        [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+        material=glass(stage),
+    )
+    assert "flat panes" in reason(stage)
+    stage.remove(pane)
+    ball(stage, glass(stage))
+    lamp.data.use_shadow = False
+    assert "no lamp that casts shadows" in reason(stage)
+    lamp.data.use_shadow = True
+    lamp.data.angle = 2.0
+    assert "so wide" in reason(stage)
+    lamp.data.angle = 0.0
+    stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = False
+    try:
+        assert "switched off" in reason(stage)
+    finally:
+        stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = True
+
+
+# Stress --------------------------------------------------------------------------------------------------------------
+
+
+def touching(stage):
+    ball(stage, glass(stage), place=(0, 0, 0.5), segments=32)
+
+
+def sheets(stage):
+    for k in range(64):
+        stage.rectangle((-0.5, -0.5), (0.5, 0.5), 0.3 + 0.01 * k, material=glass(stage, 1.2))
+
+
+def around_the_lamp(stage):
+    ball(stage, glass(stage), place=(0, 0, 2), segments=32)
+
+
+def around_the_camera(stage):
+    ball(stage, glass(stage), radius=2.0, place=(0, 0, 10), segments=32)
+
+
+def rough(stage):
+    ball(stage, glass(stage, Roughness=1.0), segments=32)
+
+
+def thin(stage):
+    stage.mesh([(-1, 0, 0.5), (1, 0, 0.5), (0, 1e-6, 0.5)], [(0, 1, 2)], material=glass(stage))
+
+
+def broken(stage):
+    nan = float("nan")
+    stage.mesh([(-1, 0, 0.5), (1, 0, 0.5), (0, 1, nan), (0, -1, 0.5)], [(0, 1, 2), (0, 3, 1)], material=glass(stage))
+
+
+def extreme_index(stage):
+    ball(stage, glass(stage, 1000.0), segments=16)
+    ball(stage, glass(stage, 0.3), place=(1, 0, 1), segments=16)
+
+
+def tiny(stage):
+    ball(stage, glass(stage), radius=1e-4, place=(0, 0, 1e-3), segments=16)
+
+
+@pytest.mark.parametrize(
+    "build", (touching, sheets, around_the_lamp, around_the_camera, rough, thin, broken, extreme_index, tiny)
+)
+def test_odd_casters_leave_finite_light(stage, technique_name, build):
+    stage.floor()
+    build(stage)
+    stage.light("POINT", location=(0.1, 0, 2), shadow_soft_size=0.0)
+    stage.light("SUN", turn=(0, 1.4, 0), angle=0.01)
+    stage.camera_above(3.0)
+    images = []
+    for _ in range(2):
+        stage.scene.candela.slot_caustics = technique_name
+        images.append(stage.render(samples=2, size=(16, 16), bounces=2)["diffuse_indirect"])
+        stage.scene.candela.slot_caustics = "AUTO"
+        stage.render(samples=1, size=(8, 8), bounces=2)  # so that the next one is drawn anew
+    assert (images[0] >= 0).all()
+    assert images[0] == pytest.approx(images[1], rel=1e-3, abs=1e-5)  # sums in another order

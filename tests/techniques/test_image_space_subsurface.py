@@ -1,0 +1,260 @@
+"""Light below surfaces: closed forms of planes, invariants, what the methods mean in Cycles, and stress."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.kernels import diffusion
+from addon.techniques import instant_radiosity
+from tests.techniques.conftest import places
+
+COLOR = (0.8, 0.5, 0.2)
+PATH = 0.25 / np.pi  # of a radius: Burley's d
+
+
+def scattering(stage, method="BURLEY", scale=1.0, radius=(1, 1, 1), color=COLOR, weight=1.0):
+    made = stage.principled(
+        Base_Color=(*color, 1), Subsurface_Weight=weight, Subsurface_Radius=radius, Subsurface_Scale=scale,
+        Specular_IOR_Level=0.0,
+    )  # fmt: skip
+    made.node_tree.nodes[0].subsurface_method = method
+    return made
+
+
+def slab(stage, material, half=10.0, cuts=1):
+    """A block whose upper face is the plane z = 0."""
+    grid = np.linspace(-half, half, cuts + 1)
+    corners = [(x, y, 0.0) for y in grid for x in grid] + [
+        (x, y, -2 * half) for y in (-half, half) for x in (-half, half)
+    ]
+    n = cuts + 1
+    faces = [(j * n + i, j * n + i + 1, (j + 1) * n + i + 1, (j + 1) * n + i) for j in range(cuts) for i in range(cuts)]
+    b, t = n * n, (0, cuts, n * n - n, n * n - 1)
+    faces += [(b, b + 2, b + 3, b + 1)]
+    faces += [(t[0], b, b + 1, t[1]), (t[1], b + 1, b + 3, t[3]), (t[3], b + 3, b + 2, t[2]), (t[2], b + 2, b, t[0])]
+    return stage.mesh(corners, faces, material=material)
+
+
+def sphere(stage, material, radius=1.0, **placement):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=radius, **placement)
+    made = bpy.context.object
+    for polygon in made.data.polygons:
+        polygon.use_smooth = True
+    made.data.materials.append(material)
+    return made
+
+
+def shown(images):
+    return images["combined"][..., :3]
+
+
+def test_an_evenly_lit_plane_has_its_albedo(stage):
+    slab(stage, scattering(stage, scale=0.3))
+    stage.light("SUN", energy=np.pi)
+    stage.camera_above(1.0)
+    assert shown(stage.render(4)).mean(axis=(0, 1)) == pytest.approx(COLOR, rel=0.015)
+
+
+def test_a_half_lit_plane_has_the_profile_of_an_edge(stage):
+    slab(stage, scattering(stage))
+    stage.blocker((-50, -50), (0, 50), 1.0)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(4.0)
+    x = places((32, 32))[0][0]
+    expected = diffusion.burley(PATH).edge(x)
+    found = shown(stage.render(16)).mean(axis=0) / COLOR
+    for channel in range(3):
+        assert found[:, channel] == pytest.approx(expected, abs=0.015)
+    assert found[:, 0] + found[::-1, 0] == pytest.approx(1.0, abs=0.015)
+
+
+@pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
+def test_each_method_means_what_it_means_in_cycles(stage, method):
+    slab(stage, scattering(stage, method, scale=0.1 if method == "RANDOM_WALK" else 1.0))
+    stage.blocker((-50, -50), (0, 50), 1.0)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(4.0)
+    cycles = shown(stage.render(128, engine="CYCLES")).mean(axis=0)
+    assert shown(stage.render(16)).mean(axis=0) == pytest.approx(cycles, abs=0.025)
+
+
+def test_a_range_within_a_pixel_is_the_local_limit_to_the_bit(stage):
+    slab(stage, scattering(stage, scale=1e-5))
+    stage.light("AREA", energy=100)
+    stage.camera_above(4.0)
+    scattered = shown(stage.render(2))
+    stage.clear()
+    slab(stage, scattering(stage, weight=0.0))
+    stage.light("AREA", energy=100)
+    stage.camera_above(4.0)
+    assert np.abs(scattered - shown(stage.render(2))).max() < 1e-5
+
+
+def test_without_scattering_materials_it_is_skipped_with_a_reason(stage):
+    stage.floor()
+    stage.light("SUN")
+    stage.camera_above()
+    stage.render(1)
+    row = next(row for row in stage.ledger.rows if row.name == "image_space_subsurface")
+    assert row.reason == "no material scatters light below its surface"
+    assert "surface.scatter_share" not in stage.renderer.frame.images
+
+
+def test_tessellation_changes_nothing_that_is_seen(stage):
+    pictures = []
+    for cuts in (1, 12):
+        stage.clear()
+        slab(stage, scattering(stage), half=2.0, cuts=cuts)
+        stage.blocker((-50, -50), (0, 50), 1.0)
+        stage.light("SUN", energy=np.pi, angle=0.0)
+        stage.camera_above(3.0)
+        pictures.append(shown(stage.render(8)))
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.006
+
+
+def test_scale_changes_nothing(stage):
+    pictures = []
+    for scale in (1.0, 100.0):
+        stage.clear()
+        slab(stage, scattering(stage, scale=scale), half=10.0 * scale)
+        stage.blocker((-50 * scale, -50 * scale), (0, 50 * scale), scale)
+        stage.light("SUN", energy=np.pi, angle=0.0)
+        camera = stage.camera_above(4.0 * scale, 10 * scale)
+        camera.data.clip_end = 1000 * scale
+        pictures.append(shown(stage.render(4)))
+    assert np.abs(pictures[0] - pictures[1]).max() < 0.01
+
+
+def test_objects_do_not_exchange_light(stage):
+    material = scattering(stage, scale=2.0)
+    for x in (-1.001, 1.001):
+        stage.mesh(
+            [(x + a, b, c) for c in (-2, 0) for b in (-4, 4) for a in (-1, 1)],
+            [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6)], material=material,
+        )  # fmt: skip
+    stage.blocker((-50, -50), (0, 50), 1.0)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(3.0)
+    picture = shown(stage.render(4))
+    assert picture[:, :15].max() < 0.01 and picture[:, 18:30].min() > 0.1
+
+
+def test_a_thin_sheet_glows_where_it_is_lit_from_behind(stage):
+    stage.rectangle((-2, -2), (2, 2), material=scattering(stage, scale=1.0))
+    sheet = stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY")
+    sheet.thickness = 0.1
+    stage.light("SUN", turn=(np.pi, 0, 0), energy=np.pi)
+    stage.camera_above(2.0)
+    ours, cycles = shown(stage.render(16)), shown(stage.render(128, engine="CYCLES"))
+    assert ours.mean(axis=(0, 1)) == pytest.approx(cycles.mean(axis=(0, 1)), rel=0.1)
+
+
+@pytest.mark.parametrize("light", ["world", "sun", "emissive"])
+def test_a_sphere_of_burleys_is_as_in_cycles_under_every_light(stage, light):
+    sphere(stage, scattering(stage, radius=(1, 0.5, 0.2)))
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    if light == "world":
+        stage.world()
+    elif light == "sun":
+        stage.light("SUN", turn=(1.2, 0, 0.6), energy=np.pi, angle=0.1)
+    else:
+        stage.rectangle((-1, -1), (1, 1), 3.0, material=stage.material("ShaderNodeEmission", Strength=20.0))
+    ours, cycles = shown(stage.render(16)), shown(stage.render(256, engine="CYCLES"))
+    assert ours.mean(axis=(0, 1)) == pytest.approx(cycles.mean(axis=(0, 1)), rel=0.04)
+
+
+def test_indirect_light_enters_too(stage):
+    slab(stage, scattering(stage, scale=0.3), half=3.0)
+    wall = stage.rectangle((-3, -3), (3, 3), 0.0, material=stage.diffuse(0.8))
+    wall.location, wall.rotation_euler = (1.5, 0, 1), (0, -np.pi / 2, 0)
+    stage.light("SUN", turn=(0, -0.9, 0), energy=np.pi)
+    stage.camera_above(2.0)
+    ours = stage.render(32, bounces=1)["diffuse_indirect"][..., :3].mean()
+    cycles = stage.render(256, bounces=1, engine="CYCLES")["diffuse_indirect"][..., :3].mean()
+    assert instant_radiosity.SUBSETS and ours == pytest.approx(cycles, rel=0.1)
+
+
+def test_one_sample_is_smooth(stage):
+    sphere(stage, scattering(stage, scale=2.0))
+    stage.world()
+    stage.camera((0, -4, 0), (np.pi / 2, 0, 0), 0.6)
+    picture = shown(stage.render(1, size=(64, 64)))[24:40, 24:40, 0]
+    assert picture.std() / picture.mean() < 0.03
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"Subsurface_Radius": (0, 0, 0)}, {"Subsurface_Scale": 1e6}, {"Base_Color": (1, 1, 1, 1)},
+        {"Base_Color": (0, 0, 0, 1)}, {"Subsurface_Anisotropy": 0.99}, {"Subsurface_Radius": (1e30, 1, 0)},
+        {"Thin_Wall": True},
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
+def test_extreme_settings_stay_finite(stage, method, change):
+    material = scattering(stage, method)
+    for name, value in change.items():
+        socket = material.node_tree.nodes[0].inputs.get(name.replace("_", " "))
+        if socket is not None:
+            socket.default_value = value
+    sphere(stage, material)
+    stage.light("POINT", (0, 0, 0.5), energy=10)  # inside
+    stage.light("SUN")
+    stage.camera((0, -1.02, 0), (np.pi / 2, 0, 0), 1.2)  # the near plane cuts the range
+    picture = shown(stage.render(2, size=(16, 16)))
+    assert picture.min() >= 0.0
+
+
+def test_many_materials_and_no_light(stage):
+    for k in range(16):
+        sphere(stage, scattering(stage, color=(0.1 + 0.05 * k, 0.5, 0.3)), 0.2, location=(k % 4 - 1.5, k // 4 - 1.5, 0))
+    stage.camera_above(4.0)
+    assert shown(stage.render(1)).max() == 0.0
+    stage.light("SUN")
+    assert shown(stage.render(1)).max() > 0.0
+
+
+def _map(name, color):
+    """An image of 64 x 64 pixels, scene-linear, by a function of u."""
+    image = bpy.data.images.new(name, 64, 64, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    u = (np.arange(64) + 0.5) / 64
+    pixels = np.ones((64, 64, 4), np.float32)
+    pixels[..., :3] = np.array([color(x) for x in u], np.float32)[None]
+    image.pixels.foreach_set(pixels.ravel())
+    return image
+
+
+def _painted_plane(stage, **maps):
+    material = scattering(stage)
+    plane = stage.card(material, 0.0, 1.0)
+    plane.scale = (2, 2, 1)
+    for name, image in maps.items():
+        setattr(material.candela, f"image_space_subsurface_{name}", image)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(2.0)
+    return stage.render(16)
+
+
+def test_neutral_maps_equal_no_maps_to_the_bit(stage):
+    plain = shown(_painted_plane(stage))
+    stage.clear()
+    maps = {"blur_map": 0.5, "tint_map": 1.0, "translucency_map": 1.0}
+    painted = {name: _map(name, lambda x, value=value: (value,) * 3) for name, value in maps.items()}
+    assert np.array_equal(shown(_painted_plane(stage, **painted)), plain)
+
+
+def test_the_edge_of_a_painted_tint_is_as_soft_as_the_range(stage):
+    tint = _map("tint", lambda x: (0.25, 1.0, 1.0) if x > 0.5 else (1.0, 1.0, 1.0))
+    picture = shown(_painted_plane(stage, tint_map=tint)).mean(axis=0)
+    x = places((32, 32), 2.0)[0][0]
+    beside = diffusion.burley(PATH).edge(x)
+    assert picture[:, 0] / COLOR[0] == pytest.approx(1.0 - 0.75 * beside, abs=0.03)
+    assert picture[:, 1] / COLOR[1] == pytest.approx(1.0, abs=0.03)
+
+
+def test_where_nothing_is_translucent_it_is_diffuse_and_gives_nothing(stage):
+    mask = _map("mask", lambda x: (0.0, 0.0, 0.0))
+    assert shown(_painted_plane(stage, translucency_map=mask)) == pytest.approx(
+        np.broadcast_to(COLOR, (32, 32, 3)), abs=1e-5
+    )

@@ -1,0 +1,400 @@
+"""Media against closed forms: Beer-Lambert, airlight's integral, phase functions, furnace, lenses; and stress."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.gfx import images, passes
+from addon.materials.volume import PHASES, Medium
+from addon.scene.media import phase_values
+from addon.snapshot.volumes import openvdb
+
+BOX = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+def volume(stage, node="ShaderNodeVolumeScatter", name="volume", **inputs):
+    made = bpy.data.materials.new(name)
+    stage.use_nodes(made)
+    nodes = made.node_tree.nodes
+    nodes.clear()
+    shader, output = nodes.new(node), nodes.new("ShaderNodeOutputMaterial")
+    made.node_tree.links.new(shader.outputs[0], output.inputs["Volume"])
+    for key, value in inputs.items():
+        shader.inputs[key.replace("_", " ")].default_value = value
+    return made
+
+
+def absorber(stage, per_metre):
+    """Absorbs these coefficients."""
+    return volume(stage, "ShaderNodeVolumeAbsorption", Color=(*(1 - np.array(per_metre)), 1.0), Density=1.0)
+
+
+def box(stage, material, low=(-0.5, -0.5, -0.5), high=(0.5, 0.5, 0.5), **placement):
+    corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    return stage.mesh(corners, BOX, material=material, **placement)
+
+
+def fog(stage, color=(0, 0, 0), node="ShaderNodeVolumeScatter", **inputs):
+    """A world of this radiance, full of a medium."""
+    tree = stage.world(color).node_tree
+    shader = tree.nodes.new(node)
+    output = next(one for one in tree.nodes if one.type == "OUTPUT_WORLD")
+    tree.links.new(shader.outputs[0], output.inputs["Volume"])
+    for key, value in inputs.items():
+        shader.inputs[key.replace("_", " ")].default_value = value
+
+
+def glowing_floor(stage, z=-2.0, strength=2.0):
+    return stage.rectangle((-5, -5), (5, 5), z=z, material=stage.material("ShaderNodeEmission", Strength=strength))
+
+
+# Transmittance ------------------------------------------------------------------------------------------------------
+
+
+def test_a_slab_absorbs_by_beer_and_lambert(stage):
+    stage.camera_above()
+    glowing_floor(stage)
+    box(stage, absorber(stage, (0.8, 0.5, 0.1)))
+    seen = stage.render(size=(16, 16))["combined"]
+    assert seen[8, 8, :3] == pytest.approx(2 * np.exp([-0.8, -0.5, -0.1]), rel=1e-4)
+    assert seen[1, 1, :3] == pytest.approx(2.0, rel=1e-6)
+
+
+def test_nested_and_overlapping_media_add_their_coefficients(stage):
+    stage.camera_above()
+    glowing_floor(stage)
+    box(stage, absorber(stage, (0.3, 0.3, 0.3)), (-1, -1, -1), (1, 1, 1))
+    box(stage, absorber(stage, (0.5, 0.0, 0.0)))  # within the first
+    box(stage, absorber(stage, (0.0, 0.4, 0.0)), (-0.5, -0.5, 0.0), (0.5, 0.5, 1.5))  # half out of it
+    seen = stage.render(size=(16, 16))["combined"][8, 8, :3]
+    assert seen == pytest.approx(2 * np.exp(-np.array([0.6 + 0.5, 0.6 + 0.4 * 1.5, 0.6])), rel=1e-3)
+
+
+def test_fog_takes_light_on_both_legs_of_its_way(stage):
+    """From a lamp 2 m above a white floor, and from there to a camera at 4 m."""
+    stage.floor()
+    stage.light("POINT", (0, 0, 2), energy=100, shadow_soft_size=0.0)
+    camera = stage.camera((0, 0, 4), (0, 0, 0), angle=0.02)
+    camera.data.clip_end = 100
+    clear = stage.render(size=(8, 8))["diffuse_direct"][4, 4, 0]
+    fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0.5, 0.5, 0.5, 1), Density=0.2)
+    images_seen = stage.render(size=(8, 8))
+    light = images_seen["combined"][4, 4, 0]
+    assert light == pytest.approx(clear * np.exp(-0.1 * (2 + 4)), rel=2e-3)
+    # The light pass is divided by the colour that is seen, as in Cycles: it has lost on one leg only.
+    assert images_seen["diffuse_direct"][4, 4, 0] == pytest.approx(clear * np.exp(-0.1 * 2), rel=2e-3)
+
+
+def test_a_camera_inside_a_medium_sees_what_is_left_from_there(stage):
+    stage.camera((0, 0, 0.25), (0, 0, 0), angle=0.1)
+    glowing_floor(stage)
+    box(stage, absorber(stage, (0.8, 0.8, 0.8)))
+    assert stage.render(size=(8, 8))["combined"][4, 4, 0] == pytest.approx(2 * np.exp(-0.8 * 0.75), rel=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1e5])
+def test_size_changes_nothing_where_densities_follow(stage, scale):
+    stage.camera_above(span=4 * scale, height=10 * scale)
+    stage.scene.camera.data.clip_start, stage.scene.camera.data.clip_end = 0.01 * scale, 100 * scale
+    half, deep = 5 * scale, -2 * scale
+    stage.rectangle((-half, -half), (half, half), z=deep, material=stage.material("ShaderNodeEmission", Strength=2.0))
+    box(stage, volume(stage, "ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=0.7 / scale), scale=(scale,) * 3)
+    assert stage.render(size=(16, 16))["combined"][8, 8, 0] == pytest.approx(2 * np.exp(-0.7), rel=2e-3)
+
+
+# Light of media -----------------------------------------------------------------------------------------------------
+
+
+def test_a_medium_shines_as_the_integral_of_what_it_emits(stage):
+    stage.camera_above()
+    made = volume(stage, "ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0.5, 0.5, 0.5),
+                  Scatter_Coefficients=(0, 0, 0), Emission_Coefficients=(3.0, 2.0, 1.0))  # fmt: skip
+    box(stage, made, (-1, -1, -1), (1, 1, 1))
+    seen = stage.render(size=(16, 16))["emission"][8, 8, :3]
+    assert seen == pytest.approx(np.array([3, 2, 1]) / 0.5 * (1 - np.exp(-1.0)), rel=1e-3)
+
+
+def airlight(origin, direction, far, light, intensity, scattering, extinction, steps=20001):
+    """Single scattering of an isotropic point light in even isotropic fog, by quadrature in the angle."""
+    along = (light - origin) @ direction
+    apart = np.linalg.norm(origin + along * direction - light)
+    angle = np.linspace(np.arctan2(-along, apart), np.arctan2(far - along, apart), steps)
+    t = along + apart * np.tan(angle)
+    away = apart / np.cos(angle)
+    values = (
+        scattering / (4 * np.pi) * intensity * np.exp(-extinction * (t + away)) / apart
+    )  # dt / away^2 = d angle / apart
+    return np.trapezoid(values, angle)
+
+
+def test_airlight_of_a_point_light_is_its_integral(stage):
+    stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.8)
+    stage.light("POINT", (0.3, 0.5, 0.2), energy=4 * np.pi**2, shadow_soft_size=0.0)  # intensity pi W/sr
+    fog(stage, Color=(0.75, 0.75, 0.75, 1), Density=0.2)
+    box_far = stage.rectangle((-50, -50), (50, 50), material=stage.diffuse(0.0), location=(0, 10, 0))
+    box_far.rotation_euler = (np.pi / 2, 0, 0)
+    fog_light = stage.render(64, size=(12, 12))["volume_direct"][..., 0]
+    place = np.tan(0.4) * (np.arange(12) + 0.5 - 6) / 6
+    expected = np.zeros((12, 12))
+    for y, up in enumerate(place):
+        for x, right in enumerate(place):
+            direction = np.array([right, 1.0, up])
+            far = 16.0 * np.linalg.norm(direction)
+            direction /= np.linalg.norm(direction)
+            light = np.array([0.3, 0.5, 0.2])
+            expected[y, x] = airlight(np.array([0, -6.0, 0]), direction, far, light, np.pi, 0.15, 0.15)
+    # Volume Scatter absorbs nothing: extinction is scattering.
+    assert fog_light.mean() == pytest.approx(expected.mean(), rel=0.01)
+    assert np.abs(fog_light / expected - 1).mean() < 0.05
+
+
+PHASE = passes.fullscreen_program(
+    "phase functions",
+    "generated/phase_test",
+    constants=(("INT", "kind"), ("FLOAT", "g"), ("VEC4", "values")),
+    snippets=((
+        "generated/phase_test",
+        '#include "media/phase.glsl"\n'  # noqa: ISC004
+        "void main() { out_value = vec4(phase_value(kind, g, values, 2.0 * screen.x - 1.0)); }\n",
+    ),),
+    outputs=(("VEC4", "out_value"),),
+)  # fmt: skip
+
+
+def phase(kind, g=0.0, values=(1.33, 0.1, 0.5, 20.0)):
+    """2,048 x 4 values of a phase function over the cosine, and the cosines."""
+    medium = Medium(np.zeros(3), np.ones(3), np.zeros(3), g, 0.0, 0.0, True, phase=kind, phase_values=values)
+    with images.borrowed(8192, 1, "RGBA32F") as target:
+        passes.fullscreen(PHASE, target, constants={
+            "kind": PHASES.index(kind), "g": g, "values": phase_values(medium),
+        })  # fmt: skip
+        return images.read(target.colors[0])[0, :, 0], (np.arange(8192) + 0.5) / 4096 - 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "g", "values"),
+    [
+        ("HENYEY_GREENSTEIN", 0.0, ()), ("HENYEY_GREENSTEIN", 0.7, ()), ("HENYEY_GREENSTEIN", -0.7, ()),
+        ("RAYLEIGH", 0.0, ()), ("DRAINE", 0.5, (1.33, 0.1, 2.0, 20.0)), ("MIE", 0.0, (1.33, 0.1, 0.5, 0.08)),
+        ("MIE", 0.0, (1.33, 0.1, 0.5, 1.0)), ("MIE", 0.0, (1.33, 0.1, 0.5, 3.0)),
+    ],
+)  # fmt: skip
+def test_phase_functions_integrate_to_one(stage, kind, g, values):
+    stage.camera_above()
+    stage.render(size=(2, 2))  # a GPU context
+    found, _ = phase(kind, g, values or (1.33, 0.1, 0.5, 20.0))
+    assert (found >= 0).all()
+    assert found.mean() * 4 * np.pi == pytest.approx(1.0, abs=3e-3)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.2])
+def test_fournier_and_forand_scatter_backwards_what_they_are_told(stage, share):
+    """Their peak forwards is a singularity, which no even quadrature finds: up to 42 % lie in one cosine of 8,192."""
+    stage.camera_above()
+    stage.render(size=(2, 2))
+    found, mu = phase("FOURNIER_FORAND", 0.0, (1.33, share, 0.5, 20.0))
+    assert (found >= 0).all()
+    assert found[mu < 0].sum() / 4096 * 2 * np.pi == pytest.approx(share, rel=1e-3)
+    assert found.mean() * 4 * np.pi < 1.001
+
+
+def test_henyey_and_greenstein_mirrors_with_the_sign_of_g(stage):
+    stage.camera_above()
+    stage.render(size=(2, 2))
+    forward, mu = phase("HENYEY_GREENSTEIN", 0.7)
+    assert forward == pytest.approx(phase("HENYEY_GREENSTEIN", -0.7)[0][::-1], rel=1e-3)
+    assert forward[-1] == pytest.approx(0.51 / (4 * np.pi * 0.3**3), rel=0.01)
+    assert 2 * np.pi * (forward * mu).sum() / 4096 == pytest.approx(0.7, abs=2e-3)  # g is the mean cosine
+
+
+def test_a_cloud_of_albedo_one_in_even_light_is_hardly_to_be_seen(stage):
+    """A white furnace: what is missing is light of more bounces than are asked."""
+    stage.camera_above()
+    stage.world((1, 1, 1))
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=1.0))
+    missing = []
+    for bounces in (0, 1, 8):
+        missing.append(1.0 - stage.render(32, size=(16, 16), bounces=bounces)["combined"][6:10, 6:10, :3].mean())
+    assert missing[0] > missing[1] > 0.02
+    assert missing[2] == pytest.approx(0.0, abs=0.01)
+
+
+def test_fog_without_light_is_attenuation_alone(stage):
+    stage.camera_above()
+    glowing_floor(stage)
+    box(stage, absorber(stage, (0.5, 0.5, 0.5)))
+    stage.render(size=(8, 8))
+    assert "absorb alone" in stage.ledger.row("airlight").reason
+    assert "radiance.volume_direct" not in stage.renderer.frame.images
+
+
+def test_a_scene_without_a_medium_pays_nothing(stage):
+    stage.camera_above()
+    stage.floor()
+    stage.light("POINT")
+    seen = stage.render(size=(8, 8))
+    for name in ("media", "airlight", "volume_caustics"):
+        assert stage.ledger.row(name).state == "skipped"
+    assert not any("volume" in name for name in stage.renderer.frame.images)
+    assert not seen["volume_direct"].any()
+
+
+# Caustics -----------------------------------------------------------------------------------------------------------
+
+
+def ball(stage, radius, ior, location=(0, 0, 0)):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=radius, location=location)
+    made = bpy.context.object
+    for face in made.data.polygons:
+        face.use_smooth = True
+    made.data.materials.append(stage.material("ShaderNodeBsdfGlass", IOR=ior, Roughness=0.0))
+    return made
+
+
+def media_light(seen):
+    return (seen["volume_direct"] + seen["volume_indirect"])[..., 0]
+
+
+def lens_scene(stage, ior):
+    stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
+    stage.light("POINT", (0, 0, 2.0), energy=300, shadow_soft_size=0.0)
+    fog(stage, Color=(0.9, 0.9, 0.9, 1), Density=0.15)
+    stage.scene.candela.airlight_bounces = 0
+    return ball(stage, 0.5, ior)
+
+
+def test_a_lens_of_index_one_changes_no_fog_below_it(stage):
+    made = lens_scene(stage, 1.0001)
+    lens = media_light(stage.render(16, size=(32, 32), bounces=1))[:13]
+    assert stage.ledger.row("volume_caustics").state == "ran"
+    made.hide_render = True
+    clear = media_light(stage.render(16, size=(32, 32), bounces=1))[:13]
+    assert lens.mean() == pytest.approx(clear.mean(), rel=0.02)
+
+
+def test_neither_rays_nor_pixels_change_a_beam(stage):
+    lens_scene(stage, 1.5)
+    found = {}
+    for rays, size in ((64, 32), (128, 32), (256, 32), (128, 64)):
+        stage.scene.candela.volume_caustics_rays = rays
+        found[rays, size] = stage.render(4, size=(size, size), bounces=1)["volume_indirect"].mean()
+    assert list(found.values()) == pytest.approx([found[256, 32]] * 4, rel=0.02)
+
+
+def test_a_ball_lens_gathers_light_where_optics_say(stage):
+    """Paraxial focus half a radius behind the ball (index 1.5); rays off the axis cross nearer to it."""
+    stage.camera((0, -20, 0), (np.pi / 2, 0, 0))
+    camera = stage.scene.camera.data
+    camera.type, camera.ortho_scale = "ORTHO", 6.0
+    stage.light("SUN", (0, 0, 5), energy=1.0, angle=0.0)
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.01), (-3, -3, -3), (3, 3, 3))
+    stage.scene.candela.airlight_bounces = 0
+    ball(stage, 1.0, 1.5)
+    beams = stage.render(8, size=(96, 96), bounces=1)["volume_indirect"][..., 0]
+    axis = beams[:, 46:50].mean(axis=1)
+    z = (np.arange(96) + 0.5 - 48) / 16
+    below = z < -1.05
+    brightest = z[below][axis[below].argmax()]
+    assert -1.55 <= brightest <= -1.1
+    wide = [(row > 0.3 * row.max()).sum() for row in beams[below]]
+    assert z[below][int(np.argmin(wide))] == pytest.approx(-1.5, abs=0.25)
+
+
+# What breaks things -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("density", [0.0, 1e6, -3.0, 1e38])
+def test_any_density_gives_a_finite_picture(stage, density):
+    stage.camera_above()
+    glowing_floor(stage)
+    stage.light("POINT", (0, 0, 0), energy=10, shadow_soft_size=0.0)  # in the middle of it
+    box(stage, volume(stage, "ShaderNodeVolumePrincipled", Density=density, Emission_Strength=0.1))
+    seen = stage.render(2, size=(8, 8))["combined"]
+    assert (seen[..., :3] >= 0).all()
+    if density == 1e6:
+        assert seen[4, 4, 0] < 1.0
+
+
+def test_open_meshes_and_flat_ones_give_a_finite_picture(stage):
+    stage.camera_above()
+    glowing_floor(stage)
+    stage.light("POINT", (0, 0, 1), energy=10)
+    made = volume(stage, Density=0.5)
+    stage.rectangle((-1, -1), (0, 1), z=0.0, material=made)
+    box(stage, made, (0.2, -1, 0), (1, 1, 0))
+    stage.render(2, size=(8, 8))
+
+
+def test_a_grid_of_any_numbers_gives_a_finite_picture(stage, tmp_path):
+    vdb = openvdb()
+    rng = np.random.default_rng(1)
+    values = rng.random((8, 8, 8), np.float32)
+    values[2, 3, 4], values[4, 4, 4], values[1, 1, 1] = np.nan, np.inf, -5.0
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    grid.copyFromArray(values, ijk=(-4, -4, -4))
+    grid.transform = vdb.createLinearTransform(voxelSize=0.25)
+    vdb.write(str(tmp_path / "cloud.vdb"), [grid])
+    cloud = bpy.data.volumes.new("cloud")
+    cloud.filepath = str(tmp_path / "cloud.vdb")
+    cloud.materials.append(volume(stage, "ShaderNodeVolumePrincipled", Density=1.0))
+    stage.link("cloud", cloud)
+    stage.camera_above()
+    glowing_floor(stage)
+    stage.light("POINT", (0, 0, 2))
+    seen = stage.render(2, size=(16, 16))
+    assert seen["combined"][8, 8, 0] > 0.05
+    assert seen["volume_direct"].max() > 0
+
+
+def test_voxels_absorb_what_stands_in_them(stage, tmp_path):
+    """An even grid of 8 voxels of 0.25 m, lifted by a voxel: two metres of extinction 0.4."""
+    vdb = openvdb()
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    grid.copyFromArray(np.full((8, 8, 8), 0.4, np.float32), ijk=(-4, -4, -3))
+    grid.transform = vdb.createLinearTransform(voxelSize=0.25)
+    vdb.write(str(tmp_path / "even.vdb"), [grid])
+    cloud = bpy.data.volumes.new("even")
+    cloud.filepath = str(tmp_path / "even.vdb")
+    made = volume(stage, "ShaderNodeVolumePrincipled", Density=1.0, Color=(0, 0, 0, 1))
+    cloud.materials.append(made)
+    stage.link("even", cloud)
+    stage.camera_above()
+    glowing_floor(stage)
+    seen = stage.render(4, size=(16, 16))["combined"]
+    assert seen[8, 8, 0] == pytest.approx(2 * np.exp(-0.8), rel=0.01)
+    assert seen[8, 3, 0] == pytest.approx(2.0 * (np.exp(-0.8) if abs(3.5 - 8) / 4 < 1.0 else 1.0), rel=0.01)
+
+
+def test_a_change_of_fog_alone_begins_the_picture_anew(stage):
+    stage.camera_above()
+    glowing_floor(stage)
+    made = box(stage, absorber(stage, (0.8, 0.8, 0.8)))
+    seen = []
+    for density in (1.0, 2.0):
+        node = next(n for n in made.data.materials[0].node_tree.nodes if n.type == "VOLUME_ABSORPTION")
+        node.inputs["Density"].default_value = density
+        seen.append(stage.render(size=(8, 8))["combined"][4, 4, 0])
+    assert seen == pytest.approx([2 * np.exp(-0.8), 2 * np.exp(-1.6)], rel=1e-3)
+    fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=0.1)
+    thin = stage.render(size=(8, 8))["combined"][0, 0, 0]
+    node = next(n for n in stage.scene.world.node_tree.nodes if n.type == "VOLUME_ABSORPTION")
+    node.inputs["Density"].default_value = 0.2
+    assert stage.render(size=(8, 8))["combined"][0, 0, 0] == pytest.approx(thin * np.exp(-1.2), rel=1e-2)
+
+
+def test_fog_in_a_scene_without_any_mesh(stage):
+    stage.camera((0, -6, 0), (np.pi / 2, 0, 0))
+    stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.0)
+    fog(stage, Density=0.2)
+    assert stage.render(2, size=(8, 8))["volume_direct"].min() > 0
+
+
+def test_a_lamp_in_endless_fog_is_seen_as_far_as_it_is(stage):
+    stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.2)
+    stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.4)
+    clear = stage.render(8, size=(9, 9))["emission"][4, 4, 0]
+    fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=0.2)
+    seen = stage.render(8, size=(9, 9))["emission"][4, 4, 0]
+    assert seen == pytest.approx(clear * np.exp(-0.2 * 6.0), rel=0.01)

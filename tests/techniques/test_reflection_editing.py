@@ -1,0 +1,300 @@
+"""Edits of reflections: the solve against closed forms and numpy, distances along meshes, and pictures."""
+
+import numpy as np
+import pytest
+
+from addon.gfx import images, passes
+from addon.surfaces import geodesic, reflection_edits
+from addon.surfaces.reflection_edits import EUCLIDEAN, SOLVE, Constraint, Region, edit_table, mirrored
+
+UP = np.array([0.0, 0.0, 1.0])
+EVERYWHERE = Region(EUCLIDEAN, np.zeros(3), 1e6, 0.0)
+
+
+def unit(*v):
+    return np.asarray(v, float) / np.linalg.norm(v)
+
+
+def about(axis, degrees):
+    """(3, 3) rotation about an axis."""
+    x, y, z = unit(*axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.radians(degrees)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def pair(place, before, after):
+    return Constraint(np.asarray(place, float), np.asarray(before, float), np.asarray(after, float), UP)
+
+
+def matrices(quaternions):
+    """(N, 3, 3) of quaternions (N, 4), x y z w."""
+    x, y, z, w = quaternions.T.astype(float)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def solved(constraints, places, directions, regions=(EVERYWHERE,), extent=1.0):
+    """(N, 4) quaternions that the GPU finds."""
+    places, directions = np.broadcast_arrays(np.atleast_2d(places), np.atleast_2d(directions))
+    members = [
+        sum(
+            1 << n
+            for n, one in enumerate(constraints)
+            if reflection_edits.influence(region, np.linalg.norm(one.place - region.centre)) > 0
+        )
+        for region in regions
+    ]
+    table = edit_table(constraints, regions, members, extent)
+    shaped = [np.pad(a, ((0, 0), (0, 1)))[None].astype(np.float32) for a in (places, directions)]
+    with images.borrowed(len(places), 1, "RGBA32F") as target:
+        passes.fullscreen(
+            SOLVE,
+            target,
+            textures={"places": images.upload(shaped[0]), "directions": images.upload(shaped[1])},
+            blocks={"edits": table.block},
+            constants=table.constants,
+        )
+        return images.read(target.colors[0])[0]
+
+
+def edited(constraints, places, directions, **options):
+    """(N, 3) directions after the edit."""
+    q = solved(constraints, places, directions, **options)
+    turned = np.einsum("nij,nj->ni", matrices(q), np.broadcast_to(directions, (len(q), 3)))
+    return np.where((q**2).sum(axis=1, keepdims=True) > 0, turned, directions)
+
+
+def degrees_between(a, b):
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))
+
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+
+def test_one_constraint_is_the_shortest_way_everywhere():
+    before, after = unit(0.2, -0.3, 1), unit(1, 0.5, 0.4)
+    places = np.random.default_rng(1).normal(size=(50, 3))
+    found = edited([pair((0, 0, 0), before, after)], places, before)
+    assert degrees_between(found, after).max() < 0.03
+    axis = np.cross(before, after)
+    assert degrees_between(edited([pair((0, 0, 0), before, after)], places, unit(*axis)), unit(*axis)).max() < 0.03
+
+
+def test_between_two_constraints_angles_blend_by_inverse_squares():
+    turned = [about((0, 1, 0), angle) @ UP for angle in (20, 60)]
+    constraints = [pair((x, 0, 0), UP, after) for x, after in zip((0, 1), turned)]
+    places = np.stack([[0.1, 0.25, 0.5, 0.75, 0.9], np.zeros(5), np.zeros(5)], axis=1)
+    found = degrees_between(edited(constraints, places, UP), UP)
+    assert found == pytest.approx([20.45, 23.76, 40.0, 56.23, 59.55], abs=0.05)
+
+
+def test_constraints_that_change_nothing_change_nothing():
+    rng = np.random.default_rng(2)
+    constraints = [pair(rng.normal(size=3), v, v) for v in (unit(*rng.normal(size=3)) for _ in range(5))]
+    r = np.array([unit(*v) for v in rng.normal(size=(40, 3))])
+    assert np.abs(edited(constraints, rng.normal(size=(40, 3)), r) - r).max() < 1e-5
+
+
+def test_one_rotation_for_all_constraints_is_reproduced():
+    turn, rng = about((1, 2, 3), 50), np.random.default_rng(3)
+    before = [unit(*rng.normal(size=3)) for _ in range(4)]
+    constraints = [pair(rng.normal(size=3), r, turn @ r) for r in before]
+    r = np.array([unit(*v) for v in rng.normal(size=(40, 3))])
+    # Where one constraint outweighs the others, what resolves its spin is of the prior's size.
+    found = edited(constraints, rng.normal(size=(40, 3)), r)
+    assert np.median(degrees_between(found, r @ turn.T)) < 0.05
+    assert degrees_between(found, r @ turn.T).max() < 0.5
+
+
+@pytest.mark.parametrize(
+    "angle, expected", [(90, (33.69, 63.43, 80.54)), (30, (11.93, 20.10, 25.83)), (170, (18.6, 160.3, None))]
+)
+def test_fades_bend_as_the_closed_form_says(angle, expected):
+    """psi(a) = atan2(2 a sin phi, 2 a cos phi + 1 - a) for rotations about an axis at right angles."""
+    constraints = [pair((0, 0, 0), UP, about((0, 1, 0), angle) @ UP)]
+    for a, psi in zip((0.25, 0.5, 0.75), expected):
+        roots = np.roots([-2, 3, 0, -(1 - a)])  # of 1 - smoothstep = a
+        t = float(next(root.real for root in roots if abs(root.imag) < 1e-9 and 0 <= root.real <= 1))
+        region = Region(EUCLIDEAN, np.zeros(3), 2.0, 1.0)
+        found = degrees_between(edited(constraints, [(1 + t, 0, 0)], UP, regions=(region,)), UP)[0]
+        phi = np.radians(angle)
+        assert found == pytest.approx(np.degrees(np.arctan2(2 * a * np.sin(phi), 2 * a * np.cos(phi) + 1 - a)), abs=0.3)
+        if psi is not None and angle < 120:
+            assert found == pytest.approx(psi, abs=0.1)
+
+
+def test_outside_of_regions_nothing_is_solved():
+    region = Region(EUCLIDEAN, np.zeros(3), 1.0, 0.5)
+    constraints = [pair((0, 0, 0), UP, unit(1, 0, 1))]
+    assert not solved(constraints, [(1.0001, 0, 0), (5, 0, 0)], UP, regions=(region,)).any()
+    assert solved(constraints, [(0.9, 0, 0)], UP, regions=(region,)).any()
+
+
+@pytest.mark.parametrize("away", [1e-2, 1e-4, 1e-6])
+def test_edits_interpolate_at_their_constraints(away):
+    rng = np.random.default_rng(4)
+    constraints = [pair(p, unit(*rng.normal(size=3)), unit(*rng.normal(size=3))) for p in rng.normal(size=(8, 3)) * 3]
+    for one in constraints:
+        found = edited(constraints, [one.place + (away, 0, 0)], one.before, extent=1e-3)
+        assert degrees_between(found, one.after).max() < max(0.05, 60 * away)
+
+
+def test_turning_scaling_and_reordering_change_nothing():
+    rng = np.random.default_rng(5)
+    constraints = [pair(p, unit(*rng.normal(size=3)), unit(*rng.normal(size=3))) for p in rng.normal(size=(5, 3))]
+    places, r = rng.normal(size=(30, 3)), np.array([unit(*v) for v in rng.normal(size=(30, 3))])
+    plain = edited(constraints, places, r)
+    turn = about((1, -1, 2), 75)
+    turned = [pair(turn @ c.place, turn @ c.before, turn @ c.after) for c in constraints]
+    assert np.abs(edited(turned, places @ turn.T, r @ turn.T) - plain @ turn.T).max() < 2e-3
+    scaled = [pair(100 * c.place, c.before, c.after) for c in constraints]
+    assert np.abs(edited(scaled, 100 * places, r, extent=100.0) - plain).max() < 2e-3
+    assert np.abs(edited(constraints[::-1], places, r) - plain).max() < 2e-3
+
+
+def test_the_solve_agrees_with_singular_values():
+    rng = np.random.default_rng(6)
+    constraints = [pair(p, unit(*rng.normal(size=3)), unit(*rng.normal(size=3))) for p in rng.normal(size=(32, 3))]
+    places = rng.normal(size=(100, 3))
+    found = matrices(solved(constraints, places, UP))
+    assert np.linalg.det(found) == pytest.approx(1.0, abs=1e-4)
+    worst = []
+    for place, rotation in zip(places, found):
+        weights = np.array([1 / ((c.place - place) @ (c.place - place)) for c in constraints])
+        weights /= weights.max()
+        b = sum(w * np.outer(c.after, c.before) for w, c in zip(weights, constraints)) + 1e-4 * np.eye(3)
+        u, _, v = np.linalg.svd(b)
+        best = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+        cost = [sum(w * ((r @ c.before - c.after) ** 2).sum() for w, c in zip(weights, constraints))
+                for r in (rotation, best)]  # fmt: skip
+        worst.append(cost[0] / cost[1] - 1)
+    assert max(worst) < 1e-3
+
+
+@pytest.mark.parametrize("case", ["opposite", "coincident", "empty region", "no border"])
+def test_stress_stays_finite(case):
+    before = unit(0.3, 0.1, 1)
+    constraints, region = [pair((0, 0, 0), before, -before)], EVERYWHERE
+    if case == "coincident":
+        constraints = [pair((0, 0, 0), before, unit(1, 0, 0)), pair((0, 0, 0), before, unit(-1, 0, 0))]
+    if case == "empty region":
+        region = Region(EUCLIDEAN, np.zeros(3), 0.0, 0.5)
+    if case == "no border":
+        region = Region(EUCLIDEAN, np.zeros(3), 1.0, 0.0)
+    places = [(0, 0, 0), (1e-6, 0, 0), (0.5, 0, 0), (0.999, 0, 0), (1.001, 0, 0)]
+    q = solved(constraints, places, before, regions=(region,))
+    size = np.linalg.norm(q, axis=1)
+    assert np.isfinite(q).all() and (np.isclose(size, 1, atol=1e-5) | (size == 0)).all()
+    if case == "opposite":
+        assert degrees_between(edited(constraints, places, before), -before).max() < 1.0
+
+
+# Distances along surfaces -------------------------------------------------------------------------------------------
+
+
+def grid(n, height=0.0):
+    axis = np.linspace(0, 1, n)
+    positions = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.full((n, n), height)], axis=-1).reshape(-1, 3)
+    k = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (part.reshape(-1) for part in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    return positions, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def test_distances_on_a_grid_are_at_most_a_twelfth_too_long():
+    positions, triangles = grid(41)
+    middle = len(positions) // 2
+    found = geodesic.distances(geodesic.neighbours(positions, triangles), np.array([middle]), np.zeros(1))
+    straight = np.linalg.norm(positions - positions[middle], axis=1)
+    assert (found >= straight - 1e-9).all()
+    apart = straight > 0
+    assert (found[apart] / straight[apart]).max() == pytest.approx(1.0824, abs=1e-3)
+
+
+def test_sheets_that_no_path_joins_are_unreached_and_a_fold_is_gone_around():
+    low, triangles = grid(11)
+    both = np.concatenate([low, low + (0, 0, 0.01)])
+    faces = np.concatenate([triangles, triangles + len(low)])
+    found = geodesic.distances(geodesic.neighbours(both, faces), np.array([0]), np.zeros(1))
+    assert (found[len(low) :] == geodesic.UNREACHED).all()
+    edge = np.arange(110, 121)  # x = 1 of the lower sheet, and the same of the upper one
+    seam = np.stack([edge[:-1], edge[1:], edge[1:] + len(low)], axis=1)
+    joined = geodesic.distances(geodesic.neighbours(both, np.concatenate([faces, seam])), np.array([0]), np.zeros(1))
+    assert joined[len(low)] == pytest.approx(2.0, rel=0.05)
+
+
+def test_the_nearest_place_of_a_mesh():
+    positions, triangles = grid(5)
+    triangle, weights = geodesic.nearest(positions, triangles, np.array([0.3, 0.6, 0.5]))
+    assert weights @ positions[triangles[triangle]] == pytest.approx([0.3, 0.6, 0.0])
+    triangle, weights = geodesic.nearest(positions, triangles, np.array([-1.0, 0.6, 0.0]))
+    assert weights @ positions[triangles[triangle]] == pytest.approx([0.0, 0.6, 0.0])
+
+
+# Pictures -----------------------------------------------------------------------------------------------------------
+
+
+def mirror_scene(stage, roughness=0.0):
+    """A mirror on the ground before a wall of two emissive halves, seen from in front."""
+    metal = stage.principled(Metallic=1.0, Roughness=roughness, Base_Color=(1, 1, 1, 1))
+    mirror = stage.rectangle((-2, -2), (2, 2), material=metal)
+    for name, x, color in (("left", -3, (1, 0.2, 0.1, 1)), ("right", 3, (0.1, 0.2, 1, 1))):
+        light = stage.material("ShaderNodeEmission", Color=color, Strength=1.0)
+        stage.rectangle((-3, -6), (3, 6), material=light, location=(x, 6, 0), turn=(np.pi / 2, 0, 0)).name = name
+    stage.floor(material=stage.diffuse(0.5), z=-0.5)
+    stage.light("AREA", location=(0, 0, 5), size=2.0)
+    stage.camera((0, -6, 3), (np.radians(65), 0, 0), 0.7)
+    return mirror
+
+
+def constrain(mirror, point, target, viewer, radius=10.0, border=0.0):
+    settings = mirror.candela
+    one = settings.reflection_editing_constraints.add()
+    one.point, one.target, one.viewer = point, target, viewer
+    region = settings.reflection_editing_regions.add()
+    region.radius, region.border = radius, border
+    mirror.update_tag()
+
+
+def test_without_enabled_edits_pictures_are_the_same_to_the_bit(stage):
+    mirror = mirror_scene(stage)
+    plain = stage.render(2, bounces=4)
+    constrain(mirror, (0, 0, 0), (-3, 6, 2), (0, -6, 3))
+    mirror.candela.reflection_editing_constraints[0].enabled = False
+    off = stage.render(2, bounces=4)
+    assert all(np.array_equal(plain[name], off[name]) for name in plain)
+
+
+def test_a_plane_mirror_shows_what_one_leaning_by_half_the_angle_does(stage):
+    """The axis of the edit lies in the mirror: every ray is as off a mirror that is turned by half as much."""
+    mirror = mirror_scene(stage)
+    viewer = np.array([0.0, -6.0, 3.0])
+    before = mirrored(unit(*viewer), UP)
+    after = about((1, 0, 0), 16) @ before
+    constrain(mirror, (0, 0, 0), tuple(10 * after), tuple(viewer))
+    found = stage.render(4, (48, 48), bounces=2)
+    mirror.candela.reflection_editing_constraints.clear()
+    lean = about((1, 0, 0), 8) @ UP
+    mirror.data.normals_split_custom_set([tuple(lean)] * 4)
+    expected = stage.render(4, (48, 48), bounces=2)
+    difference = np.abs(found["combined"][..., :3] - expected["combined"][..., :3])
+    assert np.median(difference) < 1e-3
+    assert (difference.max(axis=-1) > 0.02).mean() < 0.02  # edges between colours
+    assert np.array_equal(found["diffuse_direct"], expected["diffuse_direct"]) or np.allclose(
+        found["diffuse_direct"], expected["diffuse_direct"], atol=1e-5
+    )
+
+
+def test_pixels_outside_of_regions_do_not_change(stage):
+    mirror = mirror_scene(stage)
+    stage.scene.candela.denoise_strength = 0.0
+    plain = stage.render(1, (48, 48), bounces=2)
+    constrain(mirror, (0.1, 0, 0), (-3, 6, 3), (0, -6, 3), radius=0.5, border=0.2)
+    found = stage.render(1, (48, 48), bounces=2)
+    changed = np.any(found["combined"] != plain["combined"], axis=-1)
+    assert 0 < changed.mean() < 0.25
+    assert np.array_equal(found["diffuse_direct"], plain["diffuse_direct"])

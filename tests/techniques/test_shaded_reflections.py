@@ -1,0 +1,107 @@
+"""Shading of hits: mirrors and glass show surfaces with their own materials, bounce by bounce, by closed forms."""
+
+import numpy as np
+import pytest
+
+from .conftest import places
+
+SIZE = (24, 24)
+
+
+def shining(stage, source="UV"):
+    """Emission by UV, or by another output of the Texture Coordinate node."""
+    made = stage.material("ShaderNodeEmission", Strength=1.0)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    place = nodes.new("ShaderNodeTexCoord")
+    emission = next(node for node in nodes if node.type == "EMISSION")
+    links.new(place.outputs[source], emission.inputs["Color"])
+    return made
+
+
+def mirror(stage, tint=1.0):
+    return stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(tint, tint, tint, 1))
+
+
+def reflected(images):
+    return sum(images[f"glossy_{order}"][..., :3] * images["glossy_color"][..., :3] for order in ("direct", "indirect"))
+
+
+def ceiling(stage, material, half=4.0, z=15.0):
+    """A square above the camera that faces down, with a UV map over it."""
+    made = stage.rectangle((-half, -half), (half, half), material=material, location=(0, 0, z), turn=(np.pi, 0, 0))
+    layer = made.data.uv_layers.new(name="UVMap")
+    for corner, place in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
+        layer.uv[corner].vector = place
+    return made
+
+
+def test_a_mirror_shows_a_texture_that_no_view_does(stage):
+    """u runs with x, v against y, since the ceiling is turned around X."""
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    ceiling(stage, shining(stage))
+    stage.camera_above()
+    found = reflected(stage.render(1, SIZE, bounces=2))
+    x, y = places(SIZE)
+    assert found[..., 0] == pytest.approx((x + 4) / 8, abs=2e-3)
+    assert found[..., 1] == pytest.approx((4 - y) / 8, abs=2e-3)
+    assert np.abs(found[..., 2]).max() < 1e-6
+
+
+def test_procedurals_see_the_objects_own_space(stage):
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    top = ceiling(stage, shining(stage, "Object"))
+    top.scale = (2, 2, 2)
+    stage.camera_above()
+    found = reflected(stage.render(1, SIZE, bounces=2))
+    x, y = places(SIZE)
+    assert found[..., 0] == pytest.approx(x / 2, abs=2e-3)
+    assert found[..., 1] == pytest.approx(-y / 2, abs=2e-3)
+
+
+@pytest.mark.parametrize("bounces, share", [(1, 0.0), (2, 0.25), (8, 0.25)])
+def test_each_mirror_takes_its_share(stage, bounces, share):
+    """A periscope of two mirrors that reflect half, before a lamp-like square."""
+    half = mirror(stage, 0.5)
+    stage.rectangle((-3, -3), (3, 3), material=half, turn=(0, np.radians(45), 0))
+    stage.rectangle((-3, -3), (3, 3), material=half, location=(8, 0, 0), turn=(0, np.radians(-135), 0))
+    light = stage.material("ShaderNodeEmission", Strength=1.0)
+    stage.rectangle((-9, -9), (9, 9), material=light, location=(8, 0, -6))
+    light_above = stage.rectangle((-9, -9), (9, 9), material=light, location=(8, 0, 30))
+    light_above.visible_camera = False
+    stage.camera_above(span=1.0)
+    images = stage.render(1, (8, 8), bounces=bounces)
+    assert reflected(images).mean() == pytest.approx(share, abs=1e-3)
+
+
+def test_what_no_ray_meets_costs_nothing(stage):
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    hidden = stage.rectangle((-1, -1), (1, 1), material=stage.diffuse(0.3), location=(0, 0, -5))
+    hidden.visible_camera = True
+    stage.world((0.5, 0.5, 0.5))
+    stage.camera_above()
+    stage.render(2, SIZE, bounces=4)
+    row = next(row for row in stage.ledger.rows if row.name == "shaded_reflections")
+    assert row.state == "ran" and "materials" not in row.counters
+
+
+def test_light_reaches_what_a_mirror_shows(stage):
+    """A white ceiling under a world of radiance 1 that stands before an endless mirror: it sends back what it gets."""
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    ceiling(stage, stage.diffuse(0.5), half=3.0)
+    stage.light("SUN", location=(0, 0, 0), turn=(np.pi, 0, 0), angle=0.0).data.use_shadow = False
+    stage.camera_above(span=1.0)
+    found = reflected(stage.render(4, (8, 8), bounces=2))
+    assert found.mean() == pytest.approx(0.5 / np.pi, rel=0.01)
+
+
+def test_a_draft_shows_means(stage):
+    from addon.frame.settings import Settings
+    from addon.techniques.shaded_reflections import ShadedReflections
+
+    stage.rectangle((-9, -9), (9, 9), material=mirror(stage))
+    stage.world()
+    stage.camera_above()
+    stage.render(1, SIZE, bounces=2)
+    snapshot = stage.renderer.frame.snapshot
+    assert ShadedReflections().skip(snapshot, Settings()) is None
+    assert "drafts" in ShadedReflections().skip(snapshot, Settings().as_draft())

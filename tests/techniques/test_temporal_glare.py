@@ -1,0 +1,196 @@
+"""Temporal glare in rendered pictures: when it runs, what it leaves as it is, and that time alone decides its state."""
+
+import numpy as np
+import pytest
+
+from addon.eye import optics
+from addon.frame.ledger import RAN, SKIPPED
+from addon.gfx import images as gpu_images
+from addon.gfx import library
+
+SIZE = (72, 54)
+
+
+@pytest.fixture
+def night(stage):
+    """A grey floor in dim light with small bright squares, seen from above."""
+    stage.world((0.05, 0.05, 0.05))
+    stage.floor(material=stage.diffuse(0.5))
+    lamp = stage.material("ShaderNodeEmission", Color=(1.0, 0.7, 0.4, 1), Strength=400.0)
+    for x, y in ((-1.0, 0.6), (0.4, -0.7), (1.3, 0.9)):
+        stage.rectangle((x, y), (x + 0.06, y + 0.06), 0.1, material=lamp)
+    stage.camera_above()
+    settings = stage.scene.camera.data.candela
+    settings.glare_mode = "CONVOLUTION"
+    settings.eye_side, settings.glare_magnification = "128", 100.0  # of a picture of few pixels
+    stage.scene.frame_set(24)
+    return stage
+
+
+def glare_row(stage):
+    return stage.ledger.row("glare")
+
+
+def test_glare_is_a_pass_beside_a_combined_that_stays_as_it_is(night):
+    with_glare = night.render(size=SIZE)
+    assert glare_row(night).state == RAN
+    night.scene.camera.data.candela.glare_mode = "OFF"
+    without = night.render(size=SIZE)
+    assert "glare" not in without
+    np.testing.assert_array_equal(with_glare["combined"], without["combined"])
+    assert night.ledger.row("eye").state == glare_row(night).state == SKIPPED
+    lens, combined = with_glare["glare"][..., :3], with_glare["combined"][..., :3]
+    assert (lens >= 0).all()
+    added = (lens - combined).clip(0)
+    assert (added.max(axis=-1) > 1e-3).mean() > 0.2
+    np.testing.assert_array_equal(with_glare["glare"][..., 3], with_glare["combined"][..., 3])
+
+
+@pytest.mark.parametrize("resolution", ["FULL", "HALF"])
+def test_the_picture_is_the_convolution_by_numpy_of_the_linear_picture(night, resolution):
+    """With the kernel of the reference, from the aperture on."""
+    night.scene.camera.data.candela.glare_resolution = resolution
+    images = night.render(size=SIZE)
+    service = night.renderer.frame.service(_point_spread())
+    kernel = service._kernel[1]
+    weights = gpu_images.read(kernel.weights)[..., :3].astype(np.float64)
+    pattern = service._pattern[1]
+    side = kernel.scale.side
+    aperture = gpu_images.read(pattern.aperture)[..., 0].astype(np.float64).reshape(side, 2, side, 2).mean((1, 3))
+    colours = optics.colours(optics.intensity(optics.field(aperture, 0.25)))
+    expected = optics.tail(optics.over_pixels(colours, kernel.scale), kernel.scale)
+    assert np.sqrt(np.mean((weights - expected) ** 2) / np.mean(expected**2)) < 1e-3
+    if resolution == "FULL":
+        lens = optics.glare(images["combined"].astype(np.float64), expected, 1.0, 1.0, 1e6)
+        error = np.sqrt(np.mean((images["glare"][..., :3] - lens) ** 2) / np.mean(lens**2))
+        assert error < 1e-3
+    else:
+        total = images["combined"][..., :3].sum()
+        assert images["glare"][..., :3].sum() == pytest.approx(total, rel=0.05)  # some leaves at the borders
+
+
+def _point_spread():
+    from addon.techniques.eye import PointSpread
+
+    return PointSpread
+
+
+def test_a_picture_without_bright_light_is_left_to_the_bit_and_no_transform_compiled(night):
+    night.remove(next(o for o in night.scene.objects if o.name.startswith("Mesh.001")))
+    for thing in [o for o in night.scene.objects if o.type == "MESH" and o.dimensions.x < 1]:
+        night.remove(thing)
+    library._shaders.clear()
+    images = night.render(size=SIZE)
+    row = glare_row(night)
+    assert row.state == SKIPPED
+    assert "white" in row.reason
+    assert not [program.name for program in library._shaders if "Fourier" in program.name]
+    np.testing.assert_array_equal(images["glare"], images["combined"])
+
+
+def test_one_faint_highlight_is_not_worth_it(night):
+    night.scene.camera.data.candela.glare_strength = 1e-4
+    images = night.render(size=SIZE)
+    assert "half a step" in glare_row(night).reason
+    np.testing.assert_array_equal(images["glare"], images["combined"])
+
+
+def test_the_same_frame_is_the_same_alone_and_in_sequence(night):
+    scene = night.scene
+    sequence = {}
+    for frame in range(38, 41):
+        scene.frame_set(frame)
+        sequence[frame] = night.render(size=SIZE)["glare"]
+    assert np.abs(sequence[40] - sequence[39]).max() > 1e-4 * sequence[40].max()
+    night.renderer.release()
+    alone = night.render(size=SIZE)["glare"]
+    np.testing.assert_array_equal(alone, sequence[40])
+    np.testing.assert_array_equal(night.render(size=SIZE)["glare"], alone)
+
+
+def test_another_time_draws_no_sample_anew(night):
+    night.render(size=SIZE)
+    night.scene.frame_set(31)
+    night.render(size=SIZE)
+    assert night.ledger.row("film").state == "reused"
+    assert glare_row(night).state == RAN
+    night.scene.camera.data.candela.glare_strength = 0.5
+    night.render(size=SIZE)
+    assert night.ledger.row("film").state == "reused"
+
+
+def test_billboards_show_needles_where_a_convolution_washes_them_out(night):
+    candle = night.material("ShaderNodeEmission", Color=(1, 0.6, 0.3, 1), Strength=60.0)
+    night.rectangle((-0.1, -0.1), (0.1, 0.7), 0.2, material=candle)
+    convolved = night.render(size=SIZE)["glare"]
+    night.scene.camera.data.candela.glare_mode = "BILLBOARDS"
+    boards = night.render(size=SIZE)["glare"]
+    assert np.abs(boards - convolved).mean() > 1e-3 * convolved.mean()
+    assert boards.sum() == pytest.approx(convolved.sum(), rel=0.02)
+
+
+def test_a_blink_darkens_the_picture_and_shut_lids_leave_nothing(night):
+    before = night.render(size=SIZE)["glare"][..., :3]
+    night.scene.camera.data.candela.eye_blink = 0.75
+    half = night.render(size=SIZE)["glare"][..., :3]
+    night.scene.camera.data.candela.eye_blink = 1.0
+    shut = night.render(size=SIZE)
+    assert 0.0 < half.sum() < 0.9 * before.sum()
+    assert not shut["glare"][..., :3].any()
+    assert shut["combined"].any()
+
+
+def test_a_bright_field_makes_the_pupil_small(night):
+    def diameter():
+        night.render(size=SIZE)
+        technique = next(t for t in night.renderer.techniques if t.name == "eye")
+        frame = night.renderer.frame
+        service = frame.service(_point_spread())
+        assert service is technique._service
+        return service._pattern[0][3]
+
+    night.scene.camera.data.candela.eye_restlessness = 0.0
+    night.scene.camera.data.candela.glare_luminance = 0.01
+    dark = diameter()
+    night.scene.camera.data.candela.glare_luminance = 1e4
+    assert diameter() < dark - 1.0
+    night.scene.camera.data.candela.eye_pupil = 6.0
+    assert diameter() == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("change", [{}, {"film_transparent": True}, {"border": True}])
+def test_odd_pictures_are_drawn(night, change):
+    render = night.scene.render
+    render.film_transparent = change.get("film_transparent", False)
+    if change.get("border"):
+        render.use_border = True
+        render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.1, 0.93, 0.2, 0.77
+    night.scene.camera.data.candela.glare_sharp = False
+    night.scene.camera.data.candela.eye_fibres = 1.0
+    images = night.render(size=(53, 31))
+    assert np.isfinite(images["glare"]).all()
+
+
+def test_a_viewport_shows_the_lens_and_shows_its_samples_anew_at_another_time(night):
+    from tests.viewport.region import SIZE as REGION_SIZE
+    from tests.viewport.region import Region
+
+    night.scene.camera.data.candela.glare_white = 0.5
+    region = Region(samples=2)
+    first = region.rest()
+    frame = region.viewport.frame
+    assert frame.picture == "film.lens"
+    linear = region.viewport.renderer.frame.images["film.combined"]
+    assert (first[..., :3] != gpu_images.read(linear)[..., :3]).any()
+    night.scene.frame_set(30)
+    region.viewport.dirty = True
+    second = gpu_images.read(region.draw())
+    assert region.viewport.frame is frame
+    assert second.shape == (REGION_SIZE[1], REGION_SIZE[0], 4)
+    assert (first != second).any()
+    night.scene.camera.data.candela.glare_strength = 0.25
+    region.viewport.dirty = True
+    weaker = gpu_images.read(region.draw())
+    assert region.viewport.frame is frame
+    assert np.abs(weaker - gpu_images.read(linear)).sum() < np.abs(second - gpu_images.read(linear)).sum()
+    region.viewport.release()
