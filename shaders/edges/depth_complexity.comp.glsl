@@ -21,25 +21,8 @@
 
 // Points are asked sixteen, or eight, in a turn of a loop: Mesa's software rasteriser ends all loops of a thread after
 // 65,536 turns together, which 64 points of a thousand edges take.
-#define HIT(number) { \
-  vec3 offset = light_offset(f, light_pattern_fetch(ivec2(number, own_pattern)).xyz); \
-  bool crossed = ((n_centre + dot(n, offset) >= 0.0) != side) \
-                 && ((dot(k0, offset) >= 0.0) != (dot(k1, offset) >= 0.0)) \
-                 && ((dot(q, offset) >= 0.0) == side); \
-  half_hit |= crossed ? (1u << uint((number) & 31)) : 0u; \
-}
-#define ADD(number) { \
-  uvec2 next = (plane[number] ^ turn) & carry; \
-  plane[number] ^= carry; \
-  carry = next; \
-}
-#define COVER(number) { \
-  uint one = 1u << uint((number) & 31); \
-  if ((half_seen & one) != 0u) { \
-    vec3 offset = light_offset(f, light_pattern_fetch(ivec2(number, own_pattern)).xyz); \
-    half_seen &= card_hides(card, view, c + offset, pixel, number) ? ~one : 0xffffffffu; \
-  } \
-}
+#define HIT(number) half_hit |= hidden_point(number, own_pattern, f, n_centre, n, k0, k1, q);
+#define ADD(number) next = (plane[number] ^ turn) & carry; plane[number] ^= carry; carry = next;
 
 vec4 edge_texel(int index)
 {
@@ -50,6 +33,32 @@ uint word_of(int index)
 {
   return tile_words_fetch(ivec2(index & 2047, index >> 11)).x;
 }
+
+// The bit of point `k` where the edge lies in the triangle (receiver, centre, point). `n`: normal of the plane through the
+// receiver and the edge, on whose side n_centre the centre lies; k0, k1, q: of the planes through the receiver, the centre
+// and either end, and of that through the centre and the edge.
+uint hidden_point(int k, int own_pattern, LightFrame f, float n_centre, vec3 n, vec3 k0, vec3 k1, vec3 q)
+{
+  vec3 offset = light_offset(f, light_pattern_fetch(ivec2(k, own_pattern)).xyz);
+  bool side = n_centre >= 0.0;
+  bool crossed = ((n_centre + dot(n, offset) >= 0.0) != side) && ((dot(k0, offset) >= 0.0) != (dot(k1, offset) >= 0.0))
+                 && ((dot(q, offset) >= 0.0) == side);
+  return crossed ? (1u << uint(k & 31)) : 0u;
+}
+
+#ifdef CARDS
+// The bit of point `k` where it is still seen (bits of its half) and the card hides it.
+uint covered_point(int k, uint half_seen, int own_pattern, LightFrame f, Card card, CardView view, vec3 c, ivec2 pixel)
+{
+  uint one = 1u << uint(k & 31);
+  if ((half_seen & one) == 0u) {
+    return 0u;
+  }
+  vec3 offset = light_offset(f, light_pattern_fetch(ivec2(k, own_pattern)).xyz);
+  return card_hides(card, view, c + offset, pixel, k) ? one : 0u;
+}
+#define COVER(number) half_seen &= ~covered_point(number, half_seen, own_pattern, f, card, view, c, pixel);
+#endif
 
 void main()
 {
@@ -119,6 +128,7 @@ void main()
         int change = side ? weight : -weight;
         uvec2 carry = hit;
         int lowest = (abs(change) == 2) ? 1 : 0;
+        uvec2 next;
         uvec2 turn = uvec2((change < 0) ? 0xffffffffu : 0u);
         if (lowest == 0) {
           ADD(0)
