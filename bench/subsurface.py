@@ -198,7 +198,9 @@ def clear() -> None:
     bpy.data.batch_remove([*bpy.data.materials, *bpy.data.worlds])
 
 
-def lines(name: str, method: str, size, reference: int, pictures: Path | None) -> list[tuple[str, ...]]:
+def lines(
+    name: str, method: str, size, reference: int, pictures: Path | None, entrants=ENTRANTS
+) -> list[tuple[str, ...]]:
     """Rows of the table for one scene and method."""
     import bpy
 
@@ -218,7 +220,7 @@ def lines(name: str, method: str, size, reference: int, pictures: Path | None) -
     scale = bright**2 + (0.1 * bright.mean()) ** 2
     noise = float((((first - second) / 2) ** 2 / scale).mean())
     rows, beside = [], [right]
-    for engine, samples in ENTRANTS:
+    for engine, samples in entrants:
         shown(engine, samples)
         picture, seconds = shown(engine, samples, 1)
         error = max(float(((picture - right) ** 2 / scale).mean()) - noise, 0.0)
@@ -228,7 +230,7 @@ def lines(name: str, method: str, size, reference: int, pictures: Path | None) -
         if (engine, samples) in (("CANDELA", 1), ("CANDELA", 64), ("BLENDER_EEVEE", 16)):
             beside.append(picture)
     if pictures is not None:
-        row = np.concatenate([beside[1], beside[2], beside[0], beside[3]], axis=1)
+        row = np.concatenate([*beside[1:3], beside[0], *beside[3:]], axis=1)
         shades = (np.clip(row, 0.0, 1.0) ** (1 / 2.2) * 255).astype(np.uint8)[::-1]
         pictures.mkdir(parents=True, exist_ok=True)
         file = pictures / f"{name.replace(' ', '_').replace(',', '')}_{method.lower()}.png"
@@ -251,6 +253,7 @@ COMMAND = "python -m bench subsurface --page docs/subsurface.md"
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=list(SCENES), metavar="NAME")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS, metavar="METHOD")
+    parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out, which compiles for minutes")
     parser.add_argument("--size", type=size_of, default=(96, 96), metavar="WxH", help="default 96x96")
     parser.add_argument("--reference", type=int, default=512, metavar="N", help="of each of two (default 512)")
     parser.add_argument("--page", type=Path, metavar="PATH", help="write the table between its marks, too")
@@ -262,9 +265,10 @@ def command(options: argparse.Namespace) -> int:
 
     addon.register()
     rows: list[tuple[str, ...]] = []
+    entrants = tuple(one for one in ENTRANTS if not (options.no_eevee and one[0] == "BLENDER_EEVEE"))
     for name in options.scenes:
         for method in options.methods:
-            added = lines(name, method, options.size, options.reference, options.pictures)
+            added = lines(name, method, options.size, options.reference, options.pictures, entrants)
             print(table([HEAD, *added]), flush=True)
             rows += added
             if options.page:
