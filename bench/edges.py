@@ -193,6 +193,7 @@ def _wires(scene) -> None:
                     a, b = first + 6 * s + c, first + 6 * s + (c + 1) % 6
                     faces.append((a, b, b + 6, a + 6))
     mesh.from_pydata(vertices, [], faces)
+    mesh.materials.clear()
     mesh.materials.append(bpy.data.materials["White"])
     mesh.update()
 
@@ -223,6 +224,7 @@ def _card(scene) -> None:
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image, texture.interpolation = image, "Closest"
     tree.links.new(texture.outputs["Alpha"], shader.inputs["Alpha"])
+    mesh.materials.clear()
     mesh.materials.append(material)
 
 

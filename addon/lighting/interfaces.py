@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..frame.run import Frame
 from ..materials.compiled import CompiledMaterial
 
 
@@ -31,3 +32,9 @@ def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, flo
             if not material.glass:
                 row[1, 0] = mirrors[number]
     return table
+
+
+def clear_roughness(frame: Frame) -> float:
+    """Roughness up to which glass shows that nothing is behind it (Film > Transparent Glass); below 0: none does."""
+    film = frame.snapshot.film
+    return film.clear_glass if film.transparent else -1.0

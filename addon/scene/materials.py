@@ -352,11 +352,13 @@ EVERY_DEFINES = tuple((name, "-1" if name == "VISIBILITY_FLAG" else value) for n
 
 
 def _emission_program(compiled: CompiledMaterial) -> Program:
+    like = _caster_program(compiled)
     return replace(
-        _caster_program(compiled),
+        like,
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
+        constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
         defines=EVERY_DEFINES,
     )
 

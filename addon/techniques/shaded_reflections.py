@@ -35,6 +35,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..lighting.interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
@@ -76,7 +77,12 @@ def scatter_program(onward: bool) -> Program:
         "hits/scatter.frag.glsl",
         textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *(("RGBA32F", name) for name in before)),
         blocks=((VIEW, "film_view"),),
-        constants=(*REACH, ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size")),
+        constants=(
+            *REACH,
+            ("FLOAT", "traced_roughness"),
+            ("FLOAT", "offset_size"),
+            ("FLOAT", "clear_roughness"),
+        ),
         defines=(("ONWARD", "1"),) if onward else (),
         outputs=(("VEC4", "out_origin"), ("VEC4", "out_direction"), ("VEC4", "out_path")),
     )
@@ -251,7 +257,7 @@ class ShadedReflections(Technique):
             blocks={"film_view": frame.view_block},
             constants={
                 **reach, "ray_number": number, "offset_size": frame.offset_size,
-                "traced_roughness": traced_roughness(frame),
+                "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
             },
         )  # fmt: skip
         frame.count(self, "passes")

@@ -44,7 +44,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.interfaces import interface_table
+from ..lighting.interfaces import clear_roughness, interface_table
 from ..lighting.path_sources import PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
@@ -152,7 +152,7 @@ class TracedRefraction(Technique):
                 "light_count": len(rows), "offset_size": frame.offset_size, "interfaces": 0,
                 "world_transmission": int(bool(self._sources.world_flags & lights.TRANSMISSION_FLAG)),
                 "world_samples": float(WORLD_DIRECTIONS),
-                "clear_roughness": _clear_roughness(frame),
+                "clear_roughness": clear_roughness(frame),
             },
         }  # fmt: skip
         if frame.service(ShadedLobes) is None:
@@ -213,9 +213,3 @@ class TracedRefraction(Technique):
     def release(self) -> None:
         self._sources.release()
         self._interfaces = None
-
-
-def _clear_roughness(frame: Frame) -> float:
-    """Roughness up to which glass shows that there is nothing behind it; below 0: none does."""
-    film = frame.snapshot.film
-    return film.clear_glass if film.transparent else -1.0

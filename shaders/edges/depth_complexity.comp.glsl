@@ -19,6 +19,11 @@
 
 #define PLANES 8
 
+// Points are asked sixteen, or eight, in a turn of a loop: Mesa's software rasteriser ends all loops of a thread after
+// 65,536 turns together, which 64 points of a thousand edges take.
+#define HIT(number) half_hit |= hidden_point(number, own_pattern, f, n_centre, n, k0, k1, q);
+#define ADD(number) next = (plane[number] ^ turn) & carry; plane[number] ^= carry; carry = next;
+
 vec4 edge_texel(int index)
 {
   return edge_records_fetch(ivec2(index & 2047, index >> 11));
@@ -28,6 +33,32 @@ uint word_of(int index)
 {
   return tile_words_fetch(ivec2(index & 2047, index >> 11)).x;
 }
+
+// The bit of point `k` where the edge lies in the triangle (receiver, centre, point). `n`: normal of the plane through the
+// receiver and the edge, on whose side n_centre the centre lies; k0, k1, q: of the planes through the receiver, the centre
+// and either end, and of that through the centre and the edge.
+uint hidden_point(int k, int own_pattern, LightFrame f, float n_centre, vec3 n, vec3 k0, vec3 k1, vec3 q)
+{
+  vec3 offset = light_offset(f, light_pattern_fetch(ivec2(k, own_pattern)).xyz);
+  bool side = n_centre >= 0.0;
+  bool crossed = ((n_centre + dot(n, offset) >= 0.0) != side) && ((dot(k0, offset) >= 0.0) != (dot(k1, offset) >= 0.0))
+                 && ((dot(q, offset) >= 0.0) == side);
+  return crossed ? (1u << uint(k & 31)) : 0u;
+}
+
+#ifdef CARDS
+// The bit of point `k` where it is still seen (bits of its half) and the card hides it.
+uint covered_point(int k, uint half_seen, int own_pattern, LightFrame f, Card card, CardView view, vec3 c, ivec2 pixel)
+{
+  uint one = 1u << uint(k & 31);
+  if ((half_seen & one) == 0u) {
+    return 0u;
+  }
+  vec3 offset = light_offset(f, light_pattern_fetch(ivec2(k, own_pattern)).xyz);
+  return card_hides(card, view, c + offset, pixel, k) ? one : 0u;
+}
+#define COVER(number) half_seen &= ~covered_point(number, half_seen, own_pattern, f, card, view, c, pixel);
+#endif
 
 void main()
 {
@@ -88,24 +119,21 @@ void main()
         vec3 q = cross(along, light_at_infinity() ? c : edge_light.centre.xyz - v0.xyz);
         bool side = n_centre >= 0.0;
         uvec2 hit = uvec2(0u);
-        for (int k = 0; k < POINTS; k++) {
-          vec3 offset = light_offset(f, light_pattern_fetch(ivec2(k, own_pattern)).xyz);
-          bool crossed = ((n_centre + dot(n, offset) >= 0.0) != side)
-                         && ((dot(k0, offset) >= 0.0) != (dot(k1, offset) >= 0.0))
-                         && ((dot(q, offset) >= 0.0) == side);
-          uint one = crossed ? (1u << uint(k & 31)) : 0u;
-          hit |= (k < 32) ? uvec2(one, 0u) : uvec2(0u, one);
+        for (int k = 0; k < POINTS; k += 16) {
+          uint half_hit = 0u;
+          HIT(k) HIT(k + 1) HIT(k + 2) HIT(k + 3) HIT(k + 4) HIT(k + 5) HIT(k + 6) HIT(k + 7)
+          HIT(k + 8) HIT(k + 9) HIT(k + 10) HIT(k + 11) HIT(k + 12) HIT(k + 13) HIT(k + 14) HIT(k + 15)
+          hit |= (k < 32) ? uvec2(half_hit, 0u) : uvec2(0u, half_hit);
         }
         int change = side ? weight : -weight;
         uvec2 carry = hit;
         int lowest = (abs(change) == 2) ? 1 : 0;
-        for (int k = 0; k < PLANES; k++) {
-          if (k >= lowest) {
-            uvec2 next = ((change < 0) ? ~plane[k] : plane[k]) & carry;
-            plane[k] ^= carry;
-            carry = next;
-          }
+        uvec2 next;
+        uvec2 turn = uvec2((change < 0) ? 0xffffffffu : 0u);
+        if (lowest == 0) {
+          ADD(0)
         }
+        ADD(1) ADD(2) ADD(3) ADD(4) ADD(5) ADD(6) ADD(7)
       }
     }
     uvec2 hidden = uvec2(0u);
@@ -125,14 +153,10 @@ void main()
         if (!view.valid || !card_may_hide(card, p, c)) {
           continue;
         }
-        for (int k = 0; k < POINTS; k++) {
-          uint one = 1u << uint(k & 31);
-          if ((((k < 32) ? seen.x : seen.y) & one) != 0u) {
-            vec3 offset = light_offset(f, light_pattern_fetch(ivec2(k, own_pattern)).xyz);
-            if (card_hides(card, view, c + offset, pixel, k)) {
-              seen &= (k < 32) ? uvec2(~one, 0xffffffffu) : uvec2(0xffffffffu, ~one);
-            }
-          }
+        for (int k = 0; k < POINTS; k += 8) {
+          uint half_seen = (k < 32) ? seen.x : seen.y;
+          COVER(k) COVER(k + 1) COVER(k + 2) COVER(k + 3) COVER(k + 4) COVER(k + 5) COVER(k + 6) COVER(k + 7)
+          seen = (k < 32) ? uvec2(half_seen, seen.y) : uvec2(seen.x, half_seen);
         }
       }
     }

@@ -6,10 +6,10 @@
 #include "hits/path.glsl"
 
 // What a ray finds before `limit` in lights and the world. `lobe_density` 0: only rays can find it.
-vec3 light_found(vec3 origin, vec3 direction, bool bent, float lobe_density, float limit)
+vec3 light_found(vec3 origin, vec3 direction, bool bent, float lobe_density, float limit, bool with_world)
 {
   vec3 sum = vec3(0.0);
-  if (limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
+  if (with_world && limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
     vec3 radiance = environment_radiance(direction);
     if (lobe_density > 0.0) {
       radiance *= power_share(lobe_density, world_samples * environment_density(direction));
@@ -49,8 +49,10 @@ void main()
   float limit = (met.w != 0.0) ? dot(met.xyz - start, along.xyz) : 1e29;
   bool glossy = path_is_glossy(code);
   vec3 sum = vec3(0.0);
+  // A transparent film has a hole where clear glass shows the world: in alpha, how large.
+  bool hole = ray_number > 0 && met.w == 0.0 && path_is_clear(code);
   if (ray_number > 0) {
-    sum += light_found(start, along.xyz, path_is_bent(code), along.w, limit);
+    sum += light_found(start, along.xyz, path_is_bent(code), along.w, limit, !hole);
   }
   if (met.w != 0.0 && along.w >= 0.0) {
     vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample
@@ -58,7 +60,7 @@ void main()
     float share = (along.w > 0.0 && others.x > 0.0) ? power_share(along.w, others.y * passed.w / others.x) : 1.0;
     sum += emission * share;
   }
-  vec4 light = vec4(path.rgb * passed.rgb * sum, 0.0);
+  vec4 light = vec4(path.rgb * passed.rgb * sum, hole ? dot(path.rgb, vec3(1.0 / 3.0)) : 0.0);
   light.rgb = is_finite(max_component(abs(light.rgb))) ? light.rgb : vec3(0.0);
   if (glossy) {
     out_glossy_direct = (ray_number > 0) ? vec4(0.0) : light;

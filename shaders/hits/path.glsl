@@ -2,6 +2,7 @@
 #define PATH_GLOSSY 1        // the surface that the camera sees mirrors it
 #define PATH_TRANSMISSION 2  // or bends it
 #define PATH_BENT 4          // added where the last surface did so
+#define PATH_CLEAR 8         // added where all surfaces so far were clear glass that let it pass (Film > Transparent Glass)
 #define FOUND_ELSEWHERE -1.0 // in place of a ray's density: light samples have all that it finds of emission
 
 bool path_is_glossy(int code)
@@ -12,6 +13,11 @@ bool path_is_glossy(int code)
 bool path_is_bent(int code)
 {
   return (code & PATH_BENT) != 0;
+}
+
+bool path_is_clear(int code)
+{
+  return (code & PATH_CLEAR) != 0;
 }
 
 // Share of a technique of density `density` against another one of density `other` (power heuristic).

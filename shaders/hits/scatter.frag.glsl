@@ -23,6 +23,7 @@ void main()
   vec4 before = met_path_fetch(pixel);
   vec3 throughput = before.rgb * hit_passed_fetch(pixel).rgb;
   int code = int(before.w + 0.5) & 3;
+  bool clear = path_is_clear(int(before.w + 0.5));
   if (code == 0) {
     return;
   }
@@ -33,6 +34,7 @@ void main()
   float width = (film_view.frame.y - film_view.frame.x) / film_view.film.x * (orthographic ? 1.0 : length(path));
   vec3 throughput = vec3(1.0);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
+  bool clear = true;
 #endif
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
@@ -46,7 +48,7 @@ void main()
     direction = interface_sample(surface, u, 1.0, weight);
     interface_value(surface, direction, density);
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
-    code += PATH_BENT;
+    code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0);
   }
   else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && ray_number < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);

@@ -20,6 +20,10 @@ def by_edges(stage):
     return stage
 
 
+def row(stage):
+    return next(one for one in stage.ledger.rows if one.name == NAME)
+
+
 def technique(stage):
     return next(one for one in stage.renderer.techniques if one.name == NAME)
 
@@ -274,6 +278,25 @@ def test_direct_light_converges_to_that_of_rays(by_edges):
     scale = expected.mean()
     assert abs(found.mean() / expected.mean() - 1) < 2e-3
     assert np.sqrt(((found - expected) ** 2).mean()) < 0.02 * scale
+
+
+def test_thousands_of_edges_before_a_pixel_are_all_asked(by_edges):
+    """Software drivers end all loops of a thread after 65,536 turns: single points would take 64 an edge."""
+    stage = by_edges
+    stage.floor()
+    random = np.random.default_rng(2)
+    vertices = random.uniform((-0.7, -0.7, 0.5), (0.7, 0.7, 1.5), (900, 1, 3)) + random.normal(0, 0.03, (900, 3, 3))
+    sheets = stage.mesh(
+        [tuple(one) for one in vertices.reshape(-1, 3)], [(3 * k, 3 * k + 1, 3 * k + 2) for k in range(900)]
+    )
+    sheets.visible_camera = False
+    stage.light("AREA", (0, 0, 3), size=3.0, shape="SQUARE")
+    stage.camera_above(span=1.0)
+    stage.scene.candela.depth_complexity_mode = "POINTS"
+    stage.render(size=(16, 16))
+    bits, seen, counts, layers = expected_bits(stage, every=11)
+    assert row(stage).counters["edges"] > 2000 and 0.1 < seen.mean() < 0.9
+    assert (counts != layers).sum() == 0 and (bits != seen).mean() <= 5e-4
 
 
 def test_a_light_without_extent_has_maps(by_edges):
