@@ -22,6 +22,9 @@ LIGHTS = {  # how many of each kind
     "door_ajar": {"AREA": 1},
     "sky_courtyard": {},
     "emissive_lamp": {},
+    "caustics_pool": {"SUN": 1},
+    "caustics_rings": {"SPOT": 1},
+    "caustics_table": {"SPOT": 1},
 }
 SHADERS = {
     "BSDF_PRINCIPLED",

@@ -191,7 +191,7 @@ class Lobes:
             # Integral of K0(t) from a on is the integral over u >= 0 of exp(-a cosh u) / cosh u.
             u = np.linspace(0.0, 24.0, 8001)
             tail = np.exp(-np.abs(x[:, None]) / scale * np.cosh(u)) / np.cosh(u)
-            beyond = np.trapezoid(tail, u, axis=1) / np.pi
+            beyond = _trapezoid(tail, u, axis=1) / np.pi
             out += share * np.where(x >= 0.0, 1.0 - beyond, beyond)
         return out
 
@@ -277,3 +277,9 @@ RANDOM_WALK = np.array([
     (0.8, 0.1831, 0.4436, 0.1954, 0.5590, 0.9030),
     (0.9, 0.1393, 0.4916, 0.1202, 0.4550, 0.8162),
 ])  # fmt: skip
+
+
+def _trapezoid(values: np.ndarray, place: np.ndarray, axis: int = -1) -> np.ndarray:
+    """The integral by trapezoids along the last axis; numpy has had a function for it by this name only since 2.0."""
+    assert axis in (-1, values.ndim - 1)
+    return (0.5 * (values[..., 1:] + values[..., :-1]) * np.diff(place)).sum(axis=-1)

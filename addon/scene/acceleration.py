@@ -360,7 +360,9 @@ class HierarchyCache:
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
             self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
-        return replace(tree.hierarchy, instances=tuple(shown))
+        if tree.hierarchy.instances != shown:  # else the same object: what was made of it still stands
+            tree.hierarchy = replace(tree.hierarchy, instances=shown)
+        return tree.hierarchy
 
     def _moved(
         self, key, snapshot, materials, maps: OpacityMaps, glow: EmissionMaps, origin: np.ndarray, path: str

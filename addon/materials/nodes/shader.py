@@ -253,7 +253,8 @@ ENTRIES = (
             NORMAL,
         ),
         include="material/shader.glsl",
-        note="Drawn as a diffuse strand of the fibre's colour, that lets half of its light through; no highlights.",
+        note="Principled Hair BSDF is drawn as a diffuse strand of the fibre's colour that lets half of its light "
+        "through, without highlights.",
         summary=_soft_diffuse,
     ),
     Entry(
