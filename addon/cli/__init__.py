@@ -1,4 +1,4 @@
-"""`blender --command candela render | compare | plan | tune | merge | farm | grass …`, and the same as `python -m addon …`.
+"""`blender --command candela render | compare | plan | tune | merge | farm | grass …`, and as `python -m addon …`.
 
 What a person may get wrong ends in one sentence on standard error: exit code 2 when the command line cannot be meant
 as it stands, 1 when the file, the scene or the output will not do. Results are written beside their final place and
