@@ -15,7 +15,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -279,4 +278,4 @@ def _material(name: str, color: tuple[float, float, float], translucent: float) 
 
 def default_folder() -> Path:
     """Where patches are written unless told otherwise: beside the open file, or where Blender was started."""
-    return Path(bpy.data.filepath).parent if bpy.data.filepath else Path(os.getcwd())
+    return Path(bpy.data.filepath).parent if bpy.data.filepath else Path.cwd()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -146,7 +145,7 @@ def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
                 entry = zipfile.ZipInfo(f"{name}.npy")  # of 1980: equal patches are equal files
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 packed.writestr(entry, content.getvalue())
-        os.replace(unfinished, path)
+        unfinished.replace(path)
     except OSError as error:
         with contextlib.suppress(OSError):
             unfinished.unlink()

@@ -1,5 +1,7 @@
 """Principal components of a tile's pictures."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -45,7 +47,7 @@ def test_error_falls_with_components_and_the_mean_stays():
     light = pictures()
     found = [compression.compressed(light, k, 2) for k in (1, 2, 4, 8)]
     falling = [compression.errors(light, one)["rgb"] for one in found]
-    assert all(a > b for a, b in zip(falling, falling[1:]))
+    assert all(a > b for a, b in itertools.pairwise(falling))
     for one in found:
         assert one.mean(axis=0) == pytest.approx(light.mean(axis=0), rel=1e-9)
 
