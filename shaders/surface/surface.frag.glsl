@@ -40,6 +40,9 @@ void main()
 #endif
   evaluate_material(point, c);
   closures_end(c);
+#ifdef OWN_CLOSURES
+  own_closures(c, point);
+#endif
 
   float through = layer_chance(c);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
@@ -61,6 +64,9 @@ void main()
   vec2 lift = (instance_terminator(instance_flat.x) > 0.0) ? smooth_lift(instance, point.backfacing) : vec2(0.0);
 #endif
   store_closures(c, point, covered, holdout, lift);
+#ifdef OWN_CLOSURES
+  own_store(point);
+#endif
   if (index_shown >= 0) {
     out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
   }

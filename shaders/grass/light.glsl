@@ -1,0 +1,62 @@
+// What grass reflects of light from a direction: a place's pictures under the four lights around that direction, each
+// decoded, and their mean by the direction's weights. Grass shows its own shadows and cosine; only light that other things
+// keep from it is asked for.
+#include "grass/table.glsl"
+
+struct GrassSeen {
+  bool exists;
+  Grass grass;
+  GrassPlace place;
+  int view;
+  float contrast;
+  vec3 along;
+  vec3 across;
+};
+
+GrassSeen grass_seen;
+
+void grass_see(ivec2 pixel, Surface s)
+{
+  grass_seen.exists = s.kind == SURFACE_GRASS;
+  if (grass_seen.exists) {
+    vec4 lobe = surface_lobe_fetch(pixel);
+    float turn = surface_tint_fetch(pixel).w;
+    grass_seen.grass = grass_of(int(lobe.y + 0.5));
+    int place = int(lobe.x + 0.5);
+    grass_seen.place = grass_place(grass_seen.grass, place);
+    grass_seen.view = place / (grass_seen.grass.side * grass_seen.grass.side);
+    grass_seen.contrast = lobe.w;
+    vec3 tangent;
+    vec3 bitangent;
+    orthonormal_basis(s.normal, tangent, bitangent);
+    grass_seen.along = cos(turn) * tangent + sin(turn) * bitangent;
+    grass_seen.across = cross(s.normal, grass_seen.along);
+  }
+}
+
+vec3 grass_under(float light)
+{
+  return grass_decoded(grass_seen.grass, grass_seen.place, grass_seen.view, int(light + 0.5), grass_seen.contrast);
+}
+
+// Radiance for unit irradiance on a plane that faces the light.
+vec3 grass_reflection(Surface s, vec3 direction)
+{
+  Grass g = grass_seen.grass;
+  float rise = dot(direction, s.normal);
+  if (rise <= 0.0) {
+    return vec3(0.0);
+  }
+  vec3 light = grass_unstretched(g, vec3(dot(direction, grass_seen.along), dot(direction, grass_seen.across), rise));
+  vec4 low;
+  vec4 high;
+  float outer = grass_rings(g.entry + GRASS_LIGHT_RINGS, g.light_rings, light, low, high);
+  vec3 inside = grass_azimuths(low, light);
+  vec3 outside = grass_azimuths(high, light);
+  vec3 sum = (1.0 - outer) * ((1.0 - inside.z) * grass_under(inside.x) + inside.z * grass_under(inside.y));
+  sum += outer * ((1.0 - outside.z) * grass_under(outside.x) + outside.z * grass_under(outside.y));
+  // Beyond the last ring its pictures, darker by the cosine; and that of the direction as it is, not as it is unstretched.
+  float last = cos(radians(high.x));
+  float fall = (light.z < last) ? light.z / last : 1.0;
+  return max(sum, vec3(0.0)) * (fall * rise / max(light.z, 1e-4) / PI);
+}

@@ -1,0 +1,139 @@
+// The surface of grass: from where the view's ray enters the plane on top, to the blade that it meets there.
+// Musawir Shah, "Image-space approach to real-time realistic rendering" (2007), chapter 4. Changed: of the four views around a
+// direction each sample takes one, with the probability of its weight, and one texel of the four around a place; so colour
+// and depth are of one blade, and the mean over samples is the interpolation. Contrast and parallax: docs/grass.md.
+#include "grass/table.glsl"
+
+struct GrassHit {
+  bool bare;       // no blade stands here: the material's own surface shows
+  float place;     // of the patch's table
+  float contrast;
+  vec3 along;      // the tile's x axis on the surface
+  vec3 albedo;
+};
+
+GrassHit grass_hit;
+
+// A number of this sample and pixel, stratified over the samples.
+float grass_roll(int purpose)
+{
+  uvec2 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(purpose) + uint(film_view.seed) * 64u)).xy;
+  return shuffled(film_view.sample_index, salt);
+}
+
+float grass_cell(ivec2 cell)
+{
+  return to_unit(hash3(uvec3(uvec2(cell + ivec2(1 << 20)), 77u)).x);
+}
+
+// Smooth noise whose values are about even from 0 to 1: clumps.
+float grass_clumps(vec2 place)
+{
+  vec2 low = floor(place);
+  vec2 f = place - low;
+  f = f * f * (3.0 - 2.0 * f);
+  ivec2 cell = ivec2(low);
+  float below = mix(grass_cell(cell), grass_cell(cell + ivec2(1, 0)), f.x);
+  float above = mix(grass_cell(cell + ivec2(0, 1)), grass_cell(cell + ivec2(1, 1)), f.x);
+  return smoothstep(0.15, 0.85, mix(below, above, f.y));
+}
+
+bool own_surface(inout SurfacePoint point, Instance instance)
+{
+  Grass g = grass_of(grass_entry);
+  vec3 up = point.normal;
+  vec3 toward = point.incoming;
+  float rise = dot(toward, up);
+  if (rise <= 0.0 || point.backfacing) {
+    return false;  // from below
+  }
+  rise = max(rise, 0.02);
+  vec3 axis_x = safe_normalize(vec3(instance.row0.x, instance.row1.x, instance.row2.x));
+  vec3 axis_y = safe_normalize(vec3(instance.row0.y, instance.row1.y, instance.row2.y));
+  grass_hit.along = safe_normalize(axis_x - up * dot(axis_x, up));
+  vec3 across = cross(up, grass_hit.along);
+  vec3 from = point.position - instance_origin(instance);
+  vec2 uv = vec2(dot(from, axis_x), dot(from, axis_y)) / g.size;
+  vec3 view = grass_unstretched(g, vec3(dot(toward, grass_hit.along), dot(toward, across), rise));
+
+  vec4 low;
+  vec4 high;
+  float outer = grass_rings(g.entry + GRASS_VIEW_RINGS, g.view_rings, view, low, high);
+  vec3 inside = grass_azimuths(low, view);
+  vec3 outside = grass_azimuths(high, view);
+  bool outward = grass_roll(51) < outer;
+  vec3 chosen = outward ? outside : inside;
+  vec4 ring = outward ? high : low;
+  float number = (grass_roll(52) < chosen.z) ? chosen.y : chosen.x;
+  // Of a mean of pictures that are hardly alike the contrast falls by the root of the sum of squared weights.
+  float inner_share = (1.0 - outer) * (1.0 - outer) * ((1.0 - inside.z) * (1.0 - inside.z) + inside.z * inside.z);
+  float outer_share = outer * outer * ((1.0 - outside.z) * (1.0 - outside.z) + outside.z * outside.z);
+  float squares = inner_share + outer_share;
+
+  // The picture of that view is moved so that what is at its mean height stays where it is.
+  vec3 taken = grass_ring_direction(ring, number);
+  vec3 seen = view;
+  float steepest = cos(radians(grass_texel(g.entry + GRASS_VIEW_RINGS + g.view_rings - 1).x));
+  if (seen.z < steepest) {
+    seen = vec3(safe_normalize(vec3(seen.xy, 0.0)).xy * sqrt(1.0 - steepest * steepest), steepest);
+  }
+  vec2 shift = (1.0 - ring.w) * g.slope * (taken.xy / taken.z - seen.xy / seen.z);
+  vec2 texel = (uv + shift) * float(g.side) - 0.5 + vec2(grass_roll(53), grass_roll(54));
+  ivec2 wrapped = ivec2(floor(fract(texel / float(g.side)) * float(g.side)));
+  wrapped = clamp(wrapped, ivec2(0), ivec2(g.side - 1));
+  int picture = int(number + 0.5);
+  int place = (picture * g.side + wrapped.y) * g.side + wrapped.x;
+  GrassPlace shown = grass_place(g, place);
+  float below = (1.0 - clamp(shown.mean.w, 0.0, 1.0)) * g.height;
+
+  // On a crest the ray climbs out of the grass again before it meets what it would have met on flat ground.
+  vec3 ahead = safe_normalize(toward - up * dot(toward, up));
+  vec2 steps = window_steps(ahead, point.geometric_normal);
+  vec3 bend = steps.x * dFdx(world_normal) + steps.y * dFdy(world_normal);
+  float curvature = dot(bend, ahead) / max(length(world_normal), 1e-20);
+  float level = max(1.0 - rise * rise, 1e-6);
+  if (curvature > 0.0 && g.height - rise * rise / (2.0 * curvature * level) > g.height - below) {
+    return false;
+  }
+
+  vec2 root = uv - (below / rise) * vec2(dot(toward, grass_hit.along), dot(toward, across)) / g.size;
+  grass_hit.bare = g.density < 1.0 && grass_clumps(root * 6.0) >= g.density;
+  float depth = (grass_hit.bare ? g.height : below) / rise;
+  point.position -= toward * depth;
+  // Where a tile is smaller than a few pixels its mean is all that can be seen.
+  float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
+  float contrast = inversesqrt(max(squares, 0.0625));
+  grass_hit.contrast = contrast * smoothstep(1.5, 6.0, tile_pixels);
+  grass_hit.place = float(place);
+  grass_hit.albedo = max(grass_decoded(g, shown, picture, g.lights, grass_hit.contrast), vec3(0.0));
+  if (!grass_hit.bare) {
+    point.normal = up;
+    point.geometric_normal = up;
+    point.mesh_normal = up;
+  }
+  return true;
+}
+
+void own_closures(inout Closures c, SurfacePoint point)
+{
+  if (!grass_hit.bare) {
+    c = closures_begin(point.normal, 0.5, 0.0);
+    c.diffuse = grass_hit.albedo;
+    c.diffuse_weight = 1.0;
+    closures_end(c);
+  }
+}
+
+// What grass/light.glsl reads instead of a lobe.
+void own_store(SurfacePoint point)
+{
+  if (!grass_hit.bare) {
+    vec3 tangent;
+    vec3 bitangent;
+    orthonormal_basis(point.normal, tangent, bitangent);
+    float turn = atan(dot(grass_hit.along, bitangent), dot(grass_hit.along, tangent));
+    out_tint = vec4(0.0, 0.0, 0.0, turn);
+    out_lobe = vec4(grass_hit.place, float(grass_entry), float(SURFACE_GRASS) * 2097152.0, grass_hit.contrast);
+    out_emission = vec4(0.0, 0.0, 0.0, 1.0);
+  }
+}
