@@ -66,6 +66,17 @@ class Rings:
                 shares.append(share * part)
         return np.stack(numbers, axis=-1), np.stack(shares, axis=-1)
 
+    def neighbours(self) -> list[tuple[int, int]]:
+        """Pairs of directions side by side on a ring, and of each direction with the next one farther out."""
+        pairs = []
+        for first, count in zip(self.firsts, self.counts):
+            pairs += [(first + k, first + (k + 1) % count) for k in range(count if count > 2 else count - 1)]
+        for inner in range(len(self.counts) - 1):
+            for k in range(self.counts[inner + 1]):
+                beside = round(k / self.counts[inner + 1] * self.counts[inner]) % self.counts[inner]
+                pairs.append((self.firsts[inner] + beside, self.firsts[inner + 1] + k))
+        return pairs
+
     def solid_angles(self) -> np.ndarray:
         """(number,) of the cells around the directions that divide the hemisphere; their sum is 2 pi."""
         polar = np.radians(self.polar)

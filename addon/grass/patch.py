@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .compression import components, decoded, encoded, mean_ratio, white_of
+from .compression import LUMA, components, decoded, encoded, mean_ratio, white_of
 from .directions import Rings
 
 SUFFIX = ".grass"
@@ -37,10 +37,13 @@ class PatchError(ValueError):
 class Patch:
     """V views, L lights, N texels along a side, K components of luma and C of each difference of colour.
 
-    `mean` (V, N, N, 3) of encoded pictures over lights; `parts` (V, N, N, K + 2C) within -1..1; `weights`
-    (V, K + 2C, L); `picture_mean` and `ratio` (V, L, 3): linear mean of a picture, and what the mean of the decoded one
-    is multiplied by to become that; `heights` (V, N, N): of what is seen, 0 the ground, 1 the top. Row 0 has the
-    smallest y.
+    Each view has P = L + 1 pictures: under each light, and under a uniform sky of radiance 1. `mean` (V, N, N, 3) of
+    encoded pictures over lights; `parts` (V, N, N, K + 2C) within -1..1; `weights` (V, K + 2C, P); `picture_mean` and
+    `ratio` (V, P, 3): linear mean of a picture, and what the mean of the decoded one is multiplied by to become that;
+    `contrast` (V, P): the same of standard deviations of luminance. `excess` (V, P): of the mean where contrast is
+    doubled and what is below 0 is cut off. `light_alike` and `view_alike` (V,): correlation of
+    a view's pictures under neighbouring lights, and with those of neighbouring views, moved by their parallax.
+    `heights` (V, N, N): of what is seen, 0 the ground, 1 the top. Row 0 has the smallest y.
     """
 
     size: float  # m, of the tile's side
@@ -55,6 +58,10 @@ class Patch:
     weights: np.ndarray
     picture_mean: np.ndarray
     ratio: np.ndarray
+    contrast: np.ndarray
+    excess: np.ndarray
+    light_alike: np.ndarray
+    view_alike: np.ndarray
     heights: np.ndarray
 
     @property
@@ -62,7 +69,7 @@ class Patch:
         return self.mean.shape[1]
 
     def pictures(self, view: int) -> np.ndarray:
-        """(L, N, N, 3) linear pictures of a view, decoded: pi times radiance over the sun's irradiance head-on."""
+        """(P, N, N, 3) linear pictures of a view, decoded: pi times radiance over the sun's irradiance head-on."""
         k, c = self.luma, self.chroma
         places = self.parts[view].reshape(-1, k + 2 * c)
         values = []
@@ -74,8 +81,7 @@ class Patch:
 
     def albedo(self) -> np.ndarray:
         """(V, 3) of the tile from each view: what it reflects of a uniform sky."""
-        cells = self.lights.solid_angles() / np.pi
-        return np.einsum("l,vlc->vc", cells, self.picture_mean)
+        return self.picture_mean[:, -1]
 
     def mean_heights(self) -> np.ndarray:
         """(V,) of what each view sees, 0..1."""
@@ -87,27 +93,64 @@ def compressed_patch(
     chroma: int = 2,
 ) -> Patch:  # fmt: skip
     """A patch of pictures: `pictures(view)` gives (L, N, N, 3) linear ones, `heights` (V, N, N) in metres."""
-    whole = [pictures(view) for view in range(views.number)]
+    whole = [np.asarray(pictures(view), np.float32) for view in range(views.number)]
     white = white_of(np.concatenate([one[:, ::2, ::2] for one in whole]))
-    made: dict[str, list] = {"mean": [], "parts": [], "weights": [], "picture_mean": [], "ratio": []}
+    luma, chroma = min(luma, lights.number), min(chroma, lights.number)
+    cells = lights.solid_angles() / np.pi
+    names = ("mean", "parts", "weights", "picture_mean", "ratio", "contrast", "excess", "light_alike")
+    made: dict[str, list] = {name: [] for name in names}
+    pairs = lights.neighbours()
     for light in whole:
         count, texels = light.shape[:2]
         flat = light.transpose(1, 2, 0, 3).reshape(-1, count, 3).astype(np.float64)
-        data = encoded(flat, white)
-        found = [components(data[..., k], luma if k == 0 else chroma) for k in range(3)]
-        back = decoded(np.stack([one.pictures() for one in found], axis=-1), white)
+        found = [components(encoded(flat, white)[..., k], luma if k == 0 else chroma) for k in range(3)]
+        flat = np.concatenate([flat, (flat * cells[None, :, None]).sum(axis=1, keepdims=True)], axis=1)
+        sky = encoded(flat[:, -1], white)
+        weights, back = [], []
+        for k, one in enumerate(found):
+            of_sky = np.linalg.lstsq(one.parts, sky[:, k] - one.mean, rcond=None)[0]
+            weights.append(np.concatenate([one.weights, of_sky[:, None]], axis=1))
+            back.append(one.mean[:, None] + one.parts @ weights[-1])
+        shown = decoded(np.stack(back, axis=-1), white)
+        ratio = np.clip(mean_ratio(flat, shown), 0.0, 100.0)
+        true, kept_back = flat @ LUMA, (shown * ratio) @ LUMA
         made["mean"].append(np.stack([one.mean for one in found], axis=-1).reshape(texels, texels, 3))
-        parts = np.concatenate([one.parts for one in found], axis=1)
-        made["parts"].append(parts.reshape(texels, texels, -1))
-        made["weights"].append(np.concatenate([one.weights for one in found]))
+        made["parts"].append(np.concatenate([one.parts for one in found], axis=1).reshape(texels, texels, -1))
+        made["weights"].append(np.concatenate(weights))
         made["picture_mean"].append(flat.mean(axis=0))
-        made["ratio"].append(np.clip(mean_ratio(flat, back), 0.0, 100.0))
+        made["ratio"].append(ratio)
+        made["contrast"].append(np.clip(true.std(axis=0) / np.maximum(kept_back.std(axis=0), 1e-8), 0.5, 3.0))
+        mean = flat.mean(axis=0)
+        doubled = np.maximum(mean + 2.0 * (shown * ratio - mean), 0.0).mean(axis=0)
+        made["excess"].append(np.clip(doubled @ LUMA / np.maximum(mean @ LUMA, 1e-8) - 1.0, 0.0, 2.0))
+        made["light_alike"].append(np.mean([_alike(true[:, a], true[:, b]) for a, b in pairs]))
     arrays = {name: np.stack(values).astype(np.float32) for name, values in made.items()}
-    luma, chroma = min(luma, lights.number), min(chroma, lights.number)
-    return Patch(
-        size, height, views, lights, white, luma, chroma, heights=np.clip(heights / height, 0, 1).astype(np.float32),
-        **arrays,
-    )  # fmt: skip
+    below = np.clip(heights / height, 0, 1).astype(np.float32)
+    skies = [np.einsum("l,lyxc->yxc", cells, light) @ LUMA for light in whole]
+    arrays["view_alike"] = views_alike(views, skies, below, height / size).astype(np.float32)
+    return Patch(size, height, views, lights, white, luma, chroma, heights=below, **arrays)
+
+
+def _alike(a: np.ndarray, b: np.ndarray) -> float:
+    """Correlation of two pictures, 0 to 1."""
+    both = a.std() * b.std()
+    return float(np.clip(((a - a.mean()) * (b - b.mean())).mean() / both, 0.0, 1.0)) if both > 1e-12 else 1.0
+
+
+def views_alike(views: Rings, pictures: list[np.ndarray], heights: np.ndarray, slope: float) -> np.ndarray:
+    """(V,): how much the picture of a view is like those of its neighbours when what is at its mean height is laid over
+    the same in theirs. `slope`: height over side of the tile."""
+    vectors, texels = views.vectors, heights.shape[1]
+    slant = vectors[:, :2] / vectors[:, 2:]
+    sums, numbers = np.zeros(views.number), np.zeros(views.number)
+    for a, b in views.neighbours():
+        below = 1.0 - 0.5 * (heights[a].mean() + heights[b].mean())
+        x, y = (int(step) for step in np.rint(below * slope * (slant[b] - slant[a]) * texels))
+        found = _alike(pictures[a], np.roll(pictures[b], (-y, -x), axis=(0, 1)))
+        for view in (a, b):
+            sums[view] += found
+            numbers[view] += 1.0
+    return sums / np.maximum(numbers, 1.0)
 
 
 # The file ------------------------------------------------------------------------------------------------------------
@@ -129,6 +172,10 @@ def save(patch: Patch, path: Path) -> None:
         "weights": patch.weights.astype("<f4"),
         "picture_mean": patch.picture_mean.astype("<f4"),
         "ratio": patch.ratio.astype("<f4"),
+        "contrast": patch.contrast.astype("<f4"),
+        "excess": patch.excess.astype("<f4"),
+        "light_alike": patch.light_alike.astype("<f4"),
+        "view_alike": patch.view_alike.astype("<f4"),
     }
     write_arrays(path, arrays)
 
@@ -192,9 +239,13 @@ def load(path: Path) -> Patch:
             float(about["size"]), float(about["height"]), views, lights, float(about["white"]), luma, chroma,
             _whole(arrays["mean"], (v, n, n, 3)) / MEAN_STEPS,
             _whole(arrays["parts"], (v, n, n, k)) / PART_STEPS,
-            _floats(arrays["weights"], (v, k, lights.number)),
-            _floats(arrays["picture_mean"], (v, lights.number, 3)),
-            _floats(arrays["ratio"], (v, lights.number, 3)),
+            _floats(arrays["weights"], (v, k, lights.number + 1)),
+            _floats(arrays["picture_mean"], (v, lights.number + 1, 3)),
+            _floats(arrays["ratio"], (v, lights.number + 1, 3)),
+            _floats(arrays["contrast"], (v, lights.number + 1)),
+            _floats(arrays["excess"], (v, lights.number + 1)),
+            _floats(arrays["light_alike"], (v,)),
+            _floats(arrays["view_alike"], (v,)),
             _whole(arrays["heights"], (v, n, n)) / HEIGHT_STEPS,
         )  # fmt: skip
         sizes = np.array([patch.size, patch.height, patch.white])

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .compression import decoded, encoded
 from .patch import MOST_LUMA, MOST_RINGS, Patch
 
 WIDTH = 2048  # texels a row
@@ -81,37 +80,15 @@ def _places(patch: Patch) -> np.ndarray:
 
 def _pictures(patch: Patch) -> np.ndarray:
     k, c = patch.luma, patch.chroma
-    sky_weights, sky_mean, sky_ratio = sky(patch)
-    weights = np.concatenate([patch.weights, sky_weights[..., None]], axis=2)  # (V, K + 2C, L + 1)
-    rows = np.zeros((*weights.shape[::2], PICTURE, 4), np.float32)
-    luma = np.zeros((*weights.shape[::2], MOST_LUMA), np.float32)
-    luma[..., :k] = weights[:, :k].transpose(0, 2, 1)
+    weights = patch.weights.transpose(0, 2, 1)  # (V, P, K + 2C)
+    rows = np.zeros((*weights.shape[:2], PICTURE, 4), np.float32)
+    luma = np.zeros((*weights.shape[:2], MOST_LUMA), np.float32)
+    luma[..., :k] = weights[..., :k]
     rows[..., 0, :], rows[..., 1, :] = luma[..., :4], luma[..., 4:]
     for start in (0, 1):
-        own = weights[:, k + start * c : k + (start + 1) * c].transpose(0, 2, 1)
-        rows[..., 2, 2 * start : 2 * start + c] = own
-    rows[..., 3, :3] = np.concatenate([patch.picture_mean, sky_mean[:, None]], axis=1)
-    rows[..., 4, :3] = np.concatenate([patch.ratio, sky_ratio[:, None]], axis=1)
-    return rows.reshape(-1, 4)
-
-
-def sky(patch: Patch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the picture under a uniform sky of radiance 1, for each view: weights (V, K + 2C), mean (V, 3) and ratio of
-    true to decoded mean (V, 3)."""
-    k, c = patch.luma, patch.chroma
-    cells = patch.lights.solid_angles() / np.pi
-    mean = patch.albedo()
-    weights, ratio = np.zeros((patch.views.number, k + 2 * c)), np.ones((patch.views.number, 3))
-    for view in range(patch.views.number):
-        shown = np.einsum("l,lyxc->yxc", cells, patch.pictures(view)).reshape(-1, 3)
-        data = encoded(shown, patch.white)
-        parts = patch.parts[view].reshape(-1, k + 2 * c)
-        back = np.empty_like(data)
-        for channel, (first, end) in enumerate(((0, k), (k, k + c), (k + c, k + 2 * c))):
-            middle = patch.mean[view, ..., channel].ravel()
-            own = parts[:, first:end]
-            weights[view, first:end] = np.linalg.lstsq(own, data[:, channel] - middle, rcond=None)[0]
-            back[:, channel] = middle + own @ weights[view, first:end]
-        found = decoded(back, patch.white).mean(axis=0)
-        ratio[view] = np.clip(mean[view] / np.maximum(found, 1e-8), 0.0, 100.0)
-    return weights, mean, ratio
+        rows[..., 2, 2 * start : 2 * start + c] = weights[..., k + start * c : k + (start + 1) * c]
+    rows[..., 3, :3], rows[..., 3, 3] = patch.picture_mean, patch.contrast
+    rows[..., 4, :3], rows[..., 4, 3] = patch.ratio, patch.excess
+    about = np.zeros((len(rows), 1, PICTURE, 4), np.float32)
+    about[:, 0, 0, 0], about[:, 0, 0, 1] = patch.view_alike, patch.light_alike
+    return np.concatenate([rows, about], axis=1).reshape(-1, 4)

@@ -34,9 +34,9 @@ void grass_see(ivec2 pixel, Surface s)
   }
 }
 
-vec3 grass_under(float light)
+vec3 grass_under(float light, float contrast)
 {
-  return grass_decoded(grass_seen.grass, grass_seen.place, grass_seen.view, int(light + 0.5), grass_seen.contrast);
+  return grass_decoded(grass_seen.grass, grass_seen.place, grass_seen.view, int(light + 0.5), contrast);
 }
 
 // Radiance for unit irradiance on a plane that faces the light.
@@ -53,10 +53,12 @@ vec3 grass_reflection(Surface s, vec3 direction)
   float outer = grass_rings(g.entry + GRASS_LIGHT_RINGS, g.light_rings, light, low, high);
   vec3 inside = grass_azimuths(low, light);
   vec3 outside = grass_azimuths(high, light);
-  vec3 sum = (1.0 - outer) * ((1.0 - inside.z) * grass_under(inside.x) + inside.z * grass_under(inside.y));
-  sum += outer * ((1.0 - outside.z) * grass_under(outside.x) + outside.z * grass_under(outside.y));
-  // Beyond the last ring its pictures, darker by the cosine; and that of the direction as it is, not as it is unstretched.
-  float last = cos(radians(high.x));
-  float fall = (light.z < last) ? light.z / last : 1.0;
-  return max(sum, vec3(0.0)) * (fall * rise / max(light.z, 1e-4) / PI);
+  float alike = grass_texel(grass_picture(g, grass_seen.view, g.lights + 1)).y;
+  float squares = grass_squares(outer, inside.z, outside.z);
+  float contrast = grass_seen.contrast * grass_contrast(squares, alike);
+  // What does not depend on the light's cosine is what varies little between lights.
+  vec3 near = (1.0 - inside.z) * grass_under(inside.x, contrast) + inside.z * grass_under(inside.y, contrast);
+  vec3 far = (1.0 - outside.z) * grass_under(outside.x, contrast) + outside.z * grass_under(outside.y, contrast);
+  vec3 sum = (1.0 - outer) / cos(radians(low.x)) * near + outer / cos(radians(high.x)) * far;
+  return sum * (rise / PI);
 }

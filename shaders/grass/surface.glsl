@@ -65,10 +65,6 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   vec3 chosen = outward ? outside : inside;
   vec4 ring = outward ? high : low;
   float number = (grass_roll(52) < chosen.z) ? chosen.y : chosen.x;
-  // Of a mean of pictures that are hardly alike the contrast falls by the root of the sum of squared weights.
-  float inner_share = (1.0 - outer) * (1.0 - outer) * ((1.0 - inside.z) * (1.0 - inside.z) + inside.z * inside.z);
-  float outer_share = outer * outer * ((1.0 - outside.z) * (1.0 - outside.z) + outside.z * outside.z);
-  float squares = inner_share + outer_share;
 
   // The picture of that view is moved so that what is at its mean height stays where it is.
   vec3 taken = grass_ring_direction(ring, number);
@@ -102,10 +98,11 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
-  float contrast = inversesqrt(max(squares, 0.0625));
+  float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
+  float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike);
   grass_hit.contrast = contrast * smoothstep(1.5, 6.0, tile_pixels);
   grass_hit.place = float(place);
-  grass_hit.albedo = max(grass_decoded(g, shown, picture, g.lights, grass_hit.contrast), vec3(0.0));
+  grass_hit.albedo = grass_decoded(g, shown, picture, g.lights, grass_hit.contrast);
   if (!grass_hit.bare) {
     point.normal = up;
     point.geometric_normal = up;

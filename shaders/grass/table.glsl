@@ -4,8 +4,10 @@
 // 1: side of the tile and height of the blades, m; how much taller they are than the patch's own tile is; density;
 // 2: F_max, height over side of the patch's own tile, rings of views, rings of lights; from 3 on eight rings of views
 // (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights.
-// A patch: PICTURE texels for each view and light, and one light more, the uniform sky; then PLACE texels for each view and
-// place. How they are decoded: addon/grass/compression.py.
+// A patch: PICTURE texels for each view and light, and one light more, the uniform sky (coefficients of luma, of chroma, mean
+// colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many that begin
+// with the correlation of its pictures with those of neighbouring views, and among neighbouring lights; then PLACE texels for
+// each view and place. How they are decoded: addon/grass/compression.py.
 #include "lib/math.glsl"
 
 #define GRASS_ENTRY 16
@@ -108,9 +110,15 @@ struct GrassPlace {
   vec4 chroma;
 };
 
+// Of a view: the first texel of one of its lights, of the sky (light: their number), or of what follows that.
+int grass_picture(Grass g, int view, int light)
+{
+  return g.base + GRASS_PICTURE * (view * (g.lights + 2) + light);
+}
+
 int grass_places(Grass g)
 {
-  return g.base + GRASS_PICTURE * g.views * (g.lights + 1);
+  return g.base + GRASS_PICTURE * g.views * (g.lights + 2);
 }
 
 GrassPlace grass_place(Grass g, int place)
@@ -122,16 +130,32 @@ GrassPlace grass_place(Grass g, int place)
 // F of a place under one of the lights, or the sky: the picture's mean colour, and how far from it by `contrast`.
 vec3 grass_decoded(Grass g, GrassPlace place, int view, int light, float contrast)
 {
-  int index = g.base + GRASS_PICTURE * (view * (g.lights + 1) + light);
+  int index = grass_picture(g, view, light);
   vec4 c0 = grass_texel(index);
   vec4 c1 = grass_texel(index + 1);
   vec4 c2 = grass_texel(index + 2);
-  vec3 mean = grass_texel(index + 3).rgb;
-  vec3 ratio = grass_texel(index + 4).rgb;
+  vec4 mean = grass_texel(index + 3);
+  vec4 ratio = grass_texel(index + 4);
   float luma = place.mean.x + dot(place.luma0, c0) + dot(place.luma1, c1);
   float blue = luma + place.mean.y + dot(place.chroma.xy, c2.xy);
   float red = luma + place.mean.z + dot(place.chroma.zw, c2.zw);
   float green = (luma - 0.2126 * red - 0.0722 * blue) / 0.7152;
-  vec3 shown = g.white * pow(max(vec3(red, green, blue), vec3(0.0)), vec3(GRASS_GAMMA)) * ratio;
-  return mean + (shown - mean) * contrast;
+  vec3 shown = g.white * pow(max(vec3(red, green, blue), vec3(0.0)), vec3(GRASS_GAMMA)) * ratio.rgb;
+  // Where more contrast makes places darker than black, these are black, and all are darker, so that the mean stays.
+  float more = mean.w * contrast;
+  float excess = ratio.w * pow(max(more - 1.0, 0.0), 1.5);
+  return max(mean.rgb + (shown - mean.rgb) * more, vec3(0.0)) / (1.0 + excess);
+}
+
+// What a mean of pictures whose squared weights sum to this loses of their contrast, where they are as alike as that.
+float grass_contrast(float squares, float alike)
+{
+  return inversesqrt(max(squares + alike * (1.0 - squares), 1e-3));
+}
+
+// The sum of squared weights of four directions on two rings.
+float grass_squares(float outer, float inside, float outside)
+{
+  float inner_share = (1.0 - outer) * (1.0 - outer) * ((1.0 - inside) * (1.0 - inside) + inside * inside);
+  return inner_share + outer * outer * ((1.0 - outside) * (1.0 - outside) + outside * outside);
 }
