@@ -69,6 +69,11 @@ def no_glare(stage):
     stage.scene.camera.data.candela.glare_mode = "OFF"
 
 
+def no_grass(stage):
+    for material in stage.floor_materials:
+        material.candela.grass_patch = "NONE"
+
+
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
@@ -93,6 +98,7 @@ WITHOUT = {
     "ssdo": no_bounces,
     "caustics_mapping": no_glass,
     "screen_space_photons": no_glass,
+    "grass": no_grass,
     "denoise": dark,
     "eye": no_glare,
     "glare": no_glare,
@@ -102,7 +108,8 @@ WITHOUT = {
 @pytest.fixture
 def room(stage):
     """A scene that needs every technique: a floor with gloss, a box, glass, lamps, a paper that shines, a world."""
-    stage.floor(material=stage.principled(Roughness=0.3))
+    stage.floor_materials = [stage.principled(Roughness=0.3)]
+    stage.floor(material=stage.floor_materials[0])
     stage.rectangle((-1, -0.3), (0.4, 0.3), 0.5, material=stage.diffuse(0.5))
     stage.paper = stage.rectangle(
         (0.6, -0.4), (1.0, 0.4), 0.8, material=stage.material("ShaderNodeEmission", Strength=2.0)
@@ -134,6 +141,8 @@ def choose(stage, technique):
     if technique.name in ("eye", "glare"):
         stage.scene.camera.data.candela.glare_mode = "CONVOLUTION"
         stage.scene.camera.data.candela.glare_white = 0.01
+    if technique.name == "grass":
+        stage.floor_materials[0].candela.grass_patch = "MEADOW"
     for slot in technique.fills:
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 
