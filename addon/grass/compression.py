@@ -71,12 +71,12 @@ def mean_ratio(true: np.ndarray, found: np.ndarray) -> np.ndarray:
 
 
 def errors(true: np.ndarray, found: np.ndarray) -> dict[str, float]:
-    """Of decoded pictures (P, I, 3): root mean square over the mean, of the three colours and of luminance, and what
+    """Of decoded pictures (P, I, 3): root mean square over the mean, of all three channels and of luminance, and what
     remains of each picture's contrast (mean standard deviation of luminance over that of the true ones)."""
     luma_true, luma_found = true @ LUMA, found @ LUMA
     mean = luma_true.mean()
     return {
-        "rgb": float(np.sqrt(((true - found) ** 2).sum(axis=-1).mean()) / mean),
+        "rgb": float(np.sqrt(((true - found) ** 2).mean()) / true.mean()),
         "luma": float(np.sqrt(((luma_true - luma_found) ** 2).mean()) / mean),
         "contrast": float(luma_found.std(axis=0).mean() / luma_true.std(axis=0).mean()),
     }

@@ -24,6 +24,7 @@ from .directions import Rings
 SUFFIX = ".grass"
 FORMAT, VERSION = "Candela grass patch", 1
 PART_STEPS, HEIGHT_STEPS, MEAN_STEPS = 2047.0, 4095.0, 4095.0
+PIXEL = 1.0  # texels, standard deviation of the filter at which contrast is compared
 MOST_BYTES = 1 << 30  # of all arrays of a file, unpacked
 MOST_TEXELS, MOST_DIRECTIONS, MOST_RINGS = 256, 1024, (8, 5)
 MOST_LUMA, MOST_CHROMA = 8, 2
@@ -119,16 +120,26 @@ def compressed_patch(
         made["weights"].append(np.concatenate(weights))
         made["picture_mean"].append(flat.mean(axis=0))
         made["ratio"].append(ratio)
-        made["contrast"].append(np.clip(true.std(axis=0) / np.maximum(kept_back.std(axis=0), 1e-8), 0.5, 3.0))
+        true, kept_back = (_seen(one.T.reshape(-1, texels, texels)) for one in (true, kept_back))
+        had, has = true.std(axis=(1, 2)), kept_back.std(axis=(1, 2))
+        made["contrast"].append(np.clip(had / np.maximum(has, 1e-8), 0.5, 3.0))
         mean = flat.mean(axis=0)
         doubled = np.maximum(mean + 2.0 * (shown * ratio - mean), 0.0).mean(axis=0)
         made["excess"].append(np.clip(doubled @ LUMA / np.maximum(mean @ LUMA, 1e-8) - 1.0, 0.0, 2.0))
-        made["light_alike"].append(np.mean([_alike(true[:, a], true[:, b]) for a, b in pairs]))
+        made["light_alike"].append(np.mean([_alike(true[a], true[b]) for a, b in pairs]))
     arrays = {name: np.stack(values).astype(np.float32) for name, values in made.items()}
     below = np.clip(heights / height, 0, 1).astype(np.float32)
-    skies = [np.einsum("l,lyxc->yxc", cells, light) @ LUMA for light in whole]
+    skies = [_seen(np.einsum("l,lyxc->yxc", cells, light) @ LUMA) for light in whole]
     arrays["view_alike"] = views_alike(views, skies, below, height / size).astype(np.float32)
     return Patch(size, height, views, lights, white, luma, chroma, heights=below, **arrays)
+
+
+def _seen(pictures: np.ndarray) -> np.ndarray:
+    """Pictures (..., N, N) as pixels of about two texels show them: what they lose is mostly finer than that."""
+    texels = pictures.shape[-1]
+    frequency = np.fft.fftfreq(texels)
+    kept_waves = np.exp(-2.0 * (np.pi * PIXEL) ** 2 * (frequency[:, None] ** 2 + frequency[None, :] ** 2))
+    return np.fft.ifft2(np.fft.fft2(pictures) * kept_waves).real
 
 
 def _alike(a: np.ndarray, b: np.ndarray) -> float:

@@ -51,7 +51,7 @@ def grass_program(surface: Program) -> Program:
     glsl = '#include "grass/surface.glsl"\n'
     others = tuple(one for one in surface.snippets if one[0] != "generated/own_surface")
     return replace(
-        surface, name=f"{surface.name}, grass", vertex="grass/surface.vert.glsl",
+        surface, name=f"{surface.name} grass", vertex="grass/surface.vert.glsl",
         textures=(*surface.textures, TABLE), constants=(*surface.constants, ("INT", "grass_entry")),
         defines=(*surface.defines, ("OWN_SURFACE", ""), ("OWN_CLOSURES", "")),
         snippets=(("generated/own_surface", glsl), *others), writes_depth=True,

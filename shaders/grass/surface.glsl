@@ -4,6 +4,8 @@
 // and depth are of one blade, and the mean over samples is the interpolation. Contrast and parallax: docs/grass.md.
 #include "grass/table.glsl"
 
+#define CREST_LENGTH 6.0  // by the height
+
 struct GrassHit {
   bool bare;       // no blade stands here: the material's own surface shows
   float place;     // of the patch's table
@@ -74,7 +76,11 @@ bool own_surface(inout SurfacePoint point, Instance instance)
     seen = vec3(safe_normalize(vec3(seen.xy, 0.0)).xy * sqrt(1.0 - steepest * steepest), steepest);
   }
   vec2 shift = (1.0 - ring.w) * g.slope * (taken.xy / taken.z - seen.xy / seen.z);
-  vec2 texel = (uv + shift) * float(g.side) - 0.5 + vec2(grass_roll(53), grass_roll(54));
+  // Between texels that are larger than pixels one is drawn as bilinear interpolation weighs them; smaller ones the pixel's
+  // own filter mixes.
+  float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
+  float spread = smoothstep(0.75, 1.5, tile_pixels / float(g.side));
+  vec2 texel = (uv + shift) * float(g.side) + spread * (vec2(grass_roll(53), grass_roll(54)) - 0.5);
   ivec2 wrapped = ivec2(floor(fract(texel / float(g.side)) * float(g.side)));
   wrapped = clamp(wrapped, ivec2(0), ivec2(g.side - 1));
   int picture = int(number + 0.5);
@@ -88,7 +94,9 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   vec3 bend = steps.x * dFdx(world_normal) + steps.y * dFdy(world_normal);
   float curvature = dot(bend, ahead) / max(length(world_normal), 1e-20);
   float level = max(1.0 - rise * rise, 1e-6);
-  if (curvature > 0.0 && g.height - rise * rise / (2.0 * curvature * level) > g.height - below) {
+  // Of gentle hills, where it would run far through grass before that, the curvature here says nothing about there.
+  bool crest = 2.0 * rise < CREST_LENGTH * g.height * curvature;
+  if (crest && below > rise * rise / (2.0 * curvature * level)) {
     return false;
   }
 
@@ -97,7 +105,6 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   float depth = (grass_hit.bare ? g.height : below) / rise;
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
-  float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
   float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
   float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike);
   grass_hit.contrast = contrast * smoothstep(1.5, 6.0, tile_pixels);
