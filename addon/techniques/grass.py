@@ -53,7 +53,7 @@ def grass_program(surface: Program) -> Program:
     return replace(
         surface, name=f"{surface.name} grass", vertex="grass/surface.vert.glsl",
         textures=(*surface.textures, TABLE), constants=(*surface.constants, ("INT", "grass_entry")),
-        defines=(*surface.defines, ("OWN_SURFACE", ""), ("OWN_CLOSURES", "")),
+        defines=(*surface.defines, ("OWN_CLOSURES", "")),
         snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
     )  # fmt: skip
 

@@ -6,15 +6,13 @@
 
 #define CREST_LENGTH 6.0  // by the height
 
-struct GrassHit {
+struct OwnHit {
   bool bare;       // no blade stands here: the material's own surface shows
   float place;     // of the patch's table
   float contrast;
   vec3 along;      // the tile's x axis on the surface
   vec3 albedo;
 };
-
-GrassHit grass_hit;
 
 // A number of this sample and pixel, stratified over the samples.
 float grass_roll(int purpose)
@@ -40,8 +38,13 @@ float grass_clumps(vec2 place)
   return smoothstep(0.15, 0.85, mix(below, above, f.y));
 }
 
-bool own_surface(inout SurfacePoint point, Instance instance)
+bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
 {
+  hit.bare = true;
+  hit.place = 0.0;
+  hit.contrast = 1.0;
+  hit.along = vec3(1.0, 0.0, 0.0);
+  hit.albedo = vec3(0.0);
   Grass g = grass_of(grass_entry);
   vec3 up = point.normal;
   vec3 toward = point.incoming;
@@ -52,11 +55,11 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   rise = max(rise, 0.02);
   vec3 axis_x = safe_normalize(vec3(instance.row0.x, instance.row1.x, instance.row2.x));
   vec3 axis_y = safe_normalize(vec3(instance.row0.y, instance.row1.y, instance.row2.y));
-  grass_hit.along = safe_normalize(axis_x - up * dot(axis_x, up));
-  vec3 across = cross(up, grass_hit.along);
+  hit.along = safe_normalize(axis_x - up * dot(axis_x, up));
+  vec3 across = cross(up, hit.along);
   vec3 from = point.position - instance_origin(instance);
   vec2 uv = vec2(dot(from, axis_x), dot(from, axis_y)) / g.size;
-  vec3 view = grass_unstretched(g, vec3(dot(toward, grass_hit.along), dot(toward, across), rise));
+  vec3 view = grass_unstretched(g, vec3(dot(toward, hit.along), dot(toward, across), rise));
 
   vec4 low;
   vec4 high;
@@ -100,17 +103,17 @@ bool own_surface(inout SurfacePoint point, Instance instance)
     return false;
   }
 
-  vec2 root = uv - (below / rise) * vec2(dot(toward, grass_hit.along), dot(toward, across)) / g.size;
-  grass_hit.bare = g.density < 1.0 && grass_clumps(root * 6.0) >= g.density;
-  float depth = (grass_hit.bare ? g.height : below) / rise;
+  vec2 root = uv - (below / rise) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
+  hit.bare = g.density < 1.0 && grass_clumps(root * 6.0) >= g.density;
+  float depth = (hit.bare ? g.height : below) / rise;
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
   float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike);
-  grass_hit.contrast = contrast * smoothstep(1.5, 6.0, tile_pixels);
-  grass_hit.place = float(place);
-  grass_hit.albedo = grass_decoded(g, shown, picture, g.lights, grass_hit.contrast);
-  if (!grass_hit.bare) {
+  hit.contrast = contrast * smoothstep(1.5, 6.0, tile_pixels);
+  hit.place = float(place);
+  hit.albedo = grass_decoded(g, shown, picture, g.lights, hit.contrast);
+  if (!hit.bare) {
     point.normal = up;
     point.geometric_normal = up;
     point.mesh_normal = up;
@@ -118,26 +121,26 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   return true;
 }
 
-void own_closures(inout Closures c, SurfacePoint point)
+void own_closures(inout Closures c, SurfacePoint point, OwnHit hit)
 {
-  if (!grass_hit.bare) {
+  if (!hit.bare) {
     c = closures_begin(point.normal, 0.5, 0.0);
-    c.diffuse = grass_hit.albedo;
+    c.diffuse = hit.albedo;
     c.diffuse_weight = 1.0;
     closures_end(c);
   }
 }
 
 // What grass/light.glsl reads instead of a lobe.
-void own_store(SurfacePoint point)
+void own_store(SurfacePoint point, OwnHit hit)
 {
-  if (!grass_hit.bare) {
+  if (!hit.bare) {
     vec3 tangent;
     vec3 bitangent;
     orthonormal_basis(point.normal, tangent, bitangent);
-    float turn = atan(dot(grass_hit.along, bitangent), dot(grass_hit.along, tangent));
+    float turn = atan(dot(hit.along, bitangent), dot(hit.along, tangent));
     out_tint = vec4(0.0, 0.0, 0.0, turn);
-    out_lobe = vec4(grass_hit.place, float(grass_entry), float(SURFACE_GRASS) * 2097152.0, grass_hit.contrast);
+    out_lobe = vec4(hit.place, float(grass_entry), float(SURFACE_GRASS) * 2097152.0, hit.contrast);
     out_emission = vec4(0.0, 0.0, 0.0, 1.0);
   }
 }

@@ -124,7 +124,12 @@ int grass_places(Grass g)
 GrassPlace grass_place(Grass g, int place)
 {
   int index = grass_places(g) + GRASS_PLACE * place;
-  return GrassPlace(grass_texel(index), grass_texel(index + 1), grass_texel(index + 2), grass_texel(index + 3));
+  GrassPlace found;
+  found.mean = grass_texel(index);
+  found.luma0 = grass_texel(index + 1);
+  found.luma1 = grass_texel(index + 2);
+  found.chroma = grass_texel(index + 3);
+  return found;
 }
 
 // F of a place under one of the lights, or the sky: the picture's mean colour, and how far from it by `contrast`.

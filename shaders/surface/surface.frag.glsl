@@ -18,7 +18,13 @@ void main()
   vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
   Instance instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(incoming, instance);
-#ifdef OWN_SURFACE
+#ifdef OWN_CLOSURES
+  OwnHit own;  // what the surface is there, beside where
+  if (!own_hit(point, instance, own)) {
+    discard;
+  }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+#elif defined(OWN_SURFACE)
   if (!own_surface(point, instance)) {
     discard;
   }
@@ -41,7 +47,7 @@ void main()
   evaluate_material(point, c);
   closures_end(c);
 #ifdef OWN_CLOSURES
-  own_closures(c, point);
+  own_closures(c, point, own);
 #endif
 
   float through = layer_chance(c);
@@ -65,7 +71,7 @@ void main()
 #endif
   store_closures(c, point, covered, holdout, lift);
 #ifdef OWN_CLOSURES
-  own_store(point);
+  own_store(point, own);
 #endif
   if (index_shown >= 0) {
     out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
