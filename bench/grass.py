@@ -187,7 +187,7 @@ def pictures(options: argparse.Namespace) -> str:
     up = np.tan(0.95 / 2) * (2 * (np.arange(height) + 0.5) - height) / width
     polar = 70.0 + np.degrees(np.arctan(up))  # of the view along each row, from straight down
     meadow = [["rows seen from", "mean / Cycles", "farthest row", "contrast / Cycles"]]
-    for low, high in ((40, 60), (60, 70), (70, 75), (75, 80), (80, 84)):
+    for low, high in ((40, 60), (60, 70), (70, 75), (75, 80), (80, 82)):
         own = (polar >= low) & (polar < high)
         if own.any():
             row_means = mine[own].mean(axis=1) / true[own].mean(axis=1)

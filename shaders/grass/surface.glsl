@@ -110,7 +110,7 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
   float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike);
-  hit.contrast = contrast * smoothstep(1.5, 6.0, tile_pixels);
+  hit.contrast = contrast * smoothstep(0.5, 2.0, tile_pixels);
   hit.place = float(place);
   hit.albedo = grass_decoded(g, shown, picture, g.lights, hit.contrast);
   if (!hit.bare) {
