@@ -1,0 +1,16 @@
+// Irradiance at the points that gather for their groups, from their micro-buffers.
+#include "lib/math.glsl"
+#define NOTHING 0xffffffffu
+#define MICRO_WORD(texel) (micro_fetch(texel).x)
+#include "micro/sum.glsl"
+
+vec4 radiance_texel(uint index)
+{
+  return radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
+}
+
+void main()
+{
+  MICRO_SUM(ivec2(gl_FragCoord.xy) * micro_side)
+  out_arriving = arriving;
+}

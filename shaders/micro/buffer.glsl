@@ -1,0 +1,141 @@
+// A micro-buffer: the hemisphere above a place, cosine-weighted, as micro_side x micro_side pixels of an image of integers,
+// each of which has the depth of what it meets first in its high bits, by the logarithm, and below them which side of which
+// node of the tree that is. Filled by one thread, which goes through the tree of discs (addon/scene/point_tree.py) without
+// a stack.
+//
+// Ritschel 2009, chapter 6.3. There a node smaller than a pixel fills the pixel that its middle falls into, and pixels that
+// larger leaves cover cast rays afterwards. Here every node is drawn by rays through the middles of pixels (`centre_test`):
+// what a node's ball holds between the middles is left out with all that is below it, and silhouettes do not grow.
+//
+// Binds `nodes`, `radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
+#include "micro/warp.glsl"
+#define NOTHING 0xffffffffu
+#define SAME_SURFACE 0.7  // cosine between normals, from which on a disc whose radius reaches here is this surface
+
+vec4 node_texel(int index)
+{
+  return nodes_fetch(ivec2(index & 2047, index >> 11));
+}
+
+struct MicroFrame {
+  vec3 place;
+  vec3 tangent;
+  vec3 bitangent;
+  vec3 normal;
+  vec3 plane;  // normal of the triangle: nothing is seen below it
+  vec2 shift;  // of a pixel's middle, 0..1
+};
+
+MicroFrame micro_frame(vec3 place, vec3 normal, vec3 plane, vec3 turn_and_shift)
+{
+  MicroFrame f;
+  f.place = place;
+  f.normal = normal;
+  f.plane = plane;
+  vec3 first;
+  vec3 second;
+  orthonormal_basis(normal, first, second);
+  float turn = 2.0 * PI * turn_and_shift.x;
+  f.tangent = cos(turn) * first + sin(turn) * second;
+  f.bitangent = cross(normal, f.tangent);
+  f.shift = turn_and_shift.yz;
+  return f;
+}
+
+void micro_store(ivec2 texel, float depth, int node, bool behind)
+{
+  float last = float(NOTHING >> uint(id_bits)) - 1.0;
+  float share = clamp((log2(max(depth, 1e-30)) - log_depths.x) / (log_depths.y - log_depths.x), 0.0, 1.0);
+  uint word = (uint(share * last) << uint(id_bits)) | (2u * uint(node) + (behind ? 1u : 0u));
+  if (word < imageLoad(micro, texel).x) {
+    imageStore(micro, texel, uvec4(word));
+  }
+}
+
+// A node's disc, or ball, into the pixels `low` to `high` whose middles see it.
+void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node, vec4 shape, int node)
+{
+  vec3 axis = octahedral_decode(shape.xy);
+  float squared = shape.w * shape.w;
+  float off_plane = dot(to_node, axis);
+  // A smooth surface bends away below the disc beside it.
+  bool same = node >= leaf_count && abs(dot(axis, f.normal)) > SAME_SURFACE;
+  float nearest = same ? shape.w : 0.0;
+  int width = high.x - low.x + 1;
+  int count = width * (high.y - low.y + 1);
+  for (int i = 0; i < count; i++) {
+    ivec2 pixel = low + ivec2(i % width, i / width);
+    vec2 disc = disc_of_square((vec2(pixel) + f.shift) * (2.0 / float(micro_side)) - 1.0);
+    vec3 ray = disc.x * f.tangent + disc.y * f.bitangent + sqrt(max(1.0 - dot(disc, disc), 0.0)) * f.normal;
+    float cosine = dot(ray, axis);
+    float depth = (shape.w < 0.0) ? dot(to_node, ray) : off_plane / ((cosine == 0.0) ? 1e-30 : cosine);
+    vec3 off = depth * ray - to_node;
+    if (depth > nearest && dot(off, off) <= squared && dot(ray, f.plane) > 0.0) {
+      micro_store(corner + pixel, depth, node, cosine > 0.0);
+    }
+  }
+}
+
+void micro_clear(ivec2 corner)
+{
+  for (int i = 0; i < micro_side * micro_side; i++) {
+    imageStore(micro, corner + ivec2(i % micro_side, i / micro_side), uvec4(NOTHING));
+  }
+}
+
+int node_after(int node)
+{
+  return (node + 1) >> findLSB(node + 1);
+}
+
+// Draw what lies below node `part.y` + `part.x` of a level that has `part.y` nodes.
+void micro_fill(MicroFrame f, ivec2 corner)
+{
+  float side = float(micro_side);
+  int k = part.x + part.y;
+  int end = node_after(k);
+  for (int steps = 0; steps < 4 * leaf_count; steps++) {
+    vec4 ball = node_texel(2 * k);
+    vec3 to_node = ball.xyz - f.place;
+    bool down = false;
+    if (dot(to_node, f.normal) + ball.w > 0.0 && dot(to_node, f.plane) + ball.w > 0.0) {
+      float squared = dot(to_node, to_node);
+      float sine = ball.w * ball.w / max(squared, 1e-30);
+      ivec2 low = ivec2(0);
+      ivec2 high = ivec2(micro_side - 1);
+      float reach = side;
+      vec2 middle = vec2(0.0);
+      if (sine < 1.0) {
+        float chord = sqrt(2.0 * sine / (1.0 + sqrt(1.0 - sine)));
+        reach = 0.5 * STRETCH * chord * side;
+        vec3 direction = to_node * inversesqrt(squared);
+        vec2 disc = vec2(dot(direction, f.tangent), dot(direction, f.bitangent));
+        middle = (square_of_disc(disc) * 0.5 + 0.5) * side - f.shift;
+        low = max(low, ivec2(ceil(middle - reach)));
+        high = min(high, ivec2(floor(middle + reach)));
+      }
+      bool small_enough = reach <= detail;
+      bool seen = low.x <= high.x && low.y <= high.y;
+      if (centre_test == 0 && small_enough && dot(to_node, f.normal) > 0.0) {
+        ivec2 pixel = clamp(ivec2(floor(middle + f.shift)), ivec2(0), ivec2(micro_side - 1));
+        vec4 shape = node_texel(2 * k + 1);
+        micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
+      }
+      else if (seen || centre_test == 0) {
+        down = k < leaf_count && !small_enough;
+        if (!down) {
+          micro_draw(f, corner, low, high, to_node, node_texel(2 * k + 1), k);
+        }
+      }
+    }
+    k = down ? 2 * k : node_after(k);
+    if (k == end) {
+      break;
+    }
+  }
+}
+
+vec4 radiance_texel(uint index)
+{
+  return radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
+}
