@@ -23,7 +23,7 @@ import numpy as np
 
 from ..gfx import images
 
-COVER = 1.3  # radius of a disc beside that of the area which it stands for: evenly spread ones leave 1 % of holes
+COVER = 1.5  # radius of a disc beside that of the area which it stands for (holes: see area_points.py)
 NORMAL_WEIGHT = 0.25
 FLAT = 0.7  # cosine of the half angle of a cone of normals, up to which a group is drawn as a disc
 NODE_TEXELS = 2
