@@ -1,8 +1,8 @@
 """Points on all surfaces with what they reflect and the light that reaches them straight, for who gathers from points.
 
-A run is a set of points by area (scene/area_points.py) in the order of a tree (scene/point_tree.py). Each point has two
-sides, entries 2 i and 2 i + 1 of the images here, ROW a row: the one that its triangle faces by its winding, and the
-other one. Where objects are closed and not entered, nothing asks for the other side; rooms are closed, too, and entered.
+A run is a set of points by area (scene/area_points.py) in the order of a tree (scene/point_tree.py). Each point has
+two sides, entries 2 i and 2 i + 1 of the images here, ROW a row: the one that its triangle faces by its winding, and
+the other one. Nothing asks for the inside of a closed object that is not entered; rooms are closed, too, and entered.
 
 The material's own program is run at every point (surfaces/hits.py), once a picture. Gloss counts as diffuse: what it
 reflects of even light is right, its direction is not.

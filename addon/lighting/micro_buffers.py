@@ -1,9 +1,9 @@
 """Micro-buffers: what a place sees of a tree of discs, drawn into a small picture of its hemisphere.
 
-shaders/micro/buffer.glsl fills one, by a thread that goes through the tree; shaders/micro/sum.glsl takes the mean of the
-radiance of what it shows, which is the irradiance over pi, since its pixels are equal shares of cosine-weighted solid
-angle. Here are the radiance of nodes (`NodeRadiance`), from that of the points up, and light that is reflected again and
-again: every one of `groups` groups of points has one of its points gather for all, for both sides, and what arrives is
+shaders/micro/buffer.glsl fills one, by a thread that goes through the tree; shaders/micro/sum.glsl takes the mean of
+the radiance of what it shows, which is the irradiance over pi, since its pixels are equal shares of cosine-weighted
+solid angle. Here are the radiance of nodes (`NodeRadiance`), from that of the points up, and light that is reflected
+again and again: every one of `groups` groups of points has one of its points gather for all, for both sides, and what arrives is
 reflected by each with its own albedo. What each sees does not change from one reflection to the next, so its
 micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3: Jacobi iteration).
 
@@ -34,8 +34,8 @@ FARTHEST, NEAREST = 2.0, 1e-6  # by the size of the scene: the range of depths t
 BUFFER_TEXTURES = (("RGBA32F", "nodes"),)
 BUFFER_IMAGE = ("micro", "R32UI", "UINT_2D", "READ_WRITE")
 BUFFER_CONSTANTS = (
-    ("IVEC2", "part"), ("INT", "micro_side"), ("INT", "leaf_count"), ("INT", "id_bits"), ("FLOAT", "detail"), ("INT", "centre_test"),
-    ("VEC2", "log_depths"), ("VEC4", "choice"),
+    ("IVEC2", "part"), ("INT", "micro_side"), ("INT", "leaf_count"), ("INT", "id_bits"), ("FLOAT", "detail"),
+    ("INT", "centre_test"), ("VEC2", "log_depths"), ("VEC4", "choice"),
 )  # fmt: skip
 OF_GROUPS = Program(
     name="micro-buffers of groups",

@@ -32,8 +32,8 @@ LIGHTING = lighting(RAYS, False)
 class PointLight:
     """Lights images of points. A technique owns one, calls `begin` once a picture and `add` in each sample.
 
-    In a picture of few samples, so many points are drawn on each lamp (`few`), and in each sample at least so many of the
-    world and of emissive meshes (`others`). `reflected`: lamps that give no light to reflections are left out.
+    In a picture of few samples, so many points are drawn on each lamp (`few`), and in each sample at least so many of
+    the world and of emissive meshes (`others`). `reflected`: lamps that give no light to reflections are left out.
     """
 
     def __init__(self, use: str, few: int = FEW_POINTS, others: int = OTHER_POINTS, reflected: bool = False):

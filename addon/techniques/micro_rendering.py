@@ -13,11 +13,9 @@ from ..kernels import lists
 from ..lighting import micro_buffers
 from ..lighting.lit_points import LitPoints, Run
 from ..lighting.micro_buffers import BUFFER_CONSTANTS, BUFFER_IMAGE, BUFFER_TEXTURES, NodeRadiance, buffer_bindings
-from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from ..surfaces.draw import LIT_SURFACES, SURFACE_TEXTURES, surface_bindings
-from .instant_radiosity import INDIRECT_WRITES, no_indirect_light
+from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from .multires_radiosity import GRID, RUNS, MultiresRadiosity, _level_size, fitting_levels
 
 MOST_TEXELS = 1 << 22  # of micro-buffers that are drawn at once
@@ -45,6 +43,14 @@ def _regions(listed: bool) -> Program:
 
 
 REGIONS, REGIONS_OF_LEVEL = _regions(True), _regions(False)
+GLOSSY = Program(
+    name="micro-buffers of lobes",
+    compute="micro/glossy.comp.glsl",
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *BUFFER_TEXTURES, ("RGBA32F", "radiance")),
+    images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
+    blocks=((VIEW, "film_view"),),
+    constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
+)
 REFLECTED = passes.fullscreen_program(
     "light of micro-buffers reflected",
     "micro/reflected.frag.glsl",
@@ -62,17 +68,26 @@ class MicroRendering(MultiresRadiosity):
             "points", "Points", 8192, "Points on all surfaces that light is stored at; rounded to a power of two", 64,
             1 << 20, draft=2048,
         ),
-        Param("side", "Micro-buffer side", 12, "Pixels along a side of the hemisphere that a place gathers", 4, 32, draft=8),
         Param(
-            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be drawn "
-            "as one disc", 0.05, 16.0,
+            "side", "Micro-buffer side", 12, "Pixels along a side of the hemisphere that a place gathers", 4, 32, draft=8,
         ),
         Param(
-            "centre_test", "Centre test", True, "Draw a disc where the middles of pixels see it; else into the pixel that "
-            "its own middle falls into, which makes silhouettes grow",
+            "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
         ),
-        Param("groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14, draft=256),
-        Param("levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5),
+        Param(
+            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be "
+            "drawn as one disc", 0.05, 16.0,
+        ),
+        Param(
+            "centre_test", "Centre test", True, "Draw a disc where the middles of pixels see it; else into the pixel "
+            "that its own middle falls into, which makes silhouettes grow",
+        ),
+        Param(
+            "groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14, draft=256,
+        ),
+        Param(
+            "levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5,
+        ),
     )  # fmt: skip
     provides = ()
 
@@ -118,6 +133,8 @@ class MicroRendering(MultiresRadiosity):
         )  # fmt: skip
         images.pool.give(irradiance)
         frame.count(self, "passes", 4 * levels + 2)
+        if frame.materials.glossy:
+            yield from self._gather_lobes(frame, run, bindings, settings)
 
     def _groups(self, frame: Frame) -> int:
         """A power of two."""
@@ -140,6 +157,27 @@ class MicroRendering(MultiresRadiosity):
             constants = {"level": level, "levels": levels}
             yield from self._dispatch(REGIONS_OF_LEVEL, bindings, textures, grid, atlas, size, constants)
 
+    def _gather_lobes(self, frame: Frame, run: Run, bindings, settings: dict) -> Iterator[None]:
+        """Reflections of microfacets, each pixel's own."""
+        side = frame.settings.get(self, "lobe_side")
+        bindings = {
+            "textures": {**bindings["textures"], "energy_table": frame.materials.energy_table},
+            "blocks": bindings["blocks"],
+            "constants": {**buffer_bindings(frame, run, side, **settings, use="micro lobes"), "centre_test": 1},
+        }  # fmt: skip
+        gathered = images.pool.take(*frame.size, "RGBA32F")
+        images.Target((gathered,)).clear()
+        try:
+            yield from self._dispatch(GLOSSY, bindings, bindings["textures"], {}, gathered, frame.size, {})
+            target = frame.target("radiance.glossy_indirect")
+            passes.fullscreen(
+                passes.COPY, target, blend="ADDITIVE_PREMULT", textures={"original": gathered}
+            )  # fmt: skip
+        finally:
+            images.pool.give(gathered)
+        frame.count(self, "gathers of lobes", frame.size[0] * frame.size[1])
+        frame.count(self, "passes")
+
     def _dispatch(
         self, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
     ) -> Iterator[None]:  # fmt: skip
@@ -157,7 +195,7 @@ class MicroRendering(MultiresRadiosity):
                         blocks=bindings["blocks"],
                         constants={
                             **bindings["constants"], **grid, **constants, "first_row": first, "row_count": count,
-                            "columns": columns, "part": part,
+                            "part": part, **({} if program is GLOSSY else {"columns": columns}),
                         },
                     )  # fmt: skip
                     yield

@@ -8,6 +8,9 @@
 // what a node's ball holds between the middles is left out with all that is below it, and silhouettes do not grow.
 //
 // Binds `nodes`, `radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
+//
+// With GLOSSY the pixels are equal shares of what microfacets reflect to the viewer instead: each has a ray of the lobe, and
+// nodes beside the cone about all rays are left out.
 #include "micro/warp.glsl"
 #define NOTHING 0xffffffffu
 #define SAME_SURFACE 0.7  // cosine between normals, from which on a disc whose radius reaches here is this surface
@@ -24,7 +27,24 @@ struct MicroFrame {
   vec3 normal;
   vec3 plane;  // normal of the triangle: nothing is seen below it
   vec2 shift;  // of a pixel's middle, 0..1
+#ifdef GLOSSY
+  Lobe lobe;
+  vec3 axis;   // of the cone that holds all rays
+  float angle; // and half its angle, radians
+#endif
 };
+
+// Where the ray of a pixel goes. Of a lobe: and what light from there counts.
+vec3 micro_ray(MicroFrame f, ivec2 pixel, out vec3 weight)
+{
+#ifdef GLOSSY
+  return lobe_sample(f.lobe, (vec2(pixel) + f.shift) / float(micro_side), weight);
+#else
+  weight = vec3(1.0);
+  vec2 disc = disc_of_square((vec2(pixel) + f.shift) * (2.0 / float(micro_side)) - 1.0);
+  return disc.x * f.tangent + disc.y * f.bitangent + sqrt(max(1.0 - dot(disc, disc), 0.0)) * f.normal;
+#endif
+}
 
 MicroFrame micro_frame(vec3 place, vec3 normal, vec3 plane, vec3 turn_and_shift)
 {
@@ -65,8 +85,8 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
   int count = width * (high.y - low.y + 1);
   for (int i = 0; i < count; i++) {
     ivec2 pixel = low + ivec2(i % width, i / width);
-    vec2 disc = disc_of_square((vec2(pixel) + f.shift) * (2.0 / float(micro_side)) - 1.0);
-    vec3 ray = disc.x * f.tangent + disc.y * f.bitangent + sqrt(max(1.0 - dot(disc, disc), 0.0)) * f.normal;
+    vec3 weight;
+    vec3 ray = micro_ray(f, pixel, weight);
     float cosine = dot(ray, axis);
     float depth = (shape.w < 0.0) ? dot(to_node, ray) : off_plane / ((cosine == 0.0) ? 1e-30 : cosine);
     vec3 off = depth * ray - to_node;
@@ -107,12 +127,18 @@ void micro_fill(MicroFrame f, ivec2 corner)
       vec2 middle = vec2(0.0);
       if (sine < 1.0) {
         float chord = sqrt(2.0 * sine / (1.0 + sqrt(1.0 - sine)));
-        reach = 0.5 * STRETCH * chord * side;
         vec3 direction = to_node * inversesqrt(squared);
+#ifdef GLOSSY
+        reach = 0.5 * STRETCH * chord * side / max(2.0 * f.angle, 1e-6);
+        float apart = acos(clamp(dot(direction, f.axis), -1.0, 1.0));
+        high = (apart > f.angle + asin(sqrt(sine))) ? ivec2(-1) : high;
+#else
+        reach = 0.5 * STRETCH * chord * side;
         vec2 disc = vec2(dot(direction, f.tangent), dot(direction, f.bitangent));
         middle = (square_of_disc(disc) * 0.5 + 0.5) * side - f.shift;
         low = max(low, ivec2(ceil(middle - reach)));
         high = min(high, ivec2(floor(middle + reach)));
+#endif
       }
       bool small_enough = reach <= detail;
       bool seen = low.x <= high.x && low.y <= high.y;

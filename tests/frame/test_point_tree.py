@@ -7,24 +7,28 @@ from addon.gfx import images, passes
 from addon.scene.area_points import AreaPoints, Surfaces, spread
 from addon.scene.point_tree import COVER, FLAT, fitted, split
 
+SOURCE = """
+#include "lib/math.glsl"
+#include "micro/warp.glsl"
+void main()
+{
+  vec2 square = gl_FragCoord.xy / side * 2.0 - 1.0;
+  vec2 disc = disc_of_square(square);
+  out_places = vec4(disc, square_of_disc(disc) - square);
+}
+"""
 WARP = passes.fullscreen_program(
     "warp there and back",
     "generated/warp",
     constants=(("FLOAT", "side"),),
     outputs=(("VEC4", "out_places"),),
-    snippets=(
-        ("generated/warp", '#include "lib/math.glsl"\n#include "micro/warp.glsl"\n'
-         "void main() {\n  vec2 square = gl_FragCoord.xy / side * 2.0 - 1.0;\n  vec2 disc = disc_of_square(square);\n"
-         "  out_places = vec4(disc, square_of_disc(disc) - square);\n}\n"),
-    ),
-)  # fmt: skip
+    snippets=(("generated/warp", SOURCE),),
+)
 
 
 def surfaces(corners, opacity=1.0):
     corners = np.asarray(corners, float)
-    return Surfaces(
-        (), corners, np.full(len(corners), opacity), np.zeros(len(corners), int), np.arange(len(corners))
-    )
+    return Surfaces((), corners, np.full(len(corners), opacity), np.zeros(len(corners), int), np.arange(len(corners)))
 
 
 def square(z=0.0):

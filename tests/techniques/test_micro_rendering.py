@@ -56,7 +56,7 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     camera = stage.camera((3, 0.5, 0.5), (np.pi / 2, 0, np.pi / 2))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
     irradiance = render(1, samples=8, size=(64, 64), side=16).mean(axis=2) * np.pi
-    # Discs at the floor's rim reach beyond it by up to 1.5 times the radius of what they stand for: of 2048 on it, 3 cm.
+    # Discs at the floor's rim reach beyond it by up to 1.5 times the radius of what they stand for: of 2048, 3 cm.
     assert irradiance.mean() == pytest.approx(8 * 0.200044, rel=0.04)
     height = (np.arange(64) + 0.5) / 64
     four_rows = irradiance[:, 28:36].reshape(16, 32).mean(axis=1)
