@@ -3,9 +3,10 @@
 shaders/micro/buffer.glsl fills one, by a thread that goes through the tree; shaders/micro/sum.glsl takes the mean of
 the radiance of what it shows, which is the irradiance over pi, since its pixels are equal shares of cosine-weighted
 solid angle. Here are the radiance of nodes (`NodeRadiance`), from that of the points up, and light that is reflected
-again and again: every one of `groups` groups of points has one of its points gather for all, for both sides, and what arrives is
-reflected by each with its own albedo. What each sees does not change from one reflection to the next, so its
-micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3: Jacobi iteration).
+again and again: every one of `groups` groups of points has one of its points gather for all, for both sides, and what
+arrives is reflected by each with its own albedo. What each sees does not change from one reflection to the next, so
+its micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3: Jacobi
+iteration).
 
 | cost | for n points, G groups, K x K pixels |
 |---|---|

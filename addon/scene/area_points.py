@@ -26,6 +26,7 @@ from ..snapshot.scene import Instance
 from . import acceleration
 
 PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
+ALONE = 0.7  # how much nearer to the middle of its triangle a point lies that is the only one
 CYCLE = 1 << 20  # where stretches of the sequence begin
 
 
@@ -105,6 +106,9 @@ def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     v, w = np.mod(0.5 + number / PLASTIC, 1.0), np.mod(0.5 + number / PLASTIC**2, 1.0)
     root = np.sqrt(v)
     share = np.stack([root * (1 - w), root * w], axis=1)
+    # Where a triangle has one or few, they keep from its rim, so that they do not crowd at that of a neighbour.
+    few = np.bincount(triangle, minlength=len(areas))[triangle]
+    share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few)[:, None]
     # Where half the light passes, half as many points stand for their own discs.
     density = np.full(count, count / edges[-1])
     return AreaPoints(triangle, share, density, areas[triangle])

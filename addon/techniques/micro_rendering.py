@@ -1,4 +1,40 @@
-"""placeholder"""
+"""Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
+
+Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
+by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has discs in place of groups of
+points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into a
+micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
+are equal shares of what the surface reflects, so light is a plain mean:
+
+    E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
+
+Diffuse light is gathered by regions of the picture and interpolated as in multires_radiosity.py; lobes of microfacets
+by each pixel, whose micro-buffer has rays of the lobe. What is reflected more than once, groups of points gather for
+themselves. In each sample other points, other turns and shifts of the pixels: what is not bias averages out.
+
+Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours: groups
+are drawn by rays through the middles of pixels instead of one pixel for each middle of a group, which makes silhouettes
+grow; no list of what is left for rays; both sides of points; medians of normals, too; the concentric map.
+
+| cost | with n points, a region or pixel that gathers, K x K pixels |
+|---|---|
+| fetches | 2 for each node that is visited, some 10 to 30 K^2 log n; K^2 for the sum |
+| bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
+| rays | 2 n for each point of a light source, and none besides |
+| passes | 4 x `levels` + 2, and for each bounce 4 |
+
+A dispatch is one thread for each place. Mesa's software rasteriser ends a shader's loops after 65,536 rounds, so there
+the tree is walked by parts; eight lanes that walk different ways make it slow: docs/micro_rendering.md.
+
+Fails: a mirror needs rays: lobes narrower than the points' spacing show discs. A ground of a kilometre takes all
+points.
+
+Bias, in diffuse and glossy indirect light: discs of 1.5 times their area's radius reach over edges by half of that,
+which darkens beside them; 0.4 % of holes between them; leaves, grass and hair below the points' spacing are wrong. Points
+reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there. Sheen,
+velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog between
+surfaces dims nothing.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +105,8 @@ class MicroRendering(MultiresRadiosity):
             1 << 20, draft=2048,
         ),
         Param(
-            "side", "Micro-buffer side", 12, "Pixels along a side of the hemisphere that a place gathers", 4, 32, draft=8,
+            "side", "Micro-buffer side", 12, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
+            draft=8,
         ),
         Param(
             "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
@@ -83,10 +120,12 @@ class MicroRendering(MultiresRadiosity):
             "that its own middle falls into, which makes silhouettes grow",
         ),
         Param(
-            "groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14, draft=256,
+            "groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14,
+            draft=256,
         ),
         Param(
-            "levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5,
+            "levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0,
+            5,
         ),
     )  # fmt: skip
     provides = ()

@@ -13,6 +13,7 @@
 // nodes beside the cone about all rays are left out.
 #include "micro/warp.glsl"
 #define NOTHING 0xffffffffu
+#define ROUND 0.2  // of the size of a flat group that is drawn as one disc: up to there a bent one is drawn as a ball
 #define SAME_SURFACE 0.7  // cosine between normals, from which on a disc whose radius reaches here is this surface
 
 vec4 node_texel(int index)
@@ -136,8 +137,9 @@ void micro_fill(MicroFrame f, ivec2 corner)
         reach = 0.5 * STRETCH * chord * side;
         vec2 disc = vec2(dot(direction, f.tangent), dot(direction, f.bitangent));
         middle = (square_of_disc(disc) * 0.5 + 0.5) * side - f.shift;
-        low = max(low, ivec2(ceil(middle - reach)));
-        high = min(high, ivec2(floor(middle + reach)));
+        vec2 half_size = square_reach(disc, chord) * (0.5 * side);
+        low = max(low, ivec2(ceil(middle - half_size)));
+        high = min(high, ivec2(floor(middle + half_size)));
 #endif
       }
       bool small_enough = reach <= detail;
@@ -148,9 +150,11 @@ void micro_fill(MicroFrame f, ivec2 corner)
         micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
       }
       else if (seen || centre_test == 0) {
-        down = k < leaf_count && !small_enough;
+        // A ball in place of an edge between walls lets light pass beside it.
+        vec4 shape = node_texel(2 * k + 1);
+        down = k < leaf_count && (!small_enough || (shape.w < 0.0 && reach > ROUND * detail));
         if (!down) {
-          micro_draw(f, corner, low, high, to_node, node_texel(2 * k + 1), k);
+          micro_draw(f, corner, low, high, to_node, shape, k);
         }
       }
     }

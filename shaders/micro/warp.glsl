@@ -20,3 +20,18 @@ vec2 square_of_disc(vec2 disc)
   float radius = (larger < 0.0) ? -length(disc) : length(disc);
   return wide ? vec2(radius, along * radius) : vec2(along * radius, radius);
 }
+
+// Half the sides of a box on the square, about the place of `disc`, that holds all within `chord` of it on the disc. Along
+// the axis of its quarter the square is as long as the disc; across it sqrt((4 / PI)^2 + the angle's share squared) times.
+vec2 square_reach(vec2 disc, float chord)
+{
+  bool wide = abs(disc.x) >= abs(disc.y);
+  float larger = max(abs(disc.x), abs(disc.y));
+  float smaller = min(abs(disc.x), abs(disc.y));
+  if (larger - smaller < 1.5 * chord) {  // the box may reach into another quarter
+    return vec2(STRETCH * chord);
+  }
+  float along = min((4.0 / PI) * (smaller + chord) / (larger - chord), 1.0);  // as large as any angle's share there
+  float across = chord * sqrt(1.6212 + along * along);
+  return wide ? vec2(chord, across) : vec2(across, chord);
+}
