@@ -2,8 +2,8 @@
 
 Scenes x techniques x samples: squared error (relMSE, the noise of the reference taken off), bias and seconds of a whole
 render whose programs are compiled; then the error and time of micro-rendering by the side of its micro-buffers, the
-number of points, regions and threshold in one scene, at one sample. The seconds are of the machine that it runs on: where
-a GPU is drawn in software, a tree that is walked by each of eight lanes is what it does worst.
+number of points, regions and threshold in one scene, at one sample. The seconds are of the machine that it runs on:
+where a GPU is drawn in software, a tree that is walked by each of eight lanes is what it does worst.
 """
 
 from __future__ import annotations
@@ -105,24 +105,36 @@ def write_picture(path: Path, pictures: list) -> None:
     path.write_bytes(png((large * 255 + 0.5).astype(np.uint8)))
 
 
+PAGE = """# Micro-rendering: error and time
+
+Written by `python -m bench micro_rendering --page PATH`; do not edit. Method, bias and where it fails:
+`addon/techniques/micro_rendering.py`.
+
+{size} pixels, {bounces} bounces. Diffuse indirect light against the mean of two renders of {reference} samples by
+Cycles, whose noise is taken off the errors (relMSE). Seconds are of a whole render of which nothing has to be compiled,
+on a GPU drawn in software by two cores that others used, too: they say nothing of a GPU.
+
+{rows}
+"""
+TURNED = """
+## What its parameters cost
+
+One sample, {scene}.
+
+{turned}
+"""
+
+
 def page(rows: list, turned: list, options: argparse.Namespace) -> str:
     """The tables as Markdown."""
     from bench import markdown
 
     size = "x".join(map(str, options.size))
-    return "\n\n".join(
-        [
-            "# Micro-rendering: error and time",
-            "Written by `python -m bench micro_rendering --page PATH`; do not edit. Method, bias and where it fails: "
-            "`addon/techniques/micro_rendering.py`.",
-            f"{size} pixels, {BOUNCES} bounces. Diffuse indirect light against the mean of two renders of "
-            f"{options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Seconds are of a whole "
-            "render of which nothing has to be compiled, on a GPU drawn in software by two cores that others used, too: "
-            "ratios are to be read with care, and say nothing of a GPU.",
-            markdown.table(HEAD, rows),
-            *([f"## What its parameters cost\n\nOne sample, {DIAL_SCENE}.", markdown.table(DIAL_HEAD, turned)] if turned else []),
-        ]
-    ) + "\n"  # fmt: skip
+    table_of_rows = markdown.table([HEAD, *rows])
+    text = PAGE.format(size=size, bounces=BOUNCES, reference=options.reference, rows=table_of_rows)
+    if turned:
+        text += TURNED.format(scene=DIAL_SCENE, turned=markdown.table([DIAL_HEAD, *turned]))
+    return text
 
 
 def command(options: argparse.Namespace) -> int:

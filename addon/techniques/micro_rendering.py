@@ -30,10 +30,10 @@ Fails: a mirror needs rays: lobes narrower than the points' spacing show discs. 
 points.
 
 Bias, in diffuse and glossy indirect light: discs of 1.5 times their area's radius reach over edges by half of that,
-which darkens beside them; 0.4 % of holes between them; leaves, grass and hair below the points' spacing are wrong. Points
-reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there. Sheen,
-velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog between
-surfaces dims nothing.
+which darkens beside them; 0.4 % of holes between them; leaves, grass and hair below the points' spacing are wrong.
+Points reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there.
+Sheen, velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog
+between surfaces dims nothing.
 """
 
 from __future__ import annotations
