@@ -37,7 +37,8 @@ from .point_light import PointLight
 ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
-LIGHTS, OTHERS = 4, 2  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+LIGHTS, OTHERS = 4, 4  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+SHARPNESS = 16.0  # see PointLight: a bright spot is one of thousands of points that are gathered
 REFLECT = passes.fullscreen_program(
     "what points reflect",
     "hits/reflect.frag.glsl",
@@ -70,7 +71,7 @@ class LitPoints:
     sample."""
 
     def __init__(self, use: str):
-        self._light = PointLight(use, LIGHTS, OTHERS, reflected=True)
+        self._light = PointLight(use, LIGHTS, OTHERS, reflected=True, sharpness=SHARPNESS)
         self._runs: dict[int, Run] = {}
         self._surfaces: Surfaces | None = None
         self._key: object = None

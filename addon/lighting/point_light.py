@@ -34,11 +34,16 @@ class PointLight:
 
     In a picture of few samples, so many points are drawn on each lamp (`few`), and in each sample at least so many of
     the world and of emissive meshes (`others`). `reflected`: lamps that give no light to reflections are left out.
+    `sharpness`: how many times as many points a light counts as having where surfaces are near to one of them
+    (lights.footprint): more lose less light, but leave bright spots.
     """
 
-    def __init__(self, use: str, few: int = FEW_POINTS, others: int = OTHER_POINTS, reflected: bool = False):
+    def __init__(
+        self, use: str, few: int = FEW_POINTS, others: int = OTHER_POINTS, reflected: bool = False,
+        sharpness: float = 1.0,
+    ):  # fmt: skip
         self._use = use  # of the sequence
-        self._few, self._others, self._reflected = few, others, reflected
+        self._few, self._others, self._reflected, self._sharpness = few, others, reflected, sharpness
         self._sources = lights.Sources()
         self._emissive: EmissiveTriangles | None = None
 
@@ -84,8 +89,9 @@ class PointLight:
             each = max(self._few // settings.samples, 1) if emitter.extended else 1
             for number in range(frame.sample * each, (frame.sample + 1) * each):
                 sample = emitter.sample(*frame.random_volume_at(number, f"{self._use}/light"))
+                points = self._sharpness * each * settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
-                yield emitter.row(sample, 0, shadowed, weight, each, each * settings.samples / weight)
+                yield emitter.row(sample, 0, shadowed, weight, each, points)
 
     def _world(self, frame: Frame) -> Iterator[np.ndarray]:
         world = frame.snapshot.world
@@ -104,7 +110,8 @@ class PointLight:
         each = max(self._few // frame.settings.samples, self._others)
         for number in range(frame.sample * each, (frame.sample + 1) * each):
             numbers = frame.random_volume_at(number, f"{self._use}/emissive")
-            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=frame.settings.samples)
+            samples = self._sharpness * frame.settings.samples
+            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)
 
     def release(self) -> None:
         self._sources.release()

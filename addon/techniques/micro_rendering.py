@@ -105,14 +105,14 @@ class MicroRendering(MultiresRadiosity):
             1 << 20, draft=2048,
         ),
         Param(
-            "side", "Micro-buffer side", 12, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
+            "side", "Micro-buffer side", 8, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
             draft=8,
         ),
         Param(
             "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
         ),
         Param(
-            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be "
+            "threshold", "Threshold", 4.0, "Pixels of a micro-buffer that a group of points may cover and still be "
             "drawn as one disc", 0.05, 16.0,
         ),
         Param(

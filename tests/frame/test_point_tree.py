@@ -134,7 +134,7 @@ def test_points_of_nothing_are_none():
     assert len(points.placed(surfaces(np.zeros((0, 3, 3))))[0]) == 0
 
 
-def test_a_square_and_a_disc_are_mapped_to_each_other_in_equal_areas(registered):
+def test_a_square_and_a_disc_are_mapped_to_each_other_in_equal_areas(gpu_context):
     """The shares of rings and sectors of the disc, and the way back."""
     with images.borrowed(256, 256, "RGBA32F") as target:
         passes.fullscreen(WARP, target, constants={"side": 256.0})
