@@ -110,33 +110,35 @@ class NodeRadiance:
         leaves = run.tree.leaves
         self._prepare(4 * leaves)
         direct = points.light(frame, technique, run)
-        yield
-        sent = images.pool.take(*run.size, "RGBA32F")
-        self._send(frame, technique, run, direct, direct, 0, sent)
-        if bounces > 0:
-            groups = min(groups, leaves // 2)
-            size = (NODE_ROW, max(2 * groups // NODE_ROW, 1))
-            micro = images.pool.take(size[0] * GROUP_SIDE, size[1] * GROUP_SIDE, "R32UI")
-            arriving = images.pool.take(*size, "RGBA32F")
-            constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
-            for part in parts(leaves):
-                passes.compute(
-                    OF_GROUPS, size, textures={"nodes": run.nodes, "radiance": self.image}, images={"micro": micro},
-                    constants={**constants, "group_count": groups, "part": part},
-                )  # fmt: skip
-                yield
-            frame.count(technique, "gathers of points", 2 * groups)
-            for _ in range(bounces):
-                passes.fullscreen(
-                    ARRIVING, images.Target((arriving,)), textures={"micro": micro, "radiance": self.image},
-                    constants={name: constants[name] for name in ("micro_side", "id_bits")},
-                )  # fmt: skip
-                self._send(frame, technique, run, direct, arriving, groups, sent)
-            images.pool.give(micro)
-            images.pool.give(arriving)
-            frame.count(technique, "bounces", bounces)
-        images.pool.give(sent)
-        images.pool.give(direct)
+        held = [direct, images.pool.take(*run.size, "RGBA32F")]
+        sent = held[1]
+        try:
+            yield
+            self._send(frame, technique, run, direct, direct, 0, sent)
+            if bounces > 0:
+                groups = min(groups, leaves // 2)
+                size = (NODE_ROW, max(2 * groups // NODE_ROW, 1))
+                micro = images.pool.take(size[0] * GROUP_SIDE, size[1] * GROUP_SIDE, "R32UI")
+                arriving = images.pool.take(*size, "RGBA32F")
+                held += [micro, arriving]
+                constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
+                for part in parts(leaves):
+                    passes.compute(
+                        OF_GROUPS, size, textures={"nodes": run.nodes, "radiance": self.image},
+                        images={"micro": micro}, constants={**constants, "group_count": groups, "part": part},
+                    )  # fmt: skip
+                    yield
+                frame.count(technique, "gathers of points", 2 * groups)
+                for _ in range(bounces):
+                    passes.fullscreen(
+                        ARRIVING, images.Target((arriving,)), textures={"micro": micro, "radiance": self.image},
+                        constants={name: constants[name] for name in ("micro_side", "id_bits")},
+                    )  # fmt: skip
+                    self._send(frame, technique, run, direct, arriving, groups, sent)
+                frame.count(technique, "bounces", bounces)
+        finally:  # also where a viewport drops the sample
+            for image in held:
+                images.pool.give(image)
 
     def _send(self, frame, technique, run: Run, direct, arriving, groups: int, sent: images.Image) -> None:
         leaves = run.tree.leaves

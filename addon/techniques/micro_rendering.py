@@ -102,7 +102,7 @@ class MicroRendering(MultiresRadiosity):
     params = (
         Param(
             "points", "Points", 8192, "Points on all surfaces that light is stored at; rounded to a power of two", 64,
-            1 << 20, draft=2048,
+            1 << 20,
         ),
         Param(
             "side", "Micro-buffer side", 8, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
