@@ -112,7 +112,7 @@ class MicroRendering(MultiresRadiosity):
             "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
         ),
         Param(
-            "threshold", "Threshold", 4.0, "Pixels of a micro-buffer that a group of points may cover and still be "
+            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be "
             "drawn as one disc", 0.05, 16.0,
         ),
         Param(

@@ -136,8 +136,8 @@ def test_points_of_nothing_are_none():
 
 def test_a_square_and_a_disc_are_mapped_to_each_other_in_equal_areas(gpu_context):
     """The shares of rings and sectors of the disc, and the way back."""
-    with images.borrowed(256, 256, "RGBA32F") as target:
-        passes.fullscreen(WARP, target, constants={"side": 256.0})
+    with images.borrowed(1024, 1024, "RGBA32F") as target:
+        passes.fullscreen(WARP, target, constants={"side": 1024.0})
         places = images.read(target.colors[0]).reshape(-1, 4)
     assert np.abs(places[:, 2:]).max() < 1e-4
     radius, turn = np.hypot(*places[:, :2].T), np.arctan2(places[:, 1], places[:, 0])

@@ -102,7 +102,7 @@ def test_light_of_both_sides_of_a_sheet_is_told_apart(stage, render):
 def test_error_falls_with_samples_and_with_pixels_of_the_micro_buffer(stage, render):
     lamp_in_a_corner(stage)
     shelf(stage, material=stage.diffuse(0.5))
-    truth = render(2, samples=64, points=8192, side=16)
+    truth = render(2, samples=32, points=8192, side=16)
 
     def error(**params):
         return np.sqrt(((render(2, **params) - truth) ** 2).mean()) / truth.mean()
@@ -169,7 +169,13 @@ def test_one_triangle_and_nothing_are_drawn(stage, render):
 def test_the_threshold_and_the_test_of_centres_change_the_cost_and_not_the_light(stage, render):
     sphere(stage, stage.diffuse(0.5))
     stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
-    for params in ({"threshold": 0.1}, {"centre_test": False}, {"levels": 0}, {"groups": 16, "side": 4}):
+    for params in (
+        {"threshold": 0.1},
+        {"threshold": 4.0},
+        {"centre_test": False},
+        {"levels": 0},
+        {"groups": 16, "side": 4},
+    ):
         # Where all is drawn as single discs, the specification knows of holes up to 6 % between so few points.
         within = 0.06 if "threshold" in params else 0.03
         assert render(1, **params).mean() == pytest.approx(0.25, rel=within), params
