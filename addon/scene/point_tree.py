@@ -6,8 +6,10 @@ a normal counting as NORMAL_WEIGHT of the group's extent, in normal: so that the
 sheet that are wound the other way, part early and what is left is flat. Ties go by order: coincident points are split,
 too.
 
-    node    bounding ball, mean normal, cosine of the half angle of the cone of normals, radius of a disc in its plane
-            that has COVER^2 times the area that its points stand for (or of a ball, where normals point all ways)
+    node    bounding ball, mean normal, cosine of the half angle of the cone of normals
+    point   radius of a disc that has COVER^2 times the area that it stands for
+    group   flat: a rectangle that holds its points and half the distance to the next ones; else a ball, of a radius
+            that goes by the area
 
 Points that have moved keep their places in the tree: bounds are made anew from the leaves up (refit), at a fifth of the
 cost. `numpy` for 2^14 points: 12 ms, 3 ms refitted; 2^18: 0.4 s and 0.08.
@@ -26,13 +28,15 @@ from ..gfx import images
 COVER = 1.5  # radius of a disc beside that of the area which it stands for (holes: see area_points.py)
 NORMAL_WEIGHT = 0.25
 FLAT = 0.7  # cosine of the half angle of a cone of normals, up to which a group is drawn as a disc
-NODE_TEXELS = 2
+LOOSE = 2.0  # area of a rectangle beside that of the group that it stands for
+NODE_TEXELS = 3
 
 
 @dataclass(frozen=True)
 class PointTree:
     """`order` (n,): the points in the order of leaves. By node (2 n; 0 is unused): `centre` (2 n, 3), `radius` of the
-    bounding ball, `axis` (2 n, 3), `cone` (cosine), `disc` (radius) and `area`, m2."""
+    bounding ball, `axis` (2 n, 3), `cone` (cosine), `disc` (radius), `area`, m2, `along` (2 n, 3), a side of a flat
+    group's rectangle, and `half` (2 n, 2) of its lengths along and across."""
 
     order: np.ndarray
     centre: np.ndarray
@@ -41,18 +45,27 @@ class PointTree:
     cone: np.ndarray
     disc: np.ndarray
     area: np.ndarray
+    along: np.ndarray
+    half: np.ndarray
+
+    @property
+    def flat(self) -> np.ndarray:
+        """(2 n,) groups that a rectangle stands for: those whose rectangle is not much larger than they are."""
+        return (self.cone >= FLAT) & (4.0 * self.half.prod(axis=1) <= LOOSE * self.area)
 
     @property
     def leaves(self) -> int:
         return len(self.order)
 
     def packed(self) -> np.ndarray:
-        """(2 n NODE_TEXELS, 4) float32 for shaders/micro/nodes.glsl: centre, radius of the ball; octahedral axis,
-        cosine, radius of the disc (negative: of a ball)."""
+        """(2 n NODE_TEXELS, 4) float32 for shaders/micro/buffer.glsl: centre, radius of the ball; octahedral axis,
+        cosine, radius of the disc (negative: of a ball); octahedral side of the rectangle, its half lengths."""
         rows = np.zeros((2 * self.leaves, NODE_TEXELS, 4), np.float32)
         rows[:, 0, :3], rows[:, 0, 3] = self.centre, self.radius
         rows[:, 1, :2], rows[:, 1, 2] = octahedral(self.axis), self.cone
-        rows[:, 1, 3] = np.where(self.cone >= FLAT, self.disc, -self.disc / 2)  # of a ball: a quarter of the area
+        rows[:, 1, 3] = np.where(self.flat, self.disc, -self.disc / 2)  # of a ball: a quarter of the area
+        rows[self.leaves :, 1, 3] = self.disc[self.leaves :]
+        rows[:, 2, :2], rows[:, 2, 2:] = octahedral(self.along), self.half
         return rows.reshape(-1, 4)
 
     def upload(self) -> images.Image:
@@ -85,20 +98,40 @@ def fitted(order: np.ndarray, positions: np.ndarray, normals: np.ndarray, areas:
     centre, axis = np.zeros((2 * n, 3)), np.zeros((2 * n, 3))
     radius, cone, whole = np.zeros(2 * n), np.ones(2 * n), np.zeros(2 * n)
     centre[n:], axis[n:], radius[n:], whole[n:] = place, normal, disc, area
+    along, half = np.zeros((2 * n, 3)), np.zeros((2 * n, 2))
+    along[:] = (1.0, 0.0, 0.0)
     parts = n // 2
     while parts:
         own = slice(parts, 2 * parts)
-        of_node = place.reshape(parts, -1, 3)
-        centre[own] = (of_node.min(axis=1) + of_node.max(axis=1)) / 2
-        away = np.linalg.norm(of_node - centre[own][:, None], axis=2) + disc.reshape(parts, -1)
-        radius[own] = away.max(axis=1)
+        of_node, of_normal = place.reshape(parts, -1, 3), normal.reshape(parts, -1, 3)
+        low, high = of_node.min(axis=1), of_node.max(axis=1)
         whole[own] = area.reshape(parts, -1).sum(axis=1)
         sums = (normal * area[:, None]).reshape(parts, -1, 3).sum(axis=1)
         length = np.linalg.norm(sums, axis=1, keepdims=True)
         axis[own] = np.where(length > 1e-6 * whole[own][:, None], sums / np.maximum(length, 1e-300), (0.0, 0.0, 1.0))
-        cone[own] = (normal.reshape(parts, -1, 3) @ axis[own][:, :, None])[..., 0].min(axis=1)
+        cone[own] = (of_normal @ axis[own][:, :, None])[..., 0].min(axis=1)
+        along[own], across = _sides(axis[own], high - low)
+        middle = (low + high) / 2
+        spacing = np.sqrt(whole[own] / of_node.shape[1]) / 2
+        for number, side in enumerate((along[own], across)):
+            reach = ((of_node - middle[:, None]) @ side[:, :, None])[..., 0]
+            first, last = reach.min(axis=1), reach.max(axis=1)
+            half[own, number] = (last - first) / 2 + spacing
+            middle = middle + side * ((first + last) / 2)[:, None]
+        centre[own] = middle
+        away = np.linalg.norm(of_node - middle[:, None], axis=2) + disc.reshape(parts, -1)
+        radius[own] = np.maximum(away.max(axis=1), np.linalg.norm(half[own], axis=1) * (cone[own] >= FLAT))
         parts //= 2
-    return PointTree(order, centre, radius, axis, cone, COVER * np.sqrt(whole / np.pi), whole)
+    return PointTree(order, centre, radius, axis, cone, COVER * np.sqrt(whole / np.pi), whole, along, half)
+
+
+def _sides(axis: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) twice: sides of rectangles with these normals, the first one nearest to that axis of space along which the
+    group is longest, as medians cut it."""
+    longest = np.eye(3)[(extent * (1.0 - np.abs(axis)) + 1e-30 * (1.0 - np.abs(axis))).argmax(axis=1)]
+    along = longest - axis * (longest * axis).sum(axis=1, keepdims=True)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    return along, np.cross(axis, along)
 
 
 def octahedral(normal: np.ndarray) -> np.ndarray:

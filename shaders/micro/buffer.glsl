@@ -73,12 +73,16 @@ void micro_store(ivec2 texel, float depth, int node, bool behind)
   }
 }
 
-// A node's disc, or ball, into the pixels `low` to `high` whose middles see it.
+// A point's disc, a flat group's rectangle or a bent one's ball, into the pixels `low` to `high` whose middles see it.
 void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node, vec4 shape, int node)
 {
   vec3 axis = octahedral_decode(shape.xy);
   float squared = shape.w * shape.w;
   float off_plane = dot(to_node, axis);
+  bool flat_group = node < leaf_count && shape.w > 0.0;
+  vec4 sides = flat_group ? node_texel(3 * node + 2) : vec4(0.0);
+  vec3 along = octahedral_decode(sides.xy);
+  vec3 across = cross(axis, along);
   // A smooth surface bends away below the disc beside it.
   bool same = node >= leaf_count && abs(dot(axis, f.normal)) > SAME_SURFACE;
   float nearest = same ? shape.w : 0.0;
@@ -91,7 +95,9 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
     float cosine = dot(ray, axis);
     float depth = (shape.w < 0.0) ? dot(to_node, ray) : off_plane / ((cosine == 0.0) ? 1e-30 : cosine);
     vec3 off = depth * ray - to_node;
-    if (depth > nearest && dot(off, off) <= squared && dot(ray, f.plane) > 0.0) {
+    bool inside = flat_group ? (abs(dot(off, along)) <= sides.z && abs(dot(off, across)) <= sides.w)
+                             : dot(off, off) <= squared;
+    if (depth > nearest && inside && dot(ray, f.plane) > 0.0) {
       micro_store(corner + pixel, depth, node, cosine > 0.0);
     }
   }
@@ -116,7 +122,7 @@ void micro_fill(MicroFrame f, ivec2 corner)
   int k = part.x + part.y;
   int end = node_after(k);
   for (int steps = 0; steps < 4 * leaf_count; steps++) {
-    vec4 ball = node_texel(2 * k);
+    vec4 ball = node_texel(3 * k);
     vec3 to_node = ball.xyz - f.place;
     bool down = false;
     if (dot(to_node, f.normal) + ball.w > 0.0 && dot(to_node, f.plane) + ball.w > 0.0) {
@@ -146,12 +152,12 @@ void micro_fill(MicroFrame f, ivec2 corner)
       bool seen = low.x <= high.x && low.y <= high.y;
       if (centre_test == 0 && small_enough && dot(to_node, f.normal) > 0.0) {
         ivec2 pixel = clamp(ivec2(floor(middle + f.shift)), ivec2(0), ivec2(micro_side - 1));
-        vec4 shape = node_texel(2 * k + 1);
+        vec4 shape = node_texel(3 * k + 1);
         micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
       }
       else if (seen || centre_test == 0) {
         // A ball in place of an edge between walls lets light pass beside it.
-        vec4 shape = node_texel(2 * k + 1);
+        vec4 shape = node_texel(3 * k + 1);
         down = k < leaf_count && (!small_enough || (shape.w < 0.0 && reach > ROUND * detail));
         if (!down) {
           micro_draw(f, corner, low, high, to_node, shape, k);

@@ -6,7 +6,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   int entry = pixel.y * POINT_ROW + pixel.x;
   int leaf = entry >> 1;
-  int index = 2 * (leaf_count + leaf) + 1;
+  int index = 3 * (leaf_count + leaf) + 1;
   float radius = nodes_fetch(ivec2(index & 2047, index >> 11)).w;
   vec3 sent = direct_fetch(pixel).rgb;
   if (group_count > 0) {
