@@ -1,7 +1,7 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
 Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
-by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has discs in place of groups of
+by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of groups of
 points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into a
 micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
 are equal shares of what the surface reflects, so light is a plain mean:
@@ -13,8 +13,9 @@ by each pixel, whose micro-buffer has rays of the lobe. What is reflected more t
 themselves. In each sample other points, other turns and shifts of the pixels: what is not bias averages out.
 
 Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours: groups
-are drawn by rays through the middles of pixels instead of one pixel for each middle of a group, which makes silhouettes
-grow; no list of what is left for rays; both sides of points; medians of normals, too; the concentric map.
+are rectangles, drawn by rays through the middles of pixels (there a group fills the one pixel that its own middle falls
+into, which makes silhouettes grow); no list of what is left for rays; both sides of points; medians of normals, too;
+the concentric map.
 
 | cost | with n points, a region or pixel that gathers, K x K pixels |
 |---|---|
@@ -29,8 +30,9 @@ the tree is walked by parts; eight lanes that walk different ways make it slow: 
 Fails: a mirror needs rays: lobes narrower than the points' spacing show discs. A ground of a kilometre takes all
 points.
 
-Bias, in diffuse and glossy indirect light: discs of 1.5 times their area's radius reach over edges by half of that,
-which darkens beside them; 0.4 % of holes between them; leaves, grass and hair below the points' spacing are wrong.
+Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
+that, which darkens beside them; between them are 0.4 to 4 % of holes; leaves, grass and hair below the points' spacing
+are wrong.
 Points reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there.
 Sheen, velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog
 between surfaces dims nothing.
