@@ -1,9 +1,9 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
 Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
-by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of groups of
-points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into a
-micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
+by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of flat
+groups of points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into
+a micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
 are equal shares of what the surface reflects, so light is a plain mean:
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
