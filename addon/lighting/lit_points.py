@@ -38,7 +38,7 @@ ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
 LIGHTS, OTHERS = 4, 4  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
-SHARPNESS = 16.0  # see PointLight: a bright spot is one of thousands of points that are gathered
+SHARPNESS = 64.0  # see PointLight: a bright spot is one of thousands of points that are gathered
 REFLECT = passes.fullscreen_program(
     "what points reflect",
     "hits/reflect.frag.glsl",

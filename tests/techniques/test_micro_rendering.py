@@ -71,7 +71,7 @@ def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     stage.mesh(corners, faces, material=shining)
     stage.camera((0.3, 0.2, -0.1), (1.2, 0.3, 0.4), angle=1.4)
-    assert render(12, samples=8).mean() == pytest.approx(0.5, rel=0.04)
+    assert render(12, samples=8, points=8192).mean() == pytest.approx(0.5, rel=0.04)
 
 
 def test_twice_the_light_is_twice_the_picture(stage, render):
