@@ -2,15 +2,15 @@
 #include "lib/math.glsl"
 #define NOTHING 0xffffffffu
 #define MICRO_WORD(texel) (micro_fetch(texel).x)
-#include "micro/sum.glsl"
 
 vec4 radiance_texel(uint index)
 {
   return radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
 }
 
+#include "micro/sum.glsl"
+
 void main()
 {
-  MICRO_SUM(ivec2(gl_FragCoord.xy) * micro_side)
-  out_arriving = arriving;
+  out_arriving = micro_sum(ivec2(gl_FragCoord.xy) * micro_side);
 }

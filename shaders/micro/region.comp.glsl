@@ -24,8 +24,7 @@ void gather(ivec2 region, int level_of_region, ivec2 corner)
   }
   micro_fill(f, corner);
   if (part.x == part.y - 1) {
-    MICRO_SUM(corner)
-    imageStore(gathered, own_place, vec4(arriving.rgb, 1.0));
+    imageStore(gathered, own_place, vec4(micro_sum(corner).rgb, 1.0));
   }
 }
 
