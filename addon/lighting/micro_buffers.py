@@ -32,16 +32,16 @@ NODE_ROW = 128  # groups and sides side by side
 SOFTWARE_LEAVES = 2048  # of a part of a tree
 GROUP_SIDE = 8  # pixels of a micro-buffer of a group
 FARTHEST, NEAREST = 2.0, 1e-6  # by the size of the scene: the range of depths that a pixel tells apart
-BUFFER_TEXTURES = (("RGBA32F", "nodes"),)
+BUFFER_TEXTURES = (("RGBA32F", "tree_nodes"),)
 BUFFER_IMAGE = ("micro", "R32UI", "UINT_2D", "READ_WRITE")
 BUFFER_CONSTANTS = (
     ("IVEC2", "part"), ("INT", "micro_side"), ("INT", "leaf_count"), ("INT", "id_bits"), ("FLOAT", "detail"),
-    ("INT", "centre_test"), ("VEC2", "log_depths"), ("VEC4", "choice"),
+    ("INT", "centre_test"), ("VEC2", "log_depths"), ("VEC4", "buffer_choice"),
 )  # fmt: skip
 OF_GROUPS = Program(
     name="micro-buffers of groups",
     compute="micro/nodes.comp.glsl",
-    textures=(*BUFFER_TEXTURES, ("RGBA32F", "radiance")),
+    textures=(*BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
     images=(BUFFER_IMAGE,),
     constants=(*BUFFER_CONSTANTS, ("INT", "group_count")),
     defines=(("NODE_ROW", str(NODE_ROW)),),
@@ -49,14 +49,14 @@ OF_GROUPS = Program(
 ARRIVING = passes.fullscreen_program(
     "light arriving at groups",
     "micro/arriving.frag.glsl",
-    textures=(("UINT_2D", "micro"), ("RGBA32F", "radiance")),
+    textures=(("UINT_2D", "micro"), ("RGBA32F", "node_radiance")),
     constants=(("INT", "micro_side"), ("INT", "id_bits")),
     outputs=(("VEC4", "out_arriving"),),
 )
 SENT = passes.fullscreen_program(
     "light sent by points",
     "micro/leaf.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in ("nodes", "direct", "albedo", "arriving")),
+    textures=tuple(("RGBA32F", name) for name in ("tree_nodes", "direct", "albedo", "arriving")),
     constants=(("INT", "leaf_count"), ("INT", "group_count")),
     defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW))),
     outputs=(("VEC4", "out_sent"),),
@@ -91,7 +91,7 @@ def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_
     return {
         "micro_side": side, "leaf_count": run.tree.leaves, "id_bits": (4 * run.tree.leaves - 1).bit_length(),
         "detail": 0.81 * float(np.sqrt(threshold)), "centre_test": int(centre_test), "log_depths": (near, far),
-        "choice": (frame.lot(use), turn, x, y),
+        "buffer_choice": (frame.lot(use), turn, x, y),
     }  # fmt: skip
 
 
@@ -124,14 +124,14 @@ class NodeRadiance:
                 constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
                 for part in parts(leaves):
                     passes.compute(
-                        OF_GROUPS, size, textures={"nodes": run.nodes, "radiance": self.image},
+                        OF_GROUPS, size, textures={"tree_nodes": run.nodes, "node_radiance": self.image},
                         images={"micro": micro}, constants={**constants, "group_count": groups, "part": part},
                     )  # fmt: skip
                     yield
                 frame.count(technique, "gathers of points", 2 * groups)
                 for _ in range(bounces):
                     passes.fullscreen(
-                        ARRIVING, images.Target((arriving,)), textures={"micro": micro, "radiance": self.image},
+                        ARRIVING, images.Target((arriving,)), textures={"micro": micro, "node_radiance": self.image},
                         constants={name: constants[name] for name in ("micro_side", "id_bits")},
                     )  # fmt: skip
                     self._send(frame, technique, run, direct, arriving, groups, sent)
@@ -144,7 +144,7 @@ class NodeRadiance:
         leaves = run.tree.leaves
         passes.fullscreen(
             SENT, images.Target((sent,)), constants={"leaf_count": leaves, "group_count": groups},
-            textures={"nodes": run.nodes, "direct": direct, "albedo": run.shaded.colors[2], "arriving": arriving},
+            textures={"tree_nodes": run.nodes, "direct": direct, "albedo": run.shaded.colors[2], "arriving": arriving},
         )  # fmt: skip
         level, program, source = leaves.bit_length() - 1, PULL_POINTS, sent
         drawn = 1

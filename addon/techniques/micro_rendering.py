@@ -65,11 +65,11 @@ def _regions(listed: bool) -> Program:
         textures, constants = lists.READ, ()
     else:
         textures = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags"))
-        constants = (("INT", "level"), ("INT", "levels"))
+        constants = (("INT", "region_level"), ("INT", "levels"))
     return Program(
         name=f"micro-buffers of regions{'' if listed else ' of a level'}",
         compute="micro/region.comp.glsl",
-        textures=(*SURFACE_TEXTURES, *BUFFER_TEXTURES, ("RGBA32F", "radiance"), *textures),
+        textures=(*SURFACE_TEXTURES, *BUFFER_TEXTURES, ("RGBA32F", "node_radiance"), *textures),
         images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
         blocks=((VIEW, "film_view"),),
         constants=(
@@ -84,7 +84,7 @@ REGIONS, REGIONS_OF_LEVEL = _regions(True), _regions(False)
 GLOSSY = Program(
     name="micro-buffers of lobes",
     compute="micro/glossy.comp.glsl",
-    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *BUFFER_TEXTURES, ("RGBA32F", "radiance")),
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
     images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
     blocks=((VIEW, "film_view"),),
     constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
@@ -162,7 +162,7 @@ class MicroRendering(MultiresRadiosity):
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         bindings = {
-            "textures": {**surface_bindings(frame), "nodes": run.nodes, "radiance": self._radiance.image},
+            "textures": {**surface_bindings(frame), "tree_nodes": run.nodes, "node_radiance": self._radiance.image},
             "blocks": {"film_view": frame.view_block},
             "constants": buffer_bindings(frame, run, frame.settings.get(self, "side"), **settings, use="micro regions"),
         }
@@ -188,14 +188,14 @@ class MicroRendering(MultiresRadiosity):
         yield from self._dispatch(REGIONS, bindings, textures, grid, atlas, (columns, rows), {})
 
     def _gather_levels(self, frame: Frame, bindings, bound, grid: dict, atlas, flags: list) -> Iterator[None]:
-        levels, anything = len(flags), bindings["textures"]["nodes"]  # for what a level does not look at
+        levels, anything = len(flags), bindings["textures"]["tree_nodes"]  # for what a level does not look at
         for level in range(levels, -1, -1):
             textures = bindings["textures"] | {
                 "region_flags": flags[level - 1] if level > 0 else anything,
                 "coarser_flags": flags[level] if level < levels else anything,
             }
             size = _level_size(frame.size, level, levels)
-            constants = {"level": level, "levels": levels}
+            constants = {"region_level": level, "levels": levels}
             yield from self._dispatch(REGIONS_OF_LEVEL, bindings, textures, grid, atlas, size, constants)
 
     def _gather_lobes(self, frame: Frame, run: Run, bindings, settings: dict) -> Iterator[None]:

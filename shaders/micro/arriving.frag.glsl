@@ -5,7 +5,7 @@
 
 vec4 radiance_texel(uint index)
 {
-  return radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
+  return node_radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
 }
 
 #include "micro/sum.glsl"

@@ -7,7 +7,7 @@
 // larger leaves cover cast rays afterwards. Here every node is drawn by rays through the middles of pixels (`centre_test`):
 // what a node's ball holds between the middles is left out with all that is below it, and silhouettes do not grow.
 //
-// Binds `nodes`, `radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
+// Binds `tree_nodes`, `node_radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
 //
 // With GLOSSY the pixels are equal shares of what microfacets reflect to the viewer instead: each has a ray of the lobe, and
 // nodes beside the cone about all rays are left out.
@@ -18,7 +18,7 @@
 
 vec4 node_texel(int index)
 {
-  return nodes_fetch(ivec2(index & 2047, index >> 11));
+  return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
 }
 
 struct MicroFrame {
@@ -173,5 +173,5 @@ void micro_fill(MicroFrame f, ivec2 corner)
 
 vec4 radiance_texel(uint index)
 {
-  return radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
+  return node_radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
 }

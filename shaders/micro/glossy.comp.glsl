@@ -18,7 +18,7 @@ void main()
   }
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 37u));
-  vec3 own = fract(choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
+  vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
   MicroFrame f = micro_frame(s.position, s.geometric_normal, s.geometric_normal, own);
   f.lobe = lobe_begin(s, to_viewer);
   int count = micro_side * micro_side;

@@ -7,7 +7,7 @@ void main()
   int entry = pixel.y * POINT_ROW + pixel.x;
   int leaf = entry >> 1;
   int index = 3 * (leaf_count + leaf) + 1;
-  float radius = nodes_fetch(ivec2(index & 2047, index >> 11)).w;
+  float radius = tree_nodes_fetch(ivec2(index & 2047, index >> 11)).w;
   vec3 sent = direct_fetch(pixel).rgb;
   if (group_count > 0) {
     int group = 2 * (leaf / (leaf_count / group_count)) + (entry & 1);

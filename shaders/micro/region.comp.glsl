@@ -17,7 +17,7 @@ void gather(ivec2 region, int level_of_region, ivec2 corner)
     return;
   }
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
-  vec3 own = fract(choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
+  vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
   MicroFrame f = micro_frame(s.position, s.normal, s.geometric_normal, own);
   if (part.x == 0) {
     micro_clear(corner);
@@ -37,11 +37,11 @@ void main()
   ivec2 corner = place * micro_side;
 #ifdef BY_LEVEL
   place.y += first_row;
-  ivec2 first = (place << level) - grid_offset;
-  bool outside = any(lessThan(first + (1 << level), ivec2(1))) || any(greaterThanEqual(first, surface_position_size()));
-  bool split = level > 0 && region_flags_fetch(place).x > 0.5;
-  if (!outside && !split && (level == levels || coarser_flags_fetch(place >> 1).x > 0.5)) {
-    gather(place, level, corner);
+  ivec2 first = (place << region_level) - grid_offset;
+  bool outside = any(lessThan(first + (1 << region_level), ivec2(1))) || any(greaterThanEqual(first, surface_position_size()));
+  bool split = region_level > 0 && region_flags_fetch(place).x > 0.5;
+  if (!outside && !split && (region_level == levels || coarser_flags_fetch(place >> 1).x > 0.5)) {
+    gather(place, region_level, corner);
   }
 #else
   int index = (first_row + place.y) * columns + place.x;
