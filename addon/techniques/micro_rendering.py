@@ -27,8 +27,8 @@ the concentric map.
 A dispatch is one thread for each place. Mesa's software rasteriser ends a shader's loops after 65,536 rounds, so there
 the tree is walked by parts; eight lanes that walk different ways make it slow: docs/micro_rendering.md.
 
-Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at the
-room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
+Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at
+the room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
 narrower than the points' spacing show discs. A ground of a kilometre takes all points.
 
 Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
