@@ -30,7 +30,7 @@ the tree is walked by parts; eight lanes that walk different ways make it slow: 
 Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at
 the room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
 narrower than the points' spacing show discs. A ground of a kilometre takes all points. The room with a shaded emissive
-lamp has .58 of its light: the cause is not known yet.
+lamp has .58 of its light, the colonnade .62: the cause is not known yet.
 
 Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
 that, which darkens beside them; between them are 0.4 to 4 % of holes; leaves, grass and hair below the points' spacing
