@@ -23,6 +23,7 @@ from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .media import MediaAttenuation
+from .micro_rendering import MicroRendering
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
 from .reflection_editing import ReflectionEditing
@@ -62,6 +63,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     MultiresRadiosity,
     ClusteredVisibility,
     ImperfectShadowMaps,
+    MicroRendering,
     ScreenSpaceBounce,
     ShadedReflections,
     ImageSpaceSubsurface,
