@@ -333,7 +333,7 @@ class Hits:
         met = images.pool.take(ROW, height, "R32UI")
         met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        passes.compute(MATERIALS_MET, frame.size, textures=textures, images={"met": met})
+        passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": met})
         found = set(np.flatnonzero(images.read(met)).tolist())
         images.pool.give(met)
         return found

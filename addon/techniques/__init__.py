@@ -19,6 +19,7 @@ from .eye import EyeModel
 from .film import Film
 from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
+from .implicit_visibility import ImplicitVisibility
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .media import MediaAttenuation
@@ -60,6 +61,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     MultiresRadiosity,
     ClusteredVisibility,
     ImperfectShadowMaps,
+    ImplicitVisibility,
     ScreenSpaceBounce,
     ShadedReflections,
     ImageSpaceSubsurface,

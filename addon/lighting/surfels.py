@@ -1,0 +1,121 @@
+"""Light at surfels: what they reflect, and the light of sources there. In images of receivers (scene/surfels.py), ROW wide.
+
+A short ray back to the surface finds each receiver's triangle, and the material's own program is run there, as where any
+ray meets a surface (surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is kept is
+the share of light that leaves again, gloss counted as even. Light of lamps, the world and emissive meshes comes from the
+light loop with traced shadows (lighting/point_light.py), over white surfaces: irradiance over pi.
+
+| cost | |
+|---|---|
+| when materials or surfaces change | 1 trace, 1 pass for each material met, 1 pass; 48 bytes a receiver |
+| direct light | POINTS rays to each lamp, the world and emissive meshes, for each receiver and solution |
+
+Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
+"""
+
+from __future__ import annotations
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import images, passes
+from ..scene.materials import SURFACE_IMAGES
+from ..scene.surfels import ROW, Surfels
+from ..surfaces.draw import SURFACE_TEXTURES
+from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
+from .point_light import LIGHTING, PointLight
+
+POINTS = 16  # on each source in a solution
+RAYS = passes.fullscreen_program(
+    "rays to surfels",
+    "implicit_visibility/rays.frag.glsl",
+    textures=(("RGBA32F", "receivers"),),
+    constants=(("INT", "receiver_count"), ("FLOAT", "offset_size")),
+    outputs=(("VEC4", "out_origin"), ("VEC4", "out_direction")),
+)
+REFLECTANCE = passes.fullscreen_program(
+    "reflectance of surfels",
+    "implicit_visibility/reflectance.frag.glsl",
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
+    outputs=(("VEC4", "out_reflectance"),),
+)
+PROGRAMS = (RAYS, REFLECTANCE, LIGHTING)
+
+
+class SurfelLight:
+    """What the receivers of a technique's surfels reflect, and the direct light that they get."""
+
+    def __init__(self):
+        self._key: object = None
+        self._held: list[images.Image] = []
+        self._light = PointLight("surfels", POINTS)
+        self.reflectance: images.Image | None = None
+        self._position: images.Image | None = None
+        self._normal: images.Image | None = None
+        self._black: images.Image | None = None
+        self._white: images.Image | None = None
+
+    @staticmethod
+    def size(surfels: Surfels) -> tuple[int, int]:
+        """Of images of receivers."""
+        return ROW, max(-(-surfels.receiver_count // ROW), 1)
+
+    def update(self, frame: Frame, technique: Technique, surfels: Surfels) -> bool:
+        """Shade the receivers anew if surfaces or materials changed; True if so. In the stage `sample`."""
+        key = (surfels.changes, frame.materials.fingerprint())
+        if key == self._key:
+            return False
+        self._give()
+        self._key = key
+        size = self.size(surfels)
+        self.reflectance, self._black, self._white = (self._take(size) for _ in range(3))
+        images.Target((self._black,)).clear()
+        images.Target((self._white,)).clear((1.0, 1.0, 1.0, 0.0))
+        rays = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
+        records = Records.take(size)
+        closures = take_closures(size, records.target.depth)
+        passes.fullscreen(
+            RAYS, rays, textures={"receivers": surfels.receivers},
+            constants={"receiver_count": surfels.receiver_count, "offset_size": frame.offset_size},
+        )  # fmt: skip
+        hits = frame.kept(Hits)
+        met = hits.trace(frame, technique, rays.colors, records, path="diffuse")
+        hits.shade(frame, technique, rays.colors[1], records, met, closures)
+        bound = closure_bindings(closures)
+        passes.fullscreen(
+            REFLECTANCE, images.Target((self.reflectance,)),
+            textures={**bound, "energy_table": frame.materials.energy_table},
+        )  # fmt: skip
+        by_name = dict(zip(SURFACE_IMAGES, closures.colors))
+        self._position, self._normal = by_name.pop("position"), by_name.pop("normal")
+        self._held += [self._position, self._normal]
+        for image in (*rays.colors, *by_name.values()):
+            images.pool.give(image)
+        records.give()
+        frame.count(technique, "passes", 2)
+        return True
+
+    def begin(self, frame: Frame) -> None:
+        self._light.begin(frame)
+
+    def add_direct(self, frame: Frame, technique: Technique, target: images.Target, number: int) -> None:
+        """Irradiance over pi at receivers of points `number` on sources, into the first of two images."""
+        target.clear()
+        surfaces = {"position": self._position, "normal": self._normal, "diffuse": self._white}
+        black = dict.fromkeys(("tint", "lobe", "emission"), self._black)
+        drawn, rays = self._light.add(frame, {**surfaces, **black}, target, number)
+        frame.count(technique, "passes", drawn)
+        frame.count(technique, "light rays", rays * target.size[0] * target.size[1])
+
+    def _take(self, size: tuple[int, int]) -> images.Image:
+        self._held.append(images.pool.take(*size, "RGBA32F"))
+        return self._held[-1]
+
+    def _give(self) -> None:
+        for image in self._held:
+            images.pool.give(image)
+        self._held = []
+
+    def release(self) -> None:
+        self._give()
+        self._light.release()
+        self.__init__()
