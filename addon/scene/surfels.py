@@ -34,11 +34,11 @@ from ..gfx import images
 from ..sampling.sequence import bits
 from . import acceleration
 
-CLOUD = 8  # points of the cloud for each surfel
-BLOCK = 192  # surfels that are picked together
-TURN = 0.7  # cell sizes by which two opposite faces count as apart
+CLOUD = 16  # points of the cloud for each surfel
+BLOCK = 96  # surfels that are picked together
+TURN = 2.0  # cell sizes by which two opposite faces count as apart: no cell goes round an edge
 FEWEST = 6  # surfels of an object that is sampled by itself
-MARGIN = 1.1  # of a disc's radius: between two points of the cloud
+MARGIN = 0.6  # spacings of the cloud that a disc reaches beyond the points of its cell
 MOST_LEAVES = 64  # of a node that may stand for them
 PURE = 32  # leaves of nodes from which on splits go by normal
 FLAT, COHERENT = 0.35, 0.9  # thickness / radius, and length of the mean normal, of a node that may stand for its leaves
@@ -343,7 +343,7 @@ def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...
     radius = np.zeros(count)
     np.maximum.at(radius, owner, np.linalg.norm(place - place[stands][owner], axis=1))
     sums = np.bincount(owner, area, minlength=count)
-    radius = np.maximum(MARGIN * radius, np.sqrt(sums / np.pi))
+    radius = np.maximum(radius + MARGIN * np.sqrt(sums / members), np.sqrt(sums / np.pi))
     cover = np.bincount(owner, opacity * area, minlength=count) / np.maximum(sums, 1e-300)
     return place[stands], normal[stands], radius, sums, cover
 
@@ -370,7 +370,8 @@ def tree(cells: Cells) -> tuple[Cells, np.ndarray]:
     """The surfels in the order of a tree's leaves, and its nodes (M, NODE_TEXELS, 4), depth first:
 
     - middle, radius of a ball that holds the discs of all its leaves
-    - mean normal (octahedral), squared radius of the disc that stands for it, 0 where none may; node to go on with
+    - mean normal (octahedral), how far its discs lie off the plane through its middle, negative where no disc may stand
+      for it; node to go on with
     - first leaf, number of leaves, 0 for both sides or 1 where only fronts are seen, opacity
     """
     count = len(cells)
@@ -441,13 +442,17 @@ def _describe(cells: Cells, first: np.ndarray, last: np.ndarray, skip: np.ndarra
         rows = first[same][:, None] + np.arange(number)
         off = cells.place[rows] - middle[same][:, None]
         radius[same] = (np.linalg.norm(off, axis=2) + cells.radius[rows]).max(axis=1)
-        thickness[same] = np.abs(np.einsum("nki,ni->nk", off, normal[same])).max(axis=1)
+        height = np.abs(np.einsum("nki,ni->nk", off, normal[same]))
+        cosine = np.einsum("nki,ni->nk", cells.normal[rows], normal[same])
+        tilt = cells.radius[rows] * np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0))
+        thickness[same] = (height + tilt * (number > 1)).max(axis=1)
     stands = (leaves <= MOST_LEAVES) & (length > COHERENT) & (thickness < FLAT * radius)
     stands &= (closed == 0) | (closed == leaves)
     leaf = leaves == 1
     nodes = np.zeros((len(first), NODE_TEXELS, 4))
     nodes[:, 0, :3], nodes[:, 0, 3] = middle, radius * (1 + 1e-5)
-    nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = _octahedral(normal), (stands | leaf) * radius**2, skip
+    slab = np.maximum(thickness * (1 + 1e-3), 1e-6 * radius)
+    nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = _octahedral(normal), np.where(stands | leaf, slab, -slab), skip
     nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, closed == leaves
     nodes[:, 2, 3] = sums(cells.opacity * cells.area) / area
     return nodes

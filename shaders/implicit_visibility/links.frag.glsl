@@ -74,22 +74,23 @@ void main()
     float square = dot(off, off);
     float beside = square - along * along;
     float radius_square = ball.w * ball.w;
-    bool missed = beside > radius_square || along + ball.w < 0.0 || along - ball.w > nearest;
-    bool links = disc.z > 0.0 && (int(disc.w) == node + 1 || radius_square * per_area < square);
+    vec3 disc_normal = octahedral_decode(disc.xy);
+    float slope = dot(disc_normal, direction);
+    float steep = max(abs(slope), 1e-4);
+    float t = dot(off, disc_normal) / ((slope < 0.0) ? -steep : steep);
+    vec3 away = t * direction - off;
+    // Flat nodes by their slab: a ray along a wall passes through many balls on it.
+    float slab = ball.w + abs(disc.z) / steep;
+    bool missed = beside > radius_square || along + ball.w < 0.0 || along - ball.w > nearest || dot(away, away) > slab * slab;
+    bool leaf = int(disc.w) == node + 1;
+    bool links = disc.z > 0.0 && (leaf || radius_square * per_area < square);
     if (!missed && !links) {
       node += 1;
       continue;
     }
     int here = node;
     node = int(disc.w);
-    if (missed) {
-      continue;
-    }
-    vec3 disc_normal = octahedral_decode(disc.xy);
-    float slope = dot(disc_normal, direction);
-    float t = dot(off, disc_normal) / ((abs(slope) > 1e-6) ? slope : 1e-6);
-    vec3 away = t * direction - off;
-    if (t <= 0.0 || t >= nearest || dot(away, away) > disc.z) {
+    if (missed || t <= 0.0 || t >= nearest || dot(away, away) > radius_square) {
       continue;
     }
     vec4 leaves = surfel_node(here, 2);
