@@ -7,7 +7,7 @@ light loop with traced shadows (lighting/point_light.py), over white surfaces: i
 
 | cost | |
 |---|---|
-| when materials or surfaces change | 1 trace, 1 pass for each material met, 1 pass; 48 bytes a receiver |
+| when materials or surfaces change | 1 trace, 8 short rays, 1 pass for each material met, 1 pass; 112 bytes a receiver |
 | direct light | POINTS rays to each lamp, the world and emissive meshes, for each receiver and solution |
 
 Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
@@ -18,8 +18,10 @@ from __future__ import annotations
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
+from ..scene import acceleration
 from ..scene.materials import SURFACE_IMAGES
 from ..scene.surfels import ROW, Surfels
+from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
 from .point_light import LIGHTING, PointLight
@@ -38,7 +40,15 @@ REFLECTANCE = passes.fullscreen_program(
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
     outputs=(("VEC4", "out_reflectance"),),
 )
-PROGRAMS = (RAYS, REFLECTANCE, LIGHTING)
+FREE = passes.fullscreen_program(
+    "free ground around surfels",
+    "implicit_visibility/free.frag.glsl",
+    textures=(*acceleration.HIERARCHY_TEXTURES, ("RGBA32F", "receivers")),
+    blocks=((VIEW, "film_view"),),
+    constants=(("INT", "receiver_count"), ("FLOAT", "offset_size")),
+    outputs=(("VEC4", "out_free_a"), ("VEC4", "out_free_b")),
+)
+PROGRAMS = (RAYS, REFLECTANCE, FREE, LIGHTING)
 
 
 class SurfelLight:
@@ -49,6 +59,7 @@ class SurfelLight:
         self._held: list[images.Image] = []
         self._light = PointLight("surfels", POINTS)
         self.reflectance: images.Image | None = None
+        self.free: dict[str, images.Image] = {}  # how far surfaces run freely around receivers
         self._position: images.Image | None = None
         self._normal: images.Image | None = None
         self._black: images.Image | None = None
@@ -80,6 +91,13 @@ class SurfelLight:
         hits = frame.kept(Hits)
         met = hits.trace(frame, technique, rays.colors, records, path="diffuse")
         hits.shade(frame, technique, rays.colors[1], records, met, closures)
+        self.free = {name: self._take(size) for name in ("free_a", "free_b")}
+        passes.fullscreen(
+            FREE, images.Target(tuple(self.free.values())),
+            textures={**frame.hierarchy("diffuse").textures, "receivers": surfels.receivers},
+            blocks={"film_view": frame.view_block},
+            constants={"receiver_count": surfels.receiver_count, "offset_size": frame.offset_size},
+        )  # fmt: skip
         bound = closure_bindings(closures)
         passes.fullscreen(
             REFLECTANCE, images.Target((self.reflectance,)),
@@ -91,7 +109,7 @@ class SurfelLight:
         for image in (*rays.colors, *by_name.values()):
             images.pool.give(image)
         records.give()
-        frame.count(technique, "passes", 2)
+        frame.count(technique, "passes", 3)
         return True
 
     def begin(self, frame: Frame) -> None:

@@ -8,8 +8,8 @@ as many surfels as one of a million with the same area.
 
 Meshes are sampled in their own space after stretching (M = rotation * stretch): what moves rigidly keeps its surfels,
 instances share them, and the result does not depend on what was there before. Objects that would have fewer than FEWEST
-surfels are sampled together. Area farther than `reach` from `eye` counts by (reach / distance)^2, as in
-surface_points.py, so that a kilometre of ground does not take all.
+surfels are sampled together. Area farther than `reach` from `eye` counts by (reach / distance)^4, as in
+surface_points.py but steeper, so that a kilometre of ground does not take all.
 
 The tree is binary and lies depth first: a node's first child follows it, `skip` is where to go on beside it. Nodes of up
 to PURE leaves are split by normal first, so that most small nodes are flat and may stand for their leaves.
@@ -221,8 +221,8 @@ class _Surface:
 
 def _reach(frame, distance: float) -> tuple[float, np.ndarray]:
     """Beyond what distance from which place area counts less; of scenes no larger than what is seen, nowhere."""
-    reach = float(np.exp2(np.ceil(np.log2(4 * max(distance, 1e-30)))))
-    if not frame.geometry.size > 4.0 * reach:
+    reach = float(np.exp2(np.ceil(np.log2(1.5 * max(distance, 1e-30)))))
+    if not frame.geometry.size > 8.0 * reach:
         return np.inf, np.zeros(3)
     eye = frame.snapshot.camera.matrix[:3, 3] - frame.geometry.origin
     return reach, np.round(eye / reach) * reach if np.isfinite(eye).all() else np.zeros(3)
@@ -245,7 +245,7 @@ def _areas(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _share(pieces: np.ndarray, reach: float, eye: np.ndarray) -> np.ndarray:
-    return (reach / np.maximum(np.linalg.norm(pieces.mean(axis=1) - eye, axis=1), reach)) ** 2
+    return (reach / np.maximum(np.linalg.norm(pieces.mean(axis=1) - eye, axis=1), reach)) ** 4
 
 
 def halved(corners: np.ndarray, eye: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:

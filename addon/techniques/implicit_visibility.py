@@ -100,7 +100,11 @@ GATHER = passes.fullscreen_program(
 SHOW = passes.fullscreen_program(
     "light of surfels at pixels",
     "implicit_visibility/show.frag.glsl",
-    textures=(*SURFACE_TEXTURES, *TREE, ("RGBA32F", "surfel_leaves"), ("RGBA32F", "arriving")),
+    textures=(
+        *SURFACE_TEXTURES,
+        *TREE,
+        *(("RGBA32F", name) for name in ("surfel_leaves", "receivers", "arriving", "free_a", "free_b")),
+    ),
     constants=(("INT", "node_count"),),
     defines=IN_TREE,
     outputs=(("VEC4", "out_diffuse"),),
@@ -178,7 +182,7 @@ class ImplicitVisibility(Technique):
                 SHOW, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows,
                 textures={
                     **surface_bindings(frame), **_tree(surfels), "surfel_leaves": surfels.leaves,
-                    "arriving": solution.arriving,
+                    "receivers": surfels.receivers, "arriving": solution.arriving, **self._light.free,
                 },
                 constants={"node_count": surfels.node_count},
             )  # fmt: skip

@@ -24,5 +24,5 @@ void main()
     }
   }
   out_arriving = vec4(sum, linked) / float(count);
-  out_sent.rgb = reflectance_fetch(pixel).rgb * (max(direct_fetch(pixel).rgb, vec3(0.0)) + out_arriving.rgb);
+  out_sent.rgb = reflectance_fetch(pixel).rgb * (direct_fetch(pixel).rgb + out_arriving.rgb);
 }

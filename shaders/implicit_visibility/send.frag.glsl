@@ -3,5 +3,5 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  out_sent = vec4(reflectance_fetch(pixel).rgb * max(direct_fetch(pixel).rgb, vec3(0.0)), 0.0);
+  out_sent = vec4(reflectance_fetch(pixel).rgb * direct_fetch(pixel).rgb, 0.0);
 }

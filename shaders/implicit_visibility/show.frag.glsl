@@ -3,11 +3,12 @@
 // to them says what does at the pixel itself. So light goes on to the edges of surfaces, where all surfels lie to one side.
 #include "lib/gbuffer.glsl"
 #include "implicit_visibility/surfels.glsl"
+#include "implicit_visibility/around.glsl"
 
-#define REACH 2.5
+#define REACH 2.5      // radii
 #define OFF_PLANE 0.5  // radii
 #define STIFF 0.03     // how much the slope is held back, where few surfels tell it
-#define LEAST 1e-6     // of a surfel that faces another way: where there is none better
+#define LEAST 1e-6     // of a surfel that faces another way, or stands behind something: where there is none better
 
 vec3 arriving_at(vec3 place, vec3 normal, vec3 face)
 {
@@ -45,11 +46,15 @@ vec3 arriving_at(vec3 place, vec3 normal, vec3 face)
       receiver = int(own.y);
       alike = 0.0;
     }
-    vec4 known = arriving_fetch(receiver_pixel(receiver));
+    ivec2 stored = receiver_pixel(receiver);
+    vec4 known = arriving_fetch(stored);
+    int facing = receiver * RECEIVER_TEXELS + 1;
+    vec3 own_normal = receivers_fetch(ivec2(facing & 2047, facing >> 11)).xyz;
+    float seen = seen_around(free_a_fetch(stored), free_b_fetch(stored), own_normal, -off, ball.w);
     float near = 1.0 - square / (reach * reach);
     float beside = dot(off, face) / (OFF_PLANE * ball.w);
     alike *= alike;
-    float weight = near * near * max(alike * alike * exp(-beside * beside), LEAST);
+    float weight = near * near * max(alike * alike * seen * exp(-beside * beside), LEAST);
     float u = dot(off, tangent) / ball.w;
     float v = dot(off, bitangent) / ball.w;
     level += weight * known.rgb;
@@ -72,7 +77,8 @@ vec3 arriving_at(vec3 place, vec3 normal, vec3 face)
   float determinant = max(uu * vv - uv * uv, 1e-12);
   vec3 rise_u = (vv * along_u - uv * along_v) / determinant;
   vec3 rise_v = (uu * along_v - uv * along_u) / determinant;
-  return clamp(mean - middle.x * rise_u - middle.y * rise_v, 0.3 * mean, 2.0 * mean);
+  vec3 found = mean - middle.x * rise_u - middle.y * rise_v;
+  return clamp(found, min(0.3 * mean, 2.0 * mean), max(0.3 * mean, 2.0 * mean));  // lamps may have negative power
 }
 
 void main()

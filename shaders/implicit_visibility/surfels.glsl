@@ -1,13 +1,13 @@
 // Surfels, their tree and their receivers as lists (addon/scene/surfels.py). Receiver i is a side of a surfel; its light
 // stands at column i & 255, row i >> 8 of images of receivers.
-#define NODE_TEXELS 3
+#define SURFEL_TEXELS 3
 #define RECEIVER_TEXELS 2
 #define RECEIVER_ROW 8  // bits of a column
 
 #ifdef SURFEL_TREE
 vec4 surfel_node(int node, int texel)
 {
-  int i = node * NODE_TEXELS + texel;
+  int i = node * SURFEL_TEXELS + texel;
   return surfel_nodes_fetch(ivec2(i & 2047, i >> 11));
 }
 #endif

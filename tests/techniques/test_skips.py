@@ -90,6 +90,7 @@ WITHOUT = {
     "multires_radiosity": no_bounces,
     "clustered_visibility": no_bounces,
     "imperfect_shadow_maps": no_bounces,
+    "implicit_visibility": no_bounces,
     "ssdo": no_bounces,
     "caustics_mapping": no_glass,
     "screen_space_photons": no_glass,

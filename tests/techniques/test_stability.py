@@ -303,6 +303,7 @@ CHOICES = {
         ("indirect", "multires_radiosity", ("camera",)),
         ("indirect", "clustered_visibility", ("geometry",)),
         ("indirect", "imperfect_shadow_maps", ("geometry",)),
+        ("indirect", "implicit_visibility", ("geometry",)),
         ("environment", "directional_occlusion", ("geometry", "camera", "world")),
     )
     for name in CORPUS
