@@ -3,12 +3,13 @@
 A short ray back to the surface finds each receiver's triangle, and the material's own program is run there, as where any
 ray meets a surface (surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is kept is
 the share of light that leaves again, gloss counted as even. Light of lamps, the world and emissive meshes comes from the
-light loop with traced shadows (lighting/point_light.py), over white surfaces: irradiance over pi.
+light loop with traced shadows (lighting/point_light.py), at several points of each surfel's cell, others in each solution, over
+white surfaces: irradiance over pi. A patch of sun is then as large as it is, not as many surfels as have their middle in it.
 
 | cost | |
 |---|---|
 | when materials or surfaces change | 1 trace, 8 short rays, 1 pass for each material met, 1 pass; 112 bytes a receiver |
-| direct light | POINTS rays to each lamp, the world and emissive meshes, for each receiver and solution |
+| direct light | LIT POINTS rays to each lamp, the world and emissive meshes, for each receiver and solution |
 
 Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
 """
@@ -19,14 +20,14 @@ from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..scene import acceleration
-from ..scene.materials import SURFACE_IMAGES
-from ..scene.surfels import ROW, Surfels
+from ..scene.surfels import MEMBERS, ROW, Surfels
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
 from .point_light import LIGHTING, PointLight
 
-POINTS = 16  # on each source in a solution
+LIT = 4  # points in the cell of a surfel that are lit in a solution
+POINTS = 8  # on each source for each of them
 RAYS = passes.fullscreen_program(
     "rays to surfels",
     "implicit_visibility/rays.frag.glsl",
@@ -48,7 +49,15 @@ FREE = passes.fullscreen_program(
     constants=(("INT", "receiver_count"), ("FLOAT", "offset_size")),
     outputs=(("VEC4", "out_free_a"), ("VEC4", "out_free_b")),
 )
-PROGRAMS = (RAYS, REFLECTANCE, FREE, LIGHTING)
+MEMBER = passes.fullscreen_program(
+    "points of surfels",
+    "implicit_visibility/members.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in ("receivers", "members", "shaded")),
+    constants=(("INT", "receiver_count"), ("INT", "member")),
+    defines=(("MEMBERS", str(MEMBERS)),),
+    outputs=(("VEC4", "out_position"), ("VEC4", "out_normal")),
+)
+PROGRAMS = (RAYS, REFLECTANCE, FREE, MEMBER, LIGHTING)
 
 
 class SurfelLight:
@@ -60,8 +69,6 @@ class SurfelLight:
         self._light = PointLight("surfels", POINTS)
         self.reflectance: images.Image | None = None
         self.free: dict[str, images.Image] = {}  # how far surfaces run freely around receivers
-        self._position: images.Image | None = None
-        self._normal: images.Image | None = None
         self._black: images.Image | None = None
         self._white: images.Image | None = None
 
@@ -80,7 +87,7 @@ class SurfelLight:
         size = self.size(surfels)
         self.reflectance, self._black, self._white = (self._take(size) for _ in range(3))
         images.Target((self._black,)).clear()
-        images.Target((self._white,)).clear((1.0, 1.0, 1.0, 0.0))
+        images.Target((self._white,)).clear((1.0 / LIT, 1.0 / LIT, 1.0 / LIT, 0.0))
         rays = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
         records = Records.take(size)
         closures = take_closures(size, records.target.depth)
@@ -103,10 +110,7 @@ class SurfelLight:
             REFLECTANCE, images.Target((self.reflectance,)),
             textures={**bound, "energy_table": frame.materials.energy_table},
         )  # fmt: skip
-        by_name = dict(zip(SURFACE_IMAGES, closures.colors))
-        self._position, self._normal = by_name.pop("position"), by_name.pop("normal")
-        self._held += [self._position, self._normal]
-        for image in (*rays.colors, *by_name.values()):
+        for image in (*rays.colors, *closures.colors):
             images.pool.give(image)
         records.give()
         frame.count(technique, "passes", 3)
@@ -115,14 +119,26 @@ class SurfelLight:
     def begin(self, frame: Frame) -> None:
         self._light.begin(frame)
 
-    def add_direct(self, frame: Frame, technique: Technique, target: images.Target, number: int) -> None:
-        """Irradiance over pi at receivers of points `number` on sources, into the first of two images."""
+    def add_direct(
+        self, frame: Frame, technique: Technique, surfels: Surfels, target: images.Target, number: int
+    ) -> None:
+        """Irradiance over pi of solution `number`, mean over LIT points of each cell, into the first of two images."""
         target.clear()
-        surfaces = {"position": self._position, "normal": self._normal, "diffuse": self._white}
-        black = dict.fromkeys(("tint", "lobe", "emission"), self._black)
-        drawn, rays = self._light.add(frame, {**surfaces, **black}, target, number)
-        frame.count(technique, "passes", drawn)
-        frame.count(technique, "light rays", rays * target.size[0] * target.size[1])
+        size = target.size
+        placed = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
+        black = {name: self._black for name in ("tint", "lobe", "emission")}
+        for k in range(number * LIT, (number + 1) * LIT):
+            passes.fullscreen(
+                MEMBER, placed,
+                textures={"receivers": surfels.receivers, "members": surfels.members, "shaded": self.reflectance},
+                constants={"receiver_count": surfels.receiver_count, "member": k % MEMBERS},
+            )  # fmt: skip
+            surfaces = {"position": placed.colors[0], "normal": placed.colors[1], "diffuse": self._white, **black}
+            drawn, rays = self._light.add(frame, surfaces, target, k)
+            frame.count(technique, "passes", drawn + 1)
+            frame.count(technique, "light rays", rays * surfels.receiver_count)
+        for image in placed.colors:
+            images.pool.give(image)
 
     def _take(self, size: tuple[int, int]) -> images.Image:
         self._held.append(images.pool.take(*size, "RGBA32F"))

@@ -3,7 +3,7 @@
 Each mesh is covered by an even cloud of points in proportion to area, CLOUD for each surfel wanted. Farthest point
 sampling picks centres out of it (distance in place and, so that thin sheets keep both faces, in normal); a cell is what
 is nearest to a centre, its surfel stands at the point nearest to the cell's middle, and its disc covers all points of the
-cell. So discs leave no holes wider than a seventh of a cell, whatever the tessellation: a mesh of two triangles has
+cell; where the mesh ends, or bends sharply, it ends too. So discs leave no holes wider than a seventh of a cell, whatever the tessellation: a mesh of two triangles has
 as many surfels as one of a million with the same area.
 
 Meshes are sampled in their own space after stretching (M = rotation * stretch): what moves rigidly keeps its surfels,
@@ -18,7 +18,7 @@ to PURE leaves are split by normal first, so that most small nodes are flat and 
 |---|---|
 | CPU, once for a mesh | about 50 us a surfel |
 | CPU, when something moves | about 10 us a surfel: tree and upload |
-| bytes | 48 a node, two nodes a surfel; 32 for each side that light reaches |
+| bytes | 80 a node, two nodes a surfel; 32 for each side that light reaches; 256 for points in a surfel's cell |
 
 Sources: Dong, Kautz, Theobalt and Seidel 2007 (surfels and their hierarchy at vertices; here apart from the tessellation,
 which the thesis names as future work); Eldar et al. 1997 (farthest point sampling).
@@ -34,6 +34,7 @@ from ..gfx import images
 from ..sampling.sequence import bits
 from . import acceleration
 
+MEMBERS = 8  # points of its cell at which a surfel is lit, in turn
 CLOUD = 16  # points of the cloud for each surfel
 BLOCK = 96  # surfels that are picked together
 TURN = 2.0  # cell sizes by which two opposite faces count as apart: no cell goes round an edge
@@ -43,20 +44,28 @@ MOST_LEAVES = 64  # of a node that may stand for them
 PURE = 32  # leaves of nodes from which on splits go by normal
 FLAT, COHERENT = 0.35, 0.9  # thickness / radius, and length of the mean normal, of a node that may stand for its leaves
 ROW = 256  # receivers in a row of the images of their light
-NODE_TEXELS, RECEIVER_TEXELS = 3, 2
+NODE_TEXELS, RECEIVER_TEXELS = 5, 2
+CLIPS = 2  # edges at which a disc ends
+CREASE = 0.5  # cosine between the triangles at an edge, below which surfaces end there
+MOST_EDGES, MOST_TRIANGLES = 4000, 30_000  # of a mesh whose discs end at its edges
+NONE = 1e30
 MOST_PIECES, ROUNDS = 100_000, 64  # of triangles that are halved, and how often
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Surfels of some surface: places (N, 3), unit normals (N, 3), radii (N,), areas (N,) m2, opacities (N,), and
-    whether only the front is seen (N,) bool."""
+    """Surfels of some surface: places (N, 3), unit normals (N, 3), radii (N,), areas (N,) m2, opacities (N,), MEMBERS
+    places in the cell of each and normals there (N, MEMBERS, 3), CLIPS edges (N, CLIPS, 4) as unit direction and distance
+    at which its disc ends, and whether only the front is seen (N,) bool."""
 
     place: np.ndarray
     normal: np.ndarray
     radius: np.ndarray
     area: np.ndarray
     opacity: np.ndarray
+    clips: np.ndarray
+    members: np.ndarray
+    member_normals: np.ndarray
     closed: np.ndarray
 
     def __len__(self) -> int:
@@ -72,7 +81,9 @@ class Cells:
 
 
 NOTHING = Cells(
-    np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, bool)
+    np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, CLIPS, 4)),
+    np.zeros((0, MEMBERS, 3)),
+    np.zeros((0, MEMBERS, 3)), np.zeros(0, bool),
 )  # fmt: skip
 
 
@@ -90,6 +101,7 @@ class Surfels:
         self.nodes: images.Image | None = None
         self.leaves: images.Image | None = None
         self.receivers: images.Image | None = None
+        self.members: images.Image | None = None
         self.node_count = self.receiver_count = 0
         self.changes = 0
 
@@ -142,9 +154,11 @@ class Surfels:
         if cells is None:
             cells = sampled(one.corners, one.opacity, count, one.closed)
         known[key] = cells
+        clips = cells.clips.copy()
+        clips[..., :3] = clips[..., :3] @ one.turn.T
         return Cells(
-            cells.place @ one.turn.T + one.moved, cells.normal @ one.turn.T, cells.radius, cells.area, cells.opacity,
-            cells.closed,
+            cells.place @ one.turn.T + one.moved, cells.normal @ one.turn.T, cells.radius, cells.area, cells.opacity, clips,
+            cells.members @ one.turn.T + one.moved, cells.member_normals @ one.turn.T, cells.closed,
         )  # fmt: skip
 
     def _upload(self, cells: Cells) -> None:
@@ -163,6 +177,9 @@ class Surfels:
         self.receiver_count = len(receivers)
         self.nodes = images.upload_list(nodes.reshape(-1, 4).astype(np.float32))
         self.leaves = images.upload_list(leaves.astype(np.float32))
+        members = np.zeros((count, MEMBERS, 2, 4), np.float32)
+        members[:, :, 0, :3], members[:, :, 1, :3] = cells.members, cells.member_normals
+        self.members = images.upload_list(members.reshape(-1, 4))
         self.receivers = images.upload_list(receivers.reshape(-1, 4).astype(np.float32))
 
     def release(self) -> None:
@@ -289,6 +306,7 @@ def sampled(
     corners: np.ndarray, opacity: np.ndarray, count: int, closed: bool, reach: float = np.inf, eye=None
 ) -> Cells:
     """`count` surfels of triangles (T, 3, 3), by area or, beyond `reach`, by how large it looks from `eye`."""
+    edges_of_mesh = borders(corners)
     triangle = np.arange(len(corners))
     if np.isfinite(reach):
         corners, triangle = halved(corners, eye, reach)
@@ -309,8 +327,68 @@ def sampled(
         _cells(block, place, normal, area, opacity[triangle[chosen]], TURN / 2 * size * normal)
         for block in _blocks(place, number)
     ]
-    out = [np.concatenate(values) for values in zip(*parts)]
-    return Cells(*out, np.full(len(out[0]), closed))
+    *out, members, turned = (np.concatenate(values) for values in zip(*parts))
+    return Cells(*out, _clips(*out[:3], *edges_of_mesh), members, turned, np.full(len(members), closed))
+
+
+def borders(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where surfaces end, at open edges and sharp ones: ends (E, 2, 3), unit directions outwards in the triangle's plane
+    and the triangle's normals (E, 3). None of a mesh of more than MOST_TRIANGLES, or of more than MOST_EDGES such edges."""
+    nothing = np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3))
+    if not 0 < len(corners) <= MOST_TRIANGLES:
+        return nothing
+    normal = _areas(corners)[1]
+    number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
+    first, second = number.reshape(-1), np.roll(number, -1, axis=1).reshape(-1)
+    key = np.minimum(first, second) * (number.max() + 1) + np.maximum(first, second)
+    _, edge, times = np.unique(key, return_inverse=True, return_counts=True)
+    edge = edge.reshape(-1)
+    sums = np.stack([np.bincount(edge, np.repeat(normal[:, k], 3)) for k in range(3)], axis=1)
+    # Of two unit vectors with cosine c the sum has the squared length 2 + 2 c; of what winds the other way 2 - 2 c.
+    bend = np.abs((sums * sums).sum(axis=1) / 2 - 1)
+    sharp = (times != 2) | (bend < CREASE)
+    chosen = np.flatnonzero(sharp[edge])
+    if len(chosen) > MOST_EDGES:
+        return nothing
+    ends = np.stack([corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)], axis=1)[chosen]
+    normal = np.repeat(normal, 3, axis=0)[chosen]
+    outwards = np.cross(ends[:, 1] - ends[:, 0], normal)
+    length = np.linalg.norm(outwards, axis=1)
+    good = length > 0.0
+    return ends[good], outwards[good] / length[good, None], normal[good]
+
+
+def _clips(place, normal, radius, ends, outwards, normals) -> np.ndarray:
+    """The nearest edges within the disc of each surfel, (N, CLIPS, 4)."""
+    clips = np.full((len(place), CLIPS, 4), NONE)
+    clips[..., :3] = 0.0
+    if not len(ends):
+        return clips
+    along = ends[:, 1] - ends[:, 0]
+    for first in range(0, len(place), 256):
+        some = slice(first, first + 256)
+        off = place[some, None] - ends[None, :, 0]
+        share = (off * along).sum(axis=2) / np.maximum((along * along).sum(axis=1), 1e-300)
+        away = -(off * outwards).sum(axis=2)  # of the edge's line from the surfel
+        beside = np.abs((off * normals).sum(axis=2))
+        own = np.abs(normal[some] @ normals.T) > 0.9
+        limit = radius[some, None]
+        near = own & (share > -1e-3) & (share < 1.001) & (away >= 0.0) & (away < limit) & (beside < 0.2 * limit)
+        distance = np.where(near, away, np.inf)
+        _nearest_two(clips[some], distance, outwards[None].repeat(len(distance), axis=0))
+    return clips
+
+
+def _nearest_two(clips: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
+    """Fill in (N, CLIPS, 4) from candidates (N, K) that run in different directions (N, K, 3)."""
+    rows = np.arange(len(distance))
+    for k in range(CLIPS):
+        chosen = distance.argmin(axis=1)
+        found = np.isfinite(distance[rows, chosen])
+        clips[found, k, :3] = direction[rows, chosen][found]
+        clips[found, k, 3] = distance[rows, chosen][found]
+        alike = np.einsum("nki,ni->nk", direction, direction[rows, chosen]) > 0.9
+        distance = np.where(alike, np.inf, distance)
 
 
 def _blocks(place: np.ndarray, number: int) -> list[np.ndarray]:
@@ -329,7 +407,7 @@ def _blocks(place: np.ndarray, number: int) -> list[np.ndarray]:
 
 
 def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...]:
-    """Places, normals, radii, areas and opacities of the surfels of a block of the cloud."""
+    """Places, normals, radii, areas, opacities and members of the surfels of a block of the cloud."""
     count = max(len(block) // CLOUD, 1)
     place, normal, area, opacity = place[block], normal[block], area[block], opacity[block]
     owner = _nearest_of_farthest(np.concatenate([place, turned[block]], axis=1), count)
@@ -342,10 +420,13 @@ def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...
     stands = order[np.minimum(first, len(order) - 1)]  # the member nearest to the cell's middle
     radius = np.zeros(count)
     np.maximum.at(radius, owner, np.linalg.norm(place - place[stands][owner], axis=1))
+    # The middle, then others evenly out of the cell.
+    spread = first[:, None] + (bits(np.arange(MEMBERS), 0) * members[:, None] // 2**32).astype(np.int64)
+    some = order[np.minimum(spread, len(order) - 1)]
     sums = np.bincount(owner, area, minlength=count)
     radius = np.maximum(radius + MARGIN * np.sqrt(sums / members), np.sqrt(sums / np.pi))
     cover = np.bincount(owner, opacity * area, minlength=count) / np.maximum(sums, 1e-300)
-    return place[stands], normal[stands], radius, sums, cover
+    return place[stands], normal[stands], radius, sums, cover, place[some], normal[some]
 
 
 def _nearest_of_farthest(points: np.ndarray, count: int) -> np.ndarray:
@@ -373,6 +454,7 @@ def tree(cells: Cells) -> tuple[Cells, np.ndarray]:
     - mean normal (octahedral), how far its discs lie off the plane through its middle, negative where no disc may stand
       for it; node to go on with
     - first leaf, number of leaves, 0 for both sides or 1 where only fronts are seen, opacity
+    - two edges at which the disc ends: direction in its plane, distance from its middle
     """
     count = len(cells)
     if not count:
@@ -455,6 +537,23 @@ def _describe(cells: Cells, first: np.ndarray, last: np.ndarray, skip: np.ndarra
     nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = _octahedral(normal), np.where(stands | leaf, slab, -slab), skip
     nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, closed == leaves
     nodes[:, 2, 3] = sums(cells.opacity * cells.area) / area
+    nodes[:, 3:, 3] = NONE
+    nodes[leaf, 3:] = cells.clips[first[leaf]]
+    clipped = sums((cells.clips[:, :, 3] < NONE).any(axis=1).astype(float)) > 0
+    for number in np.unique(leaves[stands & ~leaf & clipped]):
+        same = np.flatnonzero(stands & clipped & (leaves == number))
+        rows = first[same][:, None] + np.arange(number)
+        direction = cells.clips[rows][..., :3].reshape(len(same), -1, 3)
+        at = (cells.clips[rows][..., :3] * cells.place[rows][:, :, None]).sum(axis=3) + cells.clips[rows][..., 3]
+        at = at.reshape(len(same), -1)
+        inside = np.einsum("nki,nmi->nkm", direction, cells.place[rows]).max(axis=2) <= at + 1e-6 * radius[same, None]
+        distance = at - np.einsum("nki,ni->nk", direction, middle[same])
+        level = np.abs(np.einsum("nki,ni->nk", direction, normal[same])) < 0.3
+        known = cells.clips[rows][..., 3].reshape(len(same), -1) < NONE
+        distance = np.where(inside & level & known & (distance < radius[same, None]), distance, np.inf)
+        own = nodes[same, 3:]
+        _nearest_two(own, distance, direction)
+        nodes[same, 3:] = own
     return nodes
 
 

@@ -237,7 +237,7 @@ class ImplicitVisibility(Technique):
         direct, other, *sent = (images.pool.take(*size, "RGBA32F") for _ in range(4))
         radiance = images.pool.take(images.LIST_WIDTH, -(-2 * surfels.node_count // images.LIST_WIDTH), "RGBA32F")
         try:
-            self._light.add_direct(frame, self, images.Target((direct, other)), number)
+            self._light.add_direct(frame, self, surfels, images.Target((direct, other)), number)
             yield
             known = {"reflectance": self._light.reflectance, "direct": direct}
             passes.fullscreen(SEND, images.Target((sent[0],)), textures=known)

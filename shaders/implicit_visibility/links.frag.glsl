@@ -17,6 +17,7 @@
 #define BESIDE 1e-3   // radii of a surfel that rays begin above it
 #define TOUCHING 1.5  // radii within which a disc that bends away from the receiver's surface is its own surface
 #define ALIKE 0.5
+#define EDGE 0.02     // radii that a disc reaches beyond the edge of its surface: no slit between two
 
 // From the unit square to the unit disc.
 vec2 concentric(vec2 u)
@@ -93,13 +94,19 @@ void main()
     if (missed || t <= 0.0 || t >= nearest || dot(away, away) > radius_square) {
       continue;
     }
+    vec4 edge = surfel_node(here, 3);
+    vec4 other_edge = surfel_node(here, 4);
+    float slack = EDGE * ball.w;
+    if (dot(away, edge.xyz) > edge.w + slack || dot(away, other_edge.xyz) > other_edge.w + slack) {
+      continue;
+    }
     vec4 leaves = surfel_node(here, 2);
     bool front = slope < 0.0;
     bool own_surface = int(leaves.x) == own && int(leaves.y) == 1;
     bool bends = !front && t < TOUCHING * ball.w && dot(disc_normal, normal) > ALIKE;
     bool bends_back = front && t < TOUCHING * ball.w && dot(disc_normal, normal) < -ALIKE && leaves.z < 0.5;
     bends = bends || (bends_back && dot(off, normal) < 0.0);
-    if (own_surface || bends || (!front && leaves.z > 0.5)) {
+    if (own_surface || bends) {
       continue;
     }
     if (leaves.w < 1.0) {
@@ -109,6 +116,6 @@ void main()
       }
     }
     nearest = t;
-    out_link = link_of(here, front);
+    out_link = (!front && leaves.z > 0.5) ? 0.0 : link_of(here, front);  // inside a solid it is dark
   }
 }

