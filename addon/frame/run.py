@@ -521,8 +521,9 @@ class Renderer:
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
             lights_key(snapshot), casters, self._environment[0], self.materials.fingerprint(),
-            volumes_key(snapshot), snapshot.film, camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-            camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
+            volumes_key(snapshot), snapshot.film,
+            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
+            settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),

@@ -1,14 +1,16 @@
-"""Light at surfels: what they reflect, and the light of sources there. In images of receivers (scene/surfels.py), ROW wide.
+"""Light at surfels: what they reflect, and the light of sources there. In images of receivers (scene/surfels.py), ROW
+wide.
 
-A short ray back to the surface finds each receiver's triangle, and the material's own program is run there, as where any
-ray meets a surface (surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is kept is
-the share of light that leaves again, gloss counted as even. Light of lamps, the world and emissive meshes comes from the
-light loop with traced shadows (lighting/point_light.py), at several points of each surfel's cell, others in each solution, over
-white surfaces: irradiance over pi. A patch of sun is then as large as it is, not as many surfels as have their middle in it.
+A short ray back to the surface finds each receiver's triangle, and the material's own program is run there, as where
+any ray meets a surface (surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is
+kept is the share of light that leaves again, gloss counted as even. Light of lamps, the world and emissive meshes comes
+from the light loop with traced shadows (lighting/point_light.py), at several points of each surfel's cell, others in
+each solution, over white surfaces: irradiance over pi. A patch of sun is then as large as it is, not as many surfels as
+have their middle in it.
 
 | cost | |
 |---|---|
-| when materials or surfaces change | 1 trace, 8 short rays, 1 pass for each material met, 1 pass; 112 bytes a receiver |
+| when materials or surfaces change | 9 rays a receiver, 2 passes and 1 for each material met; 112 bytes a receiver |
 | direct light | LIT POINTS rays to each lamp, the world and emissive meshes, for each receiver and solution |
 
 Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
@@ -126,7 +128,7 @@ class SurfelLight:
         target.clear()
         size = target.size
         placed = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
-        black = {name: self._black for name in ("tint", "lobe", "emission")}
+        black = dict.fromkeys(("tint", "lobe", "emission"), self._black)
         for k in range(number * LIT, (number + 1) * LIT):
             passes.fullscreen(
                 MEMBER, placed,

@@ -2,17 +2,17 @@
 
 Each mesh is covered by an even cloud of points in proportion to area, CLOUD for each surfel wanted. Farthest point
 sampling picks centres out of it (distance in place and, so that thin sheets keep both faces, in normal); a cell is what
-is nearest to a centre, its surfel stands at the point nearest to the cell's middle, and its disc covers all points of the
-cell; where the mesh ends, or bends sharply, it ends too. So discs leave no holes wider than a seventh of a cell, whatever the tessellation: a mesh of two triangles has
-as many surfels as one of a million with the same area.
+is nearest to a centre, its surfel stands at the point nearest to the cell's middle, and its disc covers all points of
+the cell; where the mesh ends, or bends sharply, it ends too. So discs leave no holes wider than a seventh of a cell,
+whatever the tessellation: a mesh of two triangles has as many surfels as one of a million with the same area.
 
 Meshes are sampled in their own space after stretching (M = rotation * stretch): what moves rigidly keeps its surfels,
 instances share them, and the result does not depend on what was there before. Objects that would have fewer than FEWEST
 surfels are sampled together. Area farther than `reach` from `eye` counts by (reach / distance)^4, as in
 surface_points.py but steeper, so that a kilometre of ground does not take all.
 
-The tree is binary and lies depth first: a node's first child follows it, `skip` is where to go on beside it. Nodes of up
-to PURE leaves are split by normal first, so that most small nodes are flat and may stand for their leaves.
+The tree is binary and lies depth first: a node's first child follows it, `skip` is where to go on beside it. Nodes of
+up to PURE leaves are split by normal first, so that most small nodes are flat and may stand for their leaves.
 
 | cost | |
 |---|---|
@@ -20,9 +20,8 @@ to PURE leaves are split by normal first, so that most small nodes are flat and 
 | CPU, when something moves | about 10 us a surfel: tree and upload |
 | bytes | 80 a node, two nodes a surfel; 32 for each side that light reaches; 256 for points in a surfel's cell |
 
-Sources: Dong, Kautz, Theobalt and Seidel 2007 (surfels and their hierarchy at vertices; here apart from the tessellation,
-which the thesis names as future work); Eldar et al. 1997 (farthest point sampling).
-"""
+Sources: Dong, Kautz, Theobalt and Seidel 2007 (surfels and their hierarchy at vertices; here apart from the
+tessellation, which the thesis names as future work); Eldar et al. 1997 (farthest point sampling)."""
 
 from __future__ import annotations
 
@@ -55,8 +54,8 @@ MOST_PIECES, ROUNDS = 100_000, 64  # of triangles that are halved, and how often
 @dataclass(frozen=True)
 class Cells:
     """Surfels of some surface: places (N, 3), unit normals (N, 3), radii (N,), areas (N,) m2, opacities (N,), MEMBERS
-    places in the cell of each and normals there (N, MEMBERS, 3), CLIPS edges (N, CLIPS, 4) as unit direction and distance
-    at which its disc ends, and whether only the front is seen (N,) bool."""
+    places in the cell of each and normals there (N, MEMBERS, 3), CLIPS edges (N, CLIPS, 4) as unit direction and
+    distance at which its disc ends, and whether only the front is seen (N,) bool."""
 
     place: np.ndarray
     normal: np.ndarray
@@ -157,8 +156,8 @@ class Surfels:
         clips = cells.clips.copy()
         clips[..., :3] = clips[..., :3] @ one.turn.T
         return Cells(
-            cells.place @ one.turn.T + one.moved, cells.normal @ one.turn.T, cells.radius, cells.area, cells.opacity, clips,
-            cells.members @ one.turn.T + one.moved, cells.member_normals @ one.turn.T, cells.closed,
+            cells.place @ one.turn.T + one.moved, cells.normal @ one.turn.T, cells.radius, cells.area, cells.opacity,
+            clips, cells.members @ one.turn.T + one.moved, cells.member_normals @ one.turn.T, cells.closed,
         )  # fmt: skip
 
     def _upload(self, cells: Cells) -> None:
@@ -266,8 +265,8 @@ def _share(pieces: np.ndarray, reach: float, eye: np.ndarray) -> np.ndarray:
 
 
 def halved(corners: np.ndarray, eye: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles, those halved at their longest edge that are longer than both `reach` and their distance from `eye`, and
-    which triangle each piece is of."""
+    """Triangles, those halved at their longest edge that are longer than both `reach` and their distance from `eye`,
+    and which triangle each piece is of."""
     triangle = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
     corners = corners[triangle]
     done, numbers, pieces = [], [], 0
@@ -332,8 +331,8 @@ def sampled(
 
 
 def borders(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where surfaces end, at open edges and sharp ones: ends (E, 2, 3), unit directions outwards in the triangle's plane
-    and the triangle's normals (E, 3). None of a mesh of more than MOST_TRIANGLES, or of more than MOST_EDGES such edges."""
+    """Where surfaces end, at open edges and sharp ones: ends (E, 2, 3), unit directions outwards in the triangle's
+    plane and the triangle's normals (E, 3). None of a mesh of more than MOST_TRIANGLES or MOST_EDGES such edges."""
     nothing = np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3))
     if not 0 < len(corners) <= MOST_TRIANGLES:
         return nothing

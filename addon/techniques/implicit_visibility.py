@@ -6,8 +6,8 @@ that making links is testing depth: no shadow map, no rays through triangles. Li
     E_k(x) / pi = mean over bins of  L_k-1(link),      L_k = rho (E_direct + E_k) / pi,        k = 1 .. bounces
 
 and what arrives at surfels is shown at pixels by a linear fit over those around (shaders/implicit_visibility/). The
-solution belongs to the surfaces, not to the picture: a camera that moves costs the fit alone, changed lights or materials
-keep the links, and what moves makes links anew.
+solution belongs to the surfaces, not to the picture: a camera that moves costs the fit alone, changed lights or
+materials keep the links, and what moves makes links anew.
 
 Bins are not the cube maps of the thesis but a square of bins folded onto the half ball over the surfel so that all have
 the same projected solid angle: weights are equal, the sum over a closed room is exactly pi, none lie below the horizon.
@@ -15,10 +15,10 @@ the same projected solid angle: weights are equal, the sum over a closed room is
 differently for every surfel and in each of `orientations` solutions, one for each sample of a picture until they begin
 anew: what a bin hides is drawn evenly out of it, and blocks average out among neighbours and over samples.
 
-Links are found bin by bin instead of pair by pair: down the tree of surfels, opening nodes until they look no larger than
-the bin, keeping the nearest disc that the bin's direction meets. That is the thesis's refinement (a link goes to a
-group that fits a bin), its pushing down (links of a leaf and of its parents: the shortest wins) and its weight E2 with the
-footprint rule in one pass, in no order and without atomics.
+Links are found bin by bin instead of pair by pair: down the tree of surfels, opening nodes until they look no larger
+than the bin, keeping the nearest disc that the bin's direction meets. That is the thesis's refinement (a link goes to a
+group that fits a bin), its pushing down (links of a leaf and of its parents: the shortest wins) and its weight E2 with
+the footprint rule in one pass, in no order and without atomics.
 
 Source: Dong, Kautz, Theobalt and Seidel, "Interactive Global Illumination Using Implicit Visibility", Pacific Graphics
 2007; Dong, PhD thesis, Saarland University 2011, chapter 4. Bins by Shirley and Chiu 1997.
@@ -31,12 +31,13 @@ Source: Dong, Kautz, Theobalt and Seidel, "Interactive Global Illumination Using
 | each sample | 1 pass, about 150 nodes per pixel of 2 fetches |
 
 Bias, all in diffuse indirect light: surfaces are discs, so that silhouettes, contacts and slits narrower than a surfel
-are blurred; light of neighbouring surfels is one linear function. Rough diffuse surfaces count as Lambertian, gloss that
-surfels send as even, glass and alpha as what they cover; participating media between surfels are left out. Directions of
-the world are those that the first picture preferred. Averages over all `orientations` are the floor of the error.
+are blurred; light of neighbouring surfels is one linear function. Rough diffuse surfaces count as Lambertian, gloss
+that surfels send as even, glass and alpha as what they cover; participating media between surfels are left out.
+Directions of the world are those that the first picture preferred. Averages over all `orientations` are the floor of
+the error.
 
-Fails: light through gaps, and on things, smaller than a surfel: `surfels` says how many there are. Gloss is one ray per pixel, as of ssdo.py.
-"""
+Fails: light through gaps, and on things, smaller than a surfel: `surfels` says how many there are. Gloss is one ray per
+pixel, as of ssdo.py."""
 
 from __future__ import annotations
 

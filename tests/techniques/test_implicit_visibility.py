@@ -1,4 +1,6 @@
-"""Light between surfels: closed forms of radiosity, invariants of links and of their tree, what is kept when, and Cycles."""
+"""Light between surfels: closed forms of radiosity, invariants of links and of their tree, what is kept, and Cycles."""
+
+from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -56,7 +58,7 @@ def towards(stage, direction, number=0):
     return cells.place[own], cells.area[own], np.where(cosine[own, None] > 0, front[own], back[own])
 
 
-# Closed forms -----------------------------------------------------------------------------------------------------------
+# Closed forms ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("bounces", [1, 2, 8])
@@ -112,7 +114,7 @@ def test_perpendicular_squares_exchange_light_by_their_form_factor(stage, render
     camera = stage.camera((3, 0.5, 0.5), (np.pi / 2, 0, np.pi / 2))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
     light = render(1, samples=8, size=(32, 32), surfels=2048) * np.pi
-    place, area, arriving = towards(stage, (1, 0, 0))
+    _, area, arriving = towards(stage, (1, 0, 0))
     assert np.average(arriving[:, 0], weights=area) * np.pi == pytest.approx(8 * 0.20004, rel=0.03)
     rows = np.arange(3, 31)
     found = light[rows, 13:19].mean(axis=(1, 2))
@@ -132,7 +134,7 @@ def test_what_stands_behind_a_blocker_gets_nothing(stage, render):
     assert arriving[place[:, 2] > 1.5, 0].max() == 0.0
 
 
-# Invariants ---------------------------------------------------------------------------------------------------------------
+# Invariants -----------------------------------------------------------------------------------------------------------
 
 
 def test_groups_of_surfels_bring_what_single_ones_do(stage, render, monkeypatch):
@@ -149,7 +151,7 @@ def test_groups_of_surfels_bring_what_single_ones_do(stage, render, monkeypatch)
 def test_more_bounces_never_darken_and_black_surfaces_send_nothing(stage, render):
     corner(stage)
     pictures = [render(bounces, size=(16, 16)) for bounces in (1, 2, 4)]
-    for fewer, more in zip(pictures, pictures[1:]):
+    for fewer, more in pairwise(pictures):
         assert (more >= fewer - 1e-6).all()
         assert more.mean() > fewer.mean()
     for placed in stage.scene.objects:
@@ -206,7 +208,7 @@ def test_error_falls_with_orientations(stage, render):
     assert error(8) < 0.6 * error(1)
 
 
-# The tree -----------------------------------------------------------------------------------------------------------------
+# The tree -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -235,7 +237,7 @@ def test_surfels_stand_for_the_whole_area_and_stand_evenly(cells):
 
 
 def test_every_cut_through_the_tree_holds_each_surfel_once(cells):
-    ordered, nodes = surfel_module.tree(cells)
+    _, nodes = surfel_module.tree(cells)
     first, count = nodes[:, 2, 0].astype(int), nodes[:, 2, 1].astype(int)
     skip = nodes[:, 1, 3].astype(int)
     for most in (1, 2, 7, 40, 1000):
@@ -260,7 +262,7 @@ def test_nodes_hold_the_discs_of_their_surfels(cells):
             assert (ordered.normal[own] @ ordered.normal[own].mean(axis=0)).min() > 0.0
 
 
-# What is kept ---------------------------------------------------------------------------------------------------------------
+# What is kept ---------------------------------------------------------------------------------------------------------
 
 
 def test_a_camera_that_moves_redoes_nothing_but_the_picture(stage, render):
@@ -303,7 +305,7 @@ def test_what_moves_is_linked_anew_and_is_what_a_new_session_finds(stage, render
     np.testing.assert_array_equal(after, render(2))
 
 
-# What is skipped, and stress ------------------------------------------------------------------------------------------------
+# What is skipped, and stress ------------------------------------------------------------------------------------------
 
 
 def reason():
@@ -361,7 +363,7 @@ def test_a_kilometre_of_ground_leaves_the_room_its_surfels(stage, render):
     assert near.sum() > 100  # of 2048; by area alone none
 
 
-# Beside Cycles --------------------------------------------------------------------------------------------------------------
+# Beside Cycles --------------------------------------------------------------------------------------------------------
 
 
 def cornell(stage):
@@ -388,7 +390,7 @@ def cornell(stage):
 
 @pytest.mark.parametrize("bounces", [1, 4])
 def test_irradiance_of_a_cornell_box_is_that_of_cycles(stage, render, bounces):
-    """At as many bins as cube maps of 12: 8 % of the mean, the specification's figure, at one sample and less at eight."""
+    """With as many bins as cube maps of 12: within 8 % of the mean at one sample, and less at eight."""
     cornell(stage)
     size = (48, 48)
     pictures = [render_passes(stage.scene, "CYCLES", 256, seed, size=size, bounces=bounces).images for seed in (1, 2)]
