@@ -33,9 +33,10 @@ LIGHTING = lighting(RAYS, False)
 class PointLight:
     """Lights images of points. A technique owns one, calls `begin` once a picture and `add` in each sample."""
 
-    def __init__(self, use: str, each: int | None = None):
+    def __init__(self, use: str, each: int | None = None, reflected: bool = False):
         self._use = use  # of the sequence
         self._each = each  # points on a source in each sample, whatever the picture's samples
+        self._reflected = reflected  # whether surfaces send this light on: of lamps that allow it
         self._sources = lights.Sources()
         self._emissive: EmissiveTriangles | None = None
 
@@ -73,7 +74,11 @@ class PointLight:
     def _lamps(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
         """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power."""
         settings = frame.settings
-        emitters = [one for one in frame.emitters if one.flags & lights.DIFFUSE_FLAG]
+        emitters = [
+            one
+            for one in frame.emitters
+            if one.flags & lights.DIFFUSE_FLAG and (one.light.bounces or not self._reflected)
+        ]
         chosen = [(emitter, 1.0) for emitter in emitters]
         if len(chosen) > FEW_POINTS:
             power = np.array([emitter.power for emitter in emitters])

@@ -68,7 +68,7 @@ class SurfelLight:
     def __init__(self):
         self._key: object = None
         self._held: list[images.Image] = []
-        self._light = PointLight("surfels", POINTS)
+        self._light = PointLight("surfels", POINTS, reflected=True)
         self.reflectance: images.Image | None = None
         self.free: dict[str, images.Image] = {}  # how far surfaces run freely around receivers
         self._black: images.Image | None = None

@@ -161,7 +161,6 @@ class ImplicitVisibility(Technique):
         for number in [k for k in self._solutions if k >= frame.settings.get(self, "orientations")]:
             self._give(self._solutions.pop(number))
         if not surfels.receiver_count:
-            frame.leave(self, "no surface has an area")
             return
         self._light.begin(frame)
         if frame.materials.glossy:

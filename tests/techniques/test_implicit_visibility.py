@@ -305,6 +305,14 @@ def test_what_moves_is_linked_anew_and_is_what_a_new_session_finds(stage, render
     np.testing.assert_array_equal(after, render(2))
 
 
+def test_a_lamp_that_allows_no_bounces_is_not_reflected(stage, render):
+    corner(stage)
+    assert render(1).mean() > 0.0
+    lamp = next(placed for placed in stage.scene.objects if placed.type == "LIGHT")
+    lamp.data.cycles.max_bounces = 0
+    assert render(1).max() == 0.0
+
+
 # What is skipped, and stress ------------------------------------------------------------------------------------------
 
 
