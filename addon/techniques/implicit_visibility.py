@@ -62,6 +62,8 @@ from .ssdo import GLOSSY
 COLUMNS = 8  # receivers side by side in an image of links
 REFINE = 1.0  # bins that a ball about a node may cover to stand for its surfels: 1 / this
 MOST_BOUNCES = 16
+REACH = 2.5  # radii of a surfel within which pixels take light from it
+STIFF = 0.03  # how much the slope of the fit is held back where few surfels tell it
 TREE = (("RGBA32F", "surfel_nodes"),)
 IN_TREE = (("SURFEL_TREE", "1"),)
 WIDE = (("COLUMNS", str(COLUMNS)),)
@@ -70,7 +72,7 @@ LINKS = passes.fullscreen_program(
     "implicit_visibility/links.frag.glsl",
     textures=(*TREE, ("RGBA32F", "receivers")),
     constants=(
-        ("INT", "receiver_count"), ("INT", "node_count"), ("INT", "bins"), ("INT", "solution"), ("INT", "seed"),
+        ("INT", "receiver_count"), ("INT", "node_count"), ("INT", "bins"), ("INT", "solution"), ("INT", "link_seed"),
         ("FLOAT", "refine"),
     ),
     defines=(*IN_TREE, *WIDE),
@@ -107,7 +109,7 @@ SHOW = passes.fullscreen_program(
         *(("RGBA32F", name) for name in ("surfel_leaves", "receivers", "arriving", "free_a", "free_b")),
     ),
     constants=(("INT", "node_count"),),
-    defines=IN_TREE,
+    defines=(*IN_TREE, ("REACH", str(REACH)), ("STIFF", str(STIFF))),
     outputs=(("VEC4", "out_diffuse"),),
 )
 PROGRAMS = (LINKS, SEND, PULL, GATHER, SHOW)
@@ -210,7 +212,7 @@ class ImplicitVisibility(Technique):
                 LINKS, target, rows=rows, textures={**_tree(surfels), "receivers": surfels.receivers},
                 constants={
                     "receiver_count": surfels.receiver_count, "node_count": surfels.node_count, "bins": bins,
-                    "solution": number, "seed": frame.settings.seed, "refine": REFINE,
+                    "solution": number, "link_seed": frame.settings.seed, "refine": REFINE,
                 },
             )  # fmt: skip
             yield

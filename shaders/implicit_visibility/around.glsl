@@ -5,7 +5,7 @@
 #define LIFTED 0.02
 
 // How much of what a receiver knows holds at a place that lies `off` from it: 0 where something stands in between.
-float seen_around(vec4 free_a, vec4 free_b, vec3 normal, vec3 off, float radius)
+float seen_around(vec4 sides_a, vec4 sides_b, vec3 normal, vec3 off, float radius)
 {
   vec3 tangent;
   vec3 bitangent;
@@ -17,8 +17,8 @@ float seen_around(vec4 free_a, vec4 free_b, vec3 normal, vec3 off, float radius)
   float share = place - floor(place);
   int first = side & (AROUND_SIDES - 1);
   int second = (side + 1) & (AROUND_SIDES - 1);
-  float one = (first < 4) ? free_a[first] : free_b[first - 4];
-  float two = (second < 4) ? free_a[second] : free_b[second - 4];
+  float one = (first < 4) ? sides_a[first] : sides_b[first - 4];
+  float two = (second < 4) ? sides_a[second] : sides_b[second - 4];
   float inverse = mix(one, two, share);
   return clamp((1.0 - range * inverse) * 10.0, 0.0, 1.0);
 }

@@ -50,7 +50,7 @@ void main()
   int own = int(facing.w);
 
   // Multiples of irrational numbers, each receiver beginning elsewhere: even over solutions.
-  uvec3 roll = hash3(uvec3(uint(receiver), 173u, uint(seed)));
+  uvec3 roll = hash3(uvec3(uint(receiver), 173u, uint(link_seed)));
   vec3 shift = vec3(to_unit(roll.x), to_unit(roll.y), to_unit(roll.z));
   shift = fract(shift + float(solution) * vec3(0.8191725134, 0.6710436067, 0.5497004779));
   vec2 cell = (vec2(float(bin % bins), float(bin / bins)) + shift.xy) / float(bins);

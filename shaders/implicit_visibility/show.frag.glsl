@@ -5,9 +5,7 @@
 #include "implicit_visibility/surfels.glsl"
 #include "implicit_visibility/around.glsl"
 
-#define REACH 2.5      // radii
 #define OFF_PLANE 0.5  // radii
-#define STIFF 0.03     // how much the slope is held back, where few surfels tell it
 #define LEAST 1e-6     // of a surfel that faces another way, or stands behind something: where there is none better
 
 vec3 arriving_at(vec3 place, vec3 normal, vec3 face)
