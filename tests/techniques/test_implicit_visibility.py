@@ -398,7 +398,11 @@ def cornell(stage):
 
 @pytest.mark.parametrize("bounces", [1, 4])
 def test_irradiance_of_a_cornell_box_is_that_of_cycles(stage, render, bounces):
-    """With as many bins as cube maps of 12: within 8 % of the mean at one sample, and less at eight."""
+    """With as many bins as cube maps of 12: within 8 % of the mean at one sample, and less at four.
+
+    Half of the surfels' sides are on the outside of the walls: some 4,000 are within, as many as the 20 x 20 squares a
+    wall and 12 x 12 a box side have corners for which that figure is expected.
+    """
     cornell(stage)
     size = (48, 48)
     pictures = [render_passes(stage.scene, "CYCLES", 256, seed, size=size, bounces=bounces).images for seed in (1, 2)]
@@ -408,9 +412,9 @@ def test_irradiance_of_a_cornell_box_is_that_of_cycles(stage, render, bounces):
     noise = np.square((truth[0] - truth[1])[known] / 2 / color[known][:, :3]).mean()
     mean = (truth[0] + truth[1])[known] / 2 / color[known][:, :3]
     errors = []
-    for samples in (1, 8):
-        found = render(bounces, samples=samples, size=size, surfels=4096)[known] / color[known][:, :3]
+    for samples in (1, 4):
+        found = render(bounces, samples=samples, size=size, surfels=8192)[known] / color[known][:, :3]
         errors.append(np.sqrt(max(np.square(found - mean).mean() - noise, 0.0)) / mean.mean())
-    print(f"{bounces} bounces: {errors[0]:.4f} at one sample, {errors[1]:.4f} at eight, of the mean")
+    print(f"{bounces} bounces: {errors[0]:.4f} at one sample, {errors[1]:.4f} at four, of the mean")
     assert errors[0] < 0.08
-    assert errors[1] <= errors[0]
+    assert errors[1] < errors[0]
