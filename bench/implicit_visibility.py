@@ -74,7 +74,7 @@ def errors(name: str) -> str:
         more = (MOST_SAMPLES,) if technique in (NAME, OTHERS[0]) else ()
         indirect.measured(scene, technique, 1, SIZE, truth)  # compiles
         for samples in (*SAMPLES, *more):
-            if technique == NAME and samples != MOST_SAMPLES:
+            if technique != NAME or samples != MOST_SAMPLES:
                 anew()
             started = time.perf_counter()
             found = indirect.measured(scene, technique, samples, SIZE, truth)
