@@ -234,7 +234,7 @@ class Hits:
                 constants["material_number"] = material
             else:
                 program = hit_program(compiled)
-                bound = frame.materials.bindings(material, frame.geometry.instances)
+                bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
                 textures, blocks = shared | bound["textures"], bound["blocks"]
                 if compiled.attributes:
                     textures["hit_attributes"] = self._attributes_of(material, compiled)

@@ -17,6 +17,7 @@ from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .eye import EyeModel
 from .film import Film
+from .grass import Grass
 from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .implicit_visibility import ImplicitVisibility
@@ -39,6 +40,7 @@ from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
     MediaAttenuation,
+    Grass,
     Surfaces,
     ReflectionEditing,
     LightProbes,
