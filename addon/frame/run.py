@@ -516,19 +516,14 @@ class Renderer:
         return list(dict.fromkeys(wanted))
 
     def _content_key(self, snapshot: Snapshot, settings: Settings, plan: Plan) -> tuple:
-        lights = tuple(
-            (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
-             light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-             light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
-            for light in snapshot.lights
-        )  # fmt: skip
         camera = snapshot.camera
         # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights, casters, self._environment[0], self.materials.fingerprint(), volumes_key(snapshot), snapshot.film,
-            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
-            camera.aperture, settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
+            lights_key(snapshot), casters, self._environment[0], self.materials.fingerprint(),
+            volumes_key(snapshot), snapshot.film,
+            camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
+            settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
@@ -564,3 +559,13 @@ def _timed(frame: Frame, parts: Iterator[None]) -> Iterator[None]:
         if part is end:
             return
         yield
+
+
+def lights_key(snapshot: Snapshot) -> tuple:
+    """Equal in two snapshots if all lamps give the same light."""
+    return tuple(
+        (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
+         light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
+         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
+        for light in snapshot.lights
+    )  # fmt: skip

@@ -19,6 +19,7 @@ import numpy as np
 from ..frame.run import Frame
 from ..gfx import images, passes
 from ..materials.compiler import may_emit
+from ..sampling.sequence import lot
 from ..sources import lights
 from .emissive_triangles import EmissiveTriangles
 from .loop import lighting
@@ -33,17 +34,19 @@ class PointLight:
     """Lights images of points. A technique owns one, calls `begin` once a picture and `add` in each sample.
 
     In a picture of few samples, so many points are drawn on each lamp (`few`), and in each sample at least so many of
-    the world and of emissive meshes (`others`). `reflected`: lamps that give no light to reflections are left out.
-    `sharpness`: how many times as many points a light counts as having where surfaces are near to one of them
-    (lights.footprint): more lose less light, but leave bright spots.
+    the world and of emissive meshes (`others`); with `each`, so many of every source in each sample, whatever the
+    picture's samples. `reflected`: lamps that give no light to reflections are left out. `sharpness`: how many times as
+    many points a light counts as having where surfaces are near to one of them (lights.footprint): more lose less
+    light, but leave bright spots.
     """
 
     def __init__(
-        self, use: str, few: int = FEW_POINTS, others: int = OTHER_POINTS, reflected: bool = False,
-        sharpness: float = 1.0,
+        self, use: str, few: int = FEW_POINTS, others: int = OTHER_POINTS, each: int | None = None,
+        reflected: bool = False, sharpness: float = 1.0,
     ):  # fmt: skip
         self._use = use  # of the sequence
-        self._few, self._others, self._reflected, self._sharpness = few, others, reflected, sharpness
+        self._few, self._others, self._each = few, others, each
+        self._reflected, self._sharpness = reflected, sharpness
         self._sources = lights.Sources()
         self._emissive: EmissiveTriangles | None = None
 
@@ -55,10 +58,13 @@ class PointLight:
             triangles = EmissiveTriangles(frame, ("diffuse",))
             self._emissive = triangles if triangles.power > 0.0 else None
 
-    def add(self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target) -> tuple[int, int]:
-        """Add this sample's diffuse and glossy direct light on `surfaces` (by the names of SURFACE_IMAGES) to the two
-        images of `target`. Returns the numbers of passes and of rays a point."""
-        rows = [*self._lamps(frame), *self._world(frame), *self._emitted(frame)]
+    def add(
+        self, frame: Frame, surfaces: dict[str, images.Image], target: images.Target, number: int | None = None
+    ) -> tuple[int, int]:
+        """Add this sample's diffuse and glossy direct light, or that of sample `number`, on `surfaces` (by the names of
+        SURFACE_IMAGES) to the two images of `target`. Returns the numbers of passes and of rays a point."""
+        number = frame.sample if number is None else number
+        rows = [*self._lamps(frame, number), *self._world(frame, number), *self._emitted(frame, number)]
         textures, constants = ray_bindings(frame)
         bound = {f"surface_{name}": image for name, image in surfaces.items()}
         for first in range(0, len(rows), lights.MOST_LIGHTS):
@@ -71,44 +77,50 @@ class PointLight:
             )  # fmt: skip
         return -(-len(rows) // lights.MOST_LIGHTS), len(rows)
 
-    def _lamps(self, frame: Frame) -> Iterator[np.ndarray]:
+    def _points(self, frame: Frame, least: int) -> int:
+        """On a source in a sample."""
+        return max(self._few // frame.settings.samples, least) if self._each is None else self._each
+
+    def _lamps(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
         """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power."""
         settings = frame.settings
-        emitters = [one for one in frame.emitters if one.flags & lights.DIFFUSE_FLAG]
-        if self._reflected:
-            emitters = [one for one in emitters if one.light.bounces]
+        emitters = [
+            one
+            for one in frame.emitters
+            if one.flags & lights.DIFFUSE_FLAG and (one.light.bounces or not self._reflected)
+        ]
         chosen = [(emitter, 1.0) for emitter in emitters]
         if len(chosen) > FEW_POINTS:
             power = np.array([emitter.power for emitter in emitters])
             chance = np.minimum(FEW_POINTS * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
             edges = np.concatenate([[0.0], np.cumsum(chance)])
-            marks = np.arange(FEW_POINTS) + frame.lot(f"{self._use}/choose")
+            marks = np.arange(FEW_POINTS) + lot(sample_number, f"{self._use}/choose", settings.seed)
             picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
             chosen = [(emitters[k], 1.0 / chance[k]) for k in picked]
         for emitter, weight in chosen:
-            each = max(self._few // settings.samples, 1) if emitter.extended else 1
-            for number in range(frame.sample * each, (frame.sample + 1) * each):
+            each = self._points(frame, 1) if emitter.extended else 1
+            for number in range(sample_number * each, (sample_number + 1) * each):
                 sample = emitter.sample(*frame.random_volume_at(number, f"{self._use}/light"))
                 points = self._sharpness * each * settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
                 yield emitter.row(sample, 0, shadowed, weight, each, points)
 
-    def _world(self, frame: Frame) -> Iterator[np.ndarray]:
+    def _world(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
         world = frame.snapshot.world
         if not frame.environment.power > 0 or not world.visibility.diffuse:
             return
-        each = max(self._few // frame.settings.samples, self._others)
-        numbers = range(frame.sample * each, (frame.sample + 1) * each)
+        each = self._points(frame, self._others)
+        numbers = range(sample_number * each, (sample_number + 1) * each)
         drawn = np.array([frame.random_at(number, f"{self._use}/world") for number in numbers])
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
         for direction, radiance, density in zip(*frame.environment.draw(*drawn.T)):
             yield lights.direction_row(direction, radiance / density, density, flags, 0, 1, each)
 
-    def _emitted(self, frame: Frame) -> Iterator[np.ndarray]:
+    def _emitted(self, frame: Frame, sample_number: int) -> Iterator[np.ndarray]:
         if self._emissive is None:
             return
-        each = max(self._few // frame.settings.samples, self._others)
-        for number in range(frame.sample * each, (frame.sample + 1) * each):
+        each = self._points(frame, self._others)
+        for number in range(sample_number * each, (sample_number + 1) * each):
             numbers = frame.random_volume_at(number, f"{self._use}/emissive")
             samples = self._sharpness * frame.settings.samples
             yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)

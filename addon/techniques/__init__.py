@@ -20,6 +20,7 @@ from .film import Film
 from .grass import Grass
 from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
+from .implicit_visibility import ImplicitVisibility
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .media import MediaAttenuation
@@ -64,6 +65,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     ClusteredVisibility,
     ImperfectShadowMaps,
     MicroRendering,
+    ImplicitVisibility,
     ScreenSpaceBounce,
     ShadedReflections,
     ImageSpaceSubsurface,

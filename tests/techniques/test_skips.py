@@ -137,6 +137,7 @@ WITHOUT = {
     "clustered_visibility": no_bounces,
     "imperfect_shadow_maps": no_bounces,
     "micro_rendering": no_bounces,
+    "implicit_visibility": no_bounces,
     "ssdo": no_bounces,
     "caustics_mapping": no_glass,
     "screen_space_photons": no_glass,

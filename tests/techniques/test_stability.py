@@ -303,6 +303,7 @@ CHOICES = {
         ("indirect", "multires_radiosity", ("camera",)),
         ("indirect", "clustered_visibility", ("geometry",)),
         ("indirect", "imperfect_shadow_maps", ("geometry",)),
+        ("indirect", "implicit_visibility", ("geometry",)),
         ("environment", "directional_occlusion", ("geometry", "camera", "world")),
     )
     for name in CORPUS
@@ -314,6 +315,7 @@ CHOICES = {
 def test_every_pixel_is_finite_and_not_negative_by_choice(room, choice):
     slot, technique, case = CHOICES[choice]
     setattr(room.scene.candela, f"slot_{slot}", technique)
+    room.scene.candela.implicit_visibility_surfels, room.scene.candela.implicit_visibility_bins = 256, 8
     test_every_pixel_is_finite_and_not_negative(room, case)
 
 

@@ -1,0 +1,302 @@
+"""Implicit visibility: light between surfels, where the shortest link of a direction is the one that is not hidden.
+
+Every side of a surfel has a half ball of direction bins. A bin keeps the link to the nearest surfel that it finds, so
+that making links is testing depth: no shadow map, no rays through triangles. Light then runs along the links,
+
+    E_k(x) / pi = mean over bins of  L_k-1(link),      L_k = rho (E_direct + E_k) / pi,        k = 1 .. bounces
+
+and what arrives at surfels is shown at pixels by a linear fit over those around (shaders/implicit_visibility/). The
+solution belongs to the surfaces, not to the picture: a camera that moves costs the fit alone, changed lights or
+materials keep the links, and what moves makes links anew.
+
+Bins are not the cube maps of the thesis but a square of bins folded onto the half ball over the surfel so that all have
+the same projected solid angle: weights are equal, the sum over a closed room is exactly pi, none lie below the horizon.
+21 x 21 are as many over a half ball as 6 x 12 x 12 are over a ball. `bins` x `bins` of them are turned and shifted
+differently for every surfel and in each of `orientations` solutions, one for each sample of a picture until they begin
+anew: what a bin hides is drawn evenly out of it, and blocks average out among neighbours and over samples.
+
+Links are found bin by bin instead of pair by pair: down the tree of surfels, opening nodes until they look no larger
+than the bin, keeping the nearest disc that the bin's direction meets. That is the thesis's refinement (a link goes to a
+group that fits a bin), its pushing down (links of a leaf and of its parents: the shortest wins) and its weight E2 with
+the footprint rule in one pass, in no order and without atomics.
+
+Source: Dong, Kautz, Theobalt and Seidel, "Interactive Global Illumination Using Implicit Visibility", Pacific Graphics
+2007; Dong, PhD thesis, Saarland University 2011, chapter 4. Bins by Shirley and Chiu 1997.
+
+| cost, R receivers | |
+|---|---|
+| surfels, when surfaces change | CPU, scene/surfels.py |
+| links, for each solution, when surfaces change | R bins^2 walks down the tree; 4 R bins^2 bytes are kept |
+| light, for each solution, when it changes | lighting/surfels.py; a bounce fetches 2 R bins^2 texels |
+| each sample | 1 pass, about 150 nodes per pixel of 2 fetches |
+
+Bias, all in diffuse indirect light: surfaces are discs, so that silhouettes, contacts and slits narrower than a surfel
+are blurred; light of neighbouring surfels is one linear function. Rough diffuse surfaces count as Lambertian, gloss
+that surfels send as even, glass and alpha as what they cover; participating media between surfels are left out.
+Directions of the world are those that the first picture preferred. Averages over all `orientations` are the floor of
+the error.
+
+Fails: light through gaps, and on things, smaller than a surfel: `surfels` says how many there are. Gloss is one ray per
+pixel, as of ssdo.py."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ..frame.run import Frame, lights_key
+from ..frame.settings import Settings
+from ..frame.technique import Param, Technique
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..lighting import surfels as surfel_light
+from ..lighting.surfels import SurfelLight
+from ..lighting.virtual_lights import VirtualLights
+from ..scene import acceleration
+from ..scene.surfels import Surfels
+from ..snapshot.scene import Snapshot
+from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, MARKS, SURFACE_TEXTURES, surface_bindings
+from .instant_radiosity import INDIRECT_WRITES, no_indirect_light
+from .ssdo import GLOSSY
+
+COLUMNS = 8  # receivers side by side in an image of links
+REFINE = 1.0  # bins that a ball about a node may cover to stand for its surfels: 1 / this
+MOST_BOUNCES = 16
+REACH = 2.5  # radii of a surfel within which pixels take light from it
+STIFF = 0.03  # how much the slope of the fit is held back where few surfels tell it
+TREE = (("RGBA32F", "surfel_nodes"),)
+IN_TREE = (("SURFEL_TREE", "1"),)
+WIDE = (("COLUMNS", str(COLUMNS)),)
+LINKS = passes.fullscreen_program(
+    "links of surfels",
+    "implicit_visibility/links.frag.glsl",
+    textures=(*TREE, ("RGBA32F", "receivers")),
+    constants=(
+        ("INT", "receiver_count"), ("INT", "node_count"), ("INT", "bins"), ("INT", "solution"), ("INT", "link_seed"),
+        ("FLOAT", "refine"),
+    ),
+    defines=(*IN_TREE, *WIDE),
+    outputs=(("FLOAT", "out_link"),),
+)  # fmt: skip
+SEND = passes.fullscreen_program(
+    "direct light that surfels send",
+    "implicit_visibility/send.frag.glsl",
+    textures=(("RGBA32F", "reflectance"), ("RGBA32F", "direct")),
+    outputs=(("VEC4", "out_sent"),),
+)
+PULL = passes.fullscreen_program(
+    "light of groups of surfels",
+    "implicit_visibility/pull.frag.glsl",
+    textures=(*TREE, ("RGBA32F", "surfel_leaves"), ("RGBA32F", "sent")),
+    constants=(("INT", "node_count"),),
+    defines=IN_TREE,
+    outputs=(("VEC4", "out_radiance"),),
+)
+GATHER = passes.fullscreen_program(
+    "bounce between surfels",
+    "implicit_visibility/gather.frag.glsl",
+    textures=(("R32F", "links"), ("RGBA32F", "node_radiance"), ("RGBA32F", "reflectance"), ("RGBA32F", "direct")),
+    constants=(("INT", "receiver_count"), ("INT", "bins")),
+    defines=WIDE,
+    outputs=(("VEC4", "out_arriving"), ("VEC4", "out_sent")),
+)
+SHOW = passes.fullscreen_program(
+    "light of surfels at pixels",
+    "implicit_visibility/show.frag.glsl",
+    textures=(
+        *SURFACE_TEXTURES,
+        *TREE,
+        *(("RGBA32F", name) for name in ("surfel_leaves", "receivers", "arriving", "free_a", "free_b")),
+    ),
+    constants=(("INT", "node_count"),),
+    defines=(*IN_TREE, ("REACH", str(REACH)), ("STIFF", str(STIFF))),
+    outputs=(("VEC4", "out_diffuse"),),
+)
+PROGRAMS = (LINKS, SEND, PULL, GATHER, SHOW)
+
+
+@dataclass
+class Solution:
+    """Links of one orientation, R32F, and what arrives at receivers by them, with what both were made for."""
+
+    links: images.Image | None = None
+    arriving: images.Image | None = None
+    linked_for: object = None
+    lit_for: object = None
+
+
+class ImplicitVisibility(Technique):
+    name = "implicit_visibility"
+    label = "Implicit visibility"
+    fills = ("indirect",)
+    params = (
+        Param("surfels", "Surfels", 4096, "Discs that stand for all surfaces, both sides counted", 64, 65536),
+        Param(
+            "bins", "Bins", 21, "Directions along a side of the square that is a surfel's half ball; 21 are as fine as "
+            "cube maps of 12", 4, 32,
+        ),
+        Param(
+            "orientations", "Orientations", 8, "Solutions with bins turned differently, of which each sample shows one",
+            1, 64,
+        ),
+    )  # fmt: skip
+    reads = LIT_SURFACES
+    writes = INDIRECT_WRITES
+
+    def __init__(self):
+        self._light = SurfelLight()
+        self._solutions: dict[int, Solution] = {}
+        self._glossy = VirtualLights()
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return (*PROGRAMS, *surfel_light.PROGRAMS)
+
+    def begin(self, frame: Frame) -> None:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        surfels = frame.kept(Surfels)
+        made = surfels.update(frame, frame.settings.get(self, "surfels"), frame.typical_distance)
+        frame.count(self, "surfels made" if made else "surfels kept", len(surfels.cells))
+        for number in [k for k in self._solutions if k >= frame.settings.get(self, "orientations")]:
+            self._give(self._solutions.pop(number))
+        if not surfels.receiver_count:
+            return
+        self._light.begin(frame)
+        if frame.materials.glossy:
+            self._glossy.begin(frame)
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        surfels = frame.kept(Surfels)
+        if not surfels.receiver_count:
+            return
+        number = frame.sample % frame.settings.get(self, "orientations")
+        solution = self._solutions.setdefault(number, Solution())
+        yield from self._link(frame, surfels, solution, number)
+        yield from self._solve(frame, surfels, solution, number)
+        target = frame.target("radiance.diffuse_indirect", depth=MARKS)
+        for rows in frame.bands(self):
+            passes.fullscreen(
+                SHOW, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows,
+                textures={
+                    **surface_bindings(frame), **_tree(surfels), "surfel_leaves": surfels.leaves,
+                    "receivers": surfels.receivers, "arriving": solution.arriving, **self._light.free,
+                },
+                constants={"node_count": surfels.node_count},
+            )  # fmt: skip
+            yield
+        frame.count(self, "passes")
+        if frame.materials.glossy:
+            yield from self._add_gloss(frame)
+
+    def _link(self, frame: Frame, surfels: Surfels, solution: Solution, number: int) -> Iterator[None]:
+        bins = frame.settings.get(self, "bins")
+        wanted = (surfels.changes, bins, frame.settings.seed)
+        count = surfels.receiver_count * bins * bins
+        if solution.linked_for == wanted:
+            frame.count(self, "links kept", count)
+            return
+        size = (COLUMNS * bins * bins, -(-surfels.receiver_count // COLUMNS))
+        if solution.links is None or solution.links.size != size:
+            if solution.links is not None:
+                images.pool.give(solution.links)
+            solution.links = images.pool.take(*size, "R32F")
+        solution.linked_for = solution.lit_for = None  # until all of them are there
+        target = images.Target((solution.links,))
+        for rows in _parts(size[1], frame):
+            passes.fullscreen(
+                LINKS, target, rows=rows, textures={**_tree(surfels), "receivers": surfels.receivers},
+                constants={
+                    "receiver_count": surfels.receiver_count, "node_count": surfels.node_count, "bins": bins,
+                    "solution": number, "link_seed": frame.settings.seed, "refine": REFINE,
+                },
+            )  # fmt: skip
+            yield
+        solution.linked_for = wanted
+        frame.count(self, "links made", count)
+        frame.count(self, "passes")
+
+    def _solve(self, frame: Frame, surfels: Surfels, solution: Solution, number: int) -> Iterator[None]:
+        bounces = min(frame.settings.bounces, MOST_BOUNCES)
+        wanted = (
+            solution.linked_for, lights_key(frame.snapshot), frame.environment, frame.materials.fingerprint(), bounces,
+        )  # fmt: skip
+        if _same(solution.lit_for, wanted):
+            frame.count(self, "light kept", surfels.receiver_count)
+            return
+        shaded = self._light.update(frame, self, surfels)
+        frame.count(self, "surfels shaded" if shaded else "shading kept", surfels.receiver_count)
+        size = SurfelLight.size(surfels)
+        if solution.arriving is None or solution.arriving.size != size:
+            if solution.arriving is not None:
+                images.pool.give(solution.arriving)
+            solution.arriving = images.pool.take(*size, "RGBA32F")
+        solution.lit_for = None
+        direct, other, *sent = (images.pool.take(*size, "RGBA32F") for _ in range(4))
+        radiance = images.pool.take(images.LIST_WIDTH, -(-2 * surfels.node_count // images.LIST_WIDTH), "RGBA32F")
+        try:
+            self._light.add_direct(frame, self, surfels, images.Target((direct, other)), number)
+            yield
+            known = {"reflectance": self._light.reflectance, "direct": direct}
+            passes.fullscreen(SEND, images.Target((sent[0],)), textures=known)
+            constants = {"receiver_count": surfels.receiver_count, "bins": frame.settings.get(self, "bins")}
+            for bounce in range(bounces):
+                before, after = sent[bounce % 2], sent[1 - bounce % 2]
+                passes.fullscreen(
+                    PULL, images.Target((radiance,)),
+                    textures={**_tree(surfels), "surfel_leaves": surfels.leaves, "sent": before},
+                    constants={"node_count": surfels.node_count},
+                )  # fmt: skip
+                passes.fullscreen(
+                    GATHER, images.Target((solution.arriving, after)),
+                    textures={**known, "links": solution.links, "node_radiance": radiance}, constants=constants,
+                )  # fmt: skip
+                yield
+        finally:
+            for image in (direct, other, *sent, radiance):
+                images.pool.give(image)
+        solution.lit_for = wanted
+        frame.count(self, "light made", surfels.receiver_count)
+        frame.count(self, "passes", 1 + 2 * bounces)
+
+    def _add_gloss(self, frame: Frame) -> Iterator[None]:
+        self._glossy.draw_sources(frame)
+        bindings = self._glossy.path_bindings(frame)
+        bindings["constants"] |= {"fan_count": 0, "step_count": 0, "farthest": 0.0, "thickness": 0.0}
+        target = frame.target("radiance.glossy_indirect", depth=MARKS)
+        for rows in frame.bands(self, "gloss"):
+            passes.fullscreen(GLOSSY, target, blend="ADDITIVE_PREMULT", where=ANY_SURFACE, rows=rows, **bindings)
+            yield
+        frame.count(self, "passes")
+
+    @staticmethod
+    def _give(solution: Solution) -> None:
+        for image in (solution.links, solution.arriving):
+            if image is not None:
+                images.pool.give(image)
+
+    def release(self) -> None:
+        for solution in self._solutions.values():
+            self._give(solution)
+        self._solutions = {}
+        self._light.release()
+        self._glossy.release()
+
+
+def _tree(surfels: Surfels) -> dict[str, images.Image]:
+    return {"surfel_nodes": surfels.nodes}
+
+
+def _parts(height: int, frame: Frame) -> list[tuple[int, int]]:
+    """Rows of links that are made at a time: all, or eighths where other work waits."""
+    step = height if frame.shared_out is None else max(-(-height // 8), 1)
+    return [(first, min(first + step, height)) for first in range(0, height, step)]
+
+
+def _same(known: tuple | None, wanted: tuple) -> bool:
+    """Whether light was made for the same; the environment is an object, the same one while the world is."""
+    return known is not None and known[2] is wanted[2] and (*known[:2], *known[3:]) == (*wanted[:2], *wanted[3:])

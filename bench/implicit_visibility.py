@@ -1,0 +1,220 @@
+"""Implicit visibility beside the other techniques of its slot and Cycles: `python -m bench implicit_visibility`.
+
+Diffuse indirect light in six rooms at 1, 16 and 64 samples: relMSE with the reference's noise taken off, bias, and
+seconds of the whole render. Then what the author tabulates: 3,400 surfels with one bounce at as many bins as cube
+maps of 8, 12 and 16, step by step; and what is redone when the camera, a light or an object moves. `--page` writes the
+tables into docs/implicit_visibility.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from bench import indirect, markdown
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "implicit_visibility.md"
+COMMAND = "python -m bench implicit_visibility --page"
+NAME = "implicit_visibility"
+OTHERS = ("instant_radiosity", "imperfect_shadow_maps", "clustered_visibility", "ssdo")
+SAMPLES, MOST_SAMPLES = (1, 16), 64  # the last for this one and for instant radiosity
+SIZE, REFERENCE = (96, 64), 128
+SURFELS, BINS = 3400, {14: "6 x 8²", 21: "6 x 12²", 28: "6 x 16²"}
+AUTHOR = {14: 112, 21: 148, 28: 218}  # ms on a GeForce 8800, one bounce of light of the environment
+STEPS = {  # programs by what they are for
+    "links": ("links of surfels",),
+    "shading": ("rays to surfels", "trace hits", "materials met", "hits", "reflectance of surfels"),
+    "direct light": ("direct light, rays",),
+    "bounce": ("direct light that surfels send", "light of groups of surfels", "bounce between surfels"),
+    "pixels": ("light of surfels at pixels",),
+}
+FRAMES, MOVING_SIZE, MOVING_REFERENCE = 5, (48, 32), 64
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenes", nargs="+", default=indirect.ROOMS, metavar="NAME", help="rooms to measure")
+    parser.add_argument("--parts", nargs="+", default=("error", "time", "motion"), choices=("error", "time", "motion"))
+    parser.add_argument("--page", action="store_true", help="write the tables into docs/implicit_visibility.md")
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+
+    addon.register()
+    made = {
+        "error": lambda: "\n\n".join(f"**{name}**\n\n{errors(name)}" for name in options.scenes),
+        "time": times,
+        "motion": motion,
+    }
+    for part in options.parts:
+        text = made[part]()
+        print(f"\n{text}", flush=True)
+        if options.page:
+            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
+    return 0
+
+
+def opened(name: str):
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(indirect.SCENES / f"{name}.blend"))
+    return bpy.context.scene
+
+
+def errors(name: str) -> str:
+    """Technique, samples, relMSE, bias, seconds of the whole render, from Blender's call to the pixels."""
+    scene = opened(name)
+    truth = indirect.reference(scene, REFERENCE, SIZE)
+    rows = [("technique", "samples", "relMSE", "bias", "seconds")]
+    for technique in (NAME, *OTHERS):
+        more = (MOST_SAMPLES,) if technique in (NAME, OTHERS[0]) else ()
+        indirect.measured(scene, technique, 1, SIZE, truth)  # compiles
+        for samples in (*SAMPLES, *more):
+            if technique != NAME or samples != MOST_SAMPLES:
+                anew()
+            started = time.perf_counter()
+            found = indirect.measured(scene, technique, samples, SIZE, truth)
+            rows.append((*found[:4], f"{time.perf_counter() - started:.2f}"))
+            print(name, *rows[-1], flush=True)
+    return markdown.table(rows)
+
+
+def anew() -> None:
+    """Drop surfels, links and light, so that a time is that of a picture by itself."""
+    from addon import engine
+
+    engine.free_sessions()
+
+
+def times() -> str:
+    """Milliseconds of each step of one picture of one sample, the GPU waited for after each program."""
+    from addon.compare.reference import render_passes
+    from addon.frame import ledger
+    from addon.scene import surfels
+
+    scene = opened("cornell_box")
+    scene.candela.slot_indirect = NAME
+    scene.candela.implicit_visibility_surfels = SURFELS
+    rows = [("bins", "as fine as", *("surfels (CPU)",), *STEPS, "GPU", "whole", "author")]
+    for bins, cube in BINS.items():
+        scene.candela.implicit_visibility_bins = bins
+        render_passes(scene, "CANDELA", 1, 1, size=SIZE, bounces=1)  # compiles
+        anew()
+        with timed() as spent, timed_call(surfels.Surfels, "update") as made:
+            render_passes(scene, "CANDELA", 1, 1, size=SIZE, bounces=1)
+        count = ledger.latest().row(NAME).counters["light made"]
+        step = [sum(ms for name, ms in spent.items() if name.startswith(names)) for names in STEPS.values()]
+        rows.append((
+            f"{bins}² on {count} sides", cube, f"{made[0]:.0f}", *(f"{ms:.1f}" for ms in step), f"{sum(step):.0f}",
+            f"{sum(step) + made[0]:.0f}", str(AUTHOR[bins]),
+        ))  # fmt: skip
+    return markdown.table(rows)
+
+
+class timed:
+    """Milliseconds by program while it is open."""
+
+    def __enter__(self) -> dict[str, float]:
+        from addon.gfx import images, passes
+
+        self.spent: dict[str, float] = {}
+        self._kept = {name: getattr(passes, name) for name in ("fullscreen", "compute")}
+        for name, run in self._kept.items():
+            setattr(passes, name, self._measuring(run, images.finish))
+        return self.spent
+
+    def _measuring(self, run: Callable, finish: Callable) -> Callable:
+        def measured(program, *arguments, **keywords):
+            finish()
+            started = time.perf_counter()
+            run(program, *arguments, **keywords)
+            finish()
+            self.spent[program.name] = self.spent.get(program.name, 0.0) + 1000 * (time.perf_counter() - started)
+
+        return measured
+
+    def __exit__(self, *_) -> None:
+        from addon.gfx import passes
+
+        for name, run in self._kept.items():
+            setattr(passes, name, run)
+
+
+class timed_call:
+    """Milliseconds of all calls of a method while it is open."""
+
+    def __init__(self, owner, name: str):
+        self.owner, self.name = owner, name
+
+    def __enter__(self) -> list[float]:
+        self.kept, self.spent = getattr(self.owner, self.name), [0.0]
+
+        def measured(*arguments, **keywords):
+            started = time.perf_counter()
+            found = self.kept(*arguments, **keywords)
+            self.spent[0] += 1000 * (time.perf_counter() - started)
+            return found
+
+        setattr(self.owner, self.name, measured)
+        return self.spent
+
+    def __exit__(self, *_) -> None:
+        setattr(self.owner, self.name, self.kept)
+
+
+def moved_camera(scene, number: int) -> None:
+    from mathutils import Matrix
+
+    if number:
+        scene.camera.matrix_world = scene.camera.matrix_world @ Matrix.Rotation(np.radians(indirect.TURN), 4, "Y")
+
+
+def moved_light(scene, number: int) -> None:
+    light = next(thing for thing in scene.objects if thing.type == "LIGHT")
+    light.location.x += 0.02 * bool(number)
+
+
+def moved_object(scene, number: int) -> None:
+    """The smallest mesh turns."""
+    meshes = [thing for thing in scene.objects if thing.type == "MESH"]
+    min(meshes, key=lambda thing: thing.dimensions.length).rotation_euler.z += 0.05 * bool(number)
+
+
+def motion() -> str:
+    """For each kind of motion what is redone, and error and its change of this technique and of instant radiosity."""
+    rows = [("what moves", "redone", "kept", "error of a frame", "new error", "instant radiosity", "new error")]
+    for label, move in (("camera", moved_camera), ("light", moved_light), ("object", moved_object)):
+        scene = opened("cornell_box")
+        found, own, other, scales = {}, [], [], []
+        for _, counters, first, second, truth in frames_of(scene, move):
+            found = counters
+            own.append(first - truth)
+            other.append(second - truth)
+            luminance = truth.mean(axis=2)
+            scales.append(luminance**2 + (0.1 * luminance.mean()) ** 2)
+        scale = np.mean(scales, axis=0)[..., None]
+        redone = ", ".join(sorted(name for name in found if name.endswith(("made", "shaded")))) or "nothing"
+        kept = ", ".join(sorted(name for name in found if name.endswith("kept")))
+        figures = []
+        for error in (own, other):
+            figures.append(f"{(np.square(error) / scale).mean():.4f}")
+            figures.append(f"{(np.square(np.diff(error, axis=0)).mean(axis=0) / 2 / scale).mean():.4f}")
+        rows.append((label, redone, kept, *figures))
+    return markdown.table(rows)
+
+
+def frames_of(scene, move: Callable) -> Iterator[tuple]:
+    from addon.frame import ledger
+
+    for number in range(FRAMES):
+        move(scene, number)
+        truth, _ = indirect.reference(scene, MOVING_REFERENCE, MOVING_SIZE)
+        scene.candela.slot_indirect = OTHERS[0]
+        second = indirect.render(scene, "CANDELA", 1, 1, MOVING_SIZE)
+        scene.candela.slot_indirect = NAME
+        first = indirect.render(scene, "CANDELA", 1, 1, MOVING_SIZE)
+        yield number, dict(ledger.latest().row(NAME).counters), first, second, truth
