@@ -258,8 +258,8 @@ def load() -> float:
 PICTURES = (
     "Milliseconds. The first compiles; *moved* is the median of five pictures after a move of the camera, from reading"
     " the scene to the last texel, *of it asking* what Python and the driver took to ask for it, *at rest* a picture of"
-    f" an unchanged scene, *final* a final render with all that Blender does, *one more sample* 1/{STEPPED} of a picture"
-    f" of {STEPPED}."
+    " an unchanged scene, *final* a final render with all that Blender does, *one more sample* the time of a sample of"
+    f" {STEPPED}."
 )
 COUNTED = (
     "A final render of 16x12 pixels and one sample after a move of the camera, under Python's profiler: the same on"

@@ -271,6 +271,7 @@ class Renderer:
             raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
         started = time.perf_counter()
         context.ensure()
+        context.begin_picture()
         ledger = Ledger(samples=0)
         self.materials.update(snapshot)
         geometry_changed = self.geometry.update(snapshot, self.materials.compiled)

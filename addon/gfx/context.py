@@ -18,6 +18,26 @@ import gpu
 _releases: list[Callable[[], Callable[[], None] | None]] = []  # each gives the function, or None once it has gone
 
 
+RECENT = 8  # pictures: what none of so many asked for may be freed
+
+pictures = 0  # that this process has begun, of all renderers
+_begins: list[Callable[[], None]] = []
+
+
+def on_picture(function: Callable[[], None]) -> Callable[[], None]:
+    """Register (as a decorator) what frees GPU resources that recent pictures did not use; see `begin_picture`."""
+    _begins.append(function)
+    return function
+
+
+def begin_picture() -> None:
+    """Another picture begins: the time by which stores of GPU resources tell what is old."""
+    global pictures
+    pictures += 1
+    for function in _begins:
+        function()
+
+
 class Turn:
     """A lock for whoever draws: who waits for it gets it before its last holder does again.
 
