@@ -15,9 +15,12 @@ import bpy
 from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
 from ..frame import ledger as ledgers
+from ..frame import probe
 from ..frame.plan import PlanError, make_plan
 from ..frame.settings import SCENE_PARAMS
 from ..gfx import context
+from ..gfx.device import Device
+from ..lighting.visibility import foreseen
 from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
@@ -308,6 +311,7 @@ class CandelaPlanEngine(bpy.types.RenderEngine):
 def plan(job: Job) -> None:
     snapshots = _snapshots(job)
     print(job.title)
+    figures = _figures(job.options.verbose)
     for layer, snapshot in snapshots:
         settings = settings_of(job.scene, viewport=False, layer=job.scene.view_layers[layer])
         try:
@@ -320,7 +324,26 @@ def plan(job: Job) -> None:
             f"{triangles} triangles, {len(snapshot.materials)} materials, {len(snapshot.lights)} lights"
         )
         print(found.text())
+        if found.runs("direct_light") and figures is not None:
+            for sentence in ledgers.some_of(tuple(foreseen(snapshot, settings))):
+                print(f"  {sentence}")
         _print_notes([*snapshot.notes, *_material_notes(snapshot)])
+
+
+def _figures(verbose: bool) -> Device | None:
+    """What the device costs, which is printed; None without a GPU, where nothing is foreseen."""
+    try:
+        with quiet(verbose):
+            context.ensure()
+            figures = probe.ensure()
+    except RuntimeError:
+        return None
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    print(f"Device {context.describe()}")
+    for line in figures.lines():
+        print(f"  {line}")
+    return figures
 
 
 def _snapshots(job: Job) -> list[tuple[str, Snapshot]]:

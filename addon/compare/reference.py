@@ -20,7 +20,6 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -31,6 +30,7 @@ import bpy
 import numpy as np
 
 from ..gfx import context
+from ..gfx.user_folder import user_folder
 from ..snapshot.exr import read_exr
 from . import cache
 from .cache import Reference
@@ -171,23 +171,7 @@ def render_reference(scene, samples: int, direct_only: bool, size, view_layer, k
 def cache_folder() -> Path:
     """Where references are kept: $CANDELA_CACHE if set, the extension's own folder if Candela is one, else a folder
     among the user's caches."""
-    given = os.environ.get("CANDELA_CACHE")
-    if given:
-        return Path(given)
-    parts = (__package__ or "").split(".")
-    if parts[0] == "bl_ext":
-        return Path(bpy.utils.extension_path_user(".".join(parts[:3]), path="references"))
-    return user_caches() / "candela" / "references"
-
-
-def user_caches() -> Path:
-    """The folder that the system has for caches of this user."""
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return given if given.is_absolute() else Path.home() / ".cache"  # a relative one is to be ignored
+    return user_folder("references")
 
 
 def reference_key(

@@ -110,7 +110,7 @@ def counts_in_images() -> bool:
     return gpu.platform.backend_type_get() != "METAL"
 
 
-def _rasterises_in_software() -> bool:
+def rasterises_in_software() -> bool:
     """Whether the driver is Mesa's llvmpipe, or its Vulkan front, which names itself the same."""
     return "llvmpipe" in gpu.platform.renderer_get()
 
@@ -118,23 +118,12 @@ def _rasterises_in_software() -> bool:
 def overtakes_draws() -> bool:
     """Whether a dispatch may run before draws that were asked for earlier: llvmpipe (seen with Mesa 22.3) starts it at
     once, while its rasteriser still works on them."""
-    return gpu.platform.backend_type_get() == "OPENGL" and _rasterises_in_software()
-
-
-def loads_beat_fetches() -> bool:
-    """Whether shaders read texels faster from images than from textures: with Mesa's software rasteriser in down to a
-    quarter of the time, where neighbours ask for texels far apart."""
-    return _rasterises_in_software()
+    return gpu.platform.backend_type_get() == "OPENGL" and rasterises_in_software()
 
 
 def masks_branches() -> bool:
     """Whether shaders compute what they branch around, and mask it: so does Mesa's software rasteriser."""
-    return _rasterises_in_software()
-
-
-def draws_slowly() -> bool:
-    """Whether a triangle of a depth map costs as much as a ray of a pixel: on no GPU, but in software."""
-    return _rasterises_in_software()
+    return rasterises_in_software()
 
 
 def to_hold(needed, everything):

@@ -17,7 +17,8 @@ from pathlib import Path
 import gpu
 
 from . import context
-from .context import loads_beat_fetches, on_picture, on_release
+from .context import on_picture, on_release
+from .device import loads_beat_fetches
 from .struct import Struct
 
 FULLSCREEN_VERTEX = "lib/fullscreen.vert.glsl"
@@ -186,7 +187,7 @@ def _set(setter, name: str, value) -> None:
         pass  # Declared but unused: the driver dropped it, which is no fault of the caller.
 
 
-MOST_PROGRAMS = 192  # kept for later; a picture of usual scenes has 40 to 120
+MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
 
 _shaders: dict[Program, Shader] = {}
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
