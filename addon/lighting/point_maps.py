@@ -104,7 +104,7 @@ class PointMaps(Technique, VisibilityProvider):
         """Whether rays take the place of this light's maps."""
         return by_rays(
             frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame), self,
-            emitter.light.key if emitter.light else "light",
+            emitter.light.name if emitter.light else "light",
         )  # fmt: skip
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:

@@ -236,7 +236,7 @@ def foreseen(snapshot: Snapshot, settings: Settings) -> list[str]:
     for light in lamps:
         views = VIEWS.get(light.kind, 1)
         found = Compared(rays_ns(size[0] * size[1], triangles), maps_ns(triangles, views * side * side, views))
-        sentences.append(f"Shadows of {light.key}: {found.why}")
+        sentences.append(f"Shadows of {light.name}: {found.why}")
     return sentences
 
 
