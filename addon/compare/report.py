@@ -103,12 +103,11 @@ def page(data: Comparison) -> str:
 
 def _opening(data: Comparison) -> str:
     """The first row: what few samples look like, and Cycles in the time of the last."""
-    figures = [
-        f'<figure><img alt="{_text(one.label)}" src="{_plain(one.pixels)}"><figcaption><b>{_text(one.label)}</b>'
-        f'<span>{one.seconds:.2f} s</span><span title="relMSE">error {_scientific(f"{one.relmse:.1e}")}</span></figcaption>'
-        "</figure>"
-        for one in data.opening
-    ]
+    figures = []
+    for one in data.opening:
+        told = f'<span>{one.seconds:.2f} s</span><span title="relMSE">error {_scientific(f"{one.relmse:.1e}")}</span>'
+        caption = f"<figcaption><b>{_text(one.label)}</b>{told}</figcaption>"
+        figures.append(f'<figure><img alt="{_text(one.label)}" src="{_plain(one.pixels)}">{caption}</figure>')
     return f'<section class="opening" aria-label="First row">{"".join(figures)}</section>' if figures else ""
 
 

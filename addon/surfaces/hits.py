@@ -43,7 +43,7 @@ from ..scene.acceleration import Hierarchy
 from ..scene.geometry import corner_attribute
 from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, values_struct
 from ..scene.view import VIEW
-from ..snapshot.scene import Mesh
+from ..snapshot.scene import Instance, Mesh
 from .draw import refracts
 from .reflectance import Reflectance
 
@@ -69,6 +69,13 @@ MATERIALS_MET = Program(
     compute="hits/met.comp.glsl",
     textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material")),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
+)
+PLACE = passes.fullscreen_program(
+    "points as hits",
+    "hits/place.frag.glsl",
+    textures=tuple(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
+    outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
+    writes_depth=True,
 )
 MASKED = {
     "vertex": "hits/material.vert.glsl",
@@ -219,6 +226,22 @@ class Hits:
         frame.count(technique, "passes")
         return self._met(frame, records)
 
+    def place(
+        self, frame: Frame, technique: Technique, points: tuple[images.Image, ...], records: Records
+    ) -> set[int]:  # fmt: skip
+        """Take points that are known as hits, and return their materials: images as the first three of RECORDS, and
+        one of the number of the material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
+        names = (name for _, name in PLACE.textures)
+        passes.fullscreen(PLACE, records.target, textures=dict(zip(names, points)))
+        frame.count(technique, "passes")
+        return self._met(frame, records)
+
+    def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
+        """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
+        `triangle`."""
+        self._number(frame)
+        return self._numbers[instance.mesh, frame.geometry.placed[1][instance.mesh].version, instance.materials]
+
     def shade(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
         closures: images.Target, number: int = 0,
@@ -236,7 +259,7 @@ class Hits:
                 constants["material_number"] = material
             else:
                 program = hit_program(compiled)
-                bound = frame.materials.bindings(material, frame.geometry.instances)
+                bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
                 textures, blocks = shared | bound["textures"], bound["blocks"]
                 if compiled.attributes:
                     textures["hit_attributes"] = self._attributes_of(material, compiled)
@@ -335,7 +358,7 @@ class Hits:
         met = images.pool.take(ROW, height, "R32UI")
         met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        passes.compute(MATERIALS_MET, frame.size, textures=textures, images={"met": met})
+        passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": met})
         found = set(np.flatnonzero(images.read(met)).tolist())
         images.pool.give(met)
         return found
