@@ -20,7 +20,7 @@ help: ## this list
 environment: ## the virtual environment, with Blender as a Python module
 	@$(PYTHON3) tools/environment.py --blender $(BLENDER)
 
-demo: environment ## one sample, 4 and 16 beside Cycles in equal time, on a page; 90 s
+demo: environment ## one sample, 4 and 16 beside Cycles in equal time, on a page
 	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --size 320x180 --samples 16 --reference-samples 48 --first-row --output out/demo
 
 pictures: environment ## the README's picture, of the demo's scene in full size
