@@ -20,11 +20,12 @@ help: ## this list
 environment: ## the virtual environment, with Blender as a Python module
 	@$(PYTHON3) tools/environment.py --blender $(BLENDER)
 
-demo: environment ## a sample scene by Candela and by Cycles, and a page that compares them
-	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --reference-samples 128 --output out/demo
+demo: environment ## one sample, 4 and 16 beside Cycles in equal time, on a page
+	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --size 320x180 --samples 16 --reference-samples 48 --first-row --output out/demo
 
-pictures: demo ## the README's picture, from the demo
-	$(PYTHON) tools/pictures.py out/demo docs/images/demo.png
+pictures: environment ## the README's picture, of the demo's scene in full size
+	$(PYTHON) -m addon compare sample_blends/soft_shadow_garden.blend --reference-samples 128 --output out/picture
+	$(PYTHON) tools/pictures.py out/picture docs/images/demo.png
 
 samples: ## write the sample scenes anew, with Blender 4.5, so that every supported Blender opens them
 	@$(PYTHON3) tools/environment.py --blender 4.5

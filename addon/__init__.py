@@ -26,6 +26,7 @@ def _parts() -> tuple:
         pass_operators,
         pass_run,
         pass_tree,
+        preferences,
         properties,
         quality,
         reflection_operators,
@@ -36,5 +37,5 @@ def _parts() -> tuple:
 
     return (
         pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
-        reflection_operators, grass, translucency, tuning, pass_operators, compare_editor, cli,
+        reflection_operators, grass, translucency, tuning, pass_operators, compare_editor, preferences, cli,
     )  # fmt: skip

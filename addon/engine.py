@@ -31,6 +31,7 @@ from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
+MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
@@ -54,9 +55,16 @@ given: dict[str, dict[str, np.ndarray]] = {}
 
 def session(scene: bpy.types.Scene, use: str) -> Session:
     """The session of a scene for 'final' or 'preview'."""
-    shared = _sessions.setdefault((scene.original.session_uid, use), Session())
+    key = (scene.original.session_uid, use)
+    shared = _sessions[key] = _sessions.pop(key, None) or Session()  # the latest is the last
     shared.renderer.publishes = use != "preview"
     return shared
+
+
+def _free_old_sessions() -> None:
+    """Of more than MOST_SESSIONS free those that rendered the longest ago."""
+    for key in list(_sessions)[:-MOST_SESSIONS]:
+        _sessions.pop(key).renderer.release()
 
 
 def free_sessions() -> None:
@@ -155,6 +163,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             snapshot = self._seen(depsgraph, snapshot, eye)
             before = shared.renderer.frame
             with context.turn:
+                _free_old_sessions()
                 frame = shared.renderer.begin(snapshot, settings, self._compiling)
                 if before is not None and before.size != frame.size:
                     images.pool.trim()  # nobody asks for images of the old size again

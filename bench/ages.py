@@ -24,6 +24,7 @@ COMMAND = "python -m bench ages"
 STAMP = re.compile(r"Made on (\d{4}-\d\d-\d\d) at commit ([0-9a-f]{7,40})\b")
 PAGES = {  # and the commands that write them
     "docs/direct_light.md": "python -m bench direct --page docs/direct_light.md",
+    "docs/gpu.md": "python -m bench gpu",
     "docs/indirect_light.md": "python -m bench indirect --page docs/indirect_light.md",
     "docs/nodes.md": "make nodes",
     "docs/performance.md": "make bench",

@@ -54,7 +54,7 @@ def command(options: argparse.Namespace) -> int:
 def machine() -> str:
     from addon.gfx import context
 
-    clock = "processor time" if context.draws_slowly() else "time"
+    clock = "processor time" if context.rasterises_in_software() else "time"
     return f"Measured on {context.describe()}; {clock}, the least of some runs."
 
 
@@ -142,7 +142,7 @@ def least(run: Callable[[], object], runs: int) -> float:
     """Milliseconds: of a software GPU the processor's, which a busy machine changes little."""
     from addon.gfx import context, images
 
-    clock = time.process_time if context.draws_slowly() else time.perf_counter
+    clock = time.process_time if context.rasterises_in_software() else time.perf_counter
     best = np.inf
     for _ in range(runs + 1):  # the first one compiles
         images.finish()

@@ -169,6 +169,7 @@ def test_plan_says_what_runs_and_why_the_rest_does_not(tmp_path):
     assert done.returncode == 0 and done.stderr == ""
     assert "Direct light" in done.stdout and "runs" in done.stdout
     assert "skipped: the world is black" in done.stdout
+    assert "Device " in done.stdout and " against " in done.stdout and "Shadows of " in done.stdout
     assert not list(tmp_path.iterdir())
 
 

@@ -31,6 +31,7 @@ BLENDER = ("bpy", "bpy_extras", "imbuf", "mathutils", "bl_math", "idprop", "nump
 ROOMS = {
     "gfx": Room(modules=("gpu", "gpu_extras", "numpy")),
     "gfx.context": Room(modules=("bpy", "gpu")),
+    "gfx.user_folder": Room(modules=("bpy",)),
     "materials": Room(modules=("numpy",)),
     "materials.reader": Room(modules=BLENDER),
     "snapshot": Room(rooms=("materials",), modules=BLENDER, optional=("openvdb",)),

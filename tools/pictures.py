@@ -2,7 +2,7 @@
 
     python tools/pictures.py [FOLDER] [PICTURE]
 
-FOLDER holds candela.png and cycles.png, as `python -m addon compare` writes them (out/demo unless told otherwise);
+FOLDER holds candela.png and cycles.png, as `python -m addon compare` writes them (out/picture unless told otherwise);
 PICTURE is docs/images/demo.png unless told otherwise.
 """
 
@@ -25,7 +25,7 @@ def side_by_side(folder: Path, picture: Path) -> None:
     try:
         images = [imread(folder / name) for name in LABELS]
     except OSError as error:
-        raise SystemExit(f"{error.filename} could not be read; `make demo` writes it.") from None
+        raise SystemExit(f"{error.filename} could not be read; `make pictures` writes it.") from None
     height, width = images[0].shape[:2]
     figure = plt.figure(figsize=(2 * width + GAP, height), dpi=1)
     for number, (image, label) in enumerate(zip(images, LABELS.values())):
@@ -42,5 +42,5 @@ def side_by_side(folder: Path, picture: Path) -> None:
 
 if __name__ == "__main__":
     places = [Path(argument) for argument in sys.argv[1:]]
-    defaults = [ROOT / "out" / "demo", ROOT / "docs" / "images" / "demo.png"]
+    defaults = [ROOT / "out" / "picture", ROOT / "docs" / "images" / "demo.png"]
     side_by_side(*places, *defaults[len(places) :])

@@ -142,6 +142,11 @@ def _parser(program: str) -> argparse.ArgumentParser:
         "--direct-only", action=argparse.BooleanOptionalAction, default=False,
         help="both engines without bounces",
     )  # fmt: skip
+    against.add_argument(
+        "--first-row", action="store_true",
+        help="begin the page with 1, 4 and 16 samples, and Cycles denoised in the time of the last",
+    )  # fmt: skip
+    against.add_argument("--progress", action="store_true", help="print lines of progress, as render does for farms")
     against.add_argument("--no-cache", action="store_true", help="render the reference anew and do not keep it")
     _add_cache(against)
     against.set_defaults(verb=verbs.compare, opens=True)

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import os
 import re
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +16,12 @@ import bpy
 from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
 from ..frame import ledger as ledgers
+from ..frame import probe
 from ..frame.plan import PlanError, make_plan
 from ..frame.settings import SCENE_PARAMS
 from ..gfx import context
+from ..gfx.device import Device
+from ..lighting.visibility import foreseen
 from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
@@ -257,6 +261,7 @@ def compare(job: Job) -> None:
                 folder=options.cache,
                 view_layer=job.layer,
                 seed=job.scene.candela.seed,
+                with_first_row=options.first_row,
             )
     except reference.RenderFailed as error:
         raise Refused(f"{options.file} could not be compared: {reason(error.__cause__ or error)}.") from None
@@ -272,6 +277,8 @@ def compare(job: Job) -> None:
     print(job.title)
     print(f"Against Cycles {bounces}; 2 × {data.reference_samples} samples{kept}")
     print(table(data.errors))
+    for one in data.opening:
+        print(f"  {one.label:<32} {one.seconds:6.2f} s   relMSE {one.relmse:.2e}")
     print(f"Candela {data.seconds:.2f} s, Cycles {data.reference_seconds / 2:.2f} s per reference")
     print(ledgers.latest().text())
     _print_notes(data.notes)
@@ -308,6 +315,7 @@ class CandelaPlanEngine(bpy.types.RenderEngine):
 def plan(job: Job) -> None:
     snapshots = _snapshots(job)
     print(job.title)
+    figures = _figures(job.options.verbose)
     for layer, snapshot in snapshots:
         settings = settings_of(job.scene, viewport=False, layer=job.scene.view_layers[layer])
         try:
@@ -320,7 +328,26 @@ def plan(job: Job) -> None:
             f"{triangles} triangles, {len(snapshot.materials)} materials, {len(snapshot.lights)} lights"
         )
         print(found.text())
+        if found.runs("direct_light") and figures is not None:
+            for sentence in ledgers.some_of(tuple(foreseen(snapshot, settings))):
+                print(f"  {sentence}")
         _print_notes([*snapshot.notes, *_material_notes(snapshot)])
+
+
+def _figures(verbose: bool) -> Device | None:
+    """What the device costs, which is printed; None without a GPU, where nothing is foreseen."""
+    try:
+        with quiet(verbose):
+            context.ensure()
+            figures = probe.ensure()
+    except RuntimeError:
+        return None
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    print(f"Device {context.describe()}")
+    for line in figures.lines():
+        print(f"  {line}")
+    return figures
 
 
 def _snapshots(job: Job) -> list[tuple[str, Snapshot]]:
@@ -354,6 +381,10 @@ def _material_notes(snapshot: Snapshot) -> list[Note]:
 # ----------------------------------------------------------------------------------------------- Blender, kept in check
 
 
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
 @contextlib.contextmanager
 def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -> Iterator[None]:
     """Candela renders inside: with progress on a terminal, without Blender's chatter, and to the last sample.
@@ -372,12 +403,16 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
             raise Refused(str(error)) from None
         renderer = engine.session(job.scene, "final").renderer
         advance, seen, wanted = renderer.advance, 0, 1
+        started = time.monotonic()
 
         def advance_and_tell(frame) -> None:
-            nonlocal seen, wanted
+            nonlocal seen, wanted, started
+            if frame.samples_done == 0:
+                started = time.monotonic()
             advance(frame)
             seen, wanted = frame.samples_done, frame.settings.samples_to_draw
-            progress(terminal, f"Sample {seen} of {wanted}" if seen < wanted else then)
+            left = (time.monotonic() - started) / max(seen, 1) * (wanted - seen)
+            progress(terminal, f"Sample {seen} of {wanted}, {_duration(left)} left" if seen < wanted else then)
             if lines is not None:
                 print(
                     f"Fra:{job.scene.frame_current} | {job.scene.name} | Rendering {seen} / {wanted} samples\n"

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import metrics
 from .cache import Reference
+from .first_row import Shown, few_samples, first_row
 from .metrics import PathError
 from .passes import ROWS, Passes, Row, light_paths
 
@@ -57,6 +58,7 @@ class Comparison:
     times: dict[str, float] = field(default_factory=dict)  # stage of Candela's render -> seconds
     notes: tuple[str, ...] = ()
     date: str = ""
+    opening: tuple[Shown, ...] = ()  # the page's first row
 
     @property
     def errors(self) -> tuple[PathError, ...]:
@@ -110,6 +112,7 @@ def compare_scene(
     view_layer=None,
     seed: int = 1,
     folder=None,
+    with_first_row: bool = False,
 ) -> Comparison:
     """Render `scene` (a bpy Scene) by `engine` and by Cycles, and compare them.
 
@@ -119,10 +122,14 @@ def compare_scene(
     from . import reference as rendering  # bpy is needed from here on only
 
     view_layer = view_layer or rendering.active_view_layer(scene)
+    few = few_samples(scene, seed, direct_only, size, view_layer) if with_first_row else []
     passes = rendering.render_passes(scene, engine, samples, seed, direct_only, size, view_layer)
     if ledger is None and engine == "CANDELA":
         ledger = _latest_ledger()
     truth = rendering.reference(scene, reference_samples, direct_only, size, view_layer, use_cache, folder)
+    opening = ()
+    if with_first_row:
+        opening = first_row(few, passes, truth, scene, seed, direct_only, size, view_layer)
     about = rendering.describe(scene)
     return Comparison(
         scene=scene.name,
@@ -145,6 +152,7 @@ def compare_scene(
         + passes.notes
         + missing_paths(passes, truth),
         date=time.strftime("%Y-%m-%d %H:%M"),
+        opening=opening,
     )
 
 

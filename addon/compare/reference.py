@@ -20,10 +20,9 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,6 +30,7 @@ import bpy
 import numpy as np
 
 from ..gfx import context
+from ..gfx.user_folder import user_folder
 from ..snapshot.exr import read_exr
 from . import cache
 from .cache import Reference
@@ -58,6 +58,7 @@ def render_passes(
     view_layer: bpy.types.ViewLayer | None = None,
     bounces: int | None = None,
     diffuse_bounces: int | None = None,
+    extra: Sequence[Setting] = (),
 ) -> Passes:
     """Render one view layer of `scene` with `engine` and return its passes.
 
@@ -65,7 +66,8 @@ def render_passes(
     a render border the pictures hold the bordered rectangle only. `bounces` limits how often light is reflected on
     its way to the surface that is seen; None leaves it to Candela's own setting, and Cycles goes on until nothing is
     left. `direct_only` means none: the direct passes stay what they are in a full render, and Combined shows direct
-    light, emission and world. EEVEE knows no such limit. `diffuse_bounces` limits Cycles' diffuse ones further.
+    light, emission and world. EEVEE knows no such limit. `diffuse_bounces` limits Cycles' diffuse ones further, `extra`
+    settings come after all others.
     Compositor and sequencer stay out of it. Blender's Render Result shows this render afterwards.
     Raises `RenderFailed`.
     """
@@ -77,6 +79,7 @@ def render_passes(
             [
                 *render_settings(scene, view_layer, engine, samples, seed, 0 if direct_only else bounces, size),
                 *([] if diffuse_bounces is None else [(scene.cycles, "diffuse_bounces", diffuse_bounces)]),
+                *extra,
             ]
         ) as notes:
             transparent = scene.render.film_transparent
@@ -171,23 +174,7 @@ def render_reference(scene, samples: int, direct_only: bool, size, view_layer, k
 def cache_folder() -> Path:
     """Where references are kept: $CANDELA_CACHE if set, the extension's own folder if Candela is one, else a folder
     among the user's caches."""
-    given = os.environ.get("CANDELA_CACHE")
-    if given:
-        return Path(given)
-    parts = (__package__ or "").split(".")
-    if parts[0] == "bl_ext":
-        return Path(bpy.utils.extension_path_user(".".join(parts[:3]), path="references"))
-    return user_caches() / "candela" / "references"
-
-
-def user_caches() -> Path:
-    """The folder that the system has for caches of this user."""
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return given if given.is_absolute() else Path.home() / ".cache"  # a relative one is to be ignored
+    return user_folder("references")
 
 
 def reference_key(
@@ -241,6 +228,16 @@ def external_files(path: Path) -> list[Path]:
 # Settings ------------------------------------------------------------------------------------------------------------
 
 Setting = tuple[object, str, object]  # owner, property, value
+
+
+def combined_alone(view_layer: bpy.types.ViewLayer) -> list[Setting]:
+    """Extra settings for `render_passes`: without any pass but Combined, as a picture is timed."""
+    found: list[Setting] = []
+    for row in PASS_NAMES:
+        owner, _, name = row.switch.rpartition(".")
+        if row.image != "combined":
+            found.append((getattr(view_layer, owner, None) if owner else view_layer, name, False))
+    return found
 
 
 def render_settings(

@@ -81,6 +81,7 @@ def page(data: Comparison) -> str:
         title=_text(f"{data.scene}: {data.engine} against {data.reference_engine}"),
         heading=_text(f"{data.engine} against {data.reference_engine}"),
         facts=_facts(data),
+        opening=_opening(data),
         cards=_cards(data),
         stage_width=max(width, 860) if width < 1140 else 1140,
         aspect=f"{width} / {height}",
@@ -98,6 +99,20 @@ def page(data: Comparison) -> str:
         notes=_notes(data),
         reference_note=_reference_note(data),
     )
+
+
+def _opening(data: Comparison) -> str:
+    """The first row: what few samples look like, and Cycles in the time of the last."""
+    figures = []
+    for one in data.opening:
+        told = f'<span>{one.seconds:.2f} s</span><span title="relMSE">error {_scientific(f"{one.relmse:.1e}")}</span>'
+        caption = f"<figcaption><b>{_text(one.label)}</b>{told}</figcaption>"
+        figures.append(f'<figure><img alt="{_text(one.label)}" src="{_plain(one.pixels)}">{caption}</figure>')
+    return f'<section class="opening" aria-label="First row">{"".join(figures)}</section>' if figures else ""
+
+
+def _plain(image: np.ndarray) -> str:
+    return data_url(png(np.round(shrink(display(image), SMALL_WIDTH)[::-1] * 255).astype(np.uint8)))
 
 
 # Pictures ------------------------------------------------------------------------------------------------------------

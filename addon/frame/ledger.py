@@ -20,6 +20,7 @@ class Row:
     milliseconds: float = 0.0
     slot: str = ""
     counters: dict[str, int] = field(default_factory=dict)  # passes, triangles, views, … per frame
+    choices: tuple[str, ...] = ()  # between methods, by what they cost on this device
 
 
 @dataclass
@@ -47,11 +48,21 @@ class Ledger:
             time = f"{row.milliseconds:9.1f} ms" if row.state == RAN else " " * 12
             counters = ", ".join(f"{value} {key}" for key, value in row.counters.items())
             lines.append(f"  {row.label:<{width}}  {row.state:<7} {time}  {row.reason or counters}".rstrip())
+            lines += [f"  {'':<{width}}    {choice}" for choice in some_of(row.choices)]
         if self.times:
             lines.append("  " + ", ".join(f"{name} {seconds * 1000:.0f} ms" for name, seconds in self.times.items()))
         if self.bad_pixels:
             lines.append(f"  {self.bad_pixels} values were not finite and were set to 0: please report this scene.")
         return "\n".join(lines)
+
+
+MOST_CHOICES = 4  # of a row that are told one by one
+
+
+def some_of(choices: tuple[str, ...]) -> list[str]:
+    """The first choices, and how many more there are."""
+    more = len(choices) - MOST_CHOICES
+    return [*choices[:MOST_CHOICES], *([f"{more} more"] if more > 0 else [])]
 
 
 _latest: Ledger | None = None

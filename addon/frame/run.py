@@ -30,6 +30,7 @@ from ..snapshot.scene import Snapshot
 from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
+from . import probe
 from .bands import Bands
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
@@ -72,6 +73,7 @@ class Frame:
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
     picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
     needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
+    choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -208,6 +210,10 @@ class Frame:
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
 
+    def chose(self, technique: Technique, of: str, why: str) -> None:
+        """Between methods, by what they cost on this device: the ledger's row says it."""
+        self.choices.setdefault(technique.name, {})[of] = why
+
     def leave(self, technique: Technique, reason: str) -> None:
         """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
         self.needless[technique.name] = reason
@@ -271,6 +277,8 @@ class Renderer:
             raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
         started = time.perf_counter()
         context.ensure()
+        context.begin_picture()
+        probe.ensure()
         ledger = Ledger(samples=0)
         self.materials.update(snapshot)
         geometry_changed = self.geometry.update(snapshot, self.materials.compiled)
@@ -454,7 +462,8 @@ class Renderer:
         if technique.name in frame.needless:
             return Row(technique.name, technique.label, SKIPPED, frame.needless[technique.name], slot=slot)
         counters = frame.counters.get(technique.name, {})
-        return Row(technique.name, technique.label, RAN, "", 1000 * seconds, slot, counters)
+        chosen = tuple(f"{of}: {why}" for of, why in frame.choices.get(technique.name, {}).items())
+        return Row(technique.name, technique.label, RAN, "", 1000 * seconds, slot, counters, chosen)
 
     def release(self) -> None:
         """Free everything on the GPU."""

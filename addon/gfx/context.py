@@ -18,6 +18,26 @@ import gpu
 _releases: list[Callable[[], Callable[[], None] | None]] = []  # each gives the function, or None once it has gone
 
 
+RECENT = 8  # pictures: what none of so many asked for may be freed
+
+pictures = 0  # that this process has begun, of all renderers
+_begins: list[Callable[[], None]] = []
+
+
+def on_picture(function: Callable[[], None]) -> Callable[[], None]:
+    """Register (as a decorator) what frees GPU resources that recent pictures did not use; see `begin_picture`."""
+    _begins.append(function)
+    return function
+
+
+def begin_picture() -> None:
+    """Another picture begins: the time by which stores of GPU resources tell what is old."""
+    global pictures
+    pictures += 1
+    for function in _begins:
+        function()
+
+
 class Turn:
     """A lock for whoever draws: who waits for it gets it before its last holder does again.
 
@@ -90,7 +110,7 @@ def counts_in_images() -> bool:
     return gpu.platform.backend_type_get() != "METAL"
 
 
-def _rasterises_in_software() -> bool:
+def rasterises_in_software() -> bool:
     """Whether the driver is Mesa's llvmpipe, or its Vulkan front, which names itself the same."""
     return "llvmpipe" in gpu.platform.renderer_get()
 
@@ -98,23 +118,12 @@ def _rasterises_in_software() -> bool:
 def overtakes_draws() -> bool:
     """Whether a dispatch may run before draws that were asked for earlier: llvmpipe (seen with Mesa 22.3) starts it at
     once, while its rasteriser still works on them."""
-    return gpu.platform.backend_type_get() == "OPENGL" and _rasterises_in_software()
-
-
-def loads_beat_fetches() -> bool:
-    """Whether shaders read texels faster from images than from textures: with Mesa's software rasteriser in down to a
-    quarter of the time, where neighbours ask for texels far apart."""
-    return _rasterises_in_software()
+    return gpu.platform.backend_type_get() == "OPENGL" and rasterises_in_software()
 
 
 def masks_branches() -> bool:
     """Whether shaders compute what they branch around, and mask it: so does Mesa's software rasteriser."""
-    return _rasterises_in_software()
-
-
-def draws_slowly() -> bool:
-    """Whether a triangle of a depth map costs as much as a ray of a pixel: on no GPU, but in software."""
-    return _rasterises_in_software()
+    return rasterises_in_software()
 
 
 def to_hold(needed, everything):

@@ -12,7 +12,8 @@ from weakref import WeakKeyDictionary
 import gpu
 import numpy as np
 
-from .context import on_release
+from . import context
+from .context import on_picture, on_release
 
 _BYTES = {
     "RGBA32F": 16,
@@ -180,31 +181,43 @@ class Pool:
     """Images by size and format, given back after use and handed out again."""
 
     def __init__(self):
-        self._free: dict[tuple[int, int, str], list[Image]] = {}
+        # By size and format, each with the picture in which it was given back, the latest last.
+        self._free: dict[tuple[int, int, str], list[tuple[Image, int]]] = {}
         self.allocated_bytes = 0
 
     def take(self, width: int, height: int, image_format: str) -> Image:
         """An image with undefined content."""
         stock = self._free.get((width, height, image_format))
         if stock:
-            return stock.pop()
+            return stock.pop()[0]
         image = create(width, height, image_format)
         self.allocated_bytes += image.bytes
         return image
 
     def give(self, image: Image) -> None:
         image.beside = {}
-        self._free.setdefault((image.width, image.height, image.format), []).append(image)
+        stock = self._free.setdefault((image.width, image.height, image.format), [])
+        stock.append((image, context.pictures))
 
     def trim(self) -> None:
         """Free all images that nobody holds."""
-        for stock in self._free.values():
-            self.allocated_bytes -= sum(image.bytes for image in stock)
-        self._free.clear()
+        self._free_before(context.pictures + 1)
+
+    def free_old(self) -> None:
+        """Free images that nobody holds and no recent picture asked for."""
+        self._free_before(context.pictures - context.RECENT)
+
+    def _free_before(self, picture: int) -> None:
+        for key, stock in list(self._free.items()):
+            self._free[key] = [one for one in stock if one[1] >= picture]
+            self.allocated_bytes -= sum(image.bytes for image, given in stock if given < picture)
+            if not self._free[key]:
+                del self._free[key]
 
 
 pool = Pool()
 on_release(pool.trim)
+on_picture(pool.free_old)
 
 
 @contextmanager

@@ -16,7 +16,9 @@ from pathlib import Path
 
 import gpu
 
-from .context import loads_beat_fetches, on_release
+from . import context
+from .context import on_picture, on_release
+from .device import loads_beat_fetches
 from .struct import Struct
 
 FULLSCREEN_VERTEX = "lib/fullscreen.vert.glsl"
@@ -83,6 +85,11 @@ class Program:
             raise ShaderError(f"Program {self.name}: {len(self.textures)} textures; Metal allows {MOST_TEXTURES}.")
         if bool(self.compute) == bool(self.fragment):
             raise ShaderError(f"Program {self.name}: give either compute, or vertex and fragment.")
+        values = (getattr(self, name) for name in self.__dataclass_fields__)
+        object.__setattr__(self, "_hash", hash(tuple(values)))  # asked for at each draw, over all its texts
+
+    def __hash__(self) -> int:
+        return self._hash
 
     @property
     def loaded(self) -> tuple[str, ...]:
@@ -132,6 +139,7 @@ class Shader:
     def __init__(self, program: Program):
         self.program = program
         self.handle = _compile(program)
+        self.used = 0  # the last picture that asked for it
         self._constants = {name: kind for kind, name in program.constants}
         self._textures = {name for _, name in program.textures}
         self._images = {name for name, *_ in program.images}
@@ -179,6 +187,8 @@ def _set(setter, name: str, value) -> None:
         pass  # Declared but unused: the driver dropped it, which is no fault of the caller.
 
 
+MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
+
 _shaders: dict[Program, Shader] = {}
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
 
@@ -188,7 +198,27 @@ def get(program: Program) -> Shader:
     shader = _shaders.get(program)
     if shader is None:
         shader = _shaders[program] = Shader(program)
+    shader.used = context.pictures
     return shader
+
+
+def kept() -> int:
+    """Compiled programs that this process holds."""
+    return len(_shaders)
+
+
+@on_picture
+def _free_old() -> None:
+    """Of more than MOST_PROGRAMS free those that were asked for the longest ago, but none that a recent picture used:
+    a scene of very many materials keeps them all."""
+    surplus = len(_shaders) - MOST_PROGRAMS
+    if surplus <= 0:
+        return
+    old = [program for program, shader in _shaders.items() if shader.used < context.pictures - context.RECENT]
+    if old:
+        gpu.shader.unbind()
+    for program in sorted(old, key=lambda one: _shaders[one].used)[:surplus]:
+        del _shaders[program]
 
 
 @on_release

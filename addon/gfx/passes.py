@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 
 import gpu
 import numpy as np
@@ -120,7 +120,7 @@ def _for_images(program: Program, bindings: dict) -> Shader:
     return get(_with_images(program, defines, tuple((image.format, name) for name, image in beside.items())))
 
 
-@cache
+@lru_cache(maxsize=1024)
 def _with_images(program: Program, defines: tuple[tuple[str, str], ...], beside: tuple[tuple[str, str], ...]):
     if not defines and not beside:
         return program

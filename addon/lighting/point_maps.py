@@ -102,7 +102,10 @@ class PointMaps(Technique, VisibilityProvider):
 
     def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:
         """Whether rays take the place of this light's maps."""
-        return by_rays(frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame))
+        return by_rays(
+            frame, lambda: self.views(frame, emitter, emitter.middle(), 0), self.resolution(frame), self,
+            emitter.light.name if emitter.light else "light",
+        )  # fmt: skip
 
     def views(self, frame: Frame, emitter: lights.Emitter, sample: np.ndarray, number: int, cell: float = 0.0) -> list:
         """Views that cover point `number` of the light, at `sample`, for all receivers."""

@@ -1,10 +1,12 @@
 """What tells a picture which points of a light it sees at less cost: depth maps, or a ray of each pixel.
 
-A map costs its triangles, texels and calls, a ray the hierarchy's nodes on its way, and each pixel needs one.
-Nanoseconds by which the two are compared, as measured with two threads of llvmpipe at 256x192 pixels (whole renders of
-16 samples of direct light, by maps and by rays): a triangle 110 to 160, a texel 20, a view .8 ms (Python's thread and
-the driver's calls), a ray 60 in rooms and 200 in a town of 100,000 triangles. On GPUs only the order is known, from
-what others publish: a triangle .2 to .5, a texel .02, a ray 1 to 3.
+A map costs its triangles, texels and calls, a ray the hierarchy's levels on its way, and each pixel needs one:
+
+    maps = triangles drawn x triangle + texels x texel + views x view
+    rays = pixels x log2(triangles) x ray_level x (1 + REPEATED x repeats)
+
+with the nanoseconds of this device (gfx/device.py). On two threads of llvmpipe at 256x192 pixels (whole renders of 16
+samples of direct light) a ray took 60 ns in rooms and 200 in a town of 100,000 triangles, which the levels follow.
 """
 
 from __future__ import annotations
@@ -14,33 +16,51 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..frame.run import Frame
-from ..gfx import context
+from ..gfx import device
+from ..gfx.device import milliseconds
 from ..scene.culling import Boxes
 from .depth_maps import MapView
 
-
-@dataclass(frozen=True)
-class Costs:
-    """Nanoseconds."""
-
-    triangle: float
-    texel: float
-    view: float
-    level: float  # of the hierarchy, which doubles the triangles, for a ray
-
-
-IN_SOFTWARE, ON_GPU = Costs(130.0, 20.0, 8e5, 8.0), Costs(0.3, 0.02, 5e3, 0.15)
 REPEATED = 0.15  # share of the pixels in which light is asked again for another point of the film, as rays cost there
 
 
-def rays_cost_less(frame: Frame, views: list[MapView], resolution: int, repeats: int) -> bool:
-    """Whether a ray of each pixel costs less than these views of a light, drawn with `resolution`. `repeats`: so many
-    times their light is asked again at edges (lighting/repeated_light.py)."""
-    costs = IN_SOFTWARE if context.draws_slowly() else ON_GPU
+@dataclass(frozen=True)
+class Compared:
+    """Nanoseconds of a sample's visibility of one point of a light, either way."""
+
+    rays: float
+    maps: float
+
+    @property
+    def by_rays(self) -> bool:
+        return self.rays < self.maps
+
+    @property
+    def why(self) -> str:
+        """For the ledger and the terminal."""
+        chosen, other = (self.rays, self.maps) if self.by_rays else (self.maps, self.rays)
+        name = "rays" if self.by_rays else "maps"
+        return f"{name}, because {milliseconds(chosen)} against {milliseconds(other)} here"
+
+
+def rays_ns(pixels: int, triangles: int, repeats: int = 0) -> float:
+    """Of a ray of each pixel. `repeats`: so many times light is asked again at edges (lighting/repeated_light.py)."""
+    ray = device.current().ray_level * float(np.log2(triangles + 2)) * (1.0 + REPEATED * repeats)
+    return ray * pixels
+
+
+def maps_ns(drawn: float, texels: float, views: int) -> float:
+    """Of depth maps: `drawn` triangles over all views."""
+    costs = device.current()
+    return costs.triangle * drawn + costs.texel * texels + costs.view * views
+
+
+def compared(frame: Frame, views: list[MapView], resolution: int, repeats: int) -> Compared:
+    """A ray of each pixel beside these views of a light, drawn with `resolution`."""
     boxes = Boxes.of(frame.geometry.opaque_casters)
     triangles = np.array([draw.triangles for draw in frame.geometry.opaque_casters], float)
     drawn = sum(float(triangles[boxes.seen(view.rows, view.least_q)].sum()) for view in views)
     texels = sum((resolution // view.scale) ** 2 for view in views)
     width, height = frame.size
-    ray = costs.level * float(np.log2(frame.geometry.triangles + 2)) * (1.0 + REPEATED * repeats)
-    return ray * width * height < costs.triangle * drawn + costs.texel * texels + costs.view * len(views)
+    rays = rays_ns(width * height, frame.geometry.triangles, repeats)
+    return Compared(rays, maps_ns(drawn, texels, len(views)))

@@ -9,15 +9,17 @@ import numpy as np
 
 from ..film import points as film_points
 from ..frame.run import Frame
+from ..frame.settings import Settings
 from ..frame.technique import Param, Service, Technique
 from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..scene import acceleration
 from ..scene.geometry import Draw
 from ..scene.receivers import TILE
+from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps, repeated_light
-from .ray_costs import rays_cost_less
+from .ray_costs import Compared, compared, maps_ns, rays_ns
 
 RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
@@ -42,7 +44,12 @@ PART_TEXELS = 2**21  # after as many of a sample that is drawn in parts, a windo
 
 def map_resolution(frame: Frame, texels_per_pixel: float) -> int:
     """Side of a depth map in texels."""
-    wished = max(frame.size) * texels_per_pixel
+    return side_of_map(frame.size, texels_per_pixel)
+
+
+def side_of_map(size: tuple[int, int], texels_per_pixel: float) -> int:
+    """The same for a picture of this size."""
+    wished = max(size) * texels_per_pixel
     return int(np.clip(np.ceil(max(wished, 1.0) / 32) * 32, 32, MOST_RESOLUTION))
 
 
@@ -183,9 +190,11 @@ def drawn_by_lot(frame: Frame) -> list[Draw]:
     return [draw for draw in frame.geometry.draws if draw.material in casting]
 
 
-def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:
+def by_rays(
+    frame: Frame, views: Callable[[], list], resolution: int, technique: Technique | None = None, of: str = "light"
+) -> bool:
     """Whether rays take the place of maps. `views` makes those of such a map, where they are asked for; without any
-    there is no shadow to trace."""
+    there is no shadow to trace. The ledger's row of the `technique` says why, `of` which light."""
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
     if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
         return False
@@ -194,9 +203,41 @@ def by_rays(frame: Frame, views: Callable[[], list], resolution: int) -> bool:
     asked = views()
     if not asked or wanted == BY_RAYS:
         return bool(asked)
+    found = rays_beside(frame, asked, resolution)
+    far_off = found.by_rays and _far_off(frame)
+    if technique is not None:
+        why = "maps, because rays begin too far off surfaces in so large a scene" if far_off else found.why
+        frame.chose(technique, of, why)
+    return found.by_rays and not far_off
+
+
+def rays_beside(frame: Frame, views: list, resolution: int) -> Compared:
+    """What a ray of each pixel costs beside these views."""
     points = film_points.points_of_sample(frame, frame.settings.value("film", film_points.POINTS))
     repeats = points - 1 if frame.settings.samples >= repeated_light.FEWEST else 0
-    return not _far_off(frame) and rays_cost_less(frame, asked, resolution, repeats)
+    return compared(frame, views, resolution, repeats)
+
+
+VIEWS = {"POINT": 6}  # of a map, by kind of lamp, where the lamp sees all around; one elsewhere
+
+
+def foreseen(snapshot: Snapshot, settings: Settings) -> list[str]:
+    """What is to be expected of `by_rays` before anything is drawn, as a sentence for each lamp with shadows: all
+    casters are taken for seen by it. The ledger of a picture says what was chosen."""
+    casters = [one for one in snapshot.instances if one.visibility.shadow]
+    triangles = sum(snapshot.meshes[one.mesh].triangle_count for one in casters)
+    lamps = [light for light in snapshot.lights if light.cast_shadow and np.any(light.strength)]
+    wanted = settings.value("accumulated_maps", SHADOWS_BY)
+    if wanted != BY_COST or not triangles or acceleration.too_many(snapshot):
+        return []
+    size = snapshot.film.width, snapshot.film.height
+    side = side_of_map(size, settings.value("accumulated_maps", RESOLUTION))
+    sentences = []
+    for light in lamps:
+        views = VIEWS.get(light.kind, 1)
+        found = Compared(rays_ns(size[0] * size[1], triangles), maps_ns(triangles, views * side * side, views))
+        sentences.append(f"Shadows of {light.name}: {found.why}")
+    return sentences
 
 
 def _far_off(frame: Frame) -> bool:

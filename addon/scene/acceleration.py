@@ -136,6 +136,11 @@ def _mean_code(material: CompiledMaterial, rays: int = ALL_RAYS) -> float:
     return float(_codes(stopped, np.full(2, opacity), False, material.glass is not None))
 
 
+def opaque_code() -> float:
+    """The code of triangles that stop every ray."""
+    return float(_codes(ALL_RAYS, np.ones(2), False, False))
+
+
 def _stopped(material: CompiledMaterial, rays: int) -> tuple[int, bool]:
     """Which rays a transparent material's triangles stop, and whether they stop those wherever they meet them."""
     if material.casts_by_lot or material.glass:

@@ -102,6 +102,8 @@ def depth_of(material: int) -> float:
 def hit_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a material where rays met it."""
     if compiled.program_key not in _programs:
+        if len(_programs) >= MOST_PROGRAMS:
+            del _programs[next(iter(_programs))]
         _programs[compiled.program_key] = _hit_program(compiled)
     return _programs[compiled.program_key]
 
@@ -368,4 +370,5 @@ def pixel_spread(frame: Frame) -> float:
     return 0.0 if frame.snapshot.camera.kind == "ORTHOGRAPHIC" else (right - left) / frame.size[0]
 
 
+MOST_PROGRAMS = 1024  # of which the texts are kept
 _programs: dict[str, Program] = {}  # by topology

@@ -90,7 +90,9 @@ class EmissiveLight(Technique):
                 points.append(self._patch(frame, provider, numbers, number, count, flags))
                 continue
             if number == 0:
-                self._traced = by_rays(frame, lambda place=point: _views(frame, place, 0, resolution), resolution)
+                self._traced = by_rays(
+                    frame, lambda place=point: _views(frame, place, 0, resolution), resolution, self, "emissive meshes"
+                )
             views = [] if self._traced else _views(frame, point, number, resolution)
             row = self._triangles.row(numbers, count, flags, len(views) or self._traced, frame.settings.samples)
             points.append(LightPoint(row, self._rays if self._traced else self._maps, views))

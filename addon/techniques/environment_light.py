@@ -59,6 +59,7 @@ from ..gfx import images, passes
 from ..lighting import depth_maps
 from ..lighting.light_rates import LightRates, world_rate
 from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
+from ..lighting.ray_costs import compared
 from ..lighting.visibility import (
     HARD,
     NO_VIEWS,
@@ -122,7 +123,6 @@ RAY_LIGHTING = tuple(lighting(WORLD_RAYS, soft_lobes, 1 << lights.DIRECTION) for
 UNSHARED = 1.5  # times less of the noise of rays than of shared directions remains after denoising
 USUAL = 4.0  # shared directions of a sample that rays are compared with: with more of both the same one wins
 WIDEST_PATCH = np.pi  # steradians of the world that one soft map stands for, at most
-MAPS_PER_RAY = 2  # a ray of each pixel takes about the time of so many maps
 FRAGMENTED = 3.0  # variance of a single shared direction below which a low-discrepancy set of them does better still
 
 
@@ -202,7 +202,7 @@ class EnvironmentLight(Technique):
         if self._edges is not None:
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
-            rays = max(1, int(rate.per_sample / MAPS_PER_RAY))
+            rays = max(1, int(rate.per_sample * min(self._maps_per_ray(frame, resolution), 1.0)))
             points = [LightPoint(row, self._rays)] * rays
             yield from light_surfaces(
                 frame, self, points, 1 << lights.DIRECTION, self._sources, lambda *_: self._own_rays(frame)
@@ -250,13 +250,19 @@ class EnvironmentLight(Technique):
 
     def _traces(self, frame: Frame, resolution: int) -> bool:
         """Whether rays take the place of maps."""
+        return by_rays(frame, lambda: self._usual_views(frame, resolution), resolution, self, "the world")
+
+    @staticmethod
+    def _usual_views(frame: Frame, resolution: int) -> list:
+        """Of a direction such as the world's are."""
         direction, *_ = frame.environment.draw(*frame.random_at(0, "environment"))
         middle = (0.5, 0.5, 0.0, 0.0)
-        return by_rays(
-            frame,
-            lambda: depth_maps.directional_views(direction, frame.receivers, frame.geometry, middle, resolution),
-            resolution,
-        )
+        return depth_maps.directional_views(direction, frame.receivers, frame.geometry, middle, resolution)
+
+    def _maps_per_ray(self, frame: Frame, resolution: int) -> float:
+        """How many rays of each pixel take the time of the map of one direction, on this device."""
+        found = compared(frame, self._usual_views(frame, resolution), resolution, 0)
+        return found.maps / max(found.rays, 1e-9)
 
     def _known(self, frame: Frame, maps: Maps, share: float) -> Maps:
         """The same maps, asked for what is missing of `share` of the world's irradiance, too."""

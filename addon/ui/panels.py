@@ -176,6 +176,8 @@ def _ledger_row(column, context, row) -> None:
     value.label(text=_seconds(row.milliseconds / 1000) if row.state == ledgers.RAN else row.state)
     if row.reason:
         _text(column, context, row.reason, dim=True, indent=True)
+    for choice in ledgers.some_of(row.choices):
+        _text(column, context, choice, dim=True, indent=True)
 
 
 class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):

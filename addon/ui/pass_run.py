@@ -53,7 +53,8 @@ class _Kept:
     cache: SnapshotCache = field(default_factory=SnapshotCache)
 
 
-_kept: dict[int, _Kept] = {}  # by session_uid of the scene
+MOST_KEPT = 2
+_kept: dict[int, _Kept] = {}  # by session_uid of the scene, the one that was asked for last at the end
 
 
 def render_steps(
@@ -67,13 +68,15 @@ def render_steps(
     RuntimeError when the GPU cannot.
     """
     gpu_context.ensure()
-    kept = _kept.setdefault(scene.session_uid, _Kept())
+    kept = _kept[scene.session_uid] = _kept.pop(scene.session_uid, None) or _Kept()
     try:
         snapshot = take(depsgraph, kept.cache, *size)
     except UnsupportedScene as error:
         raise ValueError(str(error)) from None
     yield 0.0, "compiling shaders"
     with turn:
+        for other in list(_kept)[:-MOST_KEPT]:
+            _kept.pop(other).renderer.release()
         frame = kept.renderer.begin(snapshot, replace(settings, profile=profile))
     for _ in samples_in_parts(kept.renderer, frame):
         drawing = min(frame.samples_done + 1, settings.samples)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from addon.compare.comparison import Comparison, LedgerRow, Picture
+from addon.compare.first_row import Shown
 from addon.compare.metrics import compare_depth, compare_normal, compare_radiance
 from addon.compare.passes import ROWS, Row
 from addon.compare.png import png
@@ -216,3 +217,13 @@ def test_shrinking_averages_whole_blocks():
     image = np.arange(24, dtype=np.float64).reshape(4, 6)
     np.testing.assert_array_equal(shrink(image, 3), [[3.5, 5.5, 7.5], [15.5, 17.5, 19.5]])
     assert shrink(image, 6) is image
+
+
+def test_the_first_row_opens_the_page_with_time_and_error_of_each():
+    pixels = np.ones((6, 8, 4), np.float32)
+    row = (Shown("1 sample", pixels, 0.25, 3e-2), Shown("Cycles, denoised", pixels, 1.5, 4e-3))
+    text = page(comparison(opening=row))
+    opening = text[text.index('class="opening"') : text.index('class="cards"')]
+    assert opening.count("<figure>") == 2
+    assert "<b>1 sample</b><span>0.25 s</span>" in opening and "<span>1.50 s</span>" in opening
+    assert '<section class="opening"' not in page(comparison())

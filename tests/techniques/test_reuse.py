@@ -1,6 +1,7 @@
 """Skip, reuse, then compute: the ledger says what ran and why the rest did not, and unchanged work is not redone."""
 
 import resource
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,7 @@ import pytest
 
 from addon import engine
 from addon.frame.ledger import RAN, REUSED, SKIPPED
-from addon.gfx import context, images, library
-from addon.lighting import ray_costs
+from addon.gfx import context, device, images, library
 from addon.lighting.point_maps import PointMaps
 from addon.techniques.surfaces import Surfaces
 
@@ -74,8 +74,9 @@ def test_rays_take_the_place_of_maps_that_cost_more(room, monkeypatch):
     """As told by triangles, texels and pixels; what lets some light pass has maps, whatever they cost."""
     maps = "accumulated_maps"
     for costs, by_rays in (((1e9, 0.0, 0.0, 1.0), True), ((0.0, 0.0, 0.0, 1.0), False)):
-        monkeypatch.setattr(ray_costs, "IN_SOFTWARE", ray_costs.Costs(*costs))
-        monkeypatch.setattr(ray_costs, "ON_GPU", ray_costs.Costs(*costs))
+        triangle, texel, view, level = costs
+        figures = replace(device.current(), triangle=triangle, texel=texel, view=view, ray_level=level)
+        monkeypatch.setattr(device, "current", lambda figures=figures: figures)
         room.render(2, seed=int(by_rays))
         assert ("maps" in room.ledger.row(maps).counters) != by_rays
     room.scene.candela.accumulated_maps_by = "RAYS"
@@ -167,7 +168,7 @@ def test_sliders_of_a_material_compile_nothing(room):
 def test_changing_lights_world_and_size_compiles_nothing(room, monkeypatch):
     """On GPUs; for software that masks branches, programs hold no more kinds of light than the scene has."""
     monkeypatch.setattr(context, "masks_branches", lambda: False)
-    monkeypatch.setattr(context, "draws_slowly", lambda: False)
+    monkeypatch.setattr(device, "current", lambda: device.MADE_UP["card"])
     room.world((0.1, 0.1, 0.1))
     room.render(1)
     compiled = library.compile_count

@@ -1,0 +1,156 @@
+"""What this device does at which cost: a few figures that choices between methods ask, never its name.
+
+The figures are measured once (frame/probe.py) and kept by driver and version in the user's folder for caches, so that
+a picture is drawn alike each time. They are rounded, for the same reason. Tests, and whoever wants the choices of
+another machine, set CANDELA_DEVICE to one of MADE_UP or to a JSON file with the fields of `Device`: then nothing is
+measured or kept, and pictures depend on no clock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+VERSION = 1  # of the kernels: figures of others are measured anew
+MOST_KEPT = 16  # drivers
+LOAD_GAIN = 0.7  # of a fetch's time, below which loads are worth the bindings that they take
+VARIABLE = "CANDELA_DEVICE"
+
+
+@dataclass(frozen=True)
+class Device:
+    """Nanoseconds of one of each."""
+
+    ray_level: float  # of a shadow ray, for each doubling of the triangles that it may meet
+    triangle: float  # of a depth map, small
+    texel: float  # of a depth map, cleared and drawn
+    view: float  # of a depth map: what Python and the driver take to begin it
+    render_pass: float  # over a single pixel, waited for
+    python: float  # of a pass, until it is asked for
+    fetch: float  # of a texel far from that before, from a texture
+    load: float  # the same from an image
+
+    def lines(self) -> list[str]:
+        """For the panel and the terminal."""
+        drawn = f"triangle {_time(self.triangle)}, depth texel {_time(self.texel)}, view {_time(self.view)}"
+        asked = f"pass {_time(self.render_pass)}, of it Python and driver {_time(self.python)}"
+        read = f"texel fetched {_time(self.fetch)}, loaded {_time(self.load)}"
+        return [f"ray {_time(20 * self.ray_level)} (a million triangles), {drawn}", f"{asked}; {read}"]
+
+
+# Made up for tests, near to what two threads of llvmpipe and a fast card do: whole renders of 16 samples of direct
+# light, by maps and by rays; of cards only what others publish.
+MADE_UP = {
+    "software": Device(8.0, 130.0, 20.0, 8e5, 5e5, 3e5, 8.0, 2.5),
+    "card": Device(0.15, 0.3, 0.02, 5e3, 3e4, 2.5e4, 0.01, 0.012),
+}
+
+_current: Device | None = None
+measured_s = 0.0  # that the measurement took in this process; 0: it was known
+
+
+def current() -> Device:
+    """The figures that choices ask. Before they are known, those of a card: a choice that is made then is not kept."""
+    return _current or given() or MADE_UP["card"]
+
+
+def loads_beat_fetches() -> bool:
+    """Whether shaders read texels faster from images than from textures: with Mesa's software rasteriser in down to a
+    quarter of the time, where neighbours ask for texels far apart."""
+    return current().load < LOAD_GAIN * current().fetch
+
+
+def known() -> bool:
+    return _current is not None
+
+
+def use(device: Device | None) -> None:
+    """Let these figures decide from now on; None: measure or read them again."""
+    global _current
+    _current = device
+
+
+def given() -> Device | None:
+    """What CANDELA_DEVICE names. ValueError with a sentence where it is neither made up nor a file of figures."""
+    name = os.environ.get(VARIABLE, "")
+    if not name:
+        return None
+    if name in MADE_UP:
+        return MADE_UP[name]
+    try:
+        return _of(json.loads(Path(name).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        names = ", ".join(MADE_UP)
+        raise ValueError(f"{VARIABLE} is '{name}': neither one of {names} nor a file of figures ({error}).") from None
+
+
+def _of(values: dict) -> Device:
+    device = Device(**{field.name: float(values[field.name]) for field in fields(Device)})
+    if not all(0.0 < value < 1e12 for value in asdict(device).values()):
+        raise ValueError("figures must be nanoseconds above 0")
+    return device
+
+
+def key() -> str:
+    """What the figures hold for."""
+    from .context import describe
+
+    return f"{describe()}, probe {VERSION}"
+
+
+def read(folder: Path) -> Device | None:
+    """The figures of this driver that were kept; None where there are none that can be read."""
+    return _of_kept(_kept(folder))
+
+
+def _of_kept(kept: dict) -> Device | None:
+    try:
+        return _of(kept[key()])
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _kept(folder: Path) -> dict:
+    try:
+        kept = json.loads((folder / "devices.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return kept if isinstance(kept, dict) else {}
+
+
+def write(folder: Path, device: Device) -> None:
+    """Keep the figures of this driver. A folder that cannot be written only means to measure again next time."""
+    kept = {name: one for name, one in _kept(folder).items() if name != key()}
+    kept = dict([*kept.items()][1 - MOST_KEPT :]) | {key(): asdict(device)}
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=folder, prefix=".writing_")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                json.dump(kept, file, indent=1)
+            Path(temporary).replace(folder / "devices.json")
+        except OSError:
+            Path(temporary).unlink(missing_ok=True)
+
+
+def forget(folder: Path) -> None:
+    """Measure anew when figures are next asked for: after a change of clocks, say."""
+    use(None)
+    with contextlib.suppress(OSError):
+        (folder / "devices.json").unlink(missing_ok=True)
+
+
+def _time(nanoseconds: float) -> str:
+    for unit, size in (("ms", 1e6), ("µs", 1e3)):
+        if nanoseconds >= size:
+            return f"{nanoseconds / size:.3g} {unit}"
+    return f"{nanoseconds:.3g} ns"
+
+
+def milliseconds(nanoseconds: float) -> str:
+    """For sentences about choices: `1.3 ms`."""
+    return f"{nanoseconds / 1e6:.2g} ms" if nanoseconds < 99.5e6 else f"{nanoseconds / 1e6:.0f} ms"

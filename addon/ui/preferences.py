@@ -1,0 +1,56 @@
+"""The extension's preferences: what this device was measured to do, by which Candela chooses between methods."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..frame import probe
+from ..gfx import context, device
+
+
+class CANDELA_OT_measure_device(bpy.types.Operator):
+    """Measure anew what this device does, as after a change of its clocks; takes a fraction of a second"""
+
+    bl_idname = "candela.measure_device"
+    bl_label = "Measure Again"
+
+    def execute(self, _context):
+        try:
+            context.ensure()
+            with context.turn:
+                device.forget(probe.folder())
+                probe.ensure()
+        except (RuntimeError, ValueError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class CandelaPreferences(bpy.types.AddonPreferences):
+    bl_idname = __package__.rpartition(".")[0]  # the extension's own name
+
+    def draw(self, _context):
+        column = self.layout.column()
+        for line in device_lines():
+            column.label(text=line)
+        self.layout.operator(CANDELA_OT_measure_device.bl_idname, icon="FILE_REFRESH")
+
+
+def device_lines() -> list[str]:
+    """The device and its figures, as sentences."""
+    if not device.known():
+        return ["What this device does is measured when it first draws."]
+    return [f"Choices between methods follow what this device does: {context.describe()}", *device.current().lines()]
+
+
+_CLASSES = (CANDELA_OT_measure_device, CandelaPreferences)
+
+
+def register() -> None:
+    for made in _CLASSES:
+        bpy.utils.register_class(made)
+
+
+def unregister() -> None:
+    for made in reversed(_CLASSES):
+        bpy.utils.unregister_class(made)

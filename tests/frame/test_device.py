@@ -1,0 +1,115 @@
+"""What a device costs is measured once, kept by driver, and decides between methods; its name decides nothing."""
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+
+from addon.frame import probe
+from addon.gfx import context, device
+from addon.lighting import visibility
+from addon.snapshot import SnapshotCache, take
+from addon.ui import preferences
+from addon.ui.properties import settings_of
+from tests.techniques.conftest import Stage
+
+SOFTWARE = device.MADE_UP["software"]
+# Two cards that differ in one thing: on the first, rays cost next to nothing, on the second they are all it is bad at.
+TRACER, RASTERISER = replace(SOFTWARE, ray_level=1e-3), replace(SOFTWARE, ray_level=1e4)
+
+
+@pytest.fixture
+def unknown(gpu_context, monkeypatch, tmp_path):
+    """No figures yet, and a folder of its own for them."""
+    monkeypatch.delenv(device.VARIABLE)
+    monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
+    before = device.current() if device.known() else None
+    device.use(None)
+    yield tmp_path
+    device.use(before)
+
+
+@pytest.fixture
+def room(registered):
+    stage = Stage()
+    stage.clear()
+    stage.floor(2.0)
+    stage.blocker((-0.5, -0.5), (0.5, 0.5), 0.5)
+    stage.lamp = stage.light("POINT", (0.4, 0.2, 2.0), energy=100.0)
+    stage.camera_above(4.0)
+    yield stage
+    device.use(None)
+    stage.clear()
+
+
+def test_a_choice_differs_between_two_devices_and_the_ledger_says_why(room):
+    said = {}
+    for name, figures in (("tracer", TRACER), ("rasteriser", RASTERISER)):
+        device.use(figures)
+        room.render(2, seed=len(said))
+        row = next(row for row in room.ledger.rows if row.choices)
+        said[name] = row.choices[0]
+        assert ("maps" in room.ledger.row("accumulated_maps").counters) == (name == "rasteriser")
+    assert "rays, because" in said["tracer"] and "maps, because" in said["rasteriser"]
+    assert all(sentence.endswith(" here") and " ms against " in sentence for sentence in said.values())
+    assert said["tracer"] in room.ledger.text() or said["rasteriser"] in room.ledger.text()
+
+
+def test_the_plan_foresees_the_same_choice(room):
+    import bpy
+
+    graph = bpy.context.evaluated_depsgraph_get()
+    graph.update()
+    snapshot = take(graph, SnapshotCache(), 64, 64)
+    settings = settings_of(room.scene, viewport=False)
+    for figures, method in ((TRACER, "rays"), (RASTERISER, "maps")):
+        device.use(figures)
+        (sentence,) = visibility.foreseen(snapshot, settings)
+        assert f": {method}, because" in sentence
+
+
+def test_figures_are_measured_once_and_kept_for_this_driver(unknown):
+    first = probe.ensure()
+    assert device.known()
+    (kept,) = json.loads((unknown / "devices.json").read_text(encoding="utf-8")).items()
+    assert kept == (device.key(), asdict(first))
+    device.use(None)
+    device.measured_s = -1.0
+    assert probe.ensure() == first
+    assert device.measured_s == -1.0, "what is kept is not measured again"
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{", '{"KEY": {"texel": 1}}', '{"KEY": null}', '{"another": {}}'])
+def test_figures_that_cannot_be_read_are_measured(unknown, content):
+    (unknown / "devices.json").write_text(content.replace("KEY", device.key()), encoding="utf-8")
+    assert device.read(unknown) is None
+
+
+def test_a_made_up_device_is_taken_as_it_is(unknown, monkeypatch, tmp_path):
+    monkeypatch.setenv(device.VARIABLE, "card")
+    assert probe.ensure() == device.MADE_UP["card"]
+    assert not (unknown / "devices.json").exists()
+    device.use(None)
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps(asdict(TRACER)), encoding="utf-8")
+    monkeypatch.setenv(device.VARIABLE, str(path))
+    assert probe.ensure() == TRACER
+    device.use(None)
+    monkeypatch.setenv(device.VARIABLE, "toaster")
+    with pytest.raises(ValueError, match=r"toaster.*neither one of software, card"):
+        probe.ensure()
+    monkeypatch.delenv(device.VARIABLE)
+
+
+def test_the_preferences_tell_the_figures(unknown):
+    assert preferences.device_lines() == ["What this device does is measured when it first draws."]
+    device.use(SOFTWARE)
+    lines = preferences.device_lines()
+    assert context.describe() in lines[0] and "triangle 130 ns" in lines[1]
+
+
+@pytest.mark.timing
+def test_measuring_takes_a_fifth_of_a_second_once_its_programs_are_compiled(unknown):
+    probe.measure()
+    probe.measure()
+    assert device.measured_s < 0.2
