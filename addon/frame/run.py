@@ -226,9 +226,11 @@ class Frame:
         row = self.counters.setdefault(technique.name, {})
         row[name] = row.get(name, 0) + amount
 
-    def count_texel(self, technique: Technique, name: str, image: images.Image, factor: int = 1) -> None:
-        """Add the first number of an image of one texel, times `factor`, to a counter, without reading it now: it comes
-        with the picture. Sums below 2^24 are exact."""
+    def count_texel(
+        self, technique: Technique, name: str, image: images.Image, factor: int = 1, at: tuple[int, int] = (0, 0)
+    ) -> None:
+        """Add the first number of an image's texel, times `factor`, to a counter, without reading it now: it comes with
+        the picture. Sums below 2^24 are exact."""
         entry = (technique.name, name, factor)
         if self._texel_sums is None:
             self._texel_sums = images.Target((images.pool.take(MOST_TEXELS, 1, "RGBA32F"),))
@@ -238,7 +240,7 @@ class Frame:
             if not self._texels:
                 self._texel_sums.clear()
             self._texels.append(entry)
-        put(image, self._texel_sums, self._texels.index(entry), 0, "ADDITIVE_PREMULT")
+        put(image, self._texel_sums, self._texels.index(entry), 0, "ADDITIVE_PREMULT", (*at, 1, 1))
 
     def read_with_counters(self, image: images.Image | None) -> np.ndarray | None:
         """An image's pixels; what `count_texel` has counted is read with them, and added to the counters."""
@@ -258,7 +260,7 @@ class Frame:
             found = images.read(target.colors[0])
         for (technique, name, factor), amount in zip(self._texels, found[height, :, 0]):
             row = self.counters.setdefault(technique, {})
-            row[name] = row.get(name, 0) + factor * int(round(float(amount)))
+            row[name] = row.get(name, 0) + factor * round(float(amount))
         self._texels.clear()
         return found[:height, : image.width] if image is not None else pixels
 

@@ -28,7 +28,8 @@ _ERROR_LINE = re.compile(r"(?:python_shader\.glsl|\|\s*):(\d+)(?::\d+)?:\s*(.*)"
 _QUOTED_LINE = re.compile(r"^\s*\d+ \| (.*\S)")
 
 # Types of a texture: the format of its texels, or, where that is not known beforehand, only what they are read as.
-_FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D") | {"RGBA32UI": "UINT_2D"}
+_FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D")
+_FORMATS |= dict.fromkeys(("RGBA32UI", "R32UI"), "UINT_2D")
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
 MOST_TEXTURES = 16  # of a program
 _MOST_IMAGES = 8  # that Blender binds at once

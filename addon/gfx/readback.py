@@ -1,8 +1,8 @@
 """Readbacks that wait for each other: what several steps want to know is read at once, when the first of it is needed.
 
-A readback stops the queue: the CPU waits until the GPU has done everything before it, and then the GPU waits for what the
-CPU makes of it. So what is asked for is left where it is (`later`), and the first `pixels` copies all of it into one image
-and reads that.
+A readback stops the queue: the CPU waits until the GPU has done everything before it, and then the GPU waits for what
+the CPU makes of it. So what is asked for is left where it is (`later`), and the first `pixels` copies all of it into
+one image and reads that.
 
 | cost | |
 |---|---|
@@ -26,12 +26,17 @@ PACK_INTEGERS = passes.fullscreen_program(
 )
 
 
-def put(image: images.Image, target: images.Target, x: int, y: int, blend: str = "NONE") -> None:
-    """Copy an image to a place of a target. Integers become floats, exact up to 2^24."""
+def put(
+    image: images.Image, target: images.Target, x: int, y: int, blend: str = "NONE",
+    part: tuple[int, int, int, int] | None = None,
+) -> None:  # fmt: skip
+    """Copy an image, or a part (x, y, width, height) of it, to a place of a target. Integers become floats, exact up to
+    2^24."""
     program = PACK_INTEGERS if image.format == "R32UI" else PACK
+    left, low, *size = part or (0, 0, *image.size)
     passes.fullscreen(
-        program, target, blend=blend, viewport=(x, y, *image.size),
-        textures={"original": image}, constants={"place": (x, y)},
+        program, target, blend=blend, viewport=(x, y, *size),
+        textures={"original": image}, constants={"place": (x - left, y - low)},
     )  # fmt: skip
 
 

@@ -6,10 +6,10 @@ Two questions are asked at pixels of a coarse grid, by rays through the hierarch
   directions.) Directions of the world are then drawn in proportion to radiance times usefulness: a room lit through a
   window spends them on the window. What each probe sees is also left for tables of single tiles (environment_light.py).
 - How much do single points of a light differ in what they bring? (432 probes, 8 to 32 points per light; beyond a door
-  ajar 8 find a quarter of the variance that 32 find. Of the guided world the probes' directions tell it: a direction
-  brings radiance over density times what the probe sees of its cell.) Their variance, in units of the light that the probe gets, is the
-  error that one point leaves; sources/rates.py turns it into the number of points per sample. Only for pictures whose
-  samples are shown together: otherwise every sample has one point per light.
+  ajar 8 find a quarter of the variance that 32 find. Of the guided world the directions above tell it: a point brings
+  radiance over density times what the probe sees of its cell.) Their variance, in units of the light that the probe
+  gets, is the error that one point leaves; sources/rates.py turns it into the number of points per sample. Only for
+  pictures whose samples are shown together: otherwise every sample has one point per light.
 
 | cost | once per picture |
 |---|---|
