@@ -157,6 +157,16 @@ class Shader:
         for name, value in constants.items():
             self.set_constant(name, value)
 
+    def change(self, textures=None, blocks=None, constants=None) -> None:
+        """Bind some of what `bind` has bound anew, between draws."""
+        for name, block in (blocks or {}).items():
+            _set(self.handle.uniform_block, name, block.buffer)
+        for name, image in (textures or {}).items():
+            setter = self.handle.image if name in self._loaded else self.handle.uniform_sampler
+            _set(setter, name, image.texture)
+        for name, value in (constants or {}).items():
+            self.set_constant(name, value)
+
     def set_constant(self, name: str, value) -> None:
         """Set one push constant between draws."""
         kind = self._constants[name]
