@@ -85,6 +85,15 @@ class Program:
         if bool(self.compute) == bool(self.fragment):
             raise ShaderError(f"Program {self.name}: give either compute, or vertex and fragment.")
 
+    def __hash__(self) -> int:
+        """Of all fields, found once: programs are looked up at each draw, and hold sources."""
+        known = self.__dict__.get("_hash")
+        if known is None:
+            known = hash((self.name, self.vertex, self.fragment, self.compute, self.textures, self.constants,
+                          self.defines, self.outputs, tuple(name for name, _ in self.snippets)))  # fmt: skip
+            object.__setattr__(self, "_hash", known)
+        return known
+
     @property
     def loaded(self) -> tuple[str, ...]:
         """Textures that are bound as images, because this driver loads faster than it fetches."""

@@ -15,7 +15,6 @@ import numpy as np
 
 from ..frame.run import Frame
 from ..gfx import context
-from ..scene.culling import Boxes
 from .depth_maps import MapView
 
 
@@ -37,8 +36,7 @@ def rays_cost_less(frame: Frame, views: list[MapView], resolution: int, repeats:
     """Whether a ray of each pixel costs less than these views of a light, drawn with `resolution`. `repeats`: so many
     times their light is asked again at edges (lighting/repeated_light.py)."""
     costs = IN_SOFTWARE if context.draws_slowly() else ON_GPU
-    boxes = Boxes.of(frame.geometry.opaque_casters)
-    triangles = np.array([draw.triangles for draw in frame.geometry.opaque_casters], float)
+    boxes, triangles = frame.geometry.caster_boxes, frame.geometry.caster_triangles
     drawn = sum(float(triangles[boxes.seen(view.rows, view.least_q)].sum()) for view in views)
     texels = sum((resolution // view.scale) ** 2 for view in views)
     width, height = frame.size
