@@ -33,7 +33,8 @@ lobe together: the energy that is seen is right, and only among those who see it
 |---|---|
 | candidates | 1152, or 4 N if that is more |
 | rays | 2 per bounce + 19 for each candidate, then 192 for the density of each virtual light |
-| readback | 160 bytes per candidate, 768 per virtual light |
+| passes | 16 in all, most of them over the candidates alone (lighting/light_choice.py) |
+| readback | none; how many are kept is counted in an image |
 
 Bias, in diffuse and glossy indirect light:
 

@@ -21,8 +21,8 @@ depth of field all that the rim of the lens sees, too.
 | bytes written per pixel | 6 x 16 + 4 |
 | coloured layers | + 1 pass of their draws, blended into three of the images |
 | marks | 1 pass: which pixels show a surface, which one with a narrow lobe; others are left out by the depth test |
-| first sample | + one reduction, read back at 1/256 of the pixels together with what light probes find, unless only \
-lights or settings differ from the picture before; with alpha + 2 surface passes and another one |
+| first picture of a view | + one reduction to 1/128 of the pixels, read together with what light probes find |
+| the same with alpha | + 2 surface passes and another reduction |
 | first sample with depth of field | 7 times that |
 
 Fails: more layers than samples look dithered; light through coloured layers casts grey shadows.
