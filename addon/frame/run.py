@@ -259,8 +259,9 @@ class Frame:
             put(sums, target, 0, height)
             found = images.read(target.colors[0])
         for (technique, name, factor), amount in zip(self._texels, found[height, :, 0]):
-            row = self.counters.setdefault(technique, {})
-            row[name] = row.get(name, 0) + factor * round(float(amount))
+            if amount > 0.0:  # as with `count`: what did not happen is not counted
+                row = self.counters.setdefault(technique, {})
+                row[name] = row.get(name, 0) + factor * round(float(amount))
         self._texels.clear()
         return found[:height, : image.width] if image is not None else pixels
 
@@ -270,7 +271,6 @@ class Frame:
         held = [*self.images.values(), *(self._texel_sums.colors if self._texel_sums else ())]
         for image in held:
             images.pool.give(image)
-        self.images.clear()
         self._texel_sums = None
 
     def leave(self, technique: Technique, reason: str) -> None:

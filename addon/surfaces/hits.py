@@ -78,6 +78,10 @@ MATERIALS_MET = Program(
     textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material")),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
+COUNT_MET = passes.fullscreen_program(
+    "number of materials met", "hits/met_count.frag.glsl", textures=(("R32UI", "materials_met"),),
+    constants=(("INT", "material_count"),), outputs=(("FLOAT", "out_count"),),
+)  # fmt: skip
 MASKED = {
     "vertex": "hits/material.vert.glsl",
     "inputs": passes.FULLSCREEN_INPUTS,
@@ -264,8 +268,11 @@ class Hits:
                     shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
-        frame.count(technique, "materials", len(materials))
-        frame.count(technique, "passes", len(materials))
+        with images.borrowed(1, 1, "R32F") as count:
+            number_of_all = {"material_count": len(frame.materials.compiled)}
+            passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
+            frame.count_texel(technique, "materials", count.colors[0])
+        frame.count(technique, "passes", len(materials) + 1)
 
     def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
         """The program of a material, and what it binds besides records, rays, instances and the view."""
