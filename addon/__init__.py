@@ -19,6 +19,7 @@ def _parts() -> tuple:
     from .ui import (
         compare_editor,
         eye_panel,
+        grass,
         jobs,
         panels,
         pass_nodes,
@@ -35,5 +36,5 @@ def _parts() -> tuple:
 
     return (
         pass_tree, pass_nodes, properties, engine, pass_run, jobs, quality, panels, scoped_panels, eye_panel,
-        reflection_operators, translucency, tuning, pass_operators, compare_editor, cli,
+        reflection_operators, grass, translucency, tuning, pass_operators, compare_editor, cli,
     )  # fmt: skip

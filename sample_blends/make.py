@@ -10,6 +10,7 @@ the 4.5 wheel to renew them; a newer Blender asks for `--out`, so that nobody re
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -57,4 +58,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # Blender 4.5 as a module waits forever in its exit handlers once an extension was loaded

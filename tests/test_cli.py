@@ -242,3 +242,19 @@ def test_tune_proposes_settings_and_writes_them_only_when_asked(tmp_path):
     assert CORNELL.read_bytes() == before
     again = candela("plan", tmp_path / "tuned.blend", folder=tmp_path)
     assert f"512 × 384, {samples.partition('=')[2]} sample" in again.stdout
+
+
+TINY_GRASS = ("--texels", "8", "--views", "7", "--lights", "5", "--samples", "1", "--blades", "20")
+
+
+def test_grass_writes_a_patch_and_says_where(tmp_path):
+    done = candela("grass", "tiny.grass", *TINY_GRASS, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == f"{(tmp_path / 'tiny.grass').resolve()}\n"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["tiny.grass"]
+
+
+def test_grass_that_cannot_be_made_is_refused_in_a_sentence(tmp_path):
+    assert_refused(candela("grass", "tiny.png", folder=tmp_path), 2, "must end in .grass")
+    assert_refused(candela("grass", "tiny.grass", "--luma", "9", folder=tmp_path), 2, "at most 8 components")
+    assert_refused(candela("grass", "tiny.grass", "--height", "-1", folder=tmp_path), 2, "height")

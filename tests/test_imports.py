@@ -23,7 +23,7 @@ class Room:
 DATA = ("materials", "snapshot.scene")
 BELOW_FRAME = ("gfx", "sampling", "kernels", "scene", "sources", *DATA)
 ON_A_FRAME = ("surfaces", "film", "lighting")  # pieces that techniques share, each on those before it
-BELOW_TECHNIQUES = (*BELOW_FRAME, "eye", "frame", *ON_A_FRAME)
+BELOW_TECHNIQUES = (*BELOW_FRAME, "eye", "frame", "grass", *ON_A_FRAME)
 BELOW_COMPARE = (*BELOW_TECHNIQUES, "materials", "snapshot", "techniques")
 BLENDER = ("bpy", "bpy_extras", "imbuf", "mathutils", "bl_math", "idprop", "numpy")
 
@@ -40,6 +40,8 @@ ROOMS = {
     "eye": Room(modules=("numpy",)),
     "eye.point_spread": Room(rooms=("gfx", "kernels"), modules=("numpy",)),
     "eye.scatter": Room(rooms=("gfx", "kernels"), modules=("numpy",)),
+    "grass": Room(modules=("numpy",)),
+    "grass.generate": Room(rooms=("snapshot",), modules=BLENDER),
     "scene": Room(rooms=("gfx", "sampling", "kernels", *DATA), modules=("numpy",)),
     "sources": Room(rooms=("gfx", "sampling", "kernels", "scene", *DATA), modules=("numpy",)),
     "frame": Room(rooms=BELOW_FRAME, modules=("numpy",)),

@@ -26,7 +26,7 @@ def test_zip_holds_the_extension_and_nothing_else(package):
     assert {"blender_manifest.toml", "LICENSE", "__init__.py", "addon/__init__.py"} <= names
     rest = names - {"blender_manifest.toml", "LICENSE", "__init__.py"}
     foreign = [name for name in rest if not name.startswith(("addon/", "shaders/"))]
-    foreign += [name for name in rest if not name.endswith((".py", ".glsl", ".html", ".npz", ".json", ".js"))]
+    foreign += [name for name in rest if not name.endswith((".py", ".glsl", ".html", ".npz", ".json", ".js", ".grass"))]
     assert not foreign
 
 

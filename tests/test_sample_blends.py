@@ -20,6 +20,7 @@ LIGHTS = {  # how many of each kind
     "alpha_foliage": {"SUN": 1},
     "colonnade_hall": {"SUN": 1},
     "door_ajar": {"AREA": 1},
+    "meadow": {"SUN": 1},
     "sky_courtyard": {},
     "emissive_lamp": {},
     "caustics_pool": {"SUN": 1},

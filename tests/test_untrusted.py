@@ -67,7 +67,8 @@ group.node_tree = inner
 def write_to(tree, name, place, file, extension=True):
     node = tree.nodes.new("CompositorNodeOutputFile")
     node.name = name
-    layers = tree.nodes.new("CompositorNodeRLayers")
+    # Before Blender 5 groups of the compositor hold no render layers.
+    layers = tree.nodes.new("CompositorNodeRGB" if tree is inner else "CompositorNodeRLayers")
     if hasattr(node, "directory"):
         node.directory, node.file_name = place, file
         node.format.media_type = "IMAGE"
@@ -88,7 +89,8 @@ write_to(tree, "Proper", str(folder / "out" / "parts"), "beauty")
 write_to(tree, "Taken", str(folder / "out"), "taken")
 (folder / "other").mkdir()
 (folder / "out").mkdir()
-for place in (folder / "other" / "victim.png", folder / "out" / "taken.png"):
+number = "" if bpy.app.version >= (5, 0) else "0001"  # of the frame
+for place in (folder / "other" / f"victim{number}.png", folder / "out" / f"taken{number}.png"):
     place.write_text("mine")
 bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
 os._exit(0)

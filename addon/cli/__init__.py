@@ -1,4 +1,4 @@
-"""`blender --command candela render | compare | plan | tune | merge | farm …`, and the same as `python -m addon …`.
+"""`blender --command candela render | compare | plan | tune | merge | farm | grass …`, and as `python -m addon …`.
 
 What a person may get wrong ends in one sentence on standard error: exit code 2 when the command line cannot be meant
 as it stands, 1 when the file, the scene or the output will not do. Results are written beside their final place and
@@ -22,7 +22,7 @@ from ..compare.cache import LIMIT_BYTES
 from ..compare.reference import cache_folder
 from ..frame.settings import SAMPLES
 from ..techniques import REGISTRY
-from . import farm, farm_operator, merging, tuning, verbs
+from . import farm, farm_operator, grass, merging, tuning, verbs
 from .refused import FAILURE, USAGE, Refused
 from .terminal import STDOUT
 
@@ -94,7 +94,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     shared.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
 
     parser = _Parser(prog=program, description="Candela, a render engine for Blender.", allow_abbrev=False)
-    commands = parser.add_subparsers(metavar="render|compare|plan|tune|merge|farm", required=True)
+    commands = parser.add_subparsers(metavar="render|compare|plan|tune|merge|farm|grass", required=True)
     add = {"parents": [shared], "allow_abbrev": False}
     render = commands.add_parser("render", help="render a picture", **add)
     render.add_argument("--output", metavar="PATH", type=Path, help=".png, or .exr with all passes of the file")
@@ -159,6 +159,9 @@ def _parser(program: str) -> argparse.ArgumentParser:
     tune.add_argument("--output", metavar="PATH.blend", type=Path, help="with --apply: leave FILE as it is")
     _add_cache(tune)
     tune.set_defaults(verb=tuning.tune_scene, opens=True)
+    meadow = commands.add_parser("grass", help="render a patch of grass for materials to show", allow_abbrev=False)
+    grass.add_arguments(meadow, _count)
+    meadow.set_defaults(verb=grass.make_patch, opens=False)
     return parser
 
 

@@ -51,6 +51,14 @@ REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 
 
+class OwnPoint:
+    """Whether light at a pixel's own point says nothing about other points of the film (frame.shared): then a sample
+    shows its own point alone."""
+
+    def __init__(self):
+        self.needed = False
+
+
 def count_of(points: int, samples: int) -> int:
     """How many points of the film a sample shows where the picture is to have that many in all."""
     return min(max(-(-points // max(samples, 1)), 1), MOST)
@@ -59,6 +67,8 @@ def count_of(points: int, samples: int) -> int:
 def points_of_sample(frame: Frame, points: int) -> int:
     """How many of the picture's `points` of the film a sample shows: one where all of them would show the same."""
     by_lot = any(material.transparent for material in frame.materials.compiled)
+    if frame.shared(OwnPoint).needed:
+        return 1
     if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
         return 1
     count = count_of(points, frame.settings.samples)

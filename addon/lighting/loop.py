@@ -35,6 +35,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import repeated_light, shared_visibility
+from .grass import GrassTable, grown
 from .media import MediaService, attenuated
 from .repeated_light import Lit
 from .visibility import (
@@ -106,6 +107,10 @@ def shade(
         },
     }  # fmt: skip
     program = lighting(maps.lookup, frame.materials.soft, kinds)
+    grass = frame.service(GrassTable)
+    if grass is not None:
+        program = grown(program)
+        bindings["textures"] |= grass.bindings
     media = frame.service(MediaService)
     if media is not None:
         program = attenuated(program)
@@ -113,6 +118,7 @@ def shade(
     lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
     if maps.sparse:
         between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
+        between = grown(between) if grass is not None else between
         between = attenuated(between) if media is not None else between
         yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
     else:

@@ -30,10 +30,20 @@ LIGHTING = lighting(RAYS, False)
 
 
 class PointLight:
-    """Lights images of points. A technique owns one, calls `begin` once a picture and `add` in each sample."""
+    """Lights images of points. A technique owns one, calls `begin` once a picture and `add` in each sample.
 
-    def __init__(self, use: str):
+    In a picture of few samples, so many points are drawn on each lamp (`few`), and in each sample at least so many of
+    the world and of emissive meshes (`others`). `reflected`: lamps that give no light to reflections are left out.
+    `sharpness`: how many times as many points a light counts as having where surfaces are near to one of them
+    (lights.footprint): more lose less light, but leave bright spots.
+    """
+
+    def __init__(
+        self, use: str, few: int = FEW_POINTS, others: int = OTHER_POINTS, reflected: bool = False,
+        sharpness: float = 1.0,
+    ):  # fmt: skip
         self._use = use  # of the sequence
+        self._few, self._others, self._reflected, self._sharpness = few, others, reflected, sharpness
         self._sources = lights.Sources()
         self._emissive: EmissiveTriangles | None = None
 
@@ -65,6 +75,8 @@ class PointLight:
         """Points on all lamps, several on each in a picture of few samples; of many lamps some, by power."""
         settings = frame.settings
         emitters = [one for one in frame.emitters if one.flags & lights.DIFFUSE_FLAG]
+        if self._reflected:
+            emitters = [one for one in emitters if one.light.bounces]
         chosen = [(emitter, 1.0) for emitter in emitters]
         if len(chosen) > FEW_POINTS:
             power = np.array([emitter.power for emitter in emitters])
@@ -74,17 +86,18 @@ class PointLight:
             picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
             chosen = [(emitters[k], 1.0 / chance[k]) for k in picked]
         for emitter, weight in chosen:
-            each = max(FEW_POINTS // settings.samples, 1) if emitter.extended else 1
+            each = max(self._few // settings.samples, 1) if emitter.extended else 1
             for number in range(frame.sample * each, (frame.sample + 1) * each):
                 sample = emitter.sample(*frame.random_volume_at(number, f"{self._use}/light"))
+                points = self._sharpness * each * settings.samples / weight
                 shadowed = int(emitter.light.cast_shadow)
-                yield emitter.row(sample, 0, shadowed, weight, each, each * settings.samples / weight)
+                yield emitter.row(sample, 0, shadowed, weight, each, points)
 
     def _world(self, frame: Frame) -> Iterator[np.ndarray]:
         world = frame.snapshot.world
         if not frame.environment.power > 0 or not world.visibility.diffuse:
             return
-        each = max(FEW_POINTS // frame.settings.samples, OTHER_POINTS)
+        each = max(self._few // frame.settings.samples, self._others)
         numbers = range(frame.sample * each, (frame.sample + 1) * each)
         drawn = np.array([frame.random_at(number, f"{self._use}/world") for number in numbers])
         flags = lights.SHADOW_FLAG + lights.DIFFUSE_FLAG + lights.EVEN_FLAG * world.even
@@ -94,10 +107,11 @@ class PointLight:
     def _emitted(self, frame: Frame) -> Iterator[np.ndarray]:
         if self._emissive is None:
             return
-        each = max(FEW_POINTS // frame.settings.samples, OTHER_POINTS)
+        each = max(self._few // frame.settings.samples, self._others)
         for number in range(frame.sample * each, (frame.sample + 1) * each):
             numbers = frame.random_volume_at(number, f"{self._use}/emissive")
-            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=frame.settings.samples)
+            samples = self._sharpness * frame.settings.samples
+            yield self._emissive.row(numbers, each, lights.SHADOW_FLAG, samples=samples)
 
     def release(self) -> None:
         self._sources.release()

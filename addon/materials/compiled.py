@@ -19,6 +19,22 @@ class Attribute:
 
 
 @dataclass(frozen=True)
+class OwnSurface:
+    """GLSL of a material whose surface is not where its mesh is: it moves the point that a fragment shades.
+
+    `glsl` defines `bool own_surface(inout SurfacePoint point, Instance instance)`: it puts the point where the ray from
+    `point.incoming` meets the surface (position, normals, attributes), or returns false where the ray passes. It may
+    read the varyings and, besides those of the material, `textures`, whose images MaterialSet.own_images holds. The
+    programs that draw the camera's view, views of lights and depth maps call it and write the depth of the point.
+    `shell`: what is drawn are prisms over the mesh's triangles (scene/shells.py) instead of these.
+    """
+
+    glsl: str
+    textures: tuple[tuple[str, str], ...] = ()  # as of gfx.library.Program
+    shell: bool = False
+
+
+@dataclass(frozen=True)
 class CompiledMaterial:
     """GLSL for one material topology plus the values of this material.
 
@@ -54,6 +70,7 @@ class CompiledMaterial:
     medium: Medium | None  # what its inside does with light
     scatter: float  # about how far light spreads below its surface, m; 0: it does not
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated
+    own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
 
     @property
     def bounds_alone(self) -> bool:

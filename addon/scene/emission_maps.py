@@ -118,7 +118,7 @@ class EmissionMaps:
         attributes = materials.compiled[part.material].attributes
         batch = flat_batch(part, attributes, sides, corners)
         shader = passes.get(materials.emission_map_program(part.material))
-        bindings = materials.bindings(part.material, geometry.instances)
+        bindings = materials.bindings(part.material, geometry.instances, own=False)
         at_once = max(ROWS // height, 1)
         for start in range(0, len(own), at_once):
             some = own[start : start + at_once]

@@ -54,6 +54,7 @@ class MaterialSet:
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int], images.Image] = {}
         self._used: list[str] = []
+        self.own_images: dict[int, dict[str, images.Image]] = {}  # by material: textures of its own surface program
 
     def update(self, snapshot: Snapshot) -> None:
         """Compile and upload what changed."""
@@ -170,12 +171,14 @@ class MaterialSet:
         """Adds up what material `index` emits."""
         return _emission_program(self.compiled[index])
 
-    def bindings(self, index: int, instances: images.Image) -> dict:
-        """Textures and blocks that both programs of a material need."""
+    def bindings(self, index: int, instances: images.Image, own: bool = True) -> dict:
+        """Textures and blocks that programs of a material need; without `own` of those that draw its mesh as it is."""
         compiled = self.compiled[index]
         textures = {"instances": instances, "energy_table": self.energy_table}
         for slot, name in enumerate(compiled.images):
             textures[f"material_image{slot}"] = self._images[name, self._versions[name]]
+        if compiled.own_surface and own:
+            textures |= self.own_images[index]
         return {
             "textures": textures,
             "blocks": {"material_values": self._blocks[self._keys[index]], "material_scene": self._scene},
@@ -222,7 +225,7 @@ def _struct(length: int) -> Struct:
 
 
 def _shared(compiled: CompiledMaterial) -> dict:
-    count = len(compiled.attributes)
+    count, own = len(compiled.attributes), compiled.own_surface
     copy = "".join(f"  varying_attribute{k} = attribute{k};\n" for k in range(count))
     head = "void fill_attributes(inout SurfacePoint point, vec2 steps_x, vec2 steps_y)"
     fill = "  vec4 along_x;\n  vec4 along_y;\n" + "".join(
@@ -246,8 +249,11 @@ def _shared(compiled: CompiledMaterial) -> dict:
         "textures": (
             ("RGBA32F", "instances"), ("RGBA32F", "energy_table"),
             *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *(own.textures if own else ()),
         ),
+        "writes_depth": own is not None,
         "snippets": (
+            ("generated/own_surface", own.glsl if own else ""),
             ("generated/attributes", f"void copy_attributes()\n{{\n{copy}}}\n"),
             (
                 "generated/material",
@@ -309,7 +315,12 @@ def _lobe_program(compiled: CompiledMaterial) -> Program:
 
 def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     """How layers of a material are drawn, see surface.frag.glsl."""
-    return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added
+    return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added + _own_defines(compiled)
+
+
+def _own_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
+    """Whether programs look for the surface themselves, see surface/point.glsl."""
+    return (("OWN_SURFACE", ""),) if compiled.own_surface else ()
 
 
 @_once
@@ -343,7 +354,7 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/scatter.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
         textures=(*like.textures, ("RGBA32F", "scatter_objects")),
-        defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1")),
+        defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1"), *_own_defines(compiled)),
     )
 
 
@@ -354,7 +365,7 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
         name=f"glow {compiled.program_key[:8]}",
         fragment="surface/glow.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
-        defines=CAMERA_DEFINES,
+        defines=(*CAMERA_DEFINES, *_own_defines(compiled)),
     )
 
 
@@ -367,7 +378,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
         constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
-        defines=PROJECTION_DEFINES,
+        defines=(*PROJECTION_DEFINES, *_own_defines(compiled)),
         **_shared(compiled),
     )
 
@@ -390,6 +401,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
 
 def _opacity_program(compiled: CompiledMaterial) -> Program:
     """See opacity_maps.py."""
+    compiled = replace(compiled, own_surface=None)
     like = _caster_program(compiled)
     return replace(
         like,

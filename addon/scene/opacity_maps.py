@@ -144,7 +144,7 @@ class OpacityMaps:
             attributes = materials.compiled[part.material].attributes
             batch = flat_batch(part, attributes, sides[part.own], corners[part.own])
             shader = passes.get(materials.opacity_program(part.material))
-            bindings = materials.bindings(part.material, geometry.instances)
+            bindings = materials.bindings(part.material, geometry.instances, own=False)
             with passes.drawing(target, **state):
                 for number in part.numbers[:: -(-len(part.numbers) // INSTANCES)]:
                     constants = {"first_instance": number, "tile_scale": (2 / WIDTH, 2 / height)}

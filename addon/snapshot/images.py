@@ -23,6 +23,8 @@ from .scene import Image, Note
 
 # Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
 _LINEAR_SPACES = ("Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data", "Utility - Raw", "scene_linear")
+# Cycles before Blender 5.1: bytes have straight alpha and floats premultiplied alpha, whatever their alpha mode says.
+BYTES_ARE_STRAIGHT = FLOATS_ARE_PREMULTIPLIED = bpy.app.version < (5, 1)
 MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not there
 
 
@@ -74,7 +76,8 @@ class ImageTable:
         if alpha in ("STRAIGHT", "PREMUL") and original.colorspace_settings.is_data:
             alpha = "CHANNEL_PACKED"  # what is no colour is not covered by alpha
         elif alpha in ("STRAIGHT", "PREMUL"):
-            alpha = "PREMUL" if is_float else alpha if original.source != "GENERATED" else "STRAIGHT"
+            kept = original.source != "GENERATED" and not BYTES_ARE_STRAIGHT
+            alpha = "PREMUL" if is_float else alpha if kept else "STRAIGHT"
         if encoding == "" and not missing:
             pixels, encoding = to_scene_linear(pixels, original.colorspace_settings.name), "LINEAR"
         same = (
@@ -154,9 +157,12 @@ def _pixels(original, part: Part) -> tuple[np.ndarray, tuple, bool, tuple[Note, 
             )
             found = packed([pixels for _, pixels in parts])
     else:
-        if original.alpha_mode == "PREMUL" and original.packed_file is None and not original.is_dirty:
-            # Blender's bytes are divided by alpha then; the file has what is meant.
-            found = read_file(_path(original), space) if not original.is_float else None
+        # The file has what is meant: of premultiplied bytes, which Blender divides by alpha, and, where Cycles takes
+        # all floats as premultiplied, of straight floats, which Blender multiplies.
+        mode = "STRAIGHT" if original.is_float and FLOATS_ARE_PREMULTIPLIED else "PREMUL"
+        by_file = not original.is_float or FLOATS_ARE_PREMULTIPLIED
+        if by_file and original.alpha_mode == mode and original.packed_file is None and not original.is_dirty:
+            found = read_file(_path(original), space)
         found = _own_pixels(original) if found is None else found
     if found is None or not found.size:
         return np.array([[MAGENTA]], np.float32), (), True, (Note(subject, text),)

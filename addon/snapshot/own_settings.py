@@ -6,6 +6,8 @@ whatever has been set, by the property's identifier; what was never touched has 
 
 from __future__ import annotations
 
+import bpy
+
 Own = tuple[tuple[str, object], ...]  # (identifier, value), in the properties' order; hashable
 
 
@@ -13,23 +15,25 @@ def own_settings(block) -> Own:
     """What has been set on an evaluated data-block; values are bool, int, float, str, tuples of numbers, names of
     data-blocks, and for lists a tuple of such tuples, one for each entry."""
     group = getattr(block, "candela", None)
-    return () if group is None else _values(group, every=False)
+    return () if group is None else _values(group, False, getattr(block, "library", None))
 
 
-def _values(group, every: bool) -> Own:
+def _values(group, every: bool, library=None) -> Own:
     found = []
     for prop in group.bl_rna.properties:
         name = prop.identifier
         if name in ("rna_type", "name") or (prop.is_runtime and name.endswith("_active")):
             continue
         if prop.type == "COLLECTION":
-            entries = tuple(_values(entry, every=True) for entry in getattr(group, name))
+            entries = tuple(_values(entry, True, library) for entry in getattr(group, name))
             if entries:
                 found.append((name, entries))
         elif every or group.is_property_set(name):
             value = getattr(group, name)
             if prop.type == "POINTER":
                 value = value.name if value is not None else ""
+            elif prop.type == "STRING" and prop.subtype == "FILE_PATH":
+                value = bpy.path.abspath(value, library=library) if value else ""
             elif getattr(prop, "is_array", False):
                 value = tuple(value)
             found.append((name, value))

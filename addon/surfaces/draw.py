@@ -9,6 +9,7 @@ import numpy as np
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES
@@ -62,6 +63,14 @@ def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> N
     indices = [material.pass_index for material in frame.snapshot.materials]
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
+
+
+class StandIns:
+    """What draws materials instead of their surface programs as the camera sees them (frame.shared): by material, the
+    program, its textures and its constants beside those of the material's own. Set before surfaces are drawn."""
+
+    def __init__(self):
+        self.of: dict[int, tuple[Program, dict[str, images.Image], dict[str, object]]] = {}
 
 
 class SurfaceStages:
@@ -141,17 +150,22 @@ def _submit(
     rows = frame.view_rows if rows is None else rows
     seen = np.flatnonzero(frame.geometry.boxes.seen(rows))
     material = None
+    stand_ins = frame.shared(StandIns).of if program_of == frame.materials.surface_program else {}
     unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
     for call in calls(frame.geometry.draws, seen):
         if call.draw.material in unseen or (materials is not None and call.draw.material not in materials):
             continue
         if call.draw.material != material:
             material = call.draw.material
-            shader = passes.get(program_of(material))
+            stand_in = stand_ins.get(material)
+            shader = passes.get(stand_in[0] if stand_in else program_of(material))
             bindings = frame.materials.bindings(material, frame.geometry.instances)
             bindings["blocks"]["film_view"] = view or frame.view_block
             bindings["textures"] |= textures or {}
             shown = {"index_shown": indices[material]} if indices is not None else {}
+            if stand_in:
+                bindings["textures"] |= stand_in[1]
+                shown |= stand_in[2]
             shader.bind(**bindings, constants={"first_instance": call.first, **constants, **shown})
         shader.set_constant("first_instance", call.first)
         passes.draw(shader, call.draw.batch, call.count)

@@ -50,7 +50,7 @@ from ..scene.acceleration import Hierarchy
 from ..scene.geometry import corner_attribute
 from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, values_struct
 from ..scene.view import VIEW
-from ..snapshot.scene import Mesh
+from ..snapshot.scene import Instance, Mesh
 from .draw import refracts
 from .reflectance import Reflectance
 
@@ -82,6 +82,13 @@ COUNT_MET = passes.fullscreen_program(
     "number of materials met", "hits/met_count.frag.glsl", textures=(("R32UI", "materials_met"),),
     constants=(("INT", "material_count"),), outputs=(("FLOAT", "out_count"),),
 )  # fmt: skip
+PLACE = passes.fullscreen_program(
+    "points as hits",
+    "hits/place.frag.glsl",
+    textures=tuple(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
+    outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
+    writes_depth=True,
+)
 MASKED = {
     "vertex": "hits/material.vert.glsl",
     "inputs": passes.FULLSCREEN_INPUTS,
@@ -241,7 +248,24 @@ class Hits:
             },
         )  # fmt: skip
         frame.count(technique, "passes")
-        return self._to_shade(frame, hierarchy, records)
+        return self._to_shade(frame, hierarchy, records, path)
+
+    def place(
+        self, frame: Frame, technique: Technique, points: tuple[images.Image, ...], records: Records
+    ) -> set[int]:  # fmt: skip
+        """Take points that are known as hits, and return their materials: images as the first three of RECORDS, and
+        one of the number of the material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
+        names = (name for _, name in PLACE.textures)
+        passes.fullscreen(PLACE, records.target, textures=dict(zip(names, points)))
+        frame.count(technique, "passes")
+        self._flag_met(frame, records)
+        return set(np.flatnonzero(images.read(records.met)).tolist())
+
+    def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
+        """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
+        `triangle`."""
+        self._number(frame)
+        return self._numbers[instance.mesh, frame.geometry.placed[1][instance.mesh].version, instance.materials]
 
     def shade(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
@@ -281,7 +305,7 @@ class Hits:
         if len(compiled.images) > MOST_IMAGES:
             textures = {"reflectance": self._mean_reflectance(frame)}
             return MEAN, {"textures": textures, "blocks": {}, "constants": constants}
-        bound = frame.materials.bindings(material, frame.geometry.instances)
+        bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
         textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
         if compiled.attributes:
             textures["hit_attributes"] = self._attributes_of(material, compiled)
@@ -290,13 +314,11 @@ class Hits:
 
     # What is shaded ---------------------------------------------------------------------------------------------------
 
-    def _to_shade(self, frame: Frame, hierarchy: Hierarchy, records: Records) -> set[int]:
+    def _to_shade(self, frame: Frame, hierarchy: Hierarchy, records: Records, path: str) -> set[int]:
         """Materials that are to be evaluated at these records: all that the rays may have met, without asking which,
         once their programs exist; else those that they have met."""
-        records.met.texture.clear(format="UINT", value=(0,))
-        textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        passes.compute(MATERIALS_MET, frame.size, textures=textures, images={"met": records.met})
-        possible = self._possible_of(frame, hierarchy)
+        self._flag_met(frame, records)
+        possible = self._possible_of(frame, hierarchy, path)
         if len(possible) <= MOST_UNASKED:
             unknown = {_program_key(frame.materials.compiled[k]) for k in possible} - self._compiled
             if self._asked is None:
@@ -308,12 +330,21 @@ class Hits:
                 return possible
         return set(np.flatnonzero(images.read(records.met)).tolist())
 
-    def _possible_of(self, frame: Frame, hierarchy: Hierarchy) -> set[int]:
-        """Materials of triangles that rays from lobes can meet."""
-        key = (hierarchy.leaves, frame.geometry.changes, frame.materials.fingerprint())
+    @staticmethod
+    def _flag_met(frame: Frame, records: Records) -> None:
+        """Write flags of the materials of these records."""
+        records.met.texture.clear(format="UINT", value=(0,))
+        textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
+        passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
+
+    def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:
+        """Materials of triangles that rays of a path can meet."""
+        key = (path, hierarchy.leaves, frame.geometry.changes, frame.materials.fingerprint())
         if self._possible is None or self._possible[0] != key:
             meshes, found = frame.geometry.placed[1], set()
-            for mesh, slots in {(one.mesh, one.materials) for one in hierarchy.instances if one.visibility.glossy}:
+            for mesh, slots in {
+                (one.mesh, one.materials) for one in hierarchy.instances if getattr(one.visibility, path)
+            }:
                 found.update(np.unique(meshes[mesh].triangle_materials(slots)).tolist())
             shown = {k for k in found if not frame.materials.compiled[k].bounds_alone}
             self._possible = (key, shown)

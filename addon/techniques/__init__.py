@@ -17,11 +17,13 @@ from .environment_area_lights import EnvironmentAreaLights
 from .environment_light import EnvironmentLight
 from .eye import EyeModel
 from .film import Film
+from .grass import Grass
 from .image_space_subsurface import ImageSpaceSubsurface
 from .imperfect_shadow_maps import ImperfectShadowMaps
 from .instant_radiosity import InstantRadiosity
 from .light_probes import LightProbes
 from .media import MediaAttenuation
+from .micro_rendering import MicroRendering
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
 from .reflection_editing import ReflectionEditing
@@ -38,6 +40,7 @@ from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
     MediaAttenuation,
+    Grass,
     Surfaces,
     ReflectionEditing,
     LightProbes,
@@ -60,6 +63,7 @@ REGISTRY: tuple[type[Technique], ...] = (
     MultiresRadiosity,
     ClusteredVisibility,
     ImperfectShadowMaps,
+    MicroRendering,
     ScreenSpaceBounce,
     ShadedReflections,
     ImageSpaceSubsurface,

@@ -70,6 +70,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
+from ..lighting.grass import GrassTable
 from ..lighting.path_sources import SHOWN
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -102,6 +103,11 @@ BEGIN = passes.fullscreen_program(
     defines=LEAST_COLOR,
     outputs=(("VEC4", "out_light"),),
 )
+# The same where grass is seen, whose direct light no pixel shares with others.
+BEGIN_BESIDE_GRASS = replace(
+    BEGIN, name="denoise: light and variance beside grass", textures=(*BEGIN.textures, ("RGBA32F", "surface_lobe")),
+    defines=(*BEGIN.defines, ("GRASS", "1")),
+)  # fmt: skip
 LEVEL = passes.fullscreen_program(
     "denoise: level",
     "denoise/level.frag.glsl",
@@ -215,11 +221,13 @@ class Denoise(Technique):
         }  # fmt: skip
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         half_count, half = self._half(frame, path, count)
+        grass = path == "diffuse_direct" and frame.service(GrassTable) is not None
+        lobes = {"surface_lobe": frame.images["surface.lobe"]} if grass else {}
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
                 passes.fullscreen(
-                    BEGIN, light, rows=rows, blocks=blocks,
-                    textures={**guides, **sums, "half_sum": frame.images[half]},
+                    BEGIN_BESIDE_GRASS if lobes else BEGIN, light, rows=rows, blocks=blocks,
+                    textures={**guides, **sums, **lobes, "half_sum": frame.images[half]},
                     constants={"count": count, "half_count": half_count, "sharpness": how.sharpness},
                 )  # fmt: skip
                 yield

@@ -400,6 +400,25 @@ def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room
         row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
 
 
+class CANDELA_VIEWLAYER_PT_override(_CandelaPanel, bpy.types.Panel):
+    """In Blender before 5.1, where the panel of these settings is one of Cycles."""
+
+    bl_label = "Override"
+    bl_context = "view_layer"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and not hasattr(bpy.types, "VIEWLAYER_PT_override")
+
+    def draw(self, context):
+        column = _columns(self, animatable=False)
+        column.prop(context.view_layer, "material_override")
+        if hasattr(context.view_layer, "world_override"):
+            column.prop(context.view_layer, "world_override")
+        column.prop(context.view_layer, "samples")
+
+
 _CLASSES = (
     CANDELA_OT_select_culprit,
     CANDELA_RENDER_PT_frame_notes,  # first: panels stand in this order
@@ -415,6 +434,7 @@ _CLASSES = (
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,
+    CANDELA_VIEWLAYER_PT_override,
     CANDELA_LIGHT_PT_beam_shape,
     CANDELA_LIGHT_PT_shadow,
     CANDELA_OBJECT_PT_ray_visibility,

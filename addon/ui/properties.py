@@ -47,6 +47,8 @@ def _property(param: Param, **changes):
     if param.image:
         del common["default"]
         return bpy.props.PointerProperty(type=bpy.types.Image, **common)
+    if param.file:
+        return bpy.props.StringProperty(**common, subtype="FILE_PATH")
     if isinstance(param.default, tuple):
         vector = {"size": len(param.default), "subtype": param.unit or _VECTOR_OF_HANDLE.get(param.handle, "NONE")}
         return bpy.props.FloatVectorProperty(**common, **vector)

@@ -9,6 +9,7 @@ from . import (
     emissive_lamp,
     hdri_product,
     instances,
+    meadow,
     sky_courtyard,
     soft_shadow_garden,
     window_interior,
@@ -28,4 +29,5 @@ SCENES = {
     "caustics_pool": ("Caustics Pool", caustics.build_pool),
     "caustics_rings": ("Caustics Rings", caustics.build_rings),
     "alpha_foliage": ("Alpha Foliage", alpha_foliage.build),
+    "meadow": ("Meadow", meadow.build),
 }

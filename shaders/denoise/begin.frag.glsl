@@ -2,6 +2,9 @@
 // single number per pixel, as its mean over 3x3 pixels of the same surface. Variance below 0: nothing to filter.
 #include "denoise/alike.glsl"
 #include "lib/math.glsl"
+#ifdef GRASS
+#include "lib/closure.glsl"
+#endif
 
 vec3 without_color(vec3 light, ivec2 pixel)
 {
@@ -23,6 +26,11 @@ void main()
   ivec2 size = sum_now_size();
   vec3 whole = sum_now_fetch(pixel).rgb;
   out_light = vec4(without_color(whole / float(count), pixel), -1.0);
+#ifdef GRASS
+  if (int(floor(surface_lobe_fetch(pixel).z / 2097152.0)) == SURFACE_GRASS) {
+    return;  // its blades are no noise
+  }
+#endif
   Shown here;
   bool colored = max_component(color_sum_fetch(pixel).rgb) > LEAST_COLOR * float(count);
   if (!shown_at(pixel, here) || !colored) {

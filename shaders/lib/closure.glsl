@@ -17,6 +17,8 @@
 #define LOBE_VELVET 5         // fibres after Ashikhmin; roughness is the spread of their normals
 #define LOBE_TRANSLUCENT 6    // diffuse, lit from the other side
 #define LOBE_TOON 7           // roughness: size, anisotropy: smoothness; edge 1: around the mirror direction
+// No lobe, weight 0; what its numbers in the surface images are then: grass/surface.glsl.
+#define SURFACE_GRASS 8
 
 float dielectric_f0(float ior)
 {

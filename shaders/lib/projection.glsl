@@ -13,3 +13,10 @@ bool projection_mirrors(vec4 to_x, vec4 to_y, vec4 to_w, vec4 to_q, float neares
 {
   return dot(cross(to_x.xyz, to_y.xyz), to_q.xyz - to_w.xyz) < 0.0;
 }
+
+// Depth of a place as the depth buffer of a view holds it, for fragments that are not where their triangle is.
+float projected_depth(vec3 p, vec4 to_x, vec4 to_y, vec4 to_w, vec4 to_q, float nearest)
+{
+  vec4 h = vec4(p, 1.0);
+  return 1.0 - nearest * dot(to_q, h) / dot(to_w, h);
+}

@@ -23,15 +23,26 @@
 #ifdef MEDIA
 #include "media/light.glsl"
 #endif
+#ifdef GRASS
+#include "grass/light.glsl"
+#define GRASS_ARGUMENT , grass
+#define GRASS_PARAMETER , GrassSeen grass
+#define DIFFUSE_REFLECTION(s, to_viewer, direction) \
+  (grass.exists ? grass_reflection(grass, s, direction) : surface_diffuse_reflection(s, to_viewer, direction))
+#else
+#define GRASS_ARGUMENT
+#define GRASS_PARAMETER
+#define DIFFUSE_REFLECTION(s, to_viewer, direction) surface_diffuse_reflection(s, to_viewer, direction)
+#endif
 
 // Irradiance in closed form times the closure towards the light's middle: exact for Lambert's.
-vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction)
+vec3 whole_diffuse(Light light, Surface s, vec3 to_viewer, vec3 direction GRASS_PARAMETER)
 {
   vec3 irradiance = whole_irradiance(light, s.position, s.normal, direction);
   float cosine = dot(s.normal, direction);
   // From a middle below the horizon the part above it shines in along the surface.
   vec3 raised = (cosine > 0.05) ? direction : safe_normalize(direction + s.normal * (0.05 - cosine));
-  vec3 share = surface_diffuse_reflection(s, to_viewer, raised);
+  vec3 share = DIFFUSE_REFLECTION(s, to_viewer, raised);
   return share * irradiance / max(dot(s.normal, raised), 1e-3);
 }
 
@@ -59,6 +70,9 @@ void main()
   }
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
+#ifdef GRASS
+  GrassSeen grass = grass_see(pixel, s);
+#endif
   bool has_diffuse = max_component(s.diffuse) > 0.0;
   bool has_glossy = s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;
 #ifdef SOFT_LOBES
@@ -101,7 +115,7 @@ void main()
       towards = LIGHT_IS(light, LIGHT_SUN) ? light.centre : safe_normalize(light.centre - s.position);
     }
     if (whole && on_diffuse) {
-      from_diffuse = whole_diffuse(light, s, to_viewer, towards);
+      from_diffuse = whole_diffuse(light, s, to_viewer, towards GRASS_ARGUMENT);
     }
     for (int part = 0; part < parts; part++) {
       Light source = light;
@@ -118,7 +132,7 @@ void main()
 #endif
       if (on_diffuse && !whole) {
         from_diffuse += arriving *
-                        surface_diffuse_reflection(s, to_viewer, direction);
+                        DIFFUSE_REFLECTION(s, to_viewer, direction);
       }
       // Rays of the lobe, which take the other part of this light, drop what lies below the surface, too.
       towards = whole ? towards : direction;

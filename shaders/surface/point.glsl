@@ -76,3 +76,6 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
   fill_attributes(point, window_steps(point.position_dx, flat_normal), window_steps(point.position_dy, flat_normal));
   return point;
 }
+
+#include "lib/projection.glsl"
+#include "generated/own_surface"

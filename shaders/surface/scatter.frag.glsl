@@ -17,13 +17,20 @@ void main()
 {
   vec4 hit = surface_position_fetch(ivec2(gl_FragCoord.xy));
   vec3 eye = film_view.eye.xyz;
-  // Interpolated positions of one point differ by some units of the last place between two programs.
-  float tolerance = 2e-6 * (length(hit.xyz - eye) + length(hit.xyz));
-  if (hit.w == 0.0 || distance(hit.xyz, world_position) > tolerance) {
+  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
+  Instance instance = instance_read(instance_flat.x);
+  SurfacePoint point = surface_point(incoming, instance);
+#ifdef OWN_SURFACE
+  if (!own_surface(point, instance)) {
     discard;
   }
-  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
-  SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+#endif
+  // Interpolated positions of one point differ by some units of the last place between two programs.
+  float tolerance = 2e-6 * (length(hit.xyz - eye) + length(hit.xyz));
+  if (hit.w == 0.0 || distance(hit.xyz, point.position) > tolerance) {
+    discard;
+  }
   point.refracts = glass_bends != 0;
   Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);

@@ -8,8 +8,15 @@
 
 Closures closures_seen(vec3 incoming, int ray, out bool behind)
 {
-  SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
+  Instance instance = instance_read(instance_flat.x);
+  SurfacePoint point = surface_point(incoming, instance);
   point.ray = ray;
+#ifdef OWN_SURFACE
+  gl_FragDepth = gl_FragCoord.z;
+  if (!own_surface(point, instance)) {
+    discard;
+  }
+#endif
   behind = point.backfacing;
   Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);

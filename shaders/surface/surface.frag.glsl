@@ -16,12 +16,24 @@ void main()
 {
   vec3 eye = film_view.eye.xyz;
   vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
-  float depth = dot(eye - world_position, film_view.backward.xyz);
+  Instance instance = instance_read(instance_flat.x);
+  SurfacePoint point = surface_point(incoming, instance);
+#ifdef OWN_CLOSURES
+  OwnHit own;  // what the surface is there, beside where
+  if (!own_hit(point, instance, own)) {
+    discard;
+  }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+#elif defined(OWN_SURFACE)
+  if (!own_surface(point, instance)) {
+    discard;
+  }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+#endif
+  float depth = dot(eye - point.position, film_view.backward.xyz);
   if (depth < film_view.film.z || depth > film_view.film.w) {
     discard;
   }
-  Instance instance = instance_read(instance_flat.x);
-  SurfacePoint point = surface_point(incoming, instance);
   point.refracts = glass_bends != 0;
 
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u + uint(film_view.seed)));
@@ -34,6 +46,9 @@ void main()
 #endif
   evaluate_material(point, c);
   closures_end(c);
+#ifdef OWN_CLOSURES
+  own_closures(c, point, own);
+#endif
 
   float through = layer_chance(c);
   // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
@@ -49,8 +64,15 @@ void main()
     covered = 0.0;
   }
 
+#ifdef OWN_SURFACE
+  vec2 lift = vec2(0.0);
+#else
   vec2 lift = (instance_terminator(instance_flat.x) > 0.0) ? smooth_lift(instance, point.backfacing) : vec2(0.0);
+#endif
   store_closures(c, point, covered, holdout, lift);
+#ifdef OWN_CLOSURES
+  own_store(point, own);
+#endif
   if (index_shown >= 0) {
     out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
   }

@@ -13,7 +13,16 @@ void main()
   out_tint = vec4(1.0);
   out_emission = vec4(1.0);
   vec3 eye = film_view.eye.xyz;
-  float depth = dot(eye - world_position, film_view.backward.xyz);
+  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
+  Instance instance = instance_read(instance_flat.x);
+  SurfacePoint point = surface_point(incoming, instance);
+#ifdef OWN_SURFACE
+  if (!own_surface(point, instance)) {
+    discard;
+  }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+#endif
+  float depth = dot(eye - point.position, film_view.backward.xyz);
   vec4 hit = surface_position_fetch(ivec2(gl_FragCoord.xy));
   float hit_depth = dot(eye - hit.xyz, film_view.backward.xyz);
   // Interpolated positions of one point differ by some units of the last place between two programs.
@@ -21,8 +30,6 @@ void main()
   if (behind || depth < film_view.film.z || depth > film_view.film.w) {
     discard;
   }
-  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
-  SurfacePoint point = surface_point(incoming, instance_read(instance_flat.x));
   point.refracts = glass_bends != 0;
   Closures c = closures_begin(point.normal, 0.5, 0.0);
   evaluate_material(point, c);

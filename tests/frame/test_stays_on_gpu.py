@@ -99,12 +99,12 @@ def test_the_first_picture_compiles_materials_that_rays_met_alone(monkeypatch):
     found, compiled = [], []
     ask = hits.Hits._to_shade
 
-    def asked(self, frame, hierarchy, records):
+    def asked(self, frame, hierarchy, records, path):
         before = images.read
         reads = []
         images.read = lambda image: reads.append(image) or before(image)
         try:
-            chosen = ask(self, frame, hierarchy, records)
+            chosen = ask(self, frame, hierarchy, records, path)
         finally:
             images.read = before
         found.append((len(chosen), len(reads)))

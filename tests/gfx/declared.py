@@ -9,6 +9,9 @@ import numpy as np
 import addon
 from addon.gfx.library import Program
 from addon.gfx.struct import Struct
+from addon.lighting.grass import grown
+from addon.lighting.loop import lighting
+from addon.lighting.visibility import HARD
 from addon.materials import nodes
 from addon.materials.compiled import Attribute
 from addon.materials.compiler import compile_material, default_graph
@@ -17,6 +20,7 @@ from addon.materials.volume_program import CompiledVolume, compile_volume
 from addon.scene import materials, media
 from addon.scene.world_tree import background_program, bake_program
 from addon.surfaces.hits import hit_program
+from addon.techniques.grass import grass_program
 
 
 def _found(kind: type) -> list:
@@ -55,6 +59,7 @@ def programs() -> list[Program]:
     made += [materials._scatter_program(plain), materials._glow_program(plain), materials._emission_map_program(plain)]
     made += [materials._lobe_program(plain), hit_program(plain), media.bake_program(fog(), ("density",))]
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
+    made += [grass_program(materials._surface_program(plain)), grown(lighting(HARD, False))]
     for length, file in enumerate(files, len(plain.values)):  # blocks of several lengths among the structs
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)

@@ -97,7 +97,12 @@ def edited(stage):
     region.centre, region.radius = (0.8, 0.0, 0.8), 2.0
 
 
+def grassy(stage):
+    stage.floor_materials[0].candela.grass_patch = "MEADOW"
+
+
 WITH = {
+    "grass": grassy,
     "media": foggy,
     "airlight": foggy,
     "volume_caustics": foggy,
@@ -131,9 +136,11 @@ WITHOUT = {
     "multires_radiosity": no_bounces,
     "clustered_visibility": no_bounces,
     "imperfect_shadow_maps": no_bounces,
+    "micro_rendering": no_bounces,
     "ssdo": no_bounces,
     "caustics_mapping": no_glass,
     "screen_space_photons": no_glass,
+    "grass": no_needs,
     "denoise": dark,
     "eye": no_glare,
     "glare": no_glare,
@@ -143,7 +150,8 @@ WITHOUT = {
 @pytest.fixture
 def room(stage):
     """A scene that needs every technique: a floor with gloss, a box, glass, lamps, a paper that shines, a world."""
-    stage.floor(material=stage.principled(Roughness=0.3))
+    stage.floor_materials = [stage.principled(Roughness=0.3)]
+    stage.floor(material=stage.floor_materials[0])
     stage.rectangle((-1, -0.3), (0.4, 0.3), 0.5, material=stage.diffuse(0.5))
     stage.paper = stage.rectangle(
         (0.6, -0.4), (1.0, 0.4), 0.8, material=stage.material("ShaderNodeEmission", Strength=2.0)

@@ -1,0 +1,94 @@
+"""Patches as one list of half floats for shaders, laid out as shaders/grass/table.glsl reads it.
+
+For each view one picture more than there are lights is listed: what the tile reflects of a uniform sky, by the same
+components. It is the albedo that indirect light and the colour passes ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .patch import MOST_LUMA, MOST_RINGS, Patch
+
+WIDTH = 2048  # texels a row
+ENTRY, PICTURE, PLACE = 16, 5, 4  # texels
+VIEW_RINGS, LIGHT_RINGS = 3, 11
+ALIGNED = 16  # rows: the number of the first one is exact in a half float
+
+
+@dataclass(frozen=True)
+class Field:
+    """How a material shows a patch. `size` of the tile and `height` of the blades in metres, `density` 0..1."""
+
+    patch: Patch
+    size: float
+    height: float
+    density: float
+
+
+def table_of(fields: Sequence[Field]) -> np.ndarray:
+    """(rows, WIDTH, 4) float32; entry i is that of fields[i]. Fields may share a patch."""
+    first = _aligned(-(-ENTRY * len(fields) // WIDTH))
+    parts, rows, begins = [], first, {}
+    for field in fields:
+        if id(field.patch) not in begins:
+            begins[id(field.patch)] = rows
+            listed = np.concatenate([_pictures(field.patch), _places(field.patch)])
+            taken = _aligned(-(-len(listed) // WIDTH))
+            parts.append(np.zeros((taken * WIDTH, 4), np.float32))
+            parts[-1][: len(listed)] = listed
+            rows += taken
+    head = np.zeros((first * WIDTH, 4), np.float32)
+    for k, field in enumerate(fields):
+        head[k * ENTRY : (k + 1) * ENTRY] = _entry(field, begins[id(field.patch)])
+    return np.concatenate([head, *parts]).reshape(-1, WIDTH, 4)
+
+
+def _aligned(rows: int) -> int:
+    return -(-rows // ALIGNED) * ALIGNED
+
+
+def _entry(field: Field, row: int) -> np.ndarray:
+    patch = field.patch
+    slope = patch.height / patch.size
+    rows = np.zeros((ENTRY, 4))
+    rows[0] = row, patch.texels, patch.views.number, patch.lights.number
+    rows[1] = field.size, field.height, field.height / field.size / slope, field.density
+    rows[2] = patch.white, slope, len(patch.views.polar), len(patch.lights.polar)
+    mean = patch.mean_heights()
+    for start, rings, most in ((VIEW_RINGS, patch.views, MOST_RINGS[0]), (LIGHT_RINGS, patch.lights, MOST_RINGS[1])):
+        for k, (polar, count, first) in enumerate(list(zip(rings.polar, rings.counts, rings.firsts))[:most]):
+            own = float(mean[first : first + count].mean()) if rings is patch.views else 0.0
+            rows[start + k] = polar, count, first, own
+    return rows
+
+
+def _places(patch: Patch) -> np.ndarray:
+    k, c = patch.luma, patch.chroma
+    rows = np.zeros((patch.views.number, patch.texels, patch.texels, PLACE, 4), np.float32)
+    rows[..., 0, :3], rows[..., 0, 3] = patch.mean, patch.heights
+    luma = np.zeros((*patch.parts.shape[:3], MOST_LUMA), np.float32)
+    luma[..., :k] = patch.parts[..., :k]
+    rows[..., 1, :], rows[..., 2, :] = luma[..., :4], luma[..., 4:]
+    for start in (0, 1):
+        rows[..., 3, 2 * start : 2 * start + c] = patch.parts[..., k + start * c : k + (start + 1) * c]
+    return rows.reshape(-1, 4)
+
+
+def _pictures(patch: Patch) -> np.ndarray:
+    k, c = patch.luma, patch.chroma
+    weights = patch.weights.transpose(0, 2, 1)  # (V, P, K + 2C)
+    rows = np.zeros((*weights.shape[:2], PICTURE, 4), np.float32)
+    luma = np.zeros((*weights.shape[:2], MOST_LUMA), np.float32)
+    luma[..., :k] = weights[..., :k]
+    rows[..., 0, :], rows[..., 1, :] = luma[..., :4], luma[..., 4:]
+    for start in (0, 1):
+        rows[..., 2, 2 * start : 2 * start + c] = weights[..., k + start * c : k + (start + 1) * c]
+    rows[..., 3, :3], rows[..., 3, 3] = patch.picture_mean, patch.contrast
+    rows[..., 4, :3], rows[..., 4, 3] = patch.ratio, patch.excess
+    about = np.zeros((len(rows), 1, PICTURE, 4), np.float32)
+    about[:, 0, 0, 0], about[:, 0, 0, 1] = patch.view_alike, patch.light_alike
+    return np.concatenate([rows, about], axis=1).reshape(-1, 4)

@@ -1,0 +1,172 @@
+"""Micro-buffers: what a place sees of a tree of discs, drawn into a small picture of its hemisphere.
+
+shaders/micro/buffer.glsl fills one, by a thread that goes through the tree; shaders/micro/sum.glsl takes the mean of
+the radiance of what it shows, which is the irradiance over pi, since its pixels are equal shares of cosine-weighted
+solid angle. Here are the radiance of nodes (`NodeRadiance`), from that of the points up, and light that is reflected
+again and again: every one of `groups` groups of points has one of its points gather for all, for both sides, and what
+arrives is reflected by each with its own albedo. What each sees does not change from one reflection to the next, so
+its micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3: Jacobi
+iteration).
+
+| cost | for n points, G groups, K x K pixels |
+|---|---|
+| micro-buffers of groups | 2 G trees walked, 4 K^2 bytes each, of the pool |
+| each bounce | 2 G K^2 fetches, 2 passes and, for each 7 levels of the tree, one more; 8 fetches a node |
+| radiance | 64 bytes a point, twice |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import context, images, passes
+from ..gfx.library import Program
+from .lit_points import ROW, LitPoints, Run
+
+PULLED = 7  # levels of a pass
+NODE_ROW = 128  # groups and sides side by side
+SOFTWARE_LEAVES = 2048  # of a part of a tree
+GROUP_SIDE = 8  # pixels of a micro-buffer of a group
+FARTHEST, NEAREST = 2.0, 1e-6  # by the size of the scene: the range of depths that a pixel tells apart
+BUFFER_TEXTURES = (("RGBA32F", "tree_nodes"),)
+BUFFER_IMAGE = ("micro", "R32UI", "UINT_2D", "READ_WRITE")
+BUFFER_CONSTANTS = (
+    ("IVEC2", "part"), ("INT", "micro_side"), ("INT", "leaf_count"), ("INT", "id_bits"), ("FLOAT", "detail"),
+    ("INT", "centre_test"), ("VEC2", "log_depths"), ("VEC4", "buffer_choice"),
+)  # fmt: skip
+OF_GROUPS = Program(
+    name="micro-buffers of groups",
+    compute="micro/nodes.comp.glsl",
+    textures=(*BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
+    images=(BUFFER_IMAGE,),
+    constants=(*BUFFER_CONSTANTS, ("INT", "group_count")),
+    defines=(("NODE_ROW", str(NODE_ROW)),),
+)
+ARRIVING = passes.fullscreen_program(
+    "light arriving at groups",
+    "micro/arriving.frag.glsl",
+    textures=(("UINT_2D", "micro"), ("RGBA32F", "node_radiance")),
+    constants=(("INT", "micro_side"), ("INT", "id_bits")),
+    outputs=(("VEC4", "out_arriving"),),
+)
+SENT = passes.fullscreen_program(
+    "light sent by points",
+    "micro/leaf.frag.glsl",
+    textures=tuple(("RGBA32F", name) for name in ("tree_nodes", "direct", "albedo", "arriving")),
+    constants=(("INT", "leaf_count"), ("INT", "group_count")),
+    defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW))),
+    outputs=(("VEC4", "out_sent"),),
+)
+PULL_POINTS, PULL = (
+    passes.fullscreen_program(
+        f"radiance of nodes from {below}",
+        "micro/pull.frag.glsl",
+        textures=(("RGBA32F", "sent"),),
+        constants=(("INT", "leaf_count"), ("INT", "known_level")),
+        defines=(("PULLED", str(PULLED)), ("POINT_ROW", str(ROW)), *defines),
+        outputs=(("VEC4", "out_radiance"),),
+    )
+    for below, defines in (("points", (("FIRST", ""),)), ("nodes", ()))
+)
+PROGRAMS = (OF_GROUPS, ARRIVING, SENT, PULL_POINTS, PULL)
+
+
+def parts(leaves: int) -> list[tuple[int, int]]:
+    """Parts of a tree, one for each dispatch: constant `part`. All of it at once, but in software by pieces: Mesa's
+    rasteriser leaves a shader's loops after 65,536 rounds of all of them together."""
+    count = max(leaves // SOFTWARE_LEAVES, 1) if context.masks_branches() else 1
+    return [(number, count) for number in range(count)]
+
+
+def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_test: bool, use: str) -> dict:
+    """Constants of shaders/micro/buffer.glsl for micro-buffers of `side` pixels a side, in which nodes are drawn up to
+    `threshold` pixels of solid angle."""
+    turn, x, y = frame.random_volume(use)
+    far = float(np.log2(FARTHEST * frame.geometry.size))
+    near = float(np.log2(NEAREST * frame.geometry.size))
+    return {
+        "micro_side": side, "leaf_count": run.tree.leaves, "id_bits": (4 * run.tree.leaves - 1).bit_length(),
+        "detail": 0.81 * float(np.sqrt(threshold)), "centre_test": int(centre_test), "log_depths": (near, far),
+        "buffer_choice": (frame.lot(use), turn, x, y),
+    }  # fmt: skip
+
+
+class NodeRadiance:
+    """Radiance of all nodes of a run's tree in this sample. A technique owns one."""
+
+    def __init__(self):
+        self.image: images.Image | None = None
+        self._spare: images.Image | None = None
+
+    def update(
+        self, frame: Frame, technique: Technique, points: LitPoints, run: Run, bounces: int, groups: int,
+        threshold: float, centre_test: bool,
+    ) -> Iterator[None]:  # fmt: skip
+        """Direct light at the points, and what of it has been reflected up to `bounces` times, by `groups` groups."""
+        leaves = run.tree.leaves
+        self._prepare(4 * leaves)
+        direct = points.light(frame, technique, run)
+        held = [direct, images.pool.take(*run.size, "RGBA32F")]
+        sent = held[1]
+        try:
+            yield
+            self._send(frame, technique, run, direct, direct, 0, sent)
+            if bounces > 0:
+                groups = min(groups, leaves // 2)
+                size = (NODE_ROW, max(2 * groups // NODE_ROW, 1))
+                micro = images.pool.take(size[0] * GROUP_SIDE, size[1] * GROUP_SIDE, "R32UI")
+                arriving = images.pool.take(*size, "RGBA32F")
+                held += [micro, arriving]
+                constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
+                for part in parts(leaves):
+                    passes.compute(
+                        OF_GROUPS, size, textures={"tree_nodes": run.nodes, "node_radiance": self.image},
+                        images={"micro": micro}, constants={**constants, "group_count": groups, "part": part},
+                    )  # fmt: skip
+                    yield
+                frame.count(technique, "gathers of points", 2 * groups)
+                for _ in range(bounces):
+                    passes.fullscreen(
+                        ARRIVING, images.Target((arriving,)), textures={"micro": micro, "node_radiance": self.image},
+                        constants={name: constants[name] for name in ("micro_side", "id_bits")},
+                    )  # fmt: skip
+                    self._send(frame, technique, run, direct, arriving, groups, sent)
+                frame.count(technique, "bounces", bounces)
+        finally:  # also where a viewport drops the sample
+            for image in held:
+                images.pool.give(image)
+
+    def _send(self, frame, technique, run: Run, direct, arriving, groups: int, sent: images.Image) -> None:
+        leaves = run.tree.leaves
+        passes.fullscreen(
+            SENT, images.Target((sent,)), constants={"leaf_count": leaves, "group_count": groups},
+            textures={"tree_nodes": run.nodes, "direct": direct, "albedo": run.shaded.colors[2], "arriving": arriving},
+        )  # fmt: skip
+        level, program, source = leaves.bit_length() - 1, PULL_POINTS, sent
+        drawn = 1
+        while level > 0:
+            passes.fullscreen(
+                program, images.Target((self._spare,)), textures={"sent": source},
+                constants={"leaf_count": leaves, "known_level": level},
+            )  # fmt: skip
+            self.image, self._spare = self._spare, self.image
+            level, program, source = level - PULLED, PULL, self.image
+            drawn += 1
+        frame.count(technique, "passes", drawn)
+
+    def _prepare(self, entries: int) -> None:
+        height = max(-(-entries // images.LIST_WIDTH), 1)
+        if self.image is None or self.image.height != height:
+            self.release()
+            self.image, self._spare = (images.pool.take(images.LIST_WIDTH, height, "RGBA32F") for _ in range(2))
+
+    def release(self) -> None:
+        """Give images back."""
+        for image in (self.image, self._spare):
+            if image is not None:
+                images.pool.give(image)
+        self.image = self._spare = None

@@ -1,0 +1,115 @@
+"""Points on all surfaces, spread by area, wherever the camera looks: where light is stored that others gather.
+
+Triangles are laid end to end, each as long as its area times its opacity, and points stand at equal steps along that
+line; those of one triangle are a stretch of the R2 sequence (Roberts 2018), which spreads 2 points as it does 2000. Of
+discs of 1.5 times the area's radius about them, 0.4 % of a square is free; about points of a three-dimensional Sobol'
+sequence 3.7 %, about random ones 11 %. On meshes whose triangles have one to ten points each it is 1 to 4 %: a stretch
+knows nothing of those beside it. A run takes other stretches.
+
+A point knows its triangle and place in it: where a mesh has been deformed or moved,
+it moves along, and what it stands for grows with its triangle.
+
+What rays of the diffuse path cannot meet has no points, and neither has clear glass, which lets light pass.
+
+Made on the CPU: about 1 us a point and 0.3 us a triangle. Points that follow a motion cost the same without the search.
+
+Fails: a ground of a kilometre takes all the points of the room that stands on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..sampling.sequence import bits
+from ..snapshot.scene import Instance
+from . import acceleration
+
+PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
+ALONE = 0.7  # how much nearer to the middle of its triangle a point lies that is the only one
+CYCLE = 1 << 20  # where stretches of the sequence begin
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Triangles of the instances `shown`: corners (T, 3, 3) relative to the render origin, what of their area counts
+    (T,), which of `shown` each belongs to and its number in the mesh."""
+
+    shown: tuple[Instance, ...]
+    corners: np.ndarray
+    opacity: np.ndarray
+    owner: np.ndarray
+    number: np.ndarray
+
+    @classmethod
+    def of(cls, frame) -> Surfaces:
+        """Of the frame's snapshot."""
+        instances, meshes, _ = frame.geometry.placed
+        shown = tuple(one for one in instances if one.visibility.diffuse and meshes[one.mesh].triangle_count)
+        maps = frame.opacity_maps, frame.emission_maps
+        corners, look = acceleration.world_triangles(
+            shown, meshes, frame.measured_materials, frame.geometry.origin, "diffuse", *maps
+        )
+        counts = [meshes[one.mesh].triangle_count for one in shown]
+        clear = np.array([m.glass is not None for m in frame.materials.compiled] or [False])
+        materials = [meshes[one.mesh].triangle_materials(one.materials) for one in shown]
+        passes = clear[np.concatenate(materials)] if materials else np.zeros(0, bool)
+        return cls(
+            shown,
+            corners.astype(np.float64),
+            np.where(passes, 0.0, acceleration.coverage(look[:, 0], maps[0])),
+            np.repeat(np.arange(len(shown)), counts),
+            np.concatenate([np.arange(count) for count in counts]) if counts else np.zeros(0, int),
+        )
+
+    def areas(self) -> np.ndarray:
+        """(T,) m2; 0 where a corner is not finite."""
+        across = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        areas = np.linalg.norm(across, axis=1) / 2
+        return np.where(np.isfinite(areas), areas, 0.0)
+
+
+@dataclass(frozen=True)
+class AreaPoints:
+    """Points by triangle (of Surfaces) and barycentric coordinates (N, 2) of its second and third corner; `density`:
+    the points that fall on a square metre of the triangle (N,), when they were spread."""
+
+    triangle: np.ndarray
+    share: np.ndarray
+    density: np.ndarray
+    areas: np.ndarray  # (N,) of the triangle then
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+    def placed(self, surfaces: Surfaces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (N, 3), unit normals by the triangles' winding (N, 3) and the area, m2, that each stands for."""
+        corners = surfaces.corners[self.triangle]
+        e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        across = np.cross(e1, e2)
+        double = np.linalg.norm(across, axis=1)
+        position = corners[:, 0] + self.share[:, :1] * e1 + self.share[:, 1:] * e2
+        area = double / 2 / np.maximum(self.areas, 1e-300) / np.maximum(self.density, 1e-300)
+        return position, across / np.maximum(double, 1e-300)[:, None], area
+
+
+def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
+    """`count` points of this run; none where there is no area."""
+    areas = surfaces.areas()
+    edges = np.concatenate([[0.0], np.cumsum(areas * surfaces.opacity)])
+    if not edges[-1] > 0:
+        return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    marks = (np.arange(count) + bits(run, 0) / 2.0**32) / count
+    triangle = np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, len(areas) - 1)
+    within = np.arange(count) - np.searchsorted(triangle, triangle)  # number of a point among those of its triangle
+    number = within + (triangle * 7919 + run * count) % CYCLE
+    v, w = np.mod(0.5 + number / PLASTIC, 1.0), np.mod(0.5 + number / PLASTIC**2, 1.0)
+    root = np.sqrt(v)
+    share = np.stack([root * (1 - w), root * w], axis=1)
+    # Where a triangle has one or few, they keep from its rim, so that they do not crowd at that of a neighbour.
+    few = np.bincount(triangle, minlength=len(areas))[triangle]
+    share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few**1.5)[:, None]
+    # Where half the light passes, half as many points stand for their own discs.
+    density = np.full(count, count / edges[-1])
+    return AreaPoints(triangle, share, density, areas[triangle])

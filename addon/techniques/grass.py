@@ -1,0 +1,156 @@
+"""Grass from a bidirectional texture function: a material shows a field of blades that were rendered once.
+
+A tile of real blades, rendered by Cycles from V directions under L lights (addon/grass), stands for the field: for
+each pixel the colour for its place in the tile, the direction of view and that of each light is reconstructed from
+the principal components of the view's pictures, and a depth map of that view says how far down the blade is. So
+things stand in the grass, its outline is of blades, and any number of them takes the same time. Source: M. Shah,
+J. Konttinen, S. Pattanaik, "Real-time rendering of realistic-looking grass", GRAPHITE 2005; Shah's thesis, 2007.
+
+The mesh is the ground; what is drawn is the plane on top of the blades, `height` above it along its normals. Tiles
+lie along the object's X and Y axes. Lamps, the world and meshes that shine light it in one loop (lighting/loop.py),
+with shadows of other things where the blade is; indirect light takes its albedo under a uniform sky.
+
+| cost | |
+|---|---|
+| surface pass, per pixel of grass and sample | 1 view of four, 1 texel: up to 12 fetches of rings, 9 of the patch |
+| light loop, per light and pixel of grass | 20 fetches of pictures, up to 5 of rings |
+| memory | 32 bytes for each texel and view: 7 MiB for 64 x 64 and 57 views |
+
+Bias: colours are interpolated between sampled directions; pictures of two views are hardly alike, so that blades
+dissolve into each other as the view moves. Left out: wind, shadows that grass casts on other things, what reflections
+and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and blades nearer than
+five times their height, which need geometry. A flat-shaded mesh leaves gaps in the plane on top: shade it smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from ..film.points import OwnPoint
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import MATERIAL, Param, Technique, own_value
+from ..gfx import images
+from ..gfx.library import Program
+from ..grass.patch import Patch, PatchError, kept
+from ..grass.table import Field, table_of
+from ..lighting.grass import TABLE, GrassTable
+from ..snapshot.scene import Material, Snapshot
+from ..surfaces.draw import StandIns
+
+NONE, MEADOW, FILE = "NONE", "MEADOW", "FILE"
+SHIPPED = Path(__file__).resolve().parent.parent / "grass" / "meadow.grass"
+
+
+@cache
+def grass_program(surface: Program) -> Program:
+    """The program that draws a material's surface, for grass on it."""
+    glsl = '#include "grass/surface.glsl"\n'
+    others = tuple(one for one in surface.snippets if one[0] != "generated/own_surface")
+    return replace(
+        surface, name=f"{surface.name} grass", vertex="grass/surface.vert.glsl",
+        textures=(*surface.textures, TABLE), constants=(*surface.constants, ("INT", "grass_entry")),
+        defines=(*surface.defines, ("OWN_CLOSURES", "")),
+        snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
+    )  # fmt: skip
+
+
+class Grass(Technique):
+    name = "grass"
+    label = "Grass"
+    params = (
+        Param(
+            "patch", "Patch", NONE, "What the material's surface is covered with", scope=MATERIAL,
+            items=((NONE, "None", 0), (MEADOW, "Meadow", 1), (FILE, "File", 2)),
+        ),
+        Param("file", "File", "", "A patch that Render > Candela Grass Patch has made", scope=MATERIAL, file=True),
+        Param("size", "Tile", 0.0, "Side of a tile; 0: as it was made", 0.0, 1000.0, "DISTANCE", scope=MATERIAL),
+        Param(
+            "height", "Height", 0.0, "Of the longest blades; 0: as they were made, for this tile", 0.0, 1000.0,
+            "DISTANCE", scope=MATERIAL,
+        ),
+        Param("density", "Density", 1.0, "Share of the ground that is covered", 0.0, 1.0, "FACTOR", scope=MATERIAL),
+    )  # fmt: skip
+    provides = (GrassTable,)
+
+    def __init__(self):
+        self._table: tuple[object, images.Image] | None = None
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        wanted = _wanted(snapshot)
+        if not wanted:
+            return "no material that is shown is covered with grass"
+        why = []
+        for material in wanted:
+            try:
+                kept(_file(snapshot.materials[material]))
+            except PatchError as error:
+                why.append(str(error).rstrip("."))
+        return "; ".join(dict.fromkeys(why)) if len(why) == len(wanted) else None
+
+    def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
+        return tuple(_field_key(snapshot.materials[material]) for material in _wanted(snapshot))
+
+    def begin(self, frame: Frame) -> None:
+        fields, entries = [], {}
+        for material in _wanted(frame.snapshot):
+            try:
+                fields.append(_field(frame.snapshot.materials[material]))
+            except PatchError:
+                continue
+            entries[material] = len(fields) - 1
+        key = tuple(id(one.patch) for one in fields), tuple((one.size, one.height, one.density) for one in fields)
+        if self._table is None or self._table[0] != key:
+            self._table = (key, images.upload(table_of(fields), TABLE[0]))
+            self._patches = [one.patch for one in fields]  # their ids stay theirs
+        table = self._table[1]
+        stand_ins = frame.shared(StandIns)
+        for material, entry in entries.items():
+            program = grass_program(frame.materials.surface_program(material))
+            stand_ins.of[material] = (program, {TABLE[1]: table}, {"grass_entry": entry})
+        frame.shared(OwnPoint).needed = True
+        frame.provide(GrassTable(table))
+        frame.count(self, "patches", len({id(one.patch) for one in fields}))
+        frame.count(self, "bytes", table.bytes)
+
+    def release(self) -> None:
+        self._table = None
+
+
+def _wanted(snapshot: Snapshot) -> list[int]:
+    """Materials that are shown and covered with grass."""
+    grown = [k for k, one in enumerate(snapshot.materials) if one.own and own_value(one.own, Grass, "patch") != NONE]
+    if not grown:
+        return []
+    shown = {material for instance in snapshot.instances for material in instance.materials}
+    return [material for material in grown if material in shown]
+
+
+def _file(material: Material) -> Path:
+    """Raises PatchError."""
+    if own_value(material.own, Grass, "patch") == MEADOW:
+        return SHIPPED
+    name = own_value(material.own, Grass, "file")
+    if not name:
+        raise PatchError(f"Material '{material.name}' names no file of a grass patch.")
+    return Path(name)
+
+
+def _field(material: Material) -> Field:
+    """Raises PatchError."""
+    patch: Patch = kept(_file(material))
+    size = own_value(material.own, Grass, "size") or patch.size
+    height = own_value(material.own, Grass, "height") or patch.height * size / patch.size
+    return Field(patch, size, height, own_value(material.own, Grass, "density"))
+
+
+def _field_key(material: Material) -> Hashable:
+    try:
+        file = _file(material)
+        changed = file.stat().st_mtime_ns
+    except (PatchError, OSError):
+        return None
+    return str(file), changed, material.own

@@ -1,0 +1,251 @@
+"""Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
+
+Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
+by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of flat
+groups of points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into
+a micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
+are equal shares of what the surface reflects, so light is a plain mean:
+
+    E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
+
+Diffuse light is gathered by regions of the picture and interpolated as in multires_radiosity.py; lobes of microfacets
+by each pixel, whose micro-buffer has rays of the lobe. What is reflected more than once, groups of points gather for
+themselves. In each sample other points, other turns and shifts of the pixels: what is not bias averages out.
+
+Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours: groups
+are rectangles, drawn by rays through the middles of pixels (there a group fills the one pixel that its own middle falls
+into, which makes silhouettes grow); no list of what is left for rays; both sides of points; medians of normals, too;
+the concentric map.
+
+| cost | with n points, a region or pixel that gathers, K x K pixels |
+|---|---|
+| fetches | 2 for each node that is visited, some 10 to 30 K^2 log n; K^2 for the sum |
+| bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
+| rays | 2 n for each point of a light source, and none besides |
+| passes | 4 x `levels` + 2, and for each bounce 4 |
+
+A dispatch is one thread for each place. Mesa's software rasteriser ends a shader's loops after 65,536 rounds, so there
+the tree is walked by parts; eight lanes that walk different ways make it slow: docs/micro_rendering.md.
+
+Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at
+the room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
+narrower than the points' spacing show discs. A ground of a kilometre takes all points. The room with a shaded emissive
+lamp has .58 of its light, the colonnade .62: the cause is not known yet.
+
+Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
+that, which darkens beside them; between them are 0.4 to 4 % of holes; leaves, grass and hair below the points' spacing
+are wrong.
+Points reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there.
+Sheen, velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog
+between surfaces dims nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..frame.run import Frame
+from ..frame.settings import Settings
+from ..frame.technique import Param
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..kernels import lists
+from ..lighting import micro_buffers
+from ..lighting.lit_points import LitPoints, Run
+from ..lighting.micro_buffers import BUFFER_CONSTANTS, BUFFER_IMAGE, BUFFER_TEXTURES, NodeRadiance, buffer_bindings
+from ..scene.view import VIEW
+from ..snapshot.scene import Snapshot
+from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
+from .multires_radiosity import GRID, RUNS, MultiresRadiosity, _level_size, fitting_levels
+
+MOST_TEXELS = 1 << 22  # of micro-buffers that are drawn at once
+WIDEST = 8192  # texels of their image
+
+
+def _regions(listed: bool) -> Program:
+    if listed:
+        textures, constants = lists.READ, ()
+    else:
+        textures = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags"))
+        constants = (("INT", "region_level"), ("INT", "levels"))
+    return Program(
+        name=f"micro-buffers of regions{'' if listed else ' of a level'}",
+        compute="micro/region.comp.glsl",
+        textures=(*SURFACE_TEXTURES, *BUFFER_TEXTURES, ("RGBA32F", "node_radiance"), *textures),
+        images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
+        blocks=((VIEW, "film_view"),),
+        constants=(
+            *BUFFER_CONSTANTS, *GRID, ("INT", "first_row"), ("INT", "row_count"), ("INT", "columns"), *constants,
+        ),
+        defines=(*RUNS, *(() if listed else (("BY_LEVEL", ""),))),
+        group=(lists.RUN, 1, 1),
+    )  # fmt: skip
+
+
+REGIONS, REGIONS_OF_LEVEL = _regions(True), _regions(False)
+GLOSSY = Program(
+    name="micro-buffers of lobes",
+    compute="micro/glossy.comp.glsl",
+    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
+    images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
+    blocks=((VIEW, "film_view"),),
+    constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
+)
+REFLECTED = passes.fullscreen_program(
+    "light of micro-buffers reflected",
+    "micro/reflected.frag.glsl",
+    textures=(("RGBA32F", "surface_position"), ("RGBA32F", "surface_diffuse"), ("RGBA32F", "irradiance")),
+    constants=(("IVEC2", "grid_offset"),),
+    outputs=(("VEC4", "out_diffuse"),),
+)
+
+
+class MicroRendering(MultiresRadiosity):
+    name = "micro_rendering"
+    label = "Micro-rendering"
+    params = (
+        Param(
+            "points", "Points", 8192, "Points on all surfaces that light is stored at; rounded to a power of two", 64,
+            1 << 20,
+        ),
+        Param(
+            "side", "Micro-buffer side", 8, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
+            draft=8,
+        ),
+        Param(
+            "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
+        ),
+        Param(
+            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be "
+            "drawn as one disc", 0.05, 16.0,
+        ),
+        Param(
+            "centre_test", "Centre test", True, "Draw a disc where the middles of pixels see it; else into the pixel "
+            "that its own middle falls into, which makes silhouettes grow",
+        ),
+        Param(
+            "groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14,
+            draft=256,
+        ),
+        Param(
+            "levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0,
+            5,
+        ),
+    )  # fmt: skip
+    provides = ()
+
+    def __init__(self):
+        super().__init__()
+        self._points = LitPoints("micro")
+        self._radiance = NodeRadiance()
+
+    def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
+        return False
+
+    def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
+        return (*micro_buffers.PROGRAMS, REFLECTED)
+
+    def begin(self, frame: Frame) -> None:
+        if frame.receivers is not None and len(frame.receivers.distance):
+            self._points.begin(frame, self, frame.settings.get(self, "points"))
+
+    def sample(self, frame: Frame) -> Iterator[None]:
+        if frame.receivers is None or not len(frame.receivers.distance):
+            return
+        run = self._points.run(frame, self, frame.sample)
+        if run is None:
+            return
+        settings = {name: frame.settings.get(self, name) for name in ("threshold", "centre_test")}
+        yield
+        yield from self._radiance.update(
+            frame, self, self._points, run, frame.settings.bounces - 1, self._groups(frame), **settings
+        )
+        yield
+        levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
+        offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
+        bindings = {
+            "textures": {**surface_bindings(frame), "tree_nodes": run.nodes, "node_radiance": self._radiance.image},
+            "blocks": {"film_view": frame.view_block},
+            "constants": buffer_bindings(frame, run, frame.settings.get(self, "side"), **settings, use="micro regions"),
+        }
+        irradiance = yield from self.irradiance(frame, levels, offset, frame.typical_distance, bindings, None)
+        textures = {name: surface_bindings(frame)[name] for name in ("surface_position", "surface_diffuse")}
+        passes.fullscreen(
+            REFLECTED, frame.target("radiance.diffuse_indirect"), blend="ADDITIVE_PREMULT",
+            textures={**textures, "irradiance": irradiance}, constants={"grid_offset": offset},
+        )  # fmt: skip
+        images.pool.give(irradiance)
+        frame.count(self, "passes", 4 * levels + 2)
+        if frame.materials.glossy:
+            yield from self._gather_lobes(frame, run, bindings, settings)
+
+    def _groups(self, frame: Frame) -> int:
+        """A power of two."""
+        return 1 << (int(frame.settings.get(self, "groups")).bit_length() - 1)
+
+    def _gather_listed(self, frame: Frame, bindings, bound, grid: dict, atlas, listed: dict) -> Iterator[None]:
+        textures = bindings["textures"] | listed
+        columns = min(lists.columns((WIDEST // bindings["constants"]["micro_side"], 0), 1), 512)
+        rows = -(-frame.size[0] * frame.size[1] // columns)
+        yield from self._dispatch(REGIONS, bindings, textures, grid, atlas, (columns, rows), {})
+
+    def _gather_levels(self, frame: Frame, bindings, bound, grid: dict, atlas, flags: list) -> Iterator[None]:
+        levels, anything = len(flags), bindings["textures"]["tree_nodes"]  # for what a level does not look at
+        for level in range(levels, -1, -1):
+            textures = bindings["textures"] | {
+                "region_flags": flags[level - 1] if level > 0 else anything,
+                "coarser_flags": flags[level] if level < levels else anything,
+            }
+            size = _level_size(frame.size, level, levels)
+            constants = {"region_level": level, "levels": levels}
+            yield from self._dispatch(REGIONS_OF_LEVEL, bindings, textures, grid, atlas, size, constants)
+
+    def _gather_lobes(self, frame: Frame, run: Run, bindings, settings: dict) -> Iterator[None]:
+        """Reflections of microfacets, each pixel's own."""
+        side = frame.settings.get(self, "lobe_side")
+        bindings = {
+            "textures": {**bindings["textures"], "energy_table": frame.materials.energy_table},
+            "blocks": bindings["blocks"],
+            "constants": {**buffer_bindings(frame, run, side, **settings, use="micro lobes"), "centre_test": 1},
+        }  # fmt: skip
+        gathered = images.pool.take(*frame.size, "RGBA32F")
+        images.Target((gathered,)).clear()
+        try:
+            yield from self._dispatch(GLOSSY, bindings, bindings["textures"], {}, gathered, frame.size, {})
+            target = frame.target("radiance.glossy_indirect")
+            passes.fullscreen(
+                passes.COPY, target, blend="ADDITIVE_PREMULT", textures={"original": gathered}
+            )  # fmt: skip
+        finally:
+            images.pool.give(gathered)
+        frame.count(self, "gathers of lobes", frame.size[0] * frame.size[1])
+        frame.count(self, "passes")
+
+    def _dispatch(
+        self, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
+    ) -> Iterator[None]:  # fmt: skip
+        """Some rows after the others, so that micro-buffers take little memory and no dispatch takes long."""
+        side, leaves = (bindings["constants"][name] for name in ("micro_side", "leaf_count"))
+        columns, height = size
+        rows = max(min(MOST_TEXELS // (columns * side * side), WIDEST // side, height), 1)
+        micro = images.pool.take(columns * side, rows * side, "R32UI")
+        try:
+            for first in range(0, height, rows):
+                count = min(rows, height - first)
+                for part in micro_buffers.parts(leaves):
+                    passes.compute(
+                        program, (columns, count), textures=textures, images={"gathered": atlas, "micro": micro},
+                        blocks=bindings["blocks"],
+                        constants={
+                            **bindings["constants"], **grid, **constants, "first_row": first, "row_count": count,
+                            "part": part, **({} if program is GLOSSY else {"columns": columns}),
+                        },
+                    )  # fmt: skip
+                    yield
+        finally:
+            images.pool.give(micro)
+
+    def release(self) -> None:
+        super().release()
+        self._points.release()
+        self._radiance.release()

@@ -1,0 +1,236 @@
+"""Grass from a patch beside real blades: `python -m bench grass --page`.
+
+Compression: the tile of the specification (0.25 m, blades up to 0.1 m, 500 of them, 81 views, 21 lights, 64 x 64
+texels, 16 samples), by components, with the errors of decoded pictures. Its views are kept in the cache of references,
+so that a second run takes seconds.
+
+Pictures: the shipped patch beside the field of blades that it was made of, by Cycles: means and contrast (standard
+deviation of luminance over a row of the picture, or over a tile) for one sun. Time: Candela's second render of the same
+view, of the patch and of instanced blades.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+
+from . import markdown
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "grass.md"
+COMMAND = "python -m bench grass --page"
+SIZE = (128, 96)
+SUN = (0.7, 0.0, 0.5)
+SAMPLES_OF_CYCLES = 192
+HELD_OUT = ((10.0, 40.0), (30.0, 200.0), (50.0, 100.0), (68.0, 310.0), (80.0, 10.0))  # degrees
+FIELD = 6  # tiles from the middle to a side, for times
+BLADES = (1, 4)  # times as many in a tile
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--parts", nargs="*", default=["compression", "pictures", "time"])
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what both showed as PNG")
+    parser.add_argument("--page", action="store_true", help="write the tables into docs/grass.md")
+
+
+def command(options: argparse.Namespace) -> int:
+    from addon import register
+
+    register()
+    known = {"compression": compression, "pictures": pictures, "time": times}
+    text = "\n\n".join(known[part](options) for part in options.parts)
+    print(text)
+    if options.page:
+        markdown.put_between(PAGE, COMMAND, text)
+    return 0
+
+
+# Compression ---------------------------------------------------------------------------------------------------------
+
+
+def compression(options: argparse.Namespace) -> str:
+    from addon.compare.reference import cache_folder
+    from addon.grass import compression as by
+    from addon.grass.generate import Order, read_view, studio, view_file, write_view
+
+    order, folder = Order(), cache_folder() / "grass_views"
+    missing = [view for view in range(order.views.number) if read_view(order, folder, view) is None]
+    if missing:
+        with studio(order) as stage:
+            for view in missing:
+                write_view(order, folder, view, *stage.render(order.views.vectors[view], order.lights.vectors))
+                print(view_file(folder, view), flush=True)
+    data = np.stack([read_view(order, folder, view)[0] for view in range(order.views.number)])
+    white = by.white_of(data)
+    flat = data.reshape(-1, order.texels**2, 3).transpose(1, 0, 2).astype(np.float32)
+    rows = [["components of luma / chroma", "RGB rmse / mean", "luma rmse / mean", "contrast kept"]]
+    for luma, chroma in ((4, 6), (40, 6), (140, 6)):
+        found = by.errors(flat, by.compressed(flat, luma, chroma, white))
+        rows.append([f"of all views, {luma} / {chroma}", *(f"{value:.3f}" for value in found.values())])
+    for luma, chroma in ((4, 1), (8, 1), (8, 2)):
+        views = [view.reshape(-1, order.texels**2, 3).transpose(1, 0, 2) for view in data]
+        found = by.errors(flat, np.concatenate([by.compressed(one, luma, chroma, white) for one in views], axis=1))
+        rows.append([f"of each view, {luma} / {chroma}", *(f"{value:.3f}" for value in found.values())])
+    return f"**Error of compression, tile of the specification**\n\n{markdown.table(rows)}"
+
+
+# Scenes --------------------------------------------------------------------------------------------------------------
+
+
+def recipe(blades: int = 1):
+    from addon.grass.blades import Recipe
+
+    return Recipe(0.4, 0.1, 1300 * blades, 3)  # of the shipped patch
+
+
+def clear() -> None:
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def field(patch: bool, tiles: int, blades: int = 1) -> None:
+    """Square ground of 2 x `tiles` tiles along each side, with grass from the patch or with blades; one sun."""
+    import bpy
+
+    from addon.grass.blades import SOIL
+    from addon.grass.generate import field_of
+
+    scene = bpy.context.scene
+    half = tiles * recipe().size
+    if not patch:
+        field_of(recipe(blades), scene, range(-tiles, tiles), ground=False)
+    mesh = bpy.data.meshes.new("Ground")
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    soil = bpy.data.materials.new("Soil")
+    if bpy.app.version < (5, 0):
+        soil.use_nodes = True
+    nodes = soil.node_tree.nodes
+    nodes.clear()
+    shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    shader.inputs["Color"].default_value = (*SOIL, 1.0)
+    soil.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    soil.candela.grass_patch = "MEADOW" if patch else "NONE"
+    mesh.materials.append(soil)
+    scene.collection.objects.link(bpy.data.objects.new("Ground", mesh))
+    sun = bpy.data.lights.new("Sun", "SUN")
+    sun.energy, sun.angle = 3.0, 0.0
+    lamp = bpy.data.objects.new("Sun", sun)
+    lamp.rotation_euler = SUN
+    scene.collection.objects.link(lamp)
+
+
+def camera(location, turn, span: float = 0.0, angle: float = 0.9):
+    import bpy
+
+    data = bpy.data.cameras.new("Camera")
+    data.angle = angle
+    if span:
+        data.type, data.ortho_scale = "ORTHO", span
+    made = bpy.data.objects.new("Camera", data)
+    made.location, made.rotation_euler = location, turn
+    bpy.context.scene.collection.objects.link(made)
+    bpy.context.scene.camera = made
+
+
+def seen_from(polar: float, azimuth: float, span: float) -> None:
+    from mathutils import Vector
+
+    a, b = math.radians(polar), math.radians(azimuth)
+    way = Vector((math.sin(a) * math.cos(b), math.sin(a) * math.sin(b), math.cos(a)))
+    camera(5.0 * way, way.to_track_quat("Z", "Y").to_euler(), span)
+
+
+def shown(engine: str, samples: int, size=SIZE) -> tuple[np.ndarray, float]:
+    """Luminance (H, W), and seconds."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+    from addon.grass.compression import LUMA
+
+    done = render_passes(bpy.context.scene, engine, samples, 1, size=size, bounces=4 if engine == "CYCLES" else 0)
+    return done.images["combined"][..., :3] @ LUMA, done.seconds
+
+
+def both(view, tiles: int, size=SIZE, to: Path | None = None) -> list[np.ndarray]:
+    """The field by Candela from the patch, and by Cycles of blades, from a view that `view()` sets."""
+    found = []
+    for patch in (True, False):
+        clear()
+        field(patch, tiles)
+        view()
+        found.append(shown("CANDELA", 64, size)[0] if patch else shown("CYCLES", SAMPLES_OF_CYCLES, size)[0])
+    if to:
+        from addon.compare.png import png
+
+        light = np.repeat(np.concatenate(found, axis=1)[::-1, :, None], 3, axis=2)
+        to.mkdir(parents=True, exist_ok=True)
+        (to / f"grass_{len(list(to.glob('grass_*.png')))}.png").write_bytes(
+            png(np.uint8(255 * np.sqrt(light.clip(0, 1))))
+        )
+    return found
+
+
+def pictures(options: argparse.Namespace) -> str:
+    rows = [["seen from", "mean / Cycles", "contrast / Cycles"]]
+    for polar, azimuth in HELD_OUT:
+        mine, true = both(
+            lambda polar=polar, azimuth=azimuth: seen_from(polar, azimuth, 0.8), 14, (64, 64), options.pictures
+        )
+        rows.append([f"{polar:.0f} degrees", f"{mine.mean() / true.mean():.3f}", f"{mine.std() / true.std():.3f}"])
+    mine, true = both(lambda: camera((0, -5.0, 1.7), (math.radians(70), 0, 0), angle=0.95), 24, SIZE, options.pictures)
+    height, width = mine.shape
+    up = np.tan(0.95 / 2) * (2 * (np.arange(height) + 0.5) - height) / width
+    polar = 70.0 + np.degrees(np.arctan(up))  # of the view along each row, from straight down
+    meadow = [["rows seen from", "mean / Cycles", "farthest row", "contrast / Cycles"]]
+    for low, high in ((40, 60), (60, 70), (70, 75), (75, 80), (80, 82)):
+        own = (polar >= low) & (polar < high)
+        if own.any():
+            row_means = mine[own].mean(axis=1) / true[own].mean(axis=1)
+            contrast = mine[own].std(axis=1).mean() / true[own].std(axis=1).mean()
+            farthest = row_means[np.abs(row_means - 1).argmax()]
+            whole = mine[own].mean() / true[own].mean()
+            meadow.append([f"{low} to {high} degrees", f"{whole:.3f}", f"{farthest:.3f}", f"{contrast:.3f}"])
+    first = f"**A tile from directions that were not sampled, sun at 40 degrees**\n\n{markdown.table(rows)}"
+    second = f"**A meadow from 1.7 m, by polar angle of its rows, sun at 40 degrees**\n\n{markdown.table(meadow)}"
+    return f"{first}\n\n{second}"
+
+
+def times(options: argparse.Namespace) -> str:
+    rows = [["field", "triangles of blades", "first render, s", "second, ms"]]
+    whole = recipe().blades * 10 * (2 * FIELD) ** 2
+
+    def timed(label: str, triangles: int, patch: bool, blades: int) -> None:
+        clear()
+        field(patch, FIELD, blades)
+        camera((0, -2.4, 1.7), (math.radians(65), 0, 0), angle=0.95)
+        started = time.perf_counter()
+        shown("CANDELA", 4)
+        first = time.perf_counter() - started
+        import bpy
+
+        bpy.context.scene.candela.seed += 1  # else nothing is drawn anew
+        again = []
+        for _ in range(2):
+            bpy.context.scene.candela.seed += 1
+            again.append(_second())
+        rows.append([label, f"{triangles:,}", f"{first:.2f}", f"{1000 * min(again):.0f}"])
+        print(rows[-1], flush=True)
+
+    timed("patch, any number of blades", 0, True, 1)
+    for factor in BLADES:
+        timed(f"instances, {recipe(factor).blades:,} blades a tile", whole * factor, False, factor)
+    return f"**Time of {SIZE[0]} x {SIZE[1]} pixels, 4 samples, by Candela**\n\n{markdown.table(rows)}"
+
+
+def _second() -> float:
+    import bpy
+
+    from addon.compare.reference import render_passes
+
+    seed = bpy.context.scene.candela.seed
+    return render_passes(bpy.context.scene, "CANDELA", 4, seed, size=SIZE, bounces=0).seconds

@@ -1,0 +1,156 @@
+"""Micro-rendering beside its peers and Cycles' diffuse indirect pass: `python -m bench micro_rendering`.
+
+Scenes x techniques x samples: squared error (relMSE, the noise of the reference taken off), bias and seconds of a whole
+render whose programs are compiled; then the error and time of micro-rendering by the side of its micro-buffers, the
+number of points, regions and threshold in one scene, at one sample. The seconds are of the machine that it runs on:
+where a GPU is drawn in software, a tree that is walked by each of eight lanes is what it does worst.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from bench.indirect import BOUNCES, PATH, ROOMS, SCENES, reference, render
+from bench.quick import size_of, table
+
+NAME = "micro_rendering"
+PEERS = ("instant_radiosity", "imperfect_shadow_maps", "clustered_visibility", "ssdo")
+HEAD = ("scene", "technique", "samples", "seconds", "relMSE", "bias")
+DIAL_HEAD = ("dial", "value", "seconds", "relMSE", "bias", "counters")
+DIALS = (
+    ("side", (8, 12, 16, 24)),
+    ("points", (2048, 4096, 8192, 16384)),
+    ("levels", (0, 1, 2)),
+    ("threshold", (0.25, 1.0, 4.0)),
+)
+DIAL_SCENE = "cornell_box"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenes", nargs="+", default=ROOMS, metavar="NAME", help=f"default: {', '.join(ROOMS)}")
+    parser.add_argument("--techniques", nargs="+", default=(NAME, *PEERS), metavar="NAME")
+    parser.add_argument("--samples", nargs="+", type=int, default=(1, 16, 64), metavar="N", help="default: 1 16 64")
+    parser.add_argument("--most", type=int, default=64, metavar="N", help="samples of micro-rendering at most")
+    parser.add_argument("--size", type=size_of, default=(96, 64), metavar="WxH", help="default 96x64")
+    parser.add_argument("--reference", type=int, default=256, metavar="N", help="samples of each of two references")
+    parser.add_argument("--no-dials", action="store_true", help="leave out what its parameters cost")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write PNGs beside Cycles")
+    parser.add_argument("--page", type=Path, metavar="PATH", help="write the tables as Markdown, too")
+
+
+def measured(scene, technique: str, samples: int, size, truth) -> tuple[tuple[str, str, str], object]:
+    """Seconds, error and bias; the picture."""
+    from addon.compare.metrics import compare_radiance
+
+    scene.candela.slot_indirect = technique
+    render(scene, "CANDELA", 1, 7, size)  # compiles
+    begun = time.perf_counter()
+    picture = render(scene, "CANDELA", samples, 1, size)
+    seconds = time.perf_counter() - begun
+    found = compare_radiance(PATH, picture, *truth)
+    return (f"{seconds:.2f}", f"{max(found.relmse - found.floor, 0.0):.4f}", f"{found.bias:.3f}"), picture
+
+
+def of_scene(name: str, options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
+    """Lines of one scene."""
+    scene = opened(name)
+    truth = reference(scene, options.reference, options.size)
+    shown = [truth[0]]
+    for technique in options.techniques:
+        for samples in options.samples:
+            if technique != NAME or samples <= options.most:
+                figures, picture = measured(scene, technique, samples, options.size, truth)
+                yield name, technique, str(samples), *figures
+                shown += [picture] if samples == options.samples[0] else []
+    if options.pictures:
+        write_picture(options.pictures / f"{name}.png", shown)
+
+
+def dials(options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
+    """What parameters cost and bring, one at a time."""
+    from addon.frame import ledger
+
+    scene = opened(DIAL_SCENE)
+    truth = reference(scene, options.reference, options.size)
+    for dial, values in DIALS:
+        for value in values:
+            setattr(scene.candela, f"{NAME}_{dial}", value)
+            figures, _ = measured(scene, NAME, 1, options.size, truth)
+            counted = ledger.latest().row(NAME).counters
+            told = ("regions", "light rays", "passes")
+            yield dial, str(value), *figures, ", ".join(f"{counted[one]} {one}" for one in told if one in counted)
+        scene.candela.property_unset(f"{NAME}_{dial}")
+
+
+def opened(name: str):
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
+    return bpy.context.scene
+
+
+def write_picture(path: Path, pictures: list) -> None:
+    """Cycles and the techniques side by side, one scale of light for all."""
+    import numpy as np
+
+    from addon.compare.png import png
+
+    scale = max(float(np.percentile(pictures[0], 97)), 1e-30)
+    row = np.concatenate([np.clip(picture / scale, 0, 1) ** (1 / 2.2) for picture in pictures], axis=1)
+    large = np.repeat(np.repeat(row, 3, axis=0), 3, axis=1)[::-1]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(png((large * 255 + 0.5).astype(np.uint8)))
+
+
+PAGE = """# Micro-rendering: error and time
+
+Written by `python -m bench micro_rendering --page PATH`; do not edit. Method, bias and where it fails:
+`addon/techniques/micro_rendering.py`.
+
+{size} pixels, {bounces} bounces. Diffuse indirect light against the mean of two renders of {reference} samples by
+Cycles, whose noise is taken off the errors (relMSE). Seconds are of a whole render of which nothing has to be compiled,
+on a GPU drawn in software by two cores that others used, too: they say nothing of a GPU.
+
+{rows}
+"""
+TURNED = """
+## What its parameters cost
+
+One sample, {scene}.
+
+{turned}
+"""
+
+
+def page(rows: list, turned: list, options: argparse.Namespace) -> str:
+    """The tables as Markdown."""
+    from bench import markdown
+
+    size = "x".join(map(str, options.size))
+    table_of_rows = markdown.table([HEAD, *rows])
+    text = PAGE.format(size=size, bounces=BOUNCES, reference=options.reference, rows=table_of_rows)
+    if turned:
+        text += TURNED.format(scene=DIAL_SCENE, turned=markdown.table([DIAL_HEAD, *turned]))
+    return text
+
+
+def command(options: argparse.Namespace) -> int:
+    import addon
+
+    addon.register()
+    rows: list[tuple[str, ...]] = []
+    turned: list[tuple[str, ...]] = []
+    steps = [lambda name=name: rows.extend(of_scene(name, options)) for name in options.scenes]
+    if not options.no_dials:
+        steps.append(lambda: turned.extend(dials(options)))
+    for step in steps:
+        step()
+        if options.page:  # after each scene: what is measured stays when the run is ended
+            options.page.write_text(page(rows, turned, options), encoding="utf-8")
+    print(table([HEAD, *rows]), flush=True)
+    if turned:
+        print(table([DIAL_HEAD, *turned]), flush=True)
+    return 0

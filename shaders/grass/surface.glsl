@@ -1,0 +1,146 @@
+// The surface of grass: from where the view's ray enters the plane on top, to the blade that it meets there.
+// Musawir Shah, "Image-space approach to real-time realistic rendering" (2007), chapter 4. Changed: of the four views around a
+// direction each sample takes one, with the probability of its weight, and one texel of the four around a place; so colour
+// and depth are of one blade, and the mean over samples is the interpolation. Contrast and parallax: docs/grass.md.
+#include "grass/table.glsl"
+
+#define CREST_LENGTH 6.0  // by the height
+
+struct OwnHit {
+  bool bare;       // no blade stands here: the material's own surface shows
+  float place;     // of the patch's table
+  float contrast;
+  vec3 along;      // the tile's x axis on the surface
+  vec3 albedo;
+};
+
+// A number of this sample and pixel, stratified over the samples.
+float grass_roll(int purpose)
+{
+  uvec2 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(purpose) + uint(film_view.seed) * 64u)).xy;
+  return shuffled(film_view.sample_index, salt);
+}
+
+float grass_cell(ivec2 cell)
+{
+  return to_unit(hash3(uvec3(uvec2(cell + ivec2(1 << 20)), 77u)).x);
+}
+
+// Smooth noise whose values are about even from 0 to 1: clumps.
+float grass_clumps(vec2 place)
+{
+  vec2 low = floor(place);
+  vec2 f = place - low;
+  f = f * f * (3.0 - 2.0 * f);
+  ivec2 cell = ivec2(low);
+  float below = mix(grass_cell(cell), grass_cell(cell + ivec2(1, 0)), f.x);
+  float above = mix(grass_cell(cell + ivec2(0, 1)), grass_cell(cell + ivec2(1, 1)), f.x);
+  return smoothstep(0.15, 0.85, mix(below, above, f.y));
+}
+
+bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
+{
+  hit.bare = true;
+  hit.place = 0.0;
+  hit.contrast = 1.0;
+  hit.along = vec3(1.0, 0.0, 0.0);
+  hit.albedo = vec3(0.0);
+  Grass g = grass_of(grass_entry);
+  vec3 up = point.normal;
+  vec3 toward = point.incoming;
+  float rise = dot(toward, up);
+  if (rise <= 0.0 || point.backfacing) {
+    return false;  // from below
+  }
+  rise = max(rise, 0.02);
+  vec3 axis_x = safe_normalize(vec3(instance.row0.x, instance.row1.x, instance.row2.x));
+  vec3 axis_y = safe_normalize(vec3(instance.row0.y, instance.row1.y, instance.row2.y));
+  hit.along = safe_normalize(axis_x - up * dot(axis_x, up));
+  vec3 across = cross(up, hit.along);
+  vec3 from = point.position - instance_origin(instance);
+  vec2 uv = vec2(dot(from, axis_x), dot(from, axis_y)) / g.size;
+  vec3 view = grass_unstretched(g, vec3(dot(toward, hit.along), dot(toward, across), rise));
+
+  vec4 low;
+  vec4 high;
+  float outer = grass_rings(g.entry + GRASS_VIEW_RINGS, g.view_rings, view, low, high);
+  vec3 inside = grass_azimuths(low, view);
+  vec3 outside = grass_azimuths(high, view);
+  bool outward = grass_roll(51) < outer;
+  vec3 chosen = outward ? outside : inside;
+  vec4 ring = outward ? high : low;
+  float number = (grass_roll(52) < chosen.z) ? chosen.y : chosen.x;
+
+  // The picture of that view is moved so that what is at its mean height stays where it is.
+  vec3 taken = grass_ring_direction(ring, number);
+  vec3 seen = view;
+  float steepest = cos(radians(grass_texel(g.entry + GRASS_VIEW_RINGS + g.view_rings - 1).x));
+  if (seen.z < steepest) {
+    seen = vec3(safe_normalize(vec3(seen.xy, 0.0)).xy * sqrt(1.0 - steepest * steepest), steepest);
+  }
+  vec2 shift = (1.0 - ring.w) * g.slope * (taken.xy / taken.z - seen.xy / seen.z);
+  // Between texels that are larger than pixels one is drawn as bilinear interpolation weighs them; smaller ones the pixel's
+  // own filter mixes.
+  float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
+  float spread = smoothstep(0.75, 1.5, tile_pixels / float(g.side));
+  vec2 texel = (uv + shift) * float(g.side) + spread * (vec2(grass_roll(53), grass_roll(54)) - 0.5);
+  ivec2 wrapped = ivec2(floor(fract(texel / float(g.side)) * float(g.side)));
+  wrapped = clamp(wrapped, ivec2(0), ivec2(g.side - 1));
+  int picture = int(number + 0.5);
+  int place = (picture * g.side + wrapped.y) * g.side + wrapped.x;
+  GrassPlace shown = grass_place(g, place);
+  float below = (1.0 - clamp(shown.mean.w, 0.0, 1.0)) * g.height;
+
+  // On a crest the ray climbs out of the grass again before it meets what it would have met on flat ground.
+  vec3 ahead = safe_normalize(toward - up * dot(toward, up));
+  vec2 steps = window_steps(ahead, point.geometric_normal);
+  vec3 bend = steps.x * dFdx(world_normal) + steps.y * dFdy(world_normal);
+  float curvature = dot(bend, ahead) / max(length(world_normal), 1e-20);
+  float level = max(1.0 - rise * rise, 1e-6);
+  // Of gentle hills, where it would run far through grass before that, the curvature here says nothing about there.
+  bool crest = 2.0 * rise < CREST_LENGTH * g.height * curvature;
+  if (crest && below > rise * rise / (2.0 * curvature * level)) {
+    return false;
+  }
+
+  vec2 root = uv - (below / rise) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
+  hit.bare = g.density < 1.0 && grass_clumps(root * 6.0) >= g.density;
+  float depth = (hit.bare ? g.height : below) / rise;
+  point.position -= toward * depth;
+  // Where a tile is smaller than a few pixels its mean is all that can be seen.
+  float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
+  float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike);
+  hit.contrast = contrast * smoothstep(0.5, 2.0, tile_pixels);
+  hit.place = float(place);
+  hit.albedo = grass_decoded(g, shown, picture, g.lights, hit.contrast);
+  if (!hit.bare) {
+    point.normal = up;
+    point.geometric_normal = up;
+    point.mesh_normal = up;
+  }
+  return true;
+}
+
+void own_closures(inout Closures c, SurfacePoint point, OwnHit hit)
+{
+  if (!hit.bare) {
+    c = closures_begin(point.normal, 0.5, 0.0);
+    c.diffuse = hit.albedo;
+    c.diffuse_weight = 1.0;
+    closures_end(c);
+  }
+}
+
+// What grass/light.glsl reads instead of a lobe.
+void own_store(SurfacePoint point, OwnHit hit)
+{
+  if (!hit.bare) {
+    vec3 tangent;
+    vec3 bitangent;
+    orthonormal_basis(point.normal, tangent, bitangent);
+    float turn = atan(dot(hit.along, bitangent), dot(hit.along, tangent));
+    out_tint = vec4(0.0, 0.0, 0.0, turn);
+    out_lobe = vec4(hit.place, float(grass_entry), float(SURFACE_GRASS) * 2097152.0, hit.contrast);
+    out_emission = vec4(0.0, 0.0, 0.0, 1.0);
+  }
+}

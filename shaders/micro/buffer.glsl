@@ -1,0 +1,177 @@
+// A micro-buffer: the hemisphere above a place, cosine-weighted, as micro_side x micro_side pixels of an image of integers,
+// each of which has the depth of what it meets first in its high bits, by the logarithm, and below them which side of which
+// node of the tree that is. Filled by one thread, which goes through the tree of discs (addon/scene/point_tree.py) without
+// a stack.
+//
+// Ritschel 2009, chapter 6.3. There a node smaller than a pixel fills the pixel that its middle falls into, and pixels that
+// larger leaves cover cast rays afterwards. Here every node is drawn by rays through the middles of pixels (`centre_test`):
+// what a node's ball holds between the middles is left out with all that is below it, and silhouettes do not grow.
+//
+// Binds `tree_nodes`, `node_radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
+//
+// With GLOSSY the pixels are equal shares of what microfacets reflect to the viewer instead: each has a ray of the lobe, and
+// nodes beside the cone about all rays are left out.
+#include "micro/warp.glsl"
+#define NOTHING 0xffffffffu
+#define ROUND 0.2  // of the size of a flat group that is drawn as one disc: up to there a bent one is drawn as a ball
+#define SAME_SURFACE 0.7  // cosine between normals, from which on a disc whose radius reaches here is this surface
+
+vec4 node_texel(int index)
+{
+  return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
+}
+
+struct MicroFrame {
+  vec3 place;
+  vec3 tangent;
+  vec3 bitangent;
+  vec3 normal;
+  vec3 plane;  // normal of the triangle: nothing is seen below it
+  vec2 shift;  // of a pixel's middle, 0..1
+#ifdef GLOSSY
+  Lobe lobe;
+  vec3 axis;   // of the cone that holds all rays
+  float angle; // and half its angle, radians
+#endif
+};
+
+// Where the ray of a pixel goes. Of a lobe: and what light from there counts.
+vec3 micro_ray(MicroFrame f, ivec2 pixel, out vec3 weight)
+{
+#ifdef GLOSSY
+  return lobe_sample(f.lobe, (vec2(pixel) + f.shift) / float(micro_side), weight);
+#else
+  weight = vec3(1.0);
+  vec2 disc = disc_of_square((vec2(pixel) + f.shift) * (2.0 / float(micro_side)) - 1.0);
+  return disc.x * f.tangent + disc.y * f.bitangent + sqrt(max(1.0 - dot(disc, disc), 0.0)) * f.normal;
+#endif
+}
+
+MicroFrame micro_frame(vec3 place, vec3 normal, vec3 plane, vec3 turn_and_shift)
+{
+  MicroFrame f;
+  f.place = place;
+  f.normal = normal;
+  f.plane = plane;
+  vec3 first;
+  vec3 second;
+  orthonormal_basis(normal, first, second);
+  float turn = 2.0 * PI * turn_and_shift.x;
+  f.tangent = cos(turn) * first + sin(turn) * second;
+  f.bitangent = cross(normal, f.tangent);
+  f.shift = turn_and_shift.yz;
+  return f;
+}
+
+void micro_store(ivec2 texel, float depth, int node, bool behind)
+{
+  float last = float(NOTHING >> uint(id_bits)) - 1.0;
+  float share = clamp((log2(max(depth, 1e-30)) - log_depths.x) / (log_depths.y - log_depths.x), 0.0, 1.0);
+  uint word = (uint(share * last) << uint(id_bits)) | (2u * uint(node) + (behind ? 1u : 0u));
+  if (word < imageLoad(micro, texel).x) {
+    imageStore(micro, texel, uvec4(word));
+  }
+}
+
+// A point's disc, a flat group's rectangle or a bent one's ball, into the pixels `low` to `high` whose middles see it.
+void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node, vec4 shape, int node)
+{
+  vec3 axis = octahedral_decode(shape.xy);
+  float squared = shape.w * shape.w;
+  float off_plane = dot(to_node, axis);
+  bool flat_group = node < leaf_count && shape.w > 0.0;
+  vec4 sides = flat_group ? node_texel(3 * node + 2) : vec4(0.0);
+  vec3 along = octahedral_decode(sides.xy);
+  vec3 across = cross(axis, along);
+  // A smooth surface bends away below the disc beside it.
+  bool same = node >= leaf_count && abs(dot(axis, f.normal)) > SAME_SURFACE;
+  float nearest = same ? shape.w : 0.0;
+  int width = high.x - low.x + 1;
+  int count = width * (high.y - low.y + 1);
+  for (int i = 0; i < count; i++) {
+    ivec2 pixel = low + ivec2(i % width, i / width);
+    vec3 weight;
+    vec3 ray = micro_ray(f, pixel, weight);
+    float cosine = dot(ray, axis);
+    float depth = (shape.w < 0.0) ? dot(to_node, ray) : off_plane / ((cosine == 0.0) ? 1e-30 : cosine);
+    vec3 off = depth * ray - to_node;
+    bool inside = flat_group ? (abs(dot(off, along)) <= sides.z && abs(dot(off, across)) <= sides.w)
+                             : dot(off, off) <= squared;
+    if (depth > nearest && inside && dot(ray, f.plane) > 0.0) {
+      micro_store(corner + pixel, depth, node, cosine > 0.0);
+    }
+  }
+}
+
+void micro_clear(ivec2 corner)
+{
+  for (int i = 0; i < micro_side * micro_side; i++) {
+    imageStore(micro, corner + ivec2(i % micro_side, i / micro_side), uvec4(NOTHING));
+  }
+}
+
+int node_after(int node)
+{
+  return (node + 1) >> findLSB(node + 1);
+}
+
+// Draw what lies below node `part.y` + `part.x` of a level that has `part.y` nodes.
+void micro_fill(MicroFrame f, ivec2 corner)
+{
+  float side = float(micro_side);
+  int k = part.x + part.y;
+  int end = node_after(k);
+  for (int steps = 0; steps < 4 * leaf_count; steps++) {
+    vec4 ball = node_texel(3 * k);
+    vec3 to_node = ball.xyz - f.place;
+    bool down = false;
+    if (dot(to_node, f.normal) + ball.w > 0.0 && dot(to_node, f.plane) + ball.w > 0.0) {
+      float squared = dot(to_node, to_node);
+      float sine = ball.w * ball.w / max(squared, 1e-30);
+      ivec2 low = ivec2(0);
+      ivec2 high = ivec2(micro_side - 1);
+      float reach = side;
+      vec2 middle = vec2(0.0);
+      if (sine < 1.0) {
+        float chord = sqrt(2.0 * sine / (1.0 + sqrt(1.0 - sine)));
+        vec3 direction = to_node * inversesqrt(squared);
+#ifdef GLOSSY
+        reach = 0.5 * STRETCH * chord * side / max(2.0 * f.angle, 1e-6);
+        float apart = acos(clamp(dot(direction, f.axis), -1.0, 1.0));
+        high = (apart > f.angle + asin(sqrt(sine))) ? ivec2(-1) : high;
+#else
+        reach = 0.5 * STRETCH * chord * side;
+        vec2 disc = vec2(dot(direction, f.tangent), dot(direction, f.bitangent));
+        middle = (square_of_disc(disc) * 0.5 + 0.5) * side - f.shift;
+        vec2 half_size = square_reach(disc, chord) * (0.5 * side);
+        low = max(low, ivec2(ceil(middle - half_size)));
+        high = min(high, ivec2(floor(middle + half_size)));
+#endif
+      }
+      bool small_enough = reach <= detail;
+      bool seen = low.x <= high.x && low.y <= high.y;
+      if (centre_test == 0 && small_enough && dot(to_node, f.normal) > 0.0) {
+        ivec2 pixel = clamp(ivec2(floor(middle + f.shift)), ivec2(0), ivec2(micro_side - 1));
+        vec4 shape = node_texel(3 * k + 1);
+        micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
+      }
+      else if (seen || centre_test == 0) {
+        // A ball in place of an edge between walls lets light pass beside it.
+        vec4 shape = node_texel(3 * k + 1);
+        down = k < leaf_count && (!small_enough || (shape.w < 0.0 && reach > ROUND * detail));
+        if (!down) {
+          micro_draw(f, corner, low, high, to_node, shape, k);
+        }
+      }
+    }
+    k = down ? 2 * k : node_after(k);
+    if (k == end) {
+      break;
+    }
+  }
+}
+
+vec4 radiance_texel(uint index)
+{
+  return node_radiance_fetch(ivec2(int(index & 2047u), int(index >> 11u)));
+}

@@ -1,0 +1,24 @@
+// Micro-buffers at points of the tree, both sides of each: entry 2 i + side of the list of those that gather, whose leaf
+// numbers are their group's first and `chosen` more.
+#include "lib/math.glsl"
+#include "lib/random.glsl"
+#include "micro/buffer.glsl"
+
+void main()
+{
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+  int entry = place.y * NODE_ROW + place.x;
+  if (place.x >= NODE_ROW || entry >= 2 * group_count) {
+    return;
+  }
+  int group_size = leaf_count / group_count;
+  int leaf = leaf_count + (entry >> 1) * group_size + min(int(buffer_choice.x * float(group_size)), group_size - 1);
+  vec3 normal = octahedral_decode(node_texel(3 * leaf + 1).xy) * (((entry & 1) == 0) ? 1.0 : -1.0);
+  uvec3 salt = hash3(uvec3(uint(entry), 71u, 3u));
+  vec3 own = fract(buffer_choice.yzw + vec3(to_unit(salt.x), to_unit(salt.y), to_unit(salt.z)));
+  MicroFrame f = micro_frame(node_texel(3 * leaf).xyz, normal, normal, own);
+  if (part.x == 0) {
+    micro_clear(place * micro_side);
+  }
+  micro_fill(f, place * micro_side);
+}

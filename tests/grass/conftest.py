@@ -1,0 +1,3 @@
+"""Tiles are rendered by Blender's Cycles."""
+
+import bpy  # noqa: F401

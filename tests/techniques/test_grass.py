@@ -1,0 +1,305 @@
+"""Grass from patches: radiometry in closed form, depth, shadow, invariants, and real blades by Cycles."""
+
+import math
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+
+from addon.frame.ledger import RAN, SKIPPED
+from addon.grass import patch as patches
+from addon.grass.blades import Recipe
+from addon.grass.compression import LUMA
+from addon.grass.directions import Rings
+from addon.grass.generate import field_of
+from addon.techniques.grass import SHIPPED
+
+MEADOW = Recipe(0.4, 0.1, 1300, 3)  # of the shipped patch
+ALBEDO = np.array([0.1, 0.3, 0.05])
+VIEWS, LIGHTS = Rings((0.0, 50.0, 80.0), (1, 6, 8)), Rings((0.0, 35.0, 70.0), (1, 6, 8))
+
+
+def flat_patch(path, height_seen, albedo=ALBEDO):
+    """A patch file of a Lambertian plane at `height_seen` (0 the ground, 1 the top) of a tile 0.4 m wide, 0.1 high."""
+    cosines = LIGHTS.vectors[:, 2]
+    picture = np.broadcast_to(cosines[:, None, None, None] * albedo, (LIGHTS.number, 8, 8, 3))
+    heights = np.full((VIEWS.number, 8, 8), 0.1 * height_seen)
+    patches.save(patches.compressed_patch(0.4, 0.1, VIEWS, LIGHTS, lambda view: picture, heights), path)
+    return path
+
+
+def ground(stage, patch="MEADOW", half=4.0, **settings):
+    material = stage.diffuse(0.5)
+    if isinstance(patch, str):
+        material.candela.grass_patch = patch
+    else:
+        material.candela.grass_patch, material.candela.grass_file = "FILE", str(patch)
+    for name, value in settings.items():
+        setattr(material.candela, f"grass_{name}", value)
+    return stage.rectangle((-half, -half), (half, half), material=material)
+
+
+def towards(stage, polar, azimuth, span, distance=5.0):
+    """An orthographic camera that sees the origin from a direction, in degrees."""
+    polar, azimuth = math.radians(polar), math.radians(azimuth)
+    way = Vector((math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)))
+    data = bpy.data.cameras.new("Camera")
+    data.type, data.ortho_scale = "ORTHO", span
+    camera = stage.link("Camera", data, distance * way)
+    camera.rotation_euler = way.to_track_quat("Z", "Y").to_euler()
+    stage.scene.camera = camera
+    return camera
+
+
+def sun(stage, polar, azimuth, energy=3.0):
+    polar, azimuth = math.radians(polar), math.radians(azimuth)
+    way = Vector((math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)))
+    return stage.light("SUN", turn=way.to_track_quat("Z", "Y").to_euler(), energy=energy, angle=0.0)
+
+
+def ball(stage, radius, location):
+    mesh = bpy.data.meshes.new("Ball")
+    made = bmesh.new()
+    bmesh.ops.create_uvsphere(made, u_segments=32, v_segments=16, radius=radius)
+    made.to_mesh(mesh)
+    made.free()
+    mesh.materials.append(stage.material("ShaderNodeEmission", Strength=1.0))
+    return stage.link("Ball", mesh, location)
+
+
+# Light ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("view", [(0, 0), (30, 77), (65, 200)])
+@pytest.mark.parametrize("light", [(0, 0), (20, 33), (50, 110), (80, 250)])
+def test_a_lambertian_tile_reflects_albedo_times_cosine(stage, tmp_path, view, light):
+    ground(stage, flat_patch(tmp_path / "flat.grass", 0.5))
+    sun(stage, *light)
+    towards(stage, *view, 1.0)
+    shown = stage.render(2, (8, 8))["combined"][..., :3]
+    expected = 3.0 / np.pi * ALBEDO * math.cos(math.radians(light[0]))
+    assert shown == pytest.approx(np.broadcast_to(expected, shown.shape), rel=0.01)
+
+
+def test_a_lambertian_tile_under_a_uniform_sky_shows_its_albedo(stage, tmp_path):
+    ground(stage, flat_patch(tmp_path / "flat.grass", 0.0))
+    stage.world((1, 1, 1), 1.0)
+    towards(stage, 40, 20, 0.5)
+    shown = stage.render(64, (8, 8))["combined"][..., :3].mean(axis=(0, 1))
+    assert shown == pytest.approx(ALBEDO, rel=0.03)
+
+
+def test_light_from_below_is_none(stage):
+    ground(stage)
+    sun(stage, 100, 0)
+    towards(stage, 30, 0, 1.0)
+    assert np.abs(stage.render(2, (8, 8))["combined"][..., :3]).max() == 0.0
+
+
+def test_two_suns_add_up(stage):
+    ground(stage)
+    towards(stage, 40, 70, 0.8)
+    lamps = [sun(stage, 30, 10), sun(stage, 60, 200)]
+
+    def render(*shown):
+        for k, lamp in enumerate(lamps):
+            lamp.hide_render = k not in shown
+        return stage.render(1, (32, 32))["combined"][..., :3]
+
+    assert render(0, 1) == pytest.approx(render(0) + render(1), rel=1e-4, abs=1e-6)
+
+
+def test_a_view_of_the_patch_is_shown_texel_by_texel(stage):
+    """From above with the sun in a sampled direction: what numpy decodes, with the contrast that it lost."""
+    made = patches.load(SHIPPED)
+    light = 5
+    way = made.lights.vectors[light]
+    ground(stage)
+    stage.light("SUN", turn=Vector(way).to_track_quat("Z", "Y").to_euler(), energy=math.pi, angle=0.0)
+    stage.camera_above(made.size)
+    shown = stage.render(1, (64, 64))["combined"][..., :3]
+    picture = made.pictures(0)[light]
+    more = made.contrast[0, light]
+    excess = made.excess[0, light] * max(more - 1.0, 0.0) ** 1.5
+    mean = made.picture_mean[0, light]
+    expected = np.maximum(mean + (picture - mean) * more, 0.0) / (1.0 + excess)
+    expected = np.roll(expected, (32, 32), axis=(0, 1))  # the picture's corner is half a tile off the origin
+    assert np.abs(shown - expected).mean() < 0.01 * expected.mean()
+
+
+# Place ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seen", [0.0, 0.3, 1.0])
+def test_depth_is_that_of_what_is_seen(stage, tmp_path, seen):
+    ground(stage, flat_patch(tmp_path / "flat.grass", seen))
+    sun(stage, 0, 0)
+    towards(stage, 60, 90, 0.5)
+    depth = stage.render(1, (8, 8))["depth"]
+    rows = (np.arange(8) + 0.5 - 4) / 8 * 0.5  # up the picture, in metres
+    # Along the view: 5 m to the origin; rows higher up see farther by tan 60, and what is higher is nearer by 1 / cos.
+    expected = 5.0 + rows * math.tan(math.radians(60)) - 0.1 * seen / math.cos(math.radians(60))
+    found = depth.reshape(8, 8, -1)[..., 0]
+    assert found == pytest.approx(np.broadcast_to(expected[:, None], found.shape), abs=1e-3)
+
+
+def test_a_height_of_its_own_moves_what_is_seen(stage, tmp_path):
+    ground(stage, flat_patch(tmp_path / "flat.grass", 1.0), height=0.4)
+    sun(stage, 0, 0)
+    towards(stage, 0, 0, 0.5)
+    assert stage.render(1, (4, 4))["depth"] == pytest.approx(5.0 - 0.4, abs=2e-3)
+
+
+def test_without_density_the_ground_is_seen_where_it_is(stage):
+    bare = ground(stage, "NONE")
+    sun(stage, 30, 0)
+    towards(stage, 50, 40, 0.5)
+    expected = stage.render(1, (16, 16))
+    bare.data.materials[0].candela.grass_patch = "MEADOW"
+    bare.data.materials[0].candela.grass_density = 0.0
+    shown = stage.render(1, (16, 16))
+    assert shown["combined"] == pytest.approx(expected["combined"], rel=1e-3)
+    assert shown["depth"] == pytest.approx(expected["depth"], abs=1e-4)
+
+
+def test_density_is_the_share_that_is_covered(stage, tmp_path):
+    ground(stage, flat_patch(tmp_path / "flat.grass", 1.0), density=0.5)
+    sun(stage, 0, 0)
+    towards(stage, 0, 0, 4.0)
+    depth = stage.render(1, (64, 64))["depth"]
+    assert 0.35 < (depth < 4.95).mean() < 0.65
+
+
+def test_a_ball_stands_in_the_grass(stage):
+    """Blades cover the lower part of what stands in them, and nothing higher. The view is 80 degrees from above."""
+    ball(stage, 0.11, (0, 0, 0.11))
+    towards(stage, 80, 270, 0.5)
+
+    def seen():
+        return stage.render(16, (64, 64))["emission"][..., 0].sum(axis=1)
+
+    alone = seen()
+    ground(stage)
+    sun(stage, 30, 0)
+    within = seen()
+    # The picture's middle is the ground; the ball's middle is 14 pixels above it, the plane on top of the grass 13.
+    assert within[46:].sum() == pytest.approx(alone[46:].sum(), rel=0.01)
+    assert 0.1 < within[32:44].sum() / alone[32:44].sum() < 0.95
+
+
+def test_other_things_cast_shadows_on_it(stage):
+    ground(stage)
+    stage.blocker((-0.5, -4), (4, 4), 0.6)
+    sun(stage, 0, 0)
+    stage.camera_above(4.0)
+    shown = stage.render(2, (32, 32))["combined"][..., :3]
+    assert shown[:, 20:].max() == 0.0 and shown[:, :10].mean() > 0.02
+
+
+# Invariants ----------------------------------------------------------------------------------------------------------
+
+
+def test_moving_by_whole_tiles_changes_nothing(stage):
+    field = ground(stage, half=6.0, size=0.5)
+    sun(stage, 40, 20)
+    towards(stage, 45, 100, 1.0)
+    expected = stage.render(1, (32, 32))["combined"]
+    field.location = (1.0, -0.5, 0.0)
+    assert np.abs(stage.render(1, (32, 32))["combined"] - expected).mean() < 0.02 * expected.mean()
+
+
+def test_turning_all_together_changes_nothing(stage):
+    field = ground(stage, half=6.0)
+    lamp = sun(stage, 40, 20)
+    camera = towards(stage, 45, 100, 1.0)
+    expected = stage.render(4, (32, 32))["combined"][..., :3]
+    turn = Matrix.Rotation(math.radians(50), 4, "Z")
+    for thing in (field, lamp, camera):
+        thing.matrix_world = turn @ thing.matrix_world
+    found = stage.render(4, (32, 32))["combined"][..., :3]
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.005)
+    assert np.abs(found - expected).mean() < 0.05 * expected.mean()
+
+
+def test_flat_ground_has_no_outline_of_its_own(stage):
+    ground(stage, half=50.0)
+    sun(stage, 40, 20)
+    towards(stage, 80, 10, 1.0)
+    assert stage.render(1, (32, 32))["combined"][..., 3].min() == 1.0
+
+
+def test_far_away_it_is_the_tiles_mean(stage):
+    ground(stage, half=200.0)
+    sun(stage, 35, 45)
+    towards(stage, 40, 72, 100.0, 100.0)
+    far = stage.render(1, (16, 16))["combined"][..., :3]
+    made = patches.load(SHIPPED)
+    numbers, weights = made.views.weights(np.array([math.sin(math.radians(40)) * math.cos(math.radians(72)),
+                                                    math.sin(math.radians(40)) * math.sin(math.radians(72)),
+                                                    math.cos(math.radians(40))]))  # fmt: skip
+    own = made.lights.weights(np.array([math.sin(math.radians(35)) * math.cos(math.radians(45)),
+                                        math.sin(math.radians(35)) * math.sin(math.radians(45)),
+                                        math.cos(math.radians(35))]))  # fmt: skip
+    mean = sum(w * v * made.picture_mean[n, m] for n, w in zip(numbers, weights) for m, v in zip(*own))
+    assert far.mean(axis=(0, 1)) == pytest.approx(3.0 / math.pi * mean, rel=0.02)
+
+
+# Sentences -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_material_without_a_file_is_left_as_it_is(stage):
+    ground(stage, "FILE")
+    sun(stage, 30, 0)
+    stage.camera_above(1.0)
+    stage.render(1, (8, 8))
+    row = stage.ledger.row("grass")
+    assert row.state == SKIPPED and "names no file of a grass patch" in row.reason
+
+
+def test_a_wrong_file_is_a_sentence_of_the_ledger(stage, tmp_path):
+    wrong = tmp_path / "wrong.grass"
+    wrong.write_bytes(b"nothing")
+    ground(stage, wrong)
+    sun(stage, 30, 0)
+    stage.camera_above(1.0)
+    stage.render(1, (8, 8))
+    row = stage.ledger.row("grass")
+    assert row.state == SKIPPED and "wrong.grass is no grass patch, or it is damaged" in row.reason
+
+
+def test_several_patches_in_one_picture(stage, tmp_path):
+    ground(stage, flat_patch(tmp_path / "flat.grass", 0.0), half=2.0)
+    other = ground(stage, half=2.0)
+    other.location.x = 4.0
+    sun(stage, 0, 0)
+    stage.camera_above(8.0)
+    shown = stage.render(2, (32, 32))["combined"][..., :3]
+    assert stage.ledger.row("grass").state == RAN and stage.ledger.row("grass").counters["patches"] == 2
+    assert shown[12:20, 10:14] == pytest.approx(np.broadcast_to(3.0 / np.pi * ALBEDO, (8, 4, 3)), rel=0.01)
+    assert shown[12:20, 26:30].std() > 0.0
+
+
+# Real blades ---------------------------------------------------------------------------------------------------------
+
+
+def real_field(stage, tiles):
+    field_of(MEADOW, stage.scene, range(-tiles, tiles))
+
+
+@pytest.mark.parametrize("view, light", [((40, 72), (35, 45)), ((60, 30), (35, 225)), ((75, 257.142857), (0, 0))])
+def test_from_sampled_directions_it_is_the_field_of_blades(stage, view, light):
+    """Mean of the tile within 3 %, contrast within 5 %."""
+    pictures = []
+    for engine in ("CANDELA", "CYCLES"):
+        stage.clear()
+        stage.scene.render.filter_size = 1.5
+        ground(stage) if engine == "CANDELA" else real_field(stage, 10)
+        sun(stage, *light)
+        towards(stage, *view, 0.8)
+        samples = 64 if engine == "CANDELA" else 512  # noise is contrast, too
+        pictures.append(stage.render(samples, (48, 48), engine=engine, bounces=None)["combined"][..., :3] @ LUMA)
+    mine, true = pictures
+    assert mine.mean() == pytest.approx(true.mean(), rel=0.03)
+    assert mine.std() == pytest.approx(true.std(), rel=0.05)

@@ -1,0 +1,183 @@
+"""Micro-rendering against closed forms, Cycles, and the laws that light obeys."""
+
+import numpy as np
+import pytest
+
+from addon import engine
+from addon.compare.passes import light_paths
+from addon.compare.reference import render_passes
+from addon.frame import ledger
+from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
+
+NAME = "micro_rendering"
+
+
+@pytest.fixture
+def render(stage):
+    """Diffuse indirect radiance of the stage, with the technique's parameters by name."""
+
+    def render(bounces, samples=2, size=(24, 24), seed=0, points=4096, **params):
+        stage.scene.candela.slot_indirect = NAME
+        for name, value in {"points": points, **params}.items():
+            setattr(stage.scene.candela, f"{NAME}_{name}", value)
+        images = render_passes(stage.scene, "CANDELA", samples, seed, size=size, bounces=bounces).images
+        assert ledger.latest().bad_pixels == 0
+        return light_paths(images)["diffuse_indirect"]
+
+    return render
+
+
+def counters():
+    return ledger.latest().row(NAME).counters
+
+
+def lamp_in_a_corner(stage):
+    corner(stage)
+    return next(thing for thing in stage.scene.objects if thing.type == "LIGHT")
+
+
+def shelf(stage, **options):
+    return stage.rectangle((-0.3, -0.3), (0.3, 0.3), 0.6, **options)
+
+
+@pytest.mark.parametrize("bounces", [1, 3])
+def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces):
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    light = render(bounces)
+    assert light.mean() == pytest.approx(0.5 * (1 - 0.5**bounces), rel=0.02)
+    assert light.mean(axis=2).std() < 0.03 * light.mean()
+
+
+def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render):
+    stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
+    stage.mesh([(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    camera = stage.camera((3, 0.5, 0.5), (np.pi / 2, 0, np.pi / 2))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
+    irradiance = render(1, samples=8, size=(64, 64), side=16).mean(axis=2) * np.pi
+    # Discs at the floor's rim reach beyond it by up to 1.5 times the radius of what they stand for: of 2048, 3 cm.
+    assert irradiance.mean() == pytest.approx(8 * 0.200044, rel=0.04)
+    height = (np.arange(64) + 0.5) / 64
+    four_rows = irradiance[:, 28:36].reshape(16, 32).mean(axis=1)
+    np.testing.assert_allclose(four_rows[1:], wall_irradiance(height).reshape(16, 4).mean(axis=1)[1:], rtol=0.08)
+
+
+def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
+    """Radiance 1 and albedo 1/2: each wall sends out 2 in all, so what it gets from others' reflection is 1/2."""
+    shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
+    shining.node_tree.nodes["Principled BSDF"].inputs["Emission Color"].default_value = (1, 1, 1, 1)
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    stage.mesh(corners, faces, material=shining)
+    stage.camera((0.3, 0.2, -0.1), (1.2, 0.3, 0.4), angle=1.4)
+    assert render(12, samples=8, points=8192).mean() == pytest.approx(0.5, rel=0.04)
+
+
+def test_twice_the_light_is_twice_the_picture(stage, render):
+    lamp = lamp_in_a_corner(stage)
+    once = render(3)
+    lamp.data.energy *= 2
+    np.testing.assert_allclose(render(3), 2 * once, rtol=1e-4, atol=1e-6)
+
+
+def test_a_black_thing_in_the_way_only_takes_light(stage, render):
+    lamp_in_a_corner(stage)
+    without = render(1, samples=4)
+    shelf(stage, material=stage.diffuse(0.0)).visible_camera = False
+    hidden = render(1, samples=4)
+    assert hidden.mean() < 0.97 * without.mean()
+    assert (hidden < 1.1 * without + 0.05 * without.mean()).mean() > 0.98
+
+
+def test_light_of_both_sides_of_a_sheet_is_told_apart(stage, render):
+    """A lamp above a sheet lights the floor's surroundings, not what looks at the sheet from below."""
+    stage.rectangle((-4, -4), (4, 4), 1.0, material=stage.diffuse(0.8)).visible_camera = False
+    stage.rectangle((-1, -1), (1, 1), 0.0, material=stage.diffuse(0.8))
+    stage.light("SUN", energy=10.0, angle=0.0)
+    stage.camera_above(1.0, height=0.9)
+    assert np.abs(render(1)).max() < 1e-6
+
+
+def test_error_falls_with_samples_and_with_pixels_of_the_micro_buffer(stage, render):
+    lamp_in_a_corner(stage)
+    shelf(stage, material=stage.diffuse(0.5))
+    truth = render(2, samples=32, points=8192, side=16)
+
+    def error(**params):
+        return np.sqrt(((render(2, **params) - truth) ** 2).mean()) / truth.mean()
+
+    few = error(samples=1, side=6)
+    assert error(samples=8, side=6) < 0.7 * few
+    assert error(samples=1, side=16) < 0.8 * few
+
+
+@pytest.mark.slow
+def test_a_corner_with_a_shelf_is_as_cycles_has_it(stage, render):
+    lamp_in_a_corner(stage)
+    shelf(stage, material=stage.diffuse(0.5))
+    found = render(4, samples=16, size=(32, 32), points=8192, side=16)
+    seeds = (light_paths(render_passes(stage.scene, "CYCLES", 512, s, size=(32, 32), bounces=4).images) for s in (1, 2))
+    truth = np.mean([paths["diffuse_indirect"] for paths in seeds], axis=0)
+    assert found.mean() == pytest.approx(truth.mean(), rel=0.03)
+    assert np.sqrt(((found - truth) ** 2).mean()) < 0.08 * truth.mean()
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_scene_of_any_size_looks_the_same(stage, render, scale):
+    lamp = lamp_in_a_corner(stage)
+    expected = render(2)
+    stage.enlarge(scale)
+    lamp.data.energy *= scale**2
+    found = render(2)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.01)
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.05 * expected.mean()
+
+
+def test_the_same_picture_is_drawn_again(stage, render):
+    lamp_in_a_corner(stage)
+    first = render(3)
+    engine.free_sessions()
+    np.testing.assert_array_equal(render(3), first)
+
+
+def test_trees_stay_while_cameras_and_lamps_move_and_are_made_anew_for_what_is_moved(stage, render):
+    lamp = lamp_in_a_corner(stage)
+    thing = shelf(stage, material=stage.diffuse(0.5))
+    render(2)
+    assert counters()["trees made"] == 2
+    lamp.location.z += 0.1
+    stage.scene.camera.location.x += 0.01
+    render(2)
+    assert counters()["trees kept"] == 2 and "trees made" not in counters()
+    thing.location.z -= 0.1
+    render(2)
+    assert counters()["trees made"] == 2
+
+
+def test_one_triangle_and_nothing_are_drawn(stage, render):
+    stage.mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], material=stage.diffuse(0.8))
+    stage.light("SUN")
+    stage.camera_above(4.0)
+    assert np.abs(render(2)).max() == 0.0
+    stage.clear()
+    stage.camera_above(4.0)
+    render(2)
+    assert ledger.latest().row(NAME).reason == "the scene has no surface"
+
+
+def test_the_threshold_and_the_test_of_centres_change_the_cost_and_not_the_light(stage, render):
+    sphere(stage, stage.diffuse(0.5))
+    stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)
+    for params in (
+        {"threshold": 0.1},
+        {"threshold": 4.0},
+        {"centre_test": False},
+        {"levels": 0},
+        {"groups": 16, "side": 4},
+    ):
+        # Where all is drawn as single discs, the specification knows of holes up to 6 % between so few points.
+        within = 0.06 if "threshold" in params else 0.03
+        assert render(1, **params).mean() == pytest.approx(0.25, rel=within), params
+        for name in params:
+            stage.scene.candela.property_unset(f"{NAME}_{name}")
