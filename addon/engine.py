@@ -277,7 +277,8 @@ def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
         yield
         with context.turn:
             renderer.advance(frame)
-            leash.sample()
+            if frame.samples_done < frame.settings.samples_to_draw:  # the picture is read next, which waits
+                leash.sample()
 
 
 # ------------------------------------------------------------------------------------------------------------- passes

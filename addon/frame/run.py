@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..gfx import context, images, passes
+from ..gfx.readback import Readback, Reading, put
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
@@ -40,6 +41,7 @@ from .technique import Service, Technique
 ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
 
+MOST_TEXELS = 16  # counters that are kept in an image
 FAR_BEYOND = 300.0  # by the typical distance of what is seen
 ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
 
@@ -67,7 +69,7 @@ class Frame:
     sample: int = 0  # the sample that is running
     samples_done: int = 0
     drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
-    receivers: Receivers | None = None
+    find_receivers: Callable[[], Receivers] | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
     shared_out: Bands | None = None  # for a picture that is drawn between other work
     shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
@@ -75,10 +77,14 @@ class Frame:
     needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
+    readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
     _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
     _hierarchies: dict[str, Hierarchy | None] = field(default_factory=dict)  # by path, of this frame
+    _receivers: Receivers | None = None
+    _texels: list[tuple[str, str, int]] = field(default_factory=list)  # technique, name and factor; see `count_texel`
+    _texel_sums: images.Target | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -88,6 +94,18 @@ class Frame:
     def is_first(self) -> bool:
         """Whether the first sample is running: for counters that are the same in each sample, read once."""
         return self.sample == 0
+
+    @property
+    def receivers(self) -> Receivers | None:
+        """Boxes around what the camera sees; None where no technique finds any. The first question may wait for the
+        GPU: what can be drawn before is."""
+        if self._receivers is None and self.find_receivers is not None:
+            self._receivers, self.find_receivers = self.find_receivers(), None
+        return self._receivers
+
+    def read_later(self, image: images.Image) -> Reading:
+        """Read an image of the pool, together with others, when one of them is asked for; the pool gets it back."""
+        return self.readback.later(image)
 
     @cached_property
     def emitters(self) -> list[Emitter]:
@@ -213,6 +231,53 @@ class Frame:
     def chose(self, technique: Technique, of: str, why: str) -> None:
         """Between methods, by what they cost on this device: the ledger's row says it."""
         self.choices.setdefault(technique.name, {})[of] = why
+
+    def count_texel(
+        self, technique: Technique, name: str, image: images.Image, factor: int = 1, at: tuple[int, int] = (0, 0)
+    ) -> None:
+        """Add the first number of an image's texel, times `factor`, to a counter, without reading it now: it comes with
+        the picture. Sums below 2^24 are exact."""
+        entry = (technique.name, name, factor)
+        if self._texel_sums is None:
+            self._texel_sums = images.Target((images.pool.take(MOST_TEXELS, 1, "RGBA32F"),))
+        if entry not in self._texels:
+            if len(self._texels) == MOST_TEXELS:
+                raise ValueError(f"More than {MOST_TEXELS} counters are kept in images.")
+            if not self._texels:
+                self._texel_sums.clear()
+            self._texels.append(entry)
+        put(image, self._texel_sums, self._texels.index(entry), 0, "ADDITIVE_PREMULT", (*at, 1, 1))
+
+    def read_with_counters(self, image: images.Image | None) -> np.ndarray | None:
+        """An image's pixels; what `count_texel` has counted is read with them, and added to the counters."""
+        if not self._texels:
+            return None if image is None else images.read(image)
+        sums = self._texel_sums.colors[0]
+        width = max(image.width if image else 0, sums.width)
+        height = image.height if image else 0
+        if image is not None and image.format != "RGBA32F":  # floats of another format: not worth a program
+            pixels, image, height = images.read(image), None, 0
+        else:
+            pixels = None
+        with images.borrowed(width, height + 1, "RGBA32F") as target:
+            if image is not None:
+                put(image, target, 0, 0)
+            put(sums, target, 0, height)
+            found = images.read(target.colors[0])
+        for (technique, name, factor), amount in zip(self._texels, found[height, :, 0]):
+            if amount > 0.0:  # as with `count`: what did not happen is not counted
+                row = self.counters.setdefault(technique, {})
+                row[name] = row.get(name, 0) + factor * round(float(amount))
+        self._texels.clear()
+        return found[:height, : image.width] if image is not None else pixels
+
+    def drop(self) -> None:
+        """Give back the images of the frame."""
+        self.readback.drop()
+        held = [*self.images.values(), *(self._texel_sums.colors if self._texel_sums else ())]
+        for image in held:
+            images.pool.give(image)
+        self._texel_sums = None
 
     def leave(self, technique: Technique, reason: str) -> None:
         """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
@@ -418,7 +483,12 @@ class Renderer:
         Values that are not finite become 0; the ledger counts them.
         """
         started = time.perf_counter()
-        images.finish()
+        first = next((name for name in names if name in frame.images), None)
+        if first is None:
+            frame.read_with_counters(None)
+            images.finish()
+        else:  # the wait for the GPU, with what comes of it first
+            read = frame.read_with_counters(frame.to_show(first))
         waited = time.perf_counter()
         sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
         out, bad = {}, 0
@@ -426,7 +496,7 @@ class Renderer:
             if name not in frame.images:  # no technique of the plan brings such light
                 out[name] = np.zeros((*frame.size[::-1], 4), np.float32)
                 continue
-            pixels = images.read(frame.to_show(name))
+            pixels = read if name == first else images.read(frame.to_show(name))
             finite = np.isfinite(pixels)
             if not finite.all():
                 bad += int(pixels.size - finite.sum())
@@ -482,8 +552,7 @@ class Renderer:
 
     def _drop_frame(self) -> None:
         if self.frame is not None:
-            for image in self.frame.images.values():
-                images.pool.give(image)
+            self.frame.drop()
             self.frame = None
 
     def _update_environment(self, snapshot: Snapshot) -> Environment:

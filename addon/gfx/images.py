@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from weakref import WeakKeyDictionary
+from itertools import count as counting
+from weakref import WeakKeyDictionary, ref
 
 import gpu
 import numpy as np
@@ -49,6 +51,7 @@ class Image:
     texture: gpu.types.GPUTexture
     defines: tuple[tuple[str, str], ...] = ()
     beside: dict[str, Image] = field(default_factory=dict)
+    number: int = field(default_factory=counting().__next__)  # in the order in which images were made
 
     @property
     def size(self) -> tuple[int, int]:
@@ -57,6 +60,11 @@ class Image:
     @property
     def bytes(self) -> int:
         return self.width * self.height * _BYTES[self.format]
+
+
+def channels(image_format: str) -> int:
+    """Of a format's texels."""
+    return _CHANNELS[image_format]
 
 
 def most_side() -> int:
@@ -82,9 +90,9 @@ def create(width: int, height: int, image_format: str) -> Image:
 def upload(pixels: np.ndarray, image_format: str = "RGBA32F") -> Image:
     """An image with the content of `pixels`, (H, W, channels) or (H, W) float, row 0 at the bottom."""
     height, width = pixels.shape[:2]
-    channels = pixels.shape[2] if pixels.ndim == 3 else 1
-    if channels != _CHANNELS[image_format]:
-        raise ValueError(f"{channels} channels do not fit into {image_format}.")
+    given = pixels.shape[2] if pixels.ndim == 3 else 1
+    if given != _CHANNELS[image_format]:
+        raise ValueError(f"{given} channels do not fit into {image_format}.")
     flat = np.ascontiguousarray(pixels, np.float32).ravel()
     if "16F" in image_format:
         flat = np.clip(flat, -65504.0, 65504.0)
@@ -127,16 +135,46 @@ def read(image: Image) -> np.ndarray:
     return np.array(np.frombuffer(buffer, kind)).reshape(image.height, image.width, -1)
 
 
+MOST_FRAMEBUFFERS = 32  # of one image, beside others: what was asked for least recently goes
+framebuffer_count = 0  # how many this process has made; tests assert on its growth
+
+
+class _Framebuffers:
+    """Framebuffers of a GPU context by the images that they hold. They go with any of those."""
+
+    def __init__(self):
+        self._of: WeakKeyDictionary[Image, dict[tuple, gpu.types.GPUFrameBuffer]] = WeakKeyDictionary()
+
+    def over(self, colors: tuple[Image, ...], depth: Image | None) -> gpu.types.GPUFrameBuffer:
+        """The framebuffer of these images, made when first asked for."""
+        global framebuffer_count
+        key = (*map(ref, colors), depth and ref(depth))
+        own = self._of.setdefault(colors[0] if colors else depth, {})
+        found = own.pop(key, None)
+        if found is None:
+            for gone in [known for known in own if any(one is not None and one() is None for one in known)]:
+                del own[gone]
+            while len(own) >= MOST_FRAMEBUFFERS:
+                del own[next(iter(own))]
+            slots = {"color_slots": [image.texture for image in colors]} if colors else {}
+            if depth is not None:
+                slots["depth_slot"] = depth.texture
+            found = gpu.types.GPUFrameBuffer(**slots)
+            framebuffer_count += 1
+        own[key] = found
+        return found
+
+
 # A framebuffer works in one GPU context only and must end before it. Images, programs and buffers are shared by all
 # contexts, and outlive the one of a final render, which Blender makes for each render anew.
-_lasting: WeakKeyDictionary[Target, gpu.types.GPUFrameBuffer] = WeakKeyDictionary()
+_lasting = _Framebuffers()
 _thread = threading.local()
 
 
 @contextmanager
 def passing_context():
     """For work in a GPU context that may end afterwards: framebuffers made inside are freed at the end."""
-    _thread.framebuffers = WeakKeyDictionary()
+    _thread.framebuffers = _Framebuffers()
     try:
         yield
     finally:
@@ -152,14 +190,8 @@ class Target:
 
     @property
     def framebuffer(self) -> gpu.types.GPUFrameBuffer:
-        """The attachments as an object of the current GPU context, made when first asked for."""
-        known = getattr(_thread, "framebuffers", _lasting)
-        if self not in known:
-            slots = {"color_slots": [image.texture for image in self.colors]} if self.colors else {}
-            if self.depth is not None:
-                slots["depth_slot"] = self.depth.texture
-            known[self] = gpu.types.GPUFrameBuffer(**slots)
-        return known[self]
+        """The attachments as an object of the current GPU context, made when first asked for by any target."""
+        return getattr(_thread, "framebuffers", _lasting).over(self.colors, self.depth)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -178,18 +210,19 @@ class Target:
 
 
 class Pool:
-    """Images by size and format, given back after use and handed out again."""
+    """Images by size and format, given back after use and handed out again, the oldest first: frames that ask for the
+    same images in the same order get the same ones, and so the framebuffers that were made of them."""
 
     def __init__(self):
-        # By size and format, each with the picture in which it was given back, the latest last.
-        self._free: dict[tuple[int, int, str], list[tuple[Image, int]]] = {}
+        # By size and format, the oldest first, with the number of the picture in which it was given back.
+        self._free: dict[tuple[int, int, str], list[tuple[int, Image, int]]] = {}
         self.allocated_bytes = 0
 
     def take(self, width: int, height: int, image_format: str) -> Image:
         """An image with undefined content."""
         stock = self._free.get((width, height, image_format))
         if stock:
-            return stock.pop()[0]
+            return heapq.heappop(stock)[1]
         image = create(width, height, image_format)
         self.allocated_bytes += image.bytes
         return image
@@ -197,7 +230,7 @@ class Pool:
     def give(self, image: Image) -> None:
         image.beside = {}
         stock = self._free.setdefault((image.width, image.height, image.format), [])
-        stock.append((image, context.pictures))
+        heapq.heappush(stock, (image.number, image, context.pictures))
 
     def trim(self) -> None:
         """Free all images that nobody holds."""
@@ -209,8 +242,9 @@ class Pool:
 
     def _free_before(self, picture: int) -> None:
         for key, stock in list(self._free.items()):
-            self._free[key] = [one for one in stock if one[1] >= picture]
-            self.allocated_bytes -= sum(image.bytes for image, given in stock if given < picture)
+            self.allocated_bytes -= sum(image.bytes for _, image, given in stock if given < picture)
+            self._free[key] = [one for one in stock if one[2] >= picture]
+            heapq.heapify(self._free[key])
             if not self._free[key]:
                 del self._free[key]
 

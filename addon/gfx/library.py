@@ -30,7 +30,8 @@ _ERROR_LINE = re.compile(r"(?:python_shader\.glsl|\|\s*):(\d+)(?::\d+)?:\s*(.*)"
 _QUOTED_LINE = re.compile(r"^\s*\d+ \| (.*\S)")
 
 # Types of a texture: the format of its texels, or, where that is not known beforehand, only what they are read as.
-_FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D") | {"RGBA32UI": "UINT_2D"}
+_FORMATS = dict.fromkeys(("RGBA32F", "RG32F", "R32F", "RGBA16F"), "FLOAT_2D")
+_FORMATS |= dict.fromkeys(("RGBA32UI", "R32UI"), "UINT_2D")
 _SAMPLERS = {"FLOAT_2D", "UINT_2D", "INT_2D", "DEPTH_2D", *_FORMATS}
 MOST_TEXTURES = 16  # of a program
 _MOST_IMAGES = 8  # that Blender binds at once
@@ -90,6 +91,15 @@ class Program:
 
     def __hash__(self) -> int:
         return self._hash
+
+    def __hash__(self) -> int:
+        """Of all fields, found once: programs are looked up at each draw, and hold sources."""
+        known = self.__dict__.get("_hash")
+        if known is None:
+            known = hash((self.name, self.vertex, self.fragment, self.compute, self.textures, self.constants,
+                          self.defines, self.outputs, tuple(name for name, _ in self.snippets)))  # fmt: skip
+            object.__setattr__(self, "_hash", known)
+        return known
 
     @property
     def loaded(self) -> tuple[str, ...]:
@@ -162,6 +172,16 @@ class Shader:
         for name, image in images.items():
             _set(shader.image, name, image.texture)
         for name, value in constants.items():
+            self.set_constant(name, value)
+
+    def change(self, textures=None, blocks=None, constants=None) -> None:
+        """Bind some of what `bind` has bound anew, between draws."""
+        for name, block in (blocks or {}).items():
+            _set(self.handle.uniform_block, name, block.buffer)
+        for name, image in (textures or {}).items():
+            setter = self.handle.image if name in self._loaded else self.handle.uniform_sampler
+            _set(setter, name, image.texture)
+        for name, value in (constants or {}).items():
             self.set_constant(name, value)
 
     def set_constant(self, name: str, value) -> None:

@@ -72,6 +72,12 @@ def draw(shader: Shader, batch: Batch, instances: int = 1) -> None:
     batch.handle.draw_instanced(shader.handle, instance_start=0, instance_count=instances)
 
 
+def draw_screen(shader: Shader) -> None:
+    """Draw a triangle over the whole viewport with the bound shader, whose inputs are FULLSCREEN_INPUTS. Only inside
+    `drawing`."""
+    _fullscreen_batch().draw(shader.handle)
+
+
 def draw_range(shader: Shader, batch: Batch, first: int, count: int) -> None:
     """Draw `count` triangles of a batch from the `first` on. Only inside `drawing`."""
     batch.handle.draw_range(shader.handle, elem_start=3 * first, elem_count=3 * count)

@@ -309,7 +309,7 @@ def draw_views(
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What has not moved since the first sample is worth being written out; a view that turns finds it so.
     resting = geometry.resting_casters(make=sample > 0 and lasting)
-    boxes, alpha_boxes = Boxes.of(geometry.opaque_casters), Boxes.of(alpha.draws)
+    boxes, alpha_boxes = geometry.caster_boxes, Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
     for view, (x, y, side) in zip(views, cells):
         sent = 0

@@ -18,7 +18,6 @@ import numpy as np
 from ..frame.run import Frame
 from ..gfx import device
 from ..gfx.device import milliseconds
-from ..scene.culling import Boxes
 from .depth_maps import MapView
 
 REPEATED = 0.15  # share of the pixels in which light is asked again for another point of the film, as rays cost there
@@ -57,8 +56,7 @@ def maps_ns(drawn: float, texels: float, views: int) -> float:
 
 def compared(frame: Frame, views: list[MapView], resolution: int, repeats: int) -> Compared:
     """A ray of each pixel beside these views of a light, drawn with `resolution`."""
-    boxes = Boxes.of(frame.geometry.opaque_casters)
-    triangles = np.array([draw.triangles for draw in frame.geometry.opaque_casters], float)
+    boxes, triangles = frame.geometry.caster_boxes, frame.geometry.caster_triangles
     drawn = sum(float(triangles[boxes.seen(view.rows, view.least_q)].sum()) for view in views)
     texels = sum((resolution // view.scale) ** 2 for view in views)
     width, height = frame.size

@@ -33,7 +33,8 @@ lobe together: the energy that is seen is right, and only among those who see it
 |---|---|
 | candidates | 1152, or 4 N if that is more |
 | rays | 2 per bounce + 19 for each candidate, then 192 for the density of each virtual light |
-| readback | 160 bytes per candidate, 768 per virtual light |
+| passes | 16 in all, most of them over the candidates alone (lighting/light_choice.py) |
+| readback | none; how many are kept is counted in an image |
 
 Bias, in diffuse and glossy indirect light:
 
@@ -52,7 +53,7 @@ Bias, in diffuse and glossy indirect light:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -61,7 +62,7 @@ from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block
-from ..kernels.morton import BITS, morton_codes
+from ..kernels import ordered_lists
 from ..materials.compiler import may_emit
 from ..scene import acceleration
 from ..scene.view import VIEW
@@ -70,6 +71,7 @@ from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 from .caustic_casters import answered
 from .emissive_triangles import EmissiveTriangles
+from .light_choice import GROUP, Choice, seen_middle
 from .media import MediaService, attenuated
 
 PROBES, DRAFT_PROBES = (16, 12), (12, 8)
@@ -78,11 +80,6 @@ CHOICE = 4  # candidates at least, for each virtual light that is kept
 NEAR = 0.1  # the bound of 128 virtual lights, in median distances of what is seen
 LAMP_POINTS = 16  # on all lamps, which the paths of a sample look for
 OTHER_POINTS = (32, 24)  # of emissive surfaces and of the world: of one of them, or of each of both
-GROUP = 16  # candidates that share the next surfaces of their paths
-FLOOR = 1.0  # share of the mean importance that every candidate keeps
-CELL = 8  # virtual lights of a cell in which they are chosen by themselves
-FEW = 2048  # at least, of the lights of a cell times all of them
-MOST_VIRTUAL = 2048
 
 PATH_TEXTURES = (
     *acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "reflectance"),
@@ -119,7 +116,7 @@ CANDIDATES = tuple(candidates_program(kinds) for kinds in (-1, 0))
 DENSITY = passes.fullscreen_program(
     "virtual light density",
     "indirect/density.frag.glsl",
-    textures=(*PATH_TEXTURES, ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"), ("R32F", "kept")),
+    textures=(*PATH_TEXTURES, ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"), ("RGBA32F", "slots")),
     blocks=PATH_BLOCKS,
     constants=(*PATH_CONSTANTS, *PROBE_CONSTANTS),
     outputs=(("FLOAT", "out_density"),),
@@ -129,12 +126,27 @@ PAIRS = passes.fullscreen_program(
     "indirect/pairs.frag.glsl",
     textures=(
         *PATH_TEXTURES, ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"), ("RGBA32F", "next_point"),
-        ("RGBA32F", "next_radiance"), ("R32F", "grouped"),
+        ("RGBA32F", "next_radiance"), ("R32UI", "sorted_order"),
     ),
     blocks=PATH_BLOCKS,
-    constants=(*PATH_CONSTANTS, ("INT", "rays")),
-    defines=(("GROUP", str(GROUP)),),
+    constants=(*PATH_CONSTANTS, ("INT", "rays"), ("INT", "candidate_count")),
+    defines=(*ordered_lists.DEFINES, ("GROUP", str(GROUP))),
     outputs=(("FLOAT", "out_density"),),
+)  # fmt: skip
+
+LIGHTS = passes.fullscreen_program(
+    "virtual lights",
+    "indirect/choice_lights.frag.glsl",
+    textures=(
+        ("RGBA32F", "slots"), ("RGBA32F", "candidate_point"), ("RGBA32F", "candidate_normal"),
+        ("RGBA32F", "radiances"), ("R32F", "densities"),
+    ),
+    constants=(
+        ("INT", "rays"), ("INT", "candidate_count"), ("VEC4", "seen_middle"), ("INT", "probe_count"),
+        ("FLOAT", "total_samples"),
+    ),
+    defines=ordered_lists.DEFINES,
+    outputs=(("VEC4", "out_light"),),
 )  # fmt: skip
 
 
@@ -162,18 +174,23 @@ class BoundGather:
 TRACED = Gather("rays", "indirect/traced_gather.glsl", constants=(("INT", "rays"),))
 
 
-@dataclass(frozen=True)
+@dataclass
 class VirtualLightSet:
-    """The virtual lights of one sample, as arrays and as the image that shaders/indirect/lights.glsl reads."""
+    """The virtual lights of one sample: the image that shaders/indirect/lights.glsl reads, a column each. Some of them
+    at the end have no light."""
 
-    positions: np.ndarray  # (N, 3) relative to the render origin
-    normals: np.ndarray  # (N, 3) unit; a virtual light shines to this side, Lambertian
-    intensities: np.ndarray  # (N, 3) along the normal, W/sr
-    footprints: np.ndarray  # (N,) least squared distance, m2, at which it stands for its area
     image: images.Image
+    wanted: int
 
     def __len__(self) -> int:
-        return len(self.positions)
+        """Columns."""
+        return self.image.width
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(3, N, 4) those with light, as they stand in the image. Waits for the GPU."""
+        found = images.read(self.image).astype(np.float64)
+        return found[:, found[0, :, 3] > 0]
 
 
 class VirtualLights:
@@ -185,33 +202,50 @@ class VirtualLights:
         self._source_block: Block | None = None
         self._source_count = 0
         self._emissive: EmissiveTriangles | None = None
+        self._image: images.Image | None = None
         self.kinds = 0  # of the sources, as bits
 
     def make(self, frame: Frame, technique, count: int) -> VirtualLightSet:
         """About `count` virtual lights for this sample. Counts rays in the technique's ledger row."""
         self.draw_sources(frame)
         grid = Grid.of(frame, count)
-        found = self._candidates(frame, grid)
-        point, normal, radiance, shorter = self._radiances(frame, grid, found)
-        keep, weight = _resample(point, radiance, count, frame.random("virtual lights/keep")[0])
-        density = self._densities(frame, grid, found, keep)
-        for image in found.colors:
-            images.pool.give(image)
-        keep, weight = keep[density > 0], (weight[density > 0] / density[density > 0])
         candidates = grid.count * grid.rays
+        choice = Choice(grid.rays, candidates, seen_middle(frame))
+        found = self._candidates(frame, grid)
+        held = [*found.values()]
+        try:
+            order = choice.order(found["candidate_point"], found["candidate_normal"])
+            pairs = None
+            if frame.settings.bounces > 1 and not frame.settings.draft:
+                pairs = self._pairs(frame, grid, found, order)
+                held.append(pairs)
+            radiances = choice.radiances(found, pairs)
+            slots, kept_before = choice.keep(count, frame.random("virtual lights/keep")[0])
+            densities = self._densities(frame, grid, found, slots)
+            held.append(densities)
+            self._make_image(frame, grid, {**found, "slots": slots, "radiances": radiances, "densities": densities})
+            frame.count_texel(technique, "virtual lights", kept_before, at=choice.last)
+            frame.count_texel(technique, "density rays", kept_before, grid.count, at=choice.last)
+        finally:
+            for image in held:
+                images.pool.give(image)
+            choice.release()
         frame.count(technique, "path rays", candidates * (4 + 2 * frame.settings.bounces))
-        frame.count(technique, "density rays", len(density) * grid.count)
-        intensity = radiance[keep] * weight[:, None]
-        footprints = lights.footprint(weight, frame.settings.samples)
-        packed = np.zeros((3, max(len(keep), 1), 4), np.float32)
-        if len(keep):
-            packed[0, :, :3], packed[1, :, :3], packed[2, :, :3] = point[keep], normal[keep], intensity
-            whole = np.abs(radiance[keep]) @ lights.LUMINANCE
-            packed[0, :, 3] = np.abs(intensity) @ lights.LUMINANCE
-            packed[2, :, 3] = footprints
-            packed[1, :, 3] = shorter[keep] / np.maximum(whole, 1e-300)
-        frame.count(technique, "virtual lights", len(keep))
-        return VirtualLightSet(point[keep], normal[keep], intensity, footprints, images.upload_varying(packed))
+        return VirtualLightSet(self._image, count)
+
+    def _make_image(self, frame: Frame, grid: Grid, textures: dict[str, images.Image]) -> None:
+        size = textures["slots"].width, 3
+        if self._image is None or self._image.size != size:
+            self._give()
+            self._image = images.pool.take(*size, "RGBA32F")
+        passes.fullscreen(
+            LIGHTS, images.Target((self._image,)),
+            textures={name: textures[name] for _, name in LIGHTS.textures},
+            constants={
+                "rays": grid.rays, "candidate_count": grid.count * grid.rays, "seen_middle": (0.0, 0.0, 0.0, 0.0),
+                "probe_count": grid.count, "total_samples": float(frame.settings.samples),
+            },
+        )  # fmt: skip
 
     def draw_sources(self, frame: Frame) -> None:
         """Points on light sources for this sample's paths, and what materials reflect: what `path_bindings` needs."""
@@ -293,8 +327,8 @@ class VirtualLights:
         bindings["constants"] |= {"probes": grid.probes, "rays": grid.rays}
         return bindings
 
-    def _candidates(self, frame: Frame, grid: Grid) -> images.Target:
-        """FOUND, a row per probe."""
+    def _candidates(self, frame: Frame, grid: Grid) -> dict[str, images.Image]:
+        """Images of the pool by the names of FOUND, a row per probe."""
         size = (grid.rays, grid.count)
         found = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in FOUND))
         program, bindings, media = (
@@ -306,67 +340,39 @@ class VirtualLights:
             program = attenuated(program)
             bindings["textures"] |= media.bindings
         passes.fullscreen(program, found, **bindings)
-        return found
+        return {name if "next" in name else f"candidate_{name}": image for name, image in zip(FOUND, found.colors)}
 
-    def _radiances(self, frame: Frame, grid: Grid, found: images.Target) -> tuple[np.ndarray, ...]:
-        """Points, normals and radiances (N, 3) of all candidates, and luminances (N,) of what was reflected at least
-        once less than allowed. Candidates share what their paths met next: `_shared`."""
-        point, normal, radiance, albedo, _, later = (
-            images.read(image).reshape(-1, 4).astype(np.float64) for image in found.colors
-        )
-        later[:, 3] = albedo[:, 3]
-        later[~np.isfinite(later).all(axis=1)] = 0.0
-        if frame.settings.bounces > 1 and not frame.settings.draft:
-            later = self._shared(frame, grid, found, point, normal[:, :3], later)
-        reflected = albedo[:, :3] * later[:, :3]
-        # Of light of any colour on a surface of any: luminances of factors do not multiply.
-        part = later[:, 3] / np.maximum(np.abs(later[:, :3]) @ lights.LUMINANCE, 1e-300)
-        shorter = radiance[:, 3] + part * (np.abs(reflected) @ lights.LUMINANCE)
-        return point[:, :3], normal[:, :3], radiance[:, :3] + reflected, shorter
-
-    def _shared(self, frame: Frame, grid: Grid, found: images.Target, point, normal, later: np.ndarray) -> np.ndarray:
-        """`later` (N, C), what each candidate's path brings per albedo, from the paths of all GROUP candidates that
-        stand beside each other and face alike, by the balance heuristic."""
-        there = np.flatnonzero(point[:, 3])
-        if not len(there):
-            return later
-        axis = np.abs(normal[there]).argmax(axis=1)
-        side = 2 * axis + (normal[there, axis] < 0)
-        groups = np.full((-(-len(there) // GROUP), GROUP), -1)
-        groups.reshape(-1)[: len(there)] = there[np.lexsort((morton_codes(point[there, :3]), side))]
+    def _pairs(self, frame: Frame, grid: Grid, found: dict[str, images.Image], order: images.Image) -> images.Image:
+        """How densely each candidate of a group (row) draws directions to what each of them (column) met next."""
         bindings = self.path_bindings(frame)
-        bindings["constants"]["rays"] = grid.rays
-        bindings["textures"] |= {
-            "candidate_point": found.colors[0], "candidate_normal": found.colors[1], "next_point": found.colors[4],
-            "next_radiance": found.colors[5], "grouped": images.upload_varying(groups.astype(np.float32), "R32F"),
-        }  # fmt: skip
-        with images.borrowed(GROUP, groups.size, "R32F") as target:
-            passes.fullscreen(PAIRS, target, **bindings)
-            density = images.read(target.colors[0]).astype(np.float64).reshape(-1, GROUP, GROUP)
-        share = density / np.maximum(density.sum(axis=1, keepdims=True), 1e-300)
-        shared = later.copy()
-        members = groups >= 0
-        shared[groups[members]] = (share @ np.where(members[..., None], later[groups], 0.0))[members]
-        return shared
+        count = grid.count * grid.rays
+        bindings["constants"] |= {"rays": grid.rays, "candidate_count": count}
+        names = ("candidate_point", "candidate_normal", "next_point", "next_radiance")
+        bindings["textures"] |= {name: found[name] for name in names} | {"sorted_order": order}
+        pairs = images.pool.take(GROUP, order.width * order.height, "R32F")
+        passes.fullscreen(PAIRS, images.Target((pairs,)), rows=(0, count), **bindings)
+        return pairs
 
-    def _densities(self, frame: Frame, grid: Grid, found: images.Target, keep: np.ndarray) -> np.ndarray:
-        """(N,) how many rays of all probes fall on a square metre around each candidate that is kept."""
-        if not len(keep):
-            return np.zeros(0)
+    def _densities(
+        self, frame: Frame, grid: Grid, found: dict[str, images.Image], slots: images.Image
+    ) -> images.Image:  # fmt: skip
+        """How many rays of each probe (row) fall on a square metre around each candidate that is kept (column)."""
         bindings = self._probing(frame, grid)
-        kept = np.zeros((1, MOST_VIRTUAL), np.float32)
-        kept[0, : len(keep)] = keep
-        bindings["textures"] |= {
-            "candidate_point": found.colors[0], "candidate_normal": found.colors[1],
-            "kept": images.upload(kept, "R32F"),
-        }  # fmt: skip
-        with images.borrowed(len(keep), grid.count, "R32F") as target:
-            passes.fullscreen(DENSITY, target, **bindings)
-            return images.read(target.colors[0])[..., 0].astype(np.float64).sum(axis=0)
+        names = ("candidate_point", "candidate_normal")
+        bindings["textures"] |= {name: found[name] for name in names} | {"slots": slots}
+        densities = images.pool.take(slots.width, grid.count, "R32F")
+        passes.fullscreen(DENSITY, images.Target((densities,)), **bindings)
+        return densities
+
+    def _give(self) -> None:
+        if self._image is not None:
+            images.pool.give(self._image)
+        self._image = None
 
     def release(self) -> None:
         self._sources.release()
         self._source_block = self._emissive = None
+        self._give()
 
 
 @dataclass(frozen=True)
@@ -392,55 +398,3 @@ class Grid:
 def near_radius(frame: Frame, count: int) -> float:
     """Distance below which `count` virtual lights leave light to short rays, m: in proportion to their spacing."""
     return NEAR * float(np.sqrt(128 / max(count, 1)) * frame.typical_distance)
-
-
-def _resample(point: np.ndarray, radiance: np.ndarray, count: int, u: float) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the candidates that are kept, in an order in space, and how many candidates each stands for.
-
-    Marks at equal steps of the importance run along a curve through space, so that what is kept is spread over the
-    surfaces as evenly as the candidates allow. They start anew in every cell of an octree that holds no more than
-    CELL of them: a candidate that another picture has or lacks then changes what is kept nearby, not all that is kept.
-    Few have larger cells: each cell keeps one more or less than it should, which shows in the sum of few.
-    """
-    importance = np.abs(np.nan_to_num(radiance, posinf=0.0, neginf=0.0)) @ lights.LUMINANCE
-    if not importance.sum() > 0:
-        return np.zeros(0, int), np.zeros(0)
-    importance = np.where(importance > 0, importance + FLOOR * importance.mean(), 0.0)
-    expected = importance / importance.sum() * count
-    codes = morton_codes(point, _round_bounds(point))
-    order = np.argsort(codes, kind="stable")
-    first, start = _cells(codes[order], expected[order], max(CELL, FEW / count))
-    sums = np.concatenate([[0.0], np.cumsum(expected[order])])
-    lengths = np.diff(np.append(first, len(order)))
-    along = sums[1:] - np.repeat(sums[first], lengths) + np.repeat((u + start) % 1.0, lengths)
-    before = np.concatenate([[0.0], along[:-1]])
-    before[first] = (u + start) % 1.0
-    times = np.floor(along).astype(int) - np.floor(before).astype(int)
-    place = np.flatnonzero(times)
-    keep = order[place]
-    return keep, times[place] / expected[keep]
-
-
-def _round_bounds(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of points that others of about the same bounds have, too."""
-    low, high = point.min(axis=0), point.max(axis=0)
-    side = 2.0 ** np.ceil(np.log2(max(float((high - low).max()), 1e-30)))
-    low = np.floor(low / side) * side
-    return low, low + 2.0 * side
-
-
-def _cells(codes: np.ndarray, expected: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where, among sorted codes, each cell of an octree begins that holds at most `most` expected; and a number for it
-    that the cell beside it makes up for: the bits of its place in reverse."""
-    cell, place = np.zeros(len(codes), np.uint64), np.zeros(len(codes), np.uint64)
-    for depth in range(1, BITS // 3 + 1):
-        first = np.concatenate([[0], np.flatnonzero(np.diff(cell)) + 1])
-        full = np.repeat(np.add.reduceat(expected, first) > most, np.diff(np.append(first, len(codes))))
-        if not full.any():
-            break
-        shift = np.uint64(BITS - 3 * depth)
-        cell = np.where(full, codes >> shift << shift, cell)
-        place = np.where(full, codes >> shift, place)
-    first = np.concatenate([[0], np.flatnonzero(np.diff(cell)) + 1])
-    bits = (place[first, None] >> np.arange(12, dtype=np.uint64)) & np.uint64(1)
-    return first, bits @ 0.5 ** np.arange(1, 13)

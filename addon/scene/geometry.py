@@ -21,7 +21,7 @@ from ..kernels.morton import morton_codes
 from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from . import casters
-from .culling import closed
+from .culling import Boxes, closed
 from .envelope import normal_envelope
 
 LARGE, STEPS = 256.0, 16  # m: scenes beyond it are cut into so many places for the origin
@@ -80,6 +80,8 @@ class SceneGeometry:
         self.instances: images.Image | None = None
         self.draws: list[Draw] = []  # by material, corner attributes: surfaces, and casters with alpha
         self.opaque_casters: list[Draw] = []  # positions only, materials ignored
+        self.boxes = self.caster_boxes = Boxes.of([])  # of the draws, and of the opaque casters
+        self.caster_triangles = np.zeros(0)  # of each opaque caster
         # Instances with triangles, by their rows in `instances`; meshes; materials.
         self.placed: tuple[list[Instance], dict[str, Mesh], list[CompiledMaterial]] = ([], {}, [])
         self.changes = 0  # updates that changed anything: what was drawn of the same number still stands
@@ -291,6 +293,8 @@ class SceneGeometry:
                 self.opaque_casters.append(Draw(material, batch, first, count, low, high, one_sided))
             else:
                 self.draws.append(Draw(material, batch, first, count, low, high))
+        self.boxes, self.caster_boxes = Boxes.of(self.draws), Boxes.of(self.opaque_casters)
+        self.caster_triangles = np.array([draw.triangles for draw in self.opaque_casters], float)
 
     def _shells(self, instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial]):
         """(N,) whether an instance is opaque all over and its mesh bounds a volume."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import wraps
 
 import numpy as np
 
@@ -35,6 +37,7 @@ CAMERA_DEFINES = (
     ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
     ("VISIBILITY_FLAG", "film_view.visibility"),
 )
+MOST_DECLARED = 4096  # materials whose programs are remembered
 SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
 
 
@@ -260,6 +263,23 @@ def _shared(compiled: CompiledMaterial) -> dict:
     }  # fmt: skip
 
 
+def _once(make: Callable[[CompiledMaterial], Program]) -> Callable[[CompiledMaterial], Program]:
+    """Declare the program of a compiled material once: it is asked for at each draw."""
+    made: dict[int, tuple[CompiledMaterial, Program]] = {}
+
+    @wraps(make)
+    def program(compiled: CompiledMaterial) -> Program:
+        known = made.get(id(compiled))
+        if known is None or known[0] is not compiled:
+            if len(made) >= MOST_DECLARED:
+                made.clear()
+            known = made[id(compiled)] = (compiled, make(compiled))
+        return known[1]
+
+    return program
+
+
+@_once
 def _surface_program(compiled: CompiledMaterial) -> Program:
     return Program(
         name=f"surface {compiled.program_key[:8]}",
@@ -282,6 +302,7 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+@_once
 def _lobe_program(compiled: CompiledMaterial) -> Program:
     like = _surface_program(compiled)
     return replace(
@@ -302,6 +323,7 @@ def _own_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     return (("OWN_SURFACE", ""),) if compiled.own_surface else ()
 
 
+@_once
 def _tint_program(compiled: CompiledMaterial) -> Program:
     shared = _shared(compiled)
     return Program(
@@ -323,6 +345,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
 SCATTER_IMAGES = ("length", "share", "entry")  # layout: shaders/subsurface/image.glsl
 
 
+@_once
 def _scatter_program(compiled: CompiledMaterial) -> Program:
     like = _tint_program(compiled)
     return replace(
@@ -335,6 +358,7 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+@_once
 def _glow_program(compiled: CompiledMaterial) -> Program:
     return replace(
         _tint_program(compiled),
@@ -345,6 +369,7 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+@_once
 def _caster_program(compiled: CompiledMaterial) -> Program:
     return Program(
         name=f"alpha caster {compiled.program_key[:8]}",

@@ -11,7 +11,7 @@ from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
-from ..scene.culling import Boxes, calls
+from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES
 
 STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
@@ -148,7 +148,7 @@ def _submit(
     """Draw what a view (None: the camera) may see of `materials` (None: of all), each with its own program. `indices`:
     by material, what is shown instead of where surfaces lie."""
     rows = frame.view_rows if rows is None else rows
-    seen = np.flatnonzero(Boxes.of(frame.geometry.draws).seen(rows))
+    seen = np.flatnonzero(frame.geometry.boxes.seen(rows))
     material = None
     stand_ins = frame.shared(StandIns).of if program_of == frame.materials.surface_program else {}
     unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}

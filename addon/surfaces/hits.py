@@ -7,6 +7,11 @@ procedurals, bumps, vertex colours, emission, alpha) into six images as those of
 trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
 reads surface images (lighting, indirect light) then reads hits.
 
+The first picture asks which materials were met, by a flag for each, and compiles their programs alone. Asking stops the
+queue, so where rays can meet no more than MOST_UNASKED, later pictures compile the rest (in a viewport one each) and
+then draw all of them without asking; the vertices of one that was not met leave the screen, by the same flags. Scenes
+of more materials ask in each round.
+
 Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
 of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
 attributes by that number, made when it is first met. Derivatives are those of the ray's footprint, for bumps.
@@ -16,11 +21,12 @@ attributes by that number, made when it is first met. Derivatives are those of t
 | cost | per round of rays |
 |---|---|
 | passes | 1 trace, 1 that flags the materials met, 1 for each of those |
-| readback | one flag for each material of the scene |
+| draws that end at their vertices | 1 for each other material that rays can meet; with many materials none |
+| readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
 
-A material that no ray meets costs nothing. One with more than MOST_IMAGES images is its mean reflectance instead.
+One with more than MOST_IMAGES images is its mean reflectance instead.
 
 Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
 Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits.
@@ -28,6 +34,7 @@ Images have no mip levels: footprints filter bumps, not textures. Normals of cor
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -48,6 +55,7 @@ from .draw import refracts
 from .reflectance import Reflectance
 
 MOST_IMAGES = 9  # of a material: 16 textures less those of records
+MOST_UNASKED = 64  # materials that are all evaluated, without a readback that tells which were met
 MOST_MATERIALS = 8000  # that depth tells apart, see trace.frag.glsl
 ROW = 256  # of lists by material
 RECORDS = ("place", "triangle", "normals", "passed")
@@ -70,6 +78,10 @@ MATERIALS_MET = Program(
     textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material")),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
+COUNT_MET = passes.fullscreen_program(
+    "number of materials met", "hits/met_count.frag.glsl", textures=(("R32UI", "materials_met"),),
+    constants=(("INT", "material_count"),), outputs=(("FLOAT", "out_count"),),
+)  # fmt: skip
 PLACE = passes.fullscreen_program(
     "points as hits",
     "hits/place.frag.glsl",
@@ -99,6 +111,10 @@ def depth_of(material: int) -> float:
     return 0.5 + (material + 1) / 16384
 
 
+def _program_key(compiled: CompiledMaterial) -> str:
+    return MEAN.name if len(compiled.images) > MOST_IMAGES else compiled.program_key
+
+
 def hit_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a material where rays met it."""
     if compiled.program_key not in _programs:
@@ -110,17 +126,21 @@ def hit_program(compiled: CompiledMaterial) -> Program:
 
 def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
+    room = len(compiled.images) + len(listed) < MOST_IMAGES + 1
     return Program(
         name=f"hits {compiled.program_key[:8]}",
         fragment="hits/surface.frag.glsl",
         textures=(
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
             *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *((("UINT_2D", "materials_met"),) if room else ()),
         ),
         blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth")),
+        constants=(
+            ("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth"), ("INT", "material_number"),
+        ),
         snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
-        **MASKED,
+        **{**MASKED, "defines": (*MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()))},
     )  # fmt: skip
 
 
@@ -155,12 +175,14 @@ class Records:
     """What rays of a round met: RECORDS, the number of the material, and that as depth."""
 
     target: images.Target
+    met: images.Image  # by material, in rows of ROW: 1 if any ray has met it
 
     @classmethod
     def take(cls, size: tuple[int, int]) -> Records:
         """Images of the pool, undefined."""
         colors = [images.pool.take(*size, "RGBA32F") for _ in RECORDS] + [images.pool.take(*size, "R32F")]
-        return cls(images.Target(tuple(colors), images.pool.take(*size, "DEPTH_COMPONENT32F")))
+        met = images.pool.take(ROW, -(-MOST_MATERIALS // ROW), "R32UI")
+        return cls(images.Target(tuple(colors), images.pool.take(*size, "DEPTH_COMPONENT32F")), met)
 
     @property
     def images(self) -> dict[str, images.Image]:
@@ -168,7 +190,7 @@ class Records:
 
     def give(self) -> None:
         """Back to the pool."""
-        for image in (*self.target.colors, self.target.depth):
+        for image in (*self.target.colors, self.target.depth, self.met):
             images.pool.give(image)
 
 
@@ -201,13 +223,17 @@ class Hits:
         self._numbers_key: object = None
         self._attributes: dict[int, tuple[object, images.Image]] = {}
         self._absorption: tuple[object, images.Image] | None = None
+        self._possible: tuple[object, set[int]] | None = None
+        self._compiled: set[str] = set()  # keys of programs that have been drawn with
+        self._asked: weakref.ref[Frame] | None = None  # the first picture
+        self._ahead: object = None  # the view of the last picture that compiled a program ahead
 
     def trace(
         self, frame: Frame, technique: Technique, rays: tuple[images.Image, images.Image], records: Records,
         path: str = "glossy", number: int = 0,
     ) -> set[int]:  # fmt: skip
         """Follow rays (RGBA32F origin, w: width of the footprint, m; unit direction, 0: no ray) of a path to what
-        they meet, and return the materials there. `number` below 20 tells rounds of a sample apart."""
+        they meet, and return the materials that may be there. `number` below 20 tells rounds of a sample apart."""
         hierarchy = frame.hierarchy(path)
         owners = self._owners_of(frame, hierarchy)
         passes.fullscreen(
@@ -224,7 +250,7 @@ class Hits:
             },
         )  # fmt: skip
         frame.count(technique, "passes")
-        return self._met(frame, records)
+        return self._to_shade(frame, hierarchy, records, path)
 
     def place(
         self, frame: Frame, technique: Technique, points: tuple[images.Image, ...], records: Records
@@ -234,7 +260,8 @@ class Hits:
         names = (name for _, name in PLACE.textures)
         passes.fullscreen(PLACE, records.target, textures=dict(zip(names, points)))
         frame.count(technique, "passes")
-        return self._met(frame, records)
+        self._flag_met(frame, records)
+        return set(np.flatnonzero(images.read(records.met)).tolist())
 
     def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
         """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
@@ -248,28 +275,82 @@ class Hits:
     ) -> None:  # fmt: skip
         """Evaluate these materials at the records into `closures` (take_closures), which is cleared before."""
         images.Target(closures.colors).clear()
-        shared = {f"hit_{name}": records.images[f"hit_{name}"] for name in RECORDS[:3]}
+        found = records.images
+        shared = {f"hit_{name}": found[f"hit_{name}"] for name in RECORDS[:3]}
         shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
-        for material in sorted(materials):
-            compiled = frame.materials.compiled[material]
-            constants: dict[str, object] = {"material_depth": depth_of(material)}
-            if len(compiled.images) > MOST_IMAGES:
-                program, blocks = MEAN, {}
-                textures = shared | {"reflectance": self._mean_reflectance(frame)}
-                constants["material_number"] = material
-            else:
-                program = hit_program(compiled)
-                bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
-                textures, blocks = shared | bound["textures"], bound["blocks"]
-                if compiled.attributes:
-                    textures["hit_attributes"] = self._attributes_of(material, compiled)
-                constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}
-            passes.fullscreen(
-                program, closures, where="EQUAL", textures=textures,
-                blocks={**blocks, "film_view": frame.view_block}, constants=constants,
-            )  # fmt: skip
-            frame.count(technique, "materials")
-            frame.count(technique, "passes")
+        view, shader = {"film_view": frame.view_block}, None
+        with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
+            # One program after the other: between materials that share one, only what differs is bound.
+            for material in sorted(materials, key=lambda k: (_program_key(frame.materials.compiled[k]), k)):
+                program, own = self._own_bindings(frame, material, number)
+                if program.textures and ("UINT_2D", "materials_met") in program.textures:
+                    own["textures"]["materials_met"] = records.met
+                wanted = passes.get_for(program, own["textures"])
+                if wanted is shader:
+                    shader.change(**own)
+                else:
+                    shader = wanted
+                    textures, blocks = own["textures"] | shared, own["blocks"] | view
+                    shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
+                passes.draw_screen(shader)
+                self._compiled.add(_program_key(frame.materials.compiled[material]))
+        with images.borrowed(1, 1, "R32F") as count:
+            number_of_all = {"material_count": len(frame.materials.compiled)}
+            passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
+            frame.count_texel(technique, "materials", count.colors[0])
+        frame.count(technique, "passes", len(materials) + 1)
+
+    def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
+        """The program of a material, and what it binds besides records, rays, instances and the view."""
+        compiled = frame.materials.compiled[material]
+        constants: dict[str, object] = {"material_depth": depth_of(material), "material_number": material}
+        if len(compiled.images) > MOST_IMAGES:
+            textures = {"reflectance": self._mean_reflectance(frame)}
+            return MEAN, {"textures": textures, "blocks": {}, "constants": constants}
+        bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
+        textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
+        if compiled.attributes:
+            textures["hit_attributes"] = self._attributes_of(material, compiled)
+        constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}
+        return hit_program(compiled), {"textures": textures, "blocks": bound["blocks"], "constants": constants}
+
+    # What is shaded ---------------------------------------------------------------------------------------------------
+
+    def _to_shade(self, frame: Frame, hierarchy: Hierarchy, records: Records, path: str) -> set[int]:
+        """Materials that are to be evaluated at these records: all that the rays may have met, without asking which,
+        once their programs exist; else those that they have met."""
+        self._flag_met(frame, records)
+        possible = self._possible_of(frame, hierarchy, path)
+        if len(possible) <= MOST_UNASKED:
+            unknown = {_program_key(frame.materials.compiled[k]) for k in possible} - self._compiled
+            if self._asked is None:
+                self._asked = weakref.ref(frame)
+            elif unknown and self._asked() is not frame and (frame.settings.whole or self._ahead is not frame.view):
+                self._ahead = frame.view  # one for each picture that has to move at once
+                unknown -= unknown if frame.settings.whole else {min(unknown)}
+            if not unknown:
+                return possible
+        return set(np.flatnonzero(images.read(records.met)).tolist())
+
+    @staticmethod
+    def _flag_met(frame: Frame, records: Records) -> None:
+        """Write flags of the materials of these records."""
+        records.met.texture.clear(format="UINT", value=(0,))
+        textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
+        passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
+
+    def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:
+        """Materials of triangles that rays of a path can meet."""
+        key = (path, hierarchy.leaves, frame.geometry.changes, frame.materials.fingerprint())
+        if self._possible is None or self._possible[0] != key:
+            meshes, found = frame.geometry.placed[1], set()
+            for mesh, slots in {
+                (one.mesh, one.materials) for one in hierarchy.instances if getattr(one.visibility, path)
+            }:
+                found.update(np.unique(meshes[mesh].triangle_materials(slots)).tolist())
+            shown = {k for k in found if not frame.materials.compiled[k].bounds_alone}
+            self._possible = (key, shown)
+        return self._possible[1]
 
     # What stands behind triangles -----------------------------------------------------------------------------------
 
@@ -351,17 +432,6 @@ class Hits:
     def release(self) -> None:
         """Drop GPU resources."""
         self.__init__()
-
-    @staticmethod
-    def _met(frame: Frame, records: Records) -> set[int]:
-        height = -(-max(len(frame.materials.compiled), 1) // ROW)
-        met = images.pool.take(ROW, height, "R32UI")
-        met.texture.clear(format="UINT", value=(0,))
-        textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": met})
-        found = set(np.flatnonzero(images.read(met)).tolist())
-        images.pool.give(met)
-        return found
 
 
 def pixel_spread(frame: Frame) -> float:

@@ -236,14 +236,15 @@ class ClusteredVisibility(MultiresRadiosity):
     def _areas(self, frame: Frame, found: VirtualLightSet) -> tuple[np.ndarray, np.ndarray]:
         """Cluster of each virtual light, (N,), and the clusters' rows for the shaders, (K, AREA_ROWS, 4), without
         members and place in the atlas."""
-        if not len(found):
+        points, normals, sent = (row[:, :3] for row in found.rows)
+        if not len(points):
             return np.zeros(0, int), np.zeros((0, AREA_ROWS, 4))
         refine = frame.settings.get(self, "refine")
         if not refine and self._standing is not None:
             groups, areas = self._standing
-            return groups.nearest(found.positions, found.normals), areas
-        weight = np.abs(found.intensities) @ lights.LUMINANCE
-        groups = cluster(found.positions, found.normals, weight, frame.settings.get(self, "clusters"))
+            return groups.nearest(points, normals), areas
+        weight = np.abs(sent) @ lights.LUMINANCE
+        groups = cluster(points, normals, weight, frame.settings.get(self, "clusters"))
         frame.count(self, "clusters", len(groups))
         middle, part = groups.middle, 1.0
         if refine:
@@ -251,13 +252,13 @@ class ClusteredVisibility(MultiresRadiosity):
             if part < 1.0:
                 middle = _drawn_middles(members(groups.label, len(groups)), weight, frame.random("clusters")[0])
         areas = np.zeros((len(groups), AREA_ROWS, 4))
-        areas[:, 0, :3] = found.positions[middle]
+        areas[:, 0, :3] = points[middle]
         corners = frame.receivers.corners.reshape(-1, 3)
         for area in areas:
             area[0, 3] = np.linalg.norm(corners - area[0, :3], axis=1).max()
         areas[:, 1, :3], areas[:, 1, 3] = groups.across, part * groups.half[:, 0]
         areas[:, 2, :3], areas[:, 2, 3] = np.cross(groups.normal, groups.across), part * groups.half[:, 1]
-        areas[:, 3, :3] = found.normals[middle]
+        areas[:, 3, :3] = normals[middle]
         self._standing = groups, areas
         return groups.label, areas
 
@@ -283,11 +284,9 @@ class ClusteredVisibility(MultiresRadiosity):
 
 def _packed(found: VirtualLightSet, label: np.ndarray, areas: np.ndarray) -> np.ndarray:
     """Virtual lights in the order of their clusters, and the clusters below them, (3 + AREA_ROWS, columns, 4)."""
-    packed = np.zeros((3 + AREA_ROWS, max(len(found), len(areas), 1), 4))
+    packed = np.zeros((3 + AREA_ROWS, max(len(found), len(areas)), 4))
     order = np.argsort(label, kind="stable")
-    for row, values in enumerate((found.positions, found.normals, found.intensities)):
-        packed[row, : len(found), :3] = values[order]
-    packed[2, : len(found), 3] = found.footprints[order]
+    packed[:3, : len(order)] = found.rows[:, order]
     counts = np.bincount(label, minlength=len(areas))
     packed[3:, : len(areas)] = areas.transpose(1, 0, 2)
     packed[6, : len(areas), 3] = np.cumsum(counts) - counts

@@ -178,7 +178,7 @@ def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet
     """What shaders/indirect/near.glsl needs: textures, blocks and constants of this sample. Provides it to others."""
     bindings = finder.path_bindings(frame)
     bindings["textures"]["virtual_lights"] = lights.image
-    near = near_radius(frame, len(lights))
+    near = near_radius(frame, lights.wanted)
     bindings["constants"] |= {"virtual_count": len(lights), "near_radius": near, "glossy_radius": near}
     bindings["constants"] |= {"deeper": deeper_weight(frame), "lobe_rays": 1 if frame.settings.draft else LOBE_RAYS}
     bindings["constants"]["shaded_roughness"] = shaded_roughness(frame)
@@ -233,7 +233,7 @@ class InstantRadiosity(Technique):
         lights = self.virtual_lights.make(frame, self, frame.settings.get(self, "virtual_lights"))
         bindings = gather_bindings(frame, self.virtual_lights, lights)
         bindings["constants"]["rays"] = self._rays(frame)
-        bindings["constants"] |= self._reach(frame, -(-len(lights) // SUBSETS))
+        bindings["constants"] |= self._reach(frame, -(-lights.wanted // SUBSETS))
         yield
         target = frame.target("radiance.diffuse_indirect", "radiance.glossy_indirect", depth=MARKS)
         program, media = gather_program(self.virtual_lights.kinds, *lobes_of(frame)), frame.service(MediaService)

@@ -6,14 +6,15 @@ Two questions are asked at pixels of a coarse grid, by rays through the hierarch
   directions.) Directions of the world are then drawn in proportion to radiance times usefulness: a room lit through a
   window spends them on the window. What each probe sees is also left for tables of single tiles (environment_light.py).
 - How much do single points of a light differ in what they bring? (432 probes, 8 to 32 points per light; beyond a door
-  ajar 8 find a quarter of the variance that 32 find.) Their variance, in units of the light that the probe gets, is the
-  error that one point leaves; sources/rates.py turns it into the number of points per sample. Only for pictures whose
-  samples are shown together: otherwise every sample has one point per light.
+  ajar 8 find a quarter of the variance that 32 find. Of the guided world the directions above tell it: a point brings
+  radiance over density times what the probe sees of its cell.) Their variance, in units of the light that the probe
+  gets, is the error that one point leaves; sources/rates.py turns it into the number of points per sample. Only for
+  pictures whose samples are shown together: otherwise every sample has one point per light.
 
 | cost | once per picture |
 |---|---|
 | rays | 55,296 or 221,184 for the world, 3,456 to 13,824 per light |
-| readback | 4 bytes per probe and direction, 16 per probe and light |
+| readback | 1, with the bounds of receivers; 16 bytes per probe and direction, 16 per probe and light |
 
 Bias: none; only the density of samples depends on it. Fails: where the scene has too many triangles for a hierarchy,
 every light gets one point per sample and the world is drawn by its radiance alone.
@@ -27,6 +28,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
+from ..gfx.readback import Reading
 from ..lighting.light_rates import WORLD, LightRates
 from ..sampling.sequence import point, third
 from ..scene import acceleration
@@ -98,15 +100,21 @@ class LightProbes(Technique):
         return acceleration.too_many(snapshot)
 
     def begin(self, frame: Frame) -> None:
+        # All is drawn before the first of it is read, and nothing yet known of the receivers.
+        lit = _lit(frame.snapshot.world)
+        guided = self._draw_guide(frame) if lit and frame.settings.get(self, "guiding") else None
+        shares = frame.settings.whole and frame.settings.get(self, "maps") > 0
+        trials = self._draw_trials(frame, lit) if shares else []
+        if lit and guided is None:
+            frame.environment.guide(None)
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         found = LightRates()
         frame.provide(found)
-        lit = _lit(frame.snapshot.world)
-        if lit:
-            found.world_seen = self._guide(frame)
-        if frame.settings.whole and frame.settings.get(self, "maps") > 0:
-            found.by_light = self._share_out(frame, lit)
+        if guided is not None:
+            found.world_seen = self._guide(frame, guided)
+        if shares:
+            found.by_light = self._share_out(frame, lit, trials, found.world_seen)
 
     def _rays(self, frame: Frame) -> dict:
         hierarchy = frame.hierarchy()
@@ -114,46 +122,63 @@ class LightProbes(Technique):
             "textures": {
                 **surface_bindings(frame), **hierarchy.textures,
             },
-            "constants": {"offset_size": frame.offset_size},
+            # By all that there is: what is seen is not known yet, and only densities depend on these rays.
+            "constants": {"offset_size": 1e-6 * frame.geometry.size},
         }  # fmt: skip
 
-    def _guide(self, frame: Frame) -> np.ndarray | None:
-        """Guide directions of the world; what each probe sees of it, as in LightRates.world_seen."""
-        if not frame.settings.get(self, "guiding"):
-            frame.environment.guide(None)
-            return None
+    def _draw_guide(self, frame: Frame) -> Reading:
+        """Ask probes for directions from which they see the world."""
         rays = self._rays(frame)
         rows, columns = environment.GUIDE_ROWS, environment.GUIDE_COLUMNS
         affordable = FEW * frame.size[0] * frame.size[1] * frame.settings.samples / (rows * columns)
         fine = frame.settings.whole and affordable >= FINE_PROBES[0] * FINE_PROBES[1]
         grid = FINE_PROBES if fine else GUIDE_PROBES
-        probes = grid[0] * grid[1]
-        with images.borrowed(rows * columns, probes, "RG32F") as target:
-            passes.fullscreen(
-                GUIDE,
-                target,
-                textures=rays["textures"],
-                blocks={"film_view": frame.view_block},
-                constants={**rays["constants"], "columns": columns, "rows": rows, "probes": grid},
-            )
-            found = images.read(target.colors[0]).reshape(grid[1], grid[0], rows, columns, 2)
+        image = images.pool.take(rows * columns, grid[0] * grid[1], "RG32F")
+        passes.fullscreen(
+            GUIDE,
+            images.Target((image,)),
+            textures=rays["textures"],
+            blocks={"film_view": frame.view_block},
+            constants={**rays["constants"], "columns": columns, "rows": rows, "probes": grid},
+        )
+        return frame.read_later(image)
+
+    def _guide(self, frame: Frame, drawn: Reading) -> np.ndarray:
+        """Guide directions of the world; what each probe sees of it, as in LightRates.world_seen."""
+        found = drawn.pixels()
+        grid = FINE_PROBES if len(found) == FINE_PROBES[0] * FINE_PROBES[1] else GUIDE_PROBES
+        found = found.reshape(grid[1], grid[0], environment.GUIDE_ROWS, environment.GUIDE_COLUMNS, 2)
         useful, facing = found[..., 0], found[..., 1].sum(axis=(0, 1))
         frame.environment.guide(useful.mean(axis=(0, 1)), useful.sum(axis=(0, 1)) / np.maximum(facing, 1e-30))
-        frame.count(self, "guiding rays", rows * columns * probes)
+        frame.count(self, "guiding rays", found[..., 0].size)
         return useful
 
-    def _share_out(self, frame: Frame, lit: bool) -> dict[str, Rate]:
-        """Rates of the lights by key, and of WORLD."""
-        emitters = frame.emitters
-        if len(emitters) > MOST_LIGHTS:
-            emitters = []
-        points = int(np.clip(RAYS_OF_PROBE // max(len(emitters) + lit, 1), FEWEST_POINTS, POINTS))
-        trials = [(emitter.light.key, self._points_of(frame, emitter, points)) for emitter in emitters]
-        if lit:
-            trials.append((WORLD, self._points_of_world(frame, points)))
-        if not trials:
+    def _draw_trials(self, frame: Frame, lit: bool) -> list[Reading]:
+        """Ask probes what points of each light, and of the world where it is not guided, bring."""
+        emitters, points = self._asked(frame, lit)
+        trials = [self._points_of(frame, emitter, points) for emitter in emitters]
+        if lit and not frame.settings.get(self, "guiding"):
+            frame.environment.guide(None)
+            trials.append(self._points_of_world(frame, points))
+        return self._draw_moments(frame, trials)
+
+    @staticmethod
+    def _asked(frame: Frame, lit: bool) -> tuple[list[lights.Emitter], int]:
+        """Lights that are asked about, and how many points of each."""
+        emitters = frame.emitters if len(frame.emitters) <= MOST_LIGHTS else []
+        return emitters, int(np.clip(RAYS_OF_PROBE // max(len(emitters) + lit, 1), FEWEST_POINTS, POINTS))
+
+    def _share_out(self, frame: Frame, lit: bool, trials: list[Reading], seen: np.ndarray | None) -> dict[str, Rate]:
+        """Rates of the lights by key, and of WORLD. `seen`: what probes see of the world, where it is guided."""
+        emitters, asked_points = self._asked(frame, lit)
+        if not emitters and not lit:
             return {}
-        moments = self._moments(frame, [rows for _, rows in trials])
+        found = [drawn.pixels()[..., :2].astype(np.float64) for drawn in trials]
+        if seen is not None:
+            repeat = SPREAD_PROBES[0] // seen.shape[1]
+            of_world = self._moments_of_world(frame, seen, asked_points)
+            found.append(of_world.repeat(repeat, axis=0).repeat(repeat, axis=1).reshape(1, -1, 2))
+        moments = np.concatenate(found)
         variance = relative_variance(moments[..., 0], moments[..., 1])
         # Lights in one place count as one, so that two half lights are sampled like the whole.
         places = [_place(emitter) for emitter in emitters] + [WORLD] * lit
@@ -174,8 +199,9 @@ class LightProbes(Technique):
         if any(material.transparent or material.soft for material in frame.materials.compiled):
             # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
-        frame.count(self, "probing rays", moments.shape[0] * moments.shape[1] * points)
-        return {key: rates[place] for (key, _), place in zip(trials, places)}
+        frame.count(self, "probing rays", (len(moments) - (seen is not None)) * moments.shape[1] * asked_points)
+        keys = [emitter.light.key for emitter in emitters] + [WORLD] * lit
+        return {key: rates[place] for key, place in zip(keys, places)}
 
     def _points_of(self, frame: Frame, emitter: lights.Emitter, count: int) -> list[np.ndarray]:
         seed = frame.settings.seed
@@ -189,27 +215,43 @@ class LightProbes(Technique):
         drawn = zip(*frame.environment.draw(*chosen.T))
         return [lights.direction_row(d, radiance / density, density, flags, 0, 1) for d, radiance, density in drawn]
 
-    def _moments(self, frame: Frame, trials: list[list[np.ndarray]]) -> np.ndarray:
-        """(lights, probes, 2): mean and mean square of a point's irradiance at each probe that sees a surface."""
+    @staticmethod
+    def _moments_of_world(frame: Frame, seen: np.ndarray, count: int) -> np.ndarray:
+        """(rows, columns, 2) by probe, of directions as guided; what the probe sees there is that of their cell."""
+        chosen = np.array([point(k, "environment", frame.settings.seed) for k in range(count)])
+        direction, radiance, density = frame.environment.draw(*chosen.T)
+        rows, columns = seen.shape[2:]
+        row = np.clip((direction[:, 2] + 1) / 2 * rows, 0, rows - 1).astype(int)
+        turn = np.arctan2(direction[:, 1], direction[:, 0]) / (2 * np.pi) + 0.5
+        column = np.clip(turn * columns, 0, columns - 1).astype(int)
+        brings = np.abs(radiance) @ lights.LUMINANCE / density
+        irradiance = seen[:, :, row, column] * brings
+        return np.stack([irradiance.mean(axis=-1), (irradiance**2).mean(axis=-1)], axis=-1)
+
+    def _draw_moments(self, frame: Frame, trials: list[list[np.ndarray]]) -> list[Reading]:
+        """(lights, probes, 2): mean and mean square of a point's irradiance at each probe that sees a surface; some of
+        the lights in each reading."""
+        if not trials:
+            return []
         rays = self._rays(frame)
         out = []
         points = len(trials[0])
         step = lights.MOST_LIGHTS // points  # of one uniform block
         for first in range(0, len(trials), step):
             part = trials[first : first + step]
-            with images.borrowed(SPREAD_PROBES[0] * SPREAD_PROBES[1], len(part), "RGBA32F") as target:
-                passes.fullscreen(
-                    SPREAD,
-                    target,
-                    textures=rays["textures"],
-                    blocks={
-                        "film_view": frame.view_block,
-                        "sources": self._sources.set([row for rows in part for row in rows]),
-                    },
-                    constants={**rays["constants"], "probes": SPREAD_PROBES, "points": points},
-                )
-                out.append(images.read(target.colors[0])[..., :2].astype(np.float64))
-        return np.concatenate(out)
+            image = images.pool.take(SPREAD_PROBES[0] * SPREAD_PROBES[1], len(part), "RGBA32F")
+            passes.fullscreen(
+                SPREAD,
+                images.Target((image,)),
+                textures=rays["textures"],
+                blocks={
+                    "film_view": frame.view_block,
+                    "sources": self._sources.set([row for rows in part for row in rows]),
+                },
+                constants={**rays["constants"], "probes": SPREAD_PROBES, "points": points},
+            )
+            out.append(frame.read_later(image))
+        return out
 
     def release(self) -> None:
         self._sources.release()

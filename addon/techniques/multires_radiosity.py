@@ -273,7 +273,7 @@ class MultiresRadiosity(InstantRadiosity):
                 held += listed.values()
                 yield from self._gather_listed(frame, bindings, bound, grid, atlas, listed)
                 if frame.is_first:
-                    frame.count(self, "regions", int(images.read(listed["entry_count"])[0, 0, 0]))
+                    frame.count_texel(self, "regions", listed["entry_count"])
             else:
                 yield from self._gather_levels(frame, bindings, bound, grid, atlas, flags)
                 if levels == 0 and frame.is_first:

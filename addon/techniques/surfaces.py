@@ -21,13 +21,17 @@ depth of field all that the rim of the lens sees, too.
 | bytes written per pixel | 6 x 16 + 4 |
 | coloured layers | + 1 pass of their draws, blended into three of the images |
 | marks | 1 pass: which pixels show a surface, which one with a narrow lobe; others are left out by the depth test |
-| first sample | + one reduction, read back at 1/256 of the pixels; with alpha + 2 surface passes and another one |
+| first picture of a view | + one reduction to 1/128 of the pixels, read together with what light probes find |
+| the same with alpha | + 2 surface passes and another reduction |
 | first sample with depth of field | 7 times that |
 
 Fails: more layers than samples look dithered; light through coloured layers casts grey shadows.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -82,8 +86,14 @@ class Surfaces(Technique):
 
     def begin(self, frame: Frame) -> None:
         modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
-        frame.receivers = self._receivers(frame, self._target(frame), modes)
-        if modes != (STOCHASTIC,):  # else what was drawn for the receivers is the first sample
+        known = frame.kept(_KnownReceivers)
+        key = _receivers_key(frame, modes)
+        if known.key == key:
+            frame.find_receivers = lambda: known.receivers
+            frame.look((0.0, 0.0))
+        else:
+            frame.find_receivers = self._receivers(frame, self._target(frame), modes, known, key)
+        if modes != (STOCHASTIC,) or known.key == key:  # else what was drawn for the receivers is the first sample
             draw_sample(frame, self, self._target(frame))
         self._drawn = True
 
@@ -103,17 +113,19 @@ class Surfaces(Technique):
     def _target(frame: Frame) -> images.Target:
         return frame.target(*SURFACES, depth="surface.depth_buffer")
 
-    def _receivers(self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...]) -> Receivers:
+    def _receivers(
+        self, frame: Frame, surfaces: images.Target, modes: tuple[int, ...], known: _KnownReceivers, key
+    ) -> Callable[[], Receivers]:
+        """Draw what tells the receivers; what is returned reads it."""
         width, height = frame.size
         tiles = -(-width // TILE), -(-height // TILE)
-        low = np.full((tiles[1], tiles[0], 4), np.inf)
-        high = np.full((tiles[1], tiles[0], 4), -np.inf)
-        target = images.Target(tuple(images.pool.take(*tiles, "RGBA32F") for _ in range(2)))
         aperture = frame.snapshot.camera.aperture
+        bounds = []
         for lens in (*(rim(aperture) if aperture else ()), (0.0, 0.0)):  # the middle last: it is the first sample
             frame.look(lens)
             for mode in modes:
                 draw_surfaces(frame, self, surfaces, mode, refracts(frame))
+                target = images.Target(tuple(images.pool.take(*tiles, "RGBA32F") for _ in range(2)))
                 passes.fullscreen(
                     TILE_BOUNDS,
                     target,
@@ -121,13 +133,41 @@ class Surfaces(Technique):
                     blocks={"film_view": frame.view_block},
                     constants={"tile": TILE},
                 )
-                low = np.minimum(low, images.read(target.colors[0]))
-                high = np.maximum(high, images.read(target.colors[1]))
-        for image in target.colors:
-            images.pool.give(image)
-        low, high = low.reshape(-1, 4).astype(np.float64), high.reshape(-1, 4).astype(np.float64)
-        seen = (np.isfinite(low) & np.isfinite(high)).all(axis=1) & (low <= high).all(axis=1)
-        seen &= low[:, 3] < 1e29
-        order = np.argsort(low[seen, 3], kind="stable")
-        low, high = low[seen][order], high[seen][order]
-        return Receivers(low[:, :3], high[:, :3], low[:, 3])
+                bounds.append([frame.read_later(image) for image in target.colors])
+
+        def found() -> Receivers:
+            low = np.min([low.pixels() for low, _ in bounds], axis=0)
+            high = np.max([high.pixels() for _, high in bounds], axis=0)
+            known.receivers, known.key = _boxes(low.reshape(-1, 4), high.reshape(-1, 4)), key
+            return known.receivers
+
+        return found
+
+
+@dataclass
+class _KnownReceivers:
+    """Receivers of the picture before, and what they were found in."""
+
+    key: object = None
+    receivers: Receivers | None = None
+
+
+def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
+    camera, settings = frame.snapshot.camera, frame.settings
+    return (
+        frame.size, modes, camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end,
+        camera.aperture, frame.snapshot.film, settings.seed, settings.draft, refracts(frame),
+        frame.geometry.changes, frame.geometry.origin.tobytes(), frame.materials.fingerprint(),
+        tuple(sorted(settings.values.items())), tuple(technique.name for technique in frame.plan.techniques),
+        tuple((one.key, one.own) for one in (*frame.snapshot.instances, *frame.snapshot.materials) if one.own),
+    )  # fmt: skip
+
+
+def _boxes(low: np.ndarray, high: np.ndarray) -> Receivers:
+    """From bounds of tiles, (T, 4), w: least and greatest depth."""
+    low, high = low.astype(np.float64), high.astype(np.float64)
+    seen = (np.isfinite(low) & np.isfinite(high)).all(axis=1) & (low <= high).all(axis=1)
+    seen &= low[:, 3] < 1e29
+    order = np.argsort(low[seen, 3], kind="stable")
+    low, high = low[seen][order], high[seen][order]
+    return Receivers(low[:, :3], high[:, :3], low[:, 3])

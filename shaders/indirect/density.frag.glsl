@@ -6,7 +6,11 @@ void main()
 {
   out_density = 0.0;
   ivec2 place = ivec2(gl_FragCoord.xy);
-  int number = int(kept_fetch(ivec2(place.x, 0)).x);
+  vec4 slot = slots_fetch(ivec2(place.x, 0));
+  if (slot.w == 0.0) {
+    return;
+  }
+  int number = int(slot.y);
   ivec2 candidate = ivec2(number % rays, number / rays);
   Probe probe = probe_read(place.y);
   if (!probe.receives) {

@@ -5,10 +5,10 @@ void main()
 {
   out_density = 0.0;
   ivec2 place = ivec2(gl_FragCoord.xy);
-  int group = place.y / GROUP;
-  int own = int(grouped_fetch(ivec2(place.y % GROUP, group)).x);
-  int other = int(grouped_fetch(ivec2(place.x, group)).x);
-  if (own < 0 || other < 0) {
+  int second = place.y / GROUP * GROUP + place.x;
+  int own = int(sorted_order_fetch(ivec2(place.y % LIST_COLUMNS, place.y / LIST_COLUMNS)).x);
+  int other = int(sorted_order_fetch(ivec2(second % LIST_COLUMNS, second / LIST_COLUMNS)).x);
+  if (own >= candidate_count || other >= candidate_count) {
     return;
   }
   ivec2 from = ivec2(own % rays, own / rays);
@@ -18,6 +18,9 @@ void main()
     return;
   }
   vec4 point = candidate_point_fetch(from);
+  if (point.w == 0.0) {
+    return;
+  }
   vec3 normal = candidate_normal_fetch(from).xyz * point.w;  // on the side from which light reaches it
   vec2 flat_part = vec2(candidate_normal_fetch(to).w, next_radiance_fetch(to).w);
   vec3 next_normal = vec3(flat_part, next.w * sqrt(max(1.0 - dot(flat_part, flat_part), 0.0)));

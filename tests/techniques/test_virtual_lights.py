@@ -3,9 +3,56 @@
 import numpy as np
 import pytest
 
-from addon.lighting.virtual_lights import CELL, _resample
+from addon.gfx import images
+from addon.kernels import ordered_lists
+from addon.lighting.light_choice import CELL, Choice
 
 COUNT = 512
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+
+def _listed(values):
+    """(N, C) in an image of one row."""
+    row = np.zeros((1, len(values), 4))
+    row[0, :, : values.shape[1]] = values
+    return images.upload(row)
+
+
+def _resample(points, radiance, count, u):
+    """Numbers of the candidates that are kept, in an order in space, and how many candidates each stands for."""
+    nothing = _listed(np.zeros_like(points))
+    found = {
+        "candidate_point": _listed(np.column_stack([points, np.ones(len(points))])),
+        "candidate_radiance": _listed(radiance), "candidate_albedo": nothing, "next_radiance": nothing,
+    }  # fmt: skip
+    choice = Choice(len(points), len(points), (0.0, 0.0, 0.0, 1e3))
+    choice.order(found["candidate_point"], nothing)
+    choice.radiances(found, None)
+    slots, kept = choice.keep(count, u)
+    rows, total = images.read(slots)[0], images.read(kept)[choice.last[::-1]][0]
+    choice.release()
+    rows = rows[rows[:, 3] > 0]
+    assert len(rows) == total
+    return rows[:, 1].astype(int), rows[:, 2].astype(np.float64)
+
+
+@pytest.mark.parametrize("count", (1, 127, 128, 700, 4224))
+def test_lists_are_sorted_and_equal_keys_keep_their_order(count):
+    keys = np.random.default_rng(count).integers(0, 200, count)  # of 256 cells
+    columns, rows = ordered_lists.size_for(count)
+    points = np.column_stack([keys + 0.5, np.zeros((count, 2)), np.ones(count)])
+    choice = Choice(count, count, (0.0, 0.0, 0.0, 1e3))
+    numbers = images.read(choice.order(_listed(points), _listed(np.zeros((count, 3))))).reshape(-1)
+    choice.release()
+    assert len(numbers) == columns * rows
+    np.testing.assert_array_equal(numbers[:count], np.argsort(keys, kind="stable"))
+
+
+def test_running_sums_are_those_of_all_entries_before():
+    values = np.zeros((5, ordered_lists.COLUMNS, 2), np.float32)
+    values[:] = np.random.default_rng(3).integers(0, 9, values.shape)
+    found = images.read(ordered_lists.take_running_sums(images.upload(values, "RG32F"))).reshape(-1, 2)
+    np.testing.assert_array_equal(found[1:], np.cumsum(values.reshape(-1, 2), axis=0)[:-1])
 
 
 @pytest.fixture
