@@ -181,6 +181,11 @@ class MaterialSet:
             "blocks": {"material_values": self._blocks[self._keys[index]], "material_scene": self._scene},
         }
 
+    def in_shell(self, index: int) -> bool:
+        """Whether material `index` is drawn by a shell over its mesh."""
+        own = self.compiled[index].own_surface
+        return own is not None and own.shell
+
     def release(self) -> None:
         self.__init__()
 
@@ -233,15 +238,16 @@ def _shared(compiled: CompiledMaterial) -> dict:
         f"  point.attributes_dy[{k}] = steps_y.x * along_x + steps_y.y * along_y;\n"
         for k in range(count)
     )
+    inputs = (("VEC2", "envelope"), *(("VEC4", f"attribute{k}") for k in range(count)))
+    varyings = tuple(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count))
+    if own is not None and own.shell:  # which finds what corners have in a list
+        fill, inputs, varyings = "", (("VEC2", "shell"),), (("flat", "INT", "shell_triangle"),)
     return {
-        "inputs": (
-            ("VEC3", "position"), ("VEC3", "normal"), ("VEC2", "envelope"), ("INT", "local_instance"),
-            *(("VEC4", f"attribute{k}") for k in range(count)),
-        ),
+        "vertex": "surface/shell.vert.glsl" if own is not None and own.shell else "surface/surface.vert.glsl",
+        "inputs": (("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance"), *inputs),
         "varyings": (
             ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"),
-            ("smooth", "VEC3", "normal_heights"), ("flat", "IVEC2", "instance_flat"),
-            *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
+            ("smooth", "VEC3", "normal_heights"), ("flat", "IVEC2", "instance_flat"), *varyings,
         ),
         "textures": (
             ("RGBA32F", "instances"), ("RGBA32F", "energy_table"),
@@ -263,7 +269,6 @@ def _shared(compiled: CompiledMaterial) -> dict:
 def _surface_program(compiled: CompiledMaterial) -> Program:
     return Program(
         name=f"surface {compiled.program_key[:8]}",
-        vertex="surface/surface.vert.glsl",
         fragment="surface/surface.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
         blocks=(
@@ -306,7 +311,6 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
     shared = _shared(compiled)
     return Program(
         name=f"tint {compiled.program_key[:8]}",
-        vertex="surface/surface.vert.glsl",
         fragment="surface/tint.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in ("diffuse", "tint", "emission")),
         blocks=(
@@ -348,7 +352,6 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
 def _caster_program(compiled: CompiledMaterial) -> Program:
     return Program(
         name=f"alpha caster {compiled.program_key[:8]}",
-        vertex="surface/surface.vert.glsl",
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
@@ -356,6 +359,11 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         defines=(*PROJECTION_DEFINES, *_own_defines(compiled)),
         **_shared(compiled),
     )
+
+
+def caster_like(compiled: CompiledMaterial) -> Program:
+    """The program of casters, to be changed into one that asks a material something else."""
+    return _caster_program(compiled)
 
 
 # What casts no shadow shines, too.

@@ -25,6 +25,7 @@ from .media import MediaAttenuation
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
 from .reflection_editing import ReflectionEditing
+from .relief import Relief
 from .screen_space_photons import ScreenSpacePhotons
 from .shaded_reflections import ShadedReflections
 from .shadows_by_light import ShadowsByLight
@@ -38,6 +39,7 @@ from .vssm import VarianceSoftShadows
 
 REGISTRY: tuple[type[Technique], ...] = (
     MediaAttenuation,
+    Relief,
     Surfaces,
     ReflectionEditing,
     LightProbes,
