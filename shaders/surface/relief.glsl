@@ -29,6 +29,13 @@ float relief_faded(float height, float middle, float share)
   return mix(middle, height, share);
 }
 
+// The slope at the crossing itself may differ from what the search has bracketed, which faces the ray.
+vec3 turned_to(vec3 normal, vec3 viewer)
+{
+  float cosine = dot(normal, viewer);
+  return (cosine < 1e-3) ? normalize(normal + (1e-3 - cosine) * viewer) : normal;
+}
+
 bool own_surface(inout SurfacePoint point, Instance instance)
 {
   if (point.backfacing) {
@@ -158,14 +165,17 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   float beside_x = relief_height(corner, s, b + filter_width * bx);
   float beside_y = relief_height(corner, s, b + filter_width * by);
   vec3 outwards = bumped_normal(met, met.normal, filter_width, here, beside_x, beside_y);
-  vec3 facing = side * outwards;
-  // The slope at the crossing itself may differ from what the search has bracketed.
-  float cosine = dot(facing, point.incoming);
-  facing = (cosine < 1e-3) ? normalize(facing + (1e-3 - cosine) * point.incoming) : facing;
+  // What lies there is the prism's own surface, which has edges between triangles where normals run smoothly.
+  vec3 a = s.e1 + here * s.n1;
+  vec3 c = s.e2 + here * s.n2;
+  vec3 tangent_x = filter_width * (bx.x * a + bx.y * c) + (beside_x - here) * met.normal;
+  vec3 tangent_y = filter_width * (by.x * a + by.y * c) + (beside_y - here) * met.normal;
+  vec3 across = cross(tangent_x, tangent_y);
+  vec3 flat_normal = safe_normalize(((dot(across, outwards) < 0.0) ? -side : side) * across / (width * width));
   met.position = start + t1 * direction;
-  met.normal = facing;
-  met.mesh_normal = facing;
-  met.geometric_normal = facing;
+  met.normal = side * outwards;
+  met.geometric_normal = turned_to(flat_normal, point.incoming);
+  met.mesh_normal = met.normal;
   met.backfacing = side < 0.0;
   point = met;
   return true;
