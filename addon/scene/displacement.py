@@ -27,6 +27,7 @@ Fails: at sharp edges of a mesh shells part, as faces do that Cycles displaces a
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +39,6 @@ from ..gfx.struct import Block
 from ..materials.attributes import INSTANCE
 from ..materials.compiled import CompiledMaterial, OwnSurface
 from ..materials.nodes.inputs import FLAT
-from ..snapshot.cache import next_version
 from ..snapshot.scene import Instance, Mesh, Note, Snapshot
 from .geometry import TEXELS_PER_INSTANCE, corner_attribute, instance_facts
 from .materials import EVERY_DEFINES, MATERIAL_SCENE, MaterialSet, caster_like
@@ -82,6 +82,7 @@ class Measured:
     slope: float  # steepest rise between neighbouring samples, m per m
 
 
+_versions = itertools.count(1 << 40)  # of displaced meshes: no mesh that is read from Blender ever has one of these
 Kind = tuple[str, tuple[int, ...]]  # mesh and materials
 
 
@@ -326,7 +327,7 @@ class Displacement:
         low_end = np.min([end.min(axis=0) for end in ends], axis=0).astype(np.float64)
         high_end = np.max([end.max(axis=0) for end in ends], axis=0).astype(np.float64)
         moved = replace(
-            mesh, key=name, version=next_version(), positions=positions, bounds_min=low_end, bounds_max=high_end
+            mesh, key=name, version=next(_versions), positions=positions, bounds_min=low_end, bounds_max=high_end
         )
         if any(self.modes[k] == MESH for k in own):
             moved = with_new_normals(moved, np.any(offsets != 0.0, axis=1))
