@@ -3,9 +3,9 @@
 Four scenes (relief_scenes.py) under a sun, an area light and the world, each as a coarse mesh drawn by relief and as a
 mesh subdivided to the detail of its heights (a face for each texel), displaced by Candela and by Cycles. Direct light.
 
-Error is relMSE of Combined, of all pixels and of those that are farther than a pixel from an edge: where Cycles' depth
-jumps, or its direct light ends, in a picture of one ray a pixel. Outlines are compared as the border of what covers half
-a pixel, and where a box stands in the floor as the border of what is red: the mean distance, in pixels, of places of one
+Error is relMSE of Combined, of all pixels and of those that are farther than a pixel from an edge: where Cycles'
+depth jumps, or its direct light ends, in a picture of one ray a pixel. Outlines are compared as the border of what
+covers half a pixel, and where a box stands in the floor as the border of what is red: the mean distance, in pixels, of places of one
 border to the other, over both. Times are
 seconds of the wall of whole renders, sync to picture, of the second of two; before it the scene is built anew, so that
 nothing is known of its mesh.

@@ -7,8 +7,8 @@ or both. A normal is bent by the material's program itself. A surface is moved i
   where it does not subdivide. The tree is known as a program only, so it runs on the GPU, once for each vertex, into a
   list that is read back. A vertex belongs to the first triangle that has it, normals are anew those of the moved
   triangles, and of smooth faces their mean at a vertex.
-- **relief**: the mesh stays coarse and what is drawn is a shell over it, in which each fragment searches for the surface
-  (shaders/surface/relief.glsl). Rays that run no shader meet the mesh at the relief's lowest level.
+- **relief**: the mesh stays coarse and what is drawn is a shell over it, in which each fragment searches for the
+  surface (shaders/surface/relief.glsl). Rays that run no shader meet the mesh at the relief's lowest level.
 
 Auto moves vertices where the mesh is fine enough: where heights interpolated between its vertices differ from the
 tree's at points within the triangles by no more than COARSE of the range of heights (root mean square).
@@ -53,6 +53,7 @@ SEARCHES = {FALSE_POSITION: 0, INTERVAL: 1, BISECTION: 2}
 SAMPLES = 1 << 14  # points of a kind of instance and material at which heights are looked at
 COARSE = 0.04  # of the range of heights, see above
 MARGIN = 0.02  # of the range, above and below what was found
+THINNEST = 5e-5  # of the extent of a mesh
 APART = 8  # instances of a kind whose range is looked at
 MOST_IMAGES = 11  # of a material, beside the list of the shell and what programs add
 
@@ -80,6 +81,7 @@ class Measured:
     high: float
     error: float  # of heights between vertices, root mean square, of that range
     slope: float  # steepest rise between neighbouring samples, m per m
+    thinnest: float  # m, that float32 tells apart with room to spare: what a shell around a plane has for thickness
 
 
 _versions = itertools.count(1 << 40)  # of displaced meshes: no mesh that is read from Blender ever has one of these
@@ -103,7 +105,7 @@ class Displacement:
         """The snapshot with displaced meshes. In `materials` the programs of what is displaced are changed to fit."""
         asked = {k: mode_of(m) for k, m in enumerate(snapshot.materials) if materials.compiled[k].displaces}
         asked = {k: mode for k, mode in asked.items() if mode != BUMP}
-        self.modes, self.errors, self.notes, materials.own_images = {}, {}, (), {}
+        self.modes, self.errors, self.notes = {}, {}, ()
         kinds = self._kinds(snapshot, set(asked))
         if not kinds:
             self._measured, self._meshes, self._instances, self._lists = {}, {}, {}, {}
@@ -135,9 +137,7 @@ class Displacement:
             for k in sorted(asked.intersection(np.unique(of_triangle).tolist())):
                 compiled = materials.compiled[k]
                 some = _different(instances, INSTANCE in compiled.reads)
-                places = tuple(
-                    one.matrix.tobytes() if compiled.reads else one.matrix[:3, :3].tobytes() for one in some
-                )
+                places = tuple(one.matrix.tobytes() if compiled.reads else one.matrix[:3, :3].tobytes() for one in some)
                 facts = tuple((one.random, one.color, one.pass_index) for one in some) if compiled.reads else ()
                 key = (mesh.key, mesh.version, kind[1], k, prints[k], prints[count:], places, facts)
                 known[key] = self._measured.get(key) or self._measured_of(materials, k, mesh, of_triangle == k, some)
@@ -162,7 +162,8 @@ class Displacement:
         error = float(np.sqrt(np.mean((across - sampled[0][:, 3]) ** 2))) / max(high - low, 1e-30)
         slope = self._slope(materials, k, mesh, instances[0], at_corners, triangle, weights)
         turned = np.linalg.pinv(instances[0].matrix[:3, :3])
-        return Measured(vertices, (moved[:, :3] @ turned.T).astype(np.float32), low, high, error, slope)
+        offsets = (moved[:, :3] @ turned.T).astype(np.float32)
+        return Measured(vertices, offsets, low, high, error, slope, THINNEST * _extent(mesh, instances))
 
     def _slope(self, materials, k: int, mesh: Mesh, instance: Instance, at_corners, triangle, weights) -> float:
         """Steepest rise found over steps of a hundredth of a triangle."""
@@ -261,7 +262,7 @@ class Displacement:
         self._levels: dict[int, tuple[float, float, float]] = {}
         for k, ones in ranges.items():
             low, high = min(one.low for one in ones), max(one.high for one in ones)
-            margin = MARGIN * (high - low) + 1e-7 * max(abs(low), abs(high)) + 1e-30
+            margin = MARGIN * (high - low) + max(one.thinnest for one in ones)
             self._levels[k] = low - margin, high + margin, max(one.slope for one in ones)
             compiled = materials.compiled[k]
             if self.modes[k] == MESH:
@@ -273,7 +274,7 @@ class Displacement:
         self._settings = {k: snapshot.materials[k].own for k in ranges}
 
     def _numbers(self, snapshot: Snapshot, kinds, measured) -> tuple[dict, dict[int, list]]:
-        """First number of the triangles of (kind, material) in the material's list, and (mesh, triangles) by material."""
+        """First number of the triangles of (kind, material) in the material's list; (mesh, triangles) by material."""
         numbers, parts, count = {}, {}, {}
         for kind in kinds:
             mesh = snapshot.meshes[kind[0]]
@@ -343,6 +344,14 @@ def _different(instances: list[Instance], apart: bool) -> list[Instance]:
     return [instances[k] for k in chosen if k == 0 or abs(size[k] - size[0]) > 1e-3 * size[0]]
 
 
+def _extent(mesh: Mesh, instances: list[Instance]) -> float:
+    """Of the largest of the instances, or how far off it is, as far as that costs digits, m."""
+    size = np.linalg.norm(mesh.bounds_max - mesh.bounds_min)
+    scales = [np.linalg.norm(one.matrix[:3, :3], 2) for one in instances]
+    off = [np.abs(one.matrix[:3, 3]).max() for one in instances]
+    return float(max(size * max(scales), 0.01 * max(off), 1e-30))
+
+
 def _samples(mesh: Mesh, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(N, 3) corners of triangles chosen by area, and barycentric weights of a point of each: the same every time."""
     corners = mesh.triangle_corners[own]
@@ -378,9 +387,9 @@ def _world_normals(instance: Instance, normals: np.ndarray) -> np.ndarray:
 
 
 def with_new_normals(mesh: Mesh, moved: np.ndarray) -> Mesh:
-    """The mesh with three corners of its own for each triangle, and normals of where its vertices are now: of flat faces
-    the triangle's, of smooth ones the mean over the triangles at a vertex, all of the same weight, as in Cycles. What
-    touches none of the `moved` (V,) vertices keeps its normals."""
+    """The mesh with three corners of its own for each triangle, and normals of where its vertices are now: of flat
+    faces the triangle's, of smooth ones the mean over the triangles at a vertex, all of the same weight, as in Cycles.
+    What touches none of the `moved` (V,) vertices keeps its normals."""
     source = mesh.triangle_corners.reshape(-1)
     vertices = mesh.corner_vertices[source]
     a, b, c = np.moveaxis(mesh.positions[vertices].reshape(-1, 3, 3).astype(np.float64), 1, 0)

@@ -57,7 +57,7 @@ class MaterialSet:
         """Compile and upload what changed."""
         if self.energy_table is None:
             self.energy_table = images.upload(energy_texture())
-        cache, self.compiled, notes = {}, [], []
+        cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)

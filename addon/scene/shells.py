@@ -1,9 +1,9 @@
 """Shells over triangles: prisms between a mesh at the lowest level of its relief and at the highest, for drawing.
 
-Each triangle is extruded along the normals at its corners; prisms of neighbours share their sides, so together they fill
-the space in which the surface may be. A fragment knows its triangle by a number, under which a list holds the corners
-with all that the material reads there (layout in shaders/surface/shell.glsl). How far a vertex is moved along its normal
-is the vertex shader's, so heights may change without a new mesh.
+Each triangle is extruded along the normals at its corners; prisms of neighbours share their sides, so together they
+fill the space in which the surface may be. A fragment knows its triangle by a number, under which a list holds the
+corners with all that the material reads there (layout in shaders/surface/shell.glsl). How far a vertex is moved along
+its normal is the vertex shader's, so heights may change without a new mesh.
 
 Costs 8 triangles and 6 vertices of 40 bytes for each triangle, and 96 bytes and 48 an attribute in the list.
 """
@@ -18,7 +18,7 @@ from .corners import corner_attribute
 
 
 def outward(mesh: Mesh, own: np.ndarray) -> np.ndarray:
-    """(T, 3) corners of the triangles `own` (a mask), in the order that runs anticlockwise seen from where normals point."""
+    """(T, 3) corners of the triangles `own` (a mask), anticlockwise seen from where normals point."""
     corners = mesh.triangle_corners[own].copy()
     a, b, c = np.moveaxis(mesh.positions[mesh.corner_vertices[corners]].astype(np.float64), 1, 0)
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), mesh.corner_normals[corners].sum(axis=1)) < 0.0

@@ -2,8 +2,8 @@
 
 A material whose displacement is a height is drawn as a shell of prisms over its mesh. Each fragment follows its ray
 through its prism: a linear search finds the first interval in which the ray crosses the heights, then false position
-shrinks it (Risser, Shah & Pattanaik 2007: interval mapping; here with Illinois' halving). Heights are the material's own
-tree, evaluated where the ray is, so that images and procedurals, any UV map and any attribute do. What is found is a
+shrinks it (Risser, Shah & Pattanaik 2007: interval mapping; here with Illinois' halving). Heights are the material's
+own tree, evaluated where the ray is, so that images and procedurals, any UV map and any attribute do. What is found is a
 point of the surface: it has a place, a depth, a slope and the attributes of where it stands, in the camera's picture, in
 views of lights and in depth maps, so relief shadows itself and others, stands in front of or behind other geometry, and
 has its own outline. Where the whole of it is less than a pixel high it fades into the bumped surface.
@@ -16,9 +16,9 @@ has its own outline. Where the whole of it is less than a pixel high it fades in
 | draws | 8 triangles for each of the mesh; early depth tests are lost |
 | bytes | 240 for a triangle's prism, 96 and 48 an attribute in its list |
 
-Bias: what is thinner than a step may be missed (`safe` does not, where the steepest slope was found). Rays that run no
-shader (mirrors, indirect light) meet the mesh at the lowest level of the relief, with its bumped normals. A camera within
-the shell sees through the prism that it is in. Light samples that need an opaque mesh of edges treat it as alpha.
+Bias: what is thinner than a step may be missed (`safe` does not, where the steepest slope was found). Rays that run
+no shader (mirrors, indirect light) meet the mesh at the lowest level of the relief, with its bumped normals. A camera
+within the shell sees through the prism that it is in. Soft shadows that need opaque meshes treat it as alpha.
 
 Fails: heights above an edge of a mesh that is not smooth part from those of the next face; overhangs need a mesh.
 """
