@@ -302,9 +302,13 @@ def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added + _own_defines(compiled)
 
 
-def _own_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
-    """Whether programs look for the surface themselves, see surface/point.glsl."""
-    return (("OWN_SURFACE", ""),) if compiled.own_surface else ()
+EYE = "vec4(film_view.eye.xyz, 1.0 - film_view.eye.w)"
+
+
+def _own_defines(compiled: CompiledMaterial, rays_begin: str = EYE) -> tuple[tuple[str, str], ...]:
+    """Whether programs look for the surface themselves, see surface/point.glsl; `rays_begin`: a place, w 1, or a
+    direction to infinity, w 0."""
+    return (("OWN_SURFACE", ""), ("RAYS_BEGIN", rays_begin)) if compiled.own_surface else ()
 
 
 def _tint_program(compiled: CompiledMaterial) -> Program:
@@ -356,7 +360,7 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
         constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
-        defines=(*PROJECTION_DEFINES, *_own_defines(compiled)),
+        defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
         **_shared(compiled),
     )
 
@@ -378,7 +382,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
         constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
-        defines=EVERY_DEFINES,
+        defines=(*EVERY_DEFINES, *_own_defines(compiled, "light_point")),
     )
 
 

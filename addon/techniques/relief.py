@@ -17,8 +17,8 @@ has its own outline. Where the whole of it is less than a pixel high it fades in
 | bytes | 240 for a triangle's prism, 96 and 48 an attribute in its list |
 
 Bias: what is thinner than a step may be missed (`safe` does not, where the steepest slope was found). Rays that run
-no shader (mirrors, indirect light) meet the mesh at the lowest level of the relief, with its bumped normals. A camera
-within the shell sees through the prism that it is in. Soft shadows that need opaque meshes treat it as alpha.
+no shader (mirrors, indirect light) meet the mesh at the lowest level of the relief, with its bumped normals. Soft
+shadows that need opaque meshes treat it as alpha.
 
 Fails: heights above an edge of a mesh that is not smooth part from those of the next face; overhangs need a mesh.
 """

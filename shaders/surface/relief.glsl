@@ -4,6 +4,7 @@
 // in which the ray crosses the heights, then false position, which brackets the crossing. Here heights are asked of the
 // material's own tree, and what is searched are prisms (Hirche et al. 2004), so that outlines are the relief's and frames
 // are exact: a place in a prism is found by Newton's method, and attributes vary over its triangle as they always do.
+// RAYS_BEGIN: from where rays come, w 0 if from infinitely far.
 // A crossing counts from both sides, as a sheet is seen from below, too.
 #include "lib/surface_point.glsl"
 #include "surface/shell.glsl"
@@ -38,16 +39,23 @@ vec3 turned_to(vec3 normal, vec3 viewer)
 
 bool own_surface(inout SurfacePoint point, Instance instance)
 {
-  if (point.backfacing) {
-    return false;  // a side by which the ray leaves
-  }
   vec4 levels = shell_texel(0);
   vec4 more = shell_texel(1);
   int base = 2 + shell_triangle * SHELL_STRIDE;
   Shell s = shell_read(instance, base, SHELL_STRIDE);
   vec3 direction = -point.incoming;
   vec3 start = point.position;
-  float width = pixel_width(start);
+  vec3 guess = vec3(1.0 / 3.0, 1.0 / 3.0, 0.5 * (levels.x + levels.y));
+  if (point.backfacing) {
+    // A side by which the ray leaves: what it finds it finds where it enters, unless it begins in here.
+    vec4 eye = RAYS_BEGIN;
+    vec3 inside = shell_place(s, eye.xyz, shell_place(s, eye.xyz, guess));
+    if (eye.w < 0.5 || shell_outside(inside.xy) > 0.0 || inside.z <= levels.x || inside.z >= levels.y) {
+      return false;
+    }
+    start = eye.xyz;
+  }
+  float width = pixel_width(point.position);
 
   // The point at the triangle's first corner, whose neighbours are the two others: surface_point_moved then goes anywhere.
   SurfacePoint corner = point;
@@ -58,8 +66,7 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   corner.position_dy = s.e2;
   shell_attributes(corner, base);
 
-  vec3 at = shell_place(s, start, vec3(1.0 / 3.0, 1.0 / 3.0, 0.5 * (levels.x + levels.y)));
-  at = shell_place(s, start, at);
+  vec3 at = shell_place(s, start, shell_place(s, start, guess));
   vec3 rate = shell_step(s, at, direction);
   // Where the ray leaves, if it ran straight in the prism.
   float reach = 1e30;

@@ -254,6 +254,17 @@ def test_hard_cases_stay_finite(stage, case):
     np.testing.assert_array_equal(shown["combined"], again["combined"])
 
 
+def test_a_camera_within_the_shell_sees_the_relief_below_it(stage):
+    """A ramp from 0 to 1 is .5 high in the middle, and the camera stands .2 above that."""
+    stage.card(height_material(stage, along_u, 1.0), 0, 1)
+    stage.light("SUN", angle=0.0)
+    stage.camera((0, 0, 0.7), (0, 0, 0), 0.6)
+    depth = stage.render()["depth"][..., 0]
+    slope = (np.arange(32) + 0.5 - 16) / 16 * np.tan(0.3)
+    # z = .5 + x / 2 and x = depth * slope, z = .7 - depth
+    np.testing.assert_allclose(depth, np.broadcast_to(0.2 / (1 + 0.5 * slope), depth.shape), rtol=2e-3)
+
+
 # What is chosen ------------------------------------------------------------------------------------------------------
 
 
