@@ -63,7 +63,7 @@ WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
 STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
-REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "ray_number"))
+REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "ray_number"), ("INT", "rays"))
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 ORDERS = ("direct", "indirect")
@@ -206,9 +206,11 @@ class ShadedReflections(Technique):
         mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)
         glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
         interfaces = frame.settings.get(glass, "interfaces") if glass else 0
-        reach = {"mirrors": mirrors, "interfaces": interfaces, "shaded_roughness": shaded_roughness(frame)}
-        onward_roughness = min(reach["shaded_roughness"], ONWARD_ROUGHNESS)
         rounds = max(mirrors, interfaces + 1 if transmission else 0)
+        reach = {
+            "mirrors": mirrors, "interfaces": interfaces, "rays": rounds, "shaded_roughness": shaded_roughness(frame)
+        }  # fmt: skip
+        onward_roughness = min(reach["shaded_roughness"], ONWARD_ROUGHNESS)
 
         rays, onward = self._take(frame), self._take(frame)
         records = Records.take(frame.size)

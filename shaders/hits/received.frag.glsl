@@ -15,6 +15,7 @@ struct Receiver {
   bool shines;     // has a lobe of microfacets that light samples can find
   bool bends;
   bool followed;   // by a ray
+  int mirrored;    // by so many surfaces on the way to the camera
   Lobe lobe;
   Interface glass;
 };
@@ -106,7 +107,7 @@ vec3 indirect_light(Receiver r, uvec3 roll)
     return sum;
   }
   vec3 from;
-  vec3 arriving = virtual_irradiance(r.surface.position, lit, glossy_radius, true, roll.z, from);
+  vec3 arriving = virtual_irradiance(r.surface.position, lit, glossy_radius, r.mirrored > 0, roll.z, from);
   sum += arriving * reflection_of(reflection, lit, from, r.viewer);
   Walk walk;
   walk.direction = cosine_direction(lit, vec2(to_unit(roll.x), to_unit(roll.y)));
@@ -139,8 +140,10 @@ void main()
   bool has_lobe = max_component(r.surface.glossy_weight) > 0.0;
   r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
   r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
-  r.followed = has_lobe && (r.bends ? ray_number < interfaces :
-                                      r.surface.glossy_roughness <= shaded_roughness && ray_number + 1 < mirrors);
+  r.mirrored = path_mirrors(code);
+  r.followed = has_lobe && ray_number + 1 < rays
+               && (r.bends ? ray_number < interfaces :
+                             r.surface.glossy_roughness <= shaded_roughness && r.mirrored < mirrors);
   r.lobe = lobe_begin(r.surface, r.viewer);
   r.shines = r.shines && !lobe_is_mirror(r.lobe);
   r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,
@@ -150,7 +153,7 @@ void main()
   for (int k = 0; k < repeats; k++) {
     sum += direct_light(r, roll.x);
     roll = hash3(roll);
-    if (glossy_radius > 0.0 && ray_number + 1 < bounces) {
+    if (glossy_radius > 0.0 && r.mirrored < bounces) {
       sum += indirect_light(r, roll);
     }
   }

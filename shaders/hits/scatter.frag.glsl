@@ -22,8 +22,10 @@ void main()
   float width = hit_place_fetch(pixel).w;
   vec4 before = met_path_fetch(pixel);
   vec3 throughput = before.rgb * hit_passed_fetch(pixel).rgb;
-  int code = int(before.w + 0.5) & 3;
-  bool clear = path_is_clear(int(before.w + 0.5));
+  int code = int(before.w + 0.5);
+  bool clear = path_is_clear(code);
+  int mirrored = path_mirrors(code);
+  code = (code & 3) + PATH_MIRROR * mirrored;
   if (code == 0) {
     return;
   }
@@ -35,6 +37,7 @@ void main()
   vec3 throughput = vec3(1.0);
   int code = (s.kind == LOBE_REFRACTION) ? PATH_TRANSMISSION : PATH_GLOSSY;
   bool clear = true;
+  int mirrored = 0;
 #endif
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 131u + 7u * uint(ray_number)));
   vec2 u = vec2(shuffled(film_view.sample_index, salt.xy), shuffled(film_view.sample_index, salt.yz));
@@ -50,11 +53,12 @@ void main()
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
     code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0);
   }
-  else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && ray_number < mirrors) {
+  else if (s.kind <= FRESNEL_F82 && s.glossy_roughness <= shaded_roughness && mirrored < mirrors) {
     Lobe lobe = lobe_begin(s, viewer);
     direction = lobe_sample(lobe, u, weight);
     lobe_reflection(lobe, direction, density);
     weight *= may_mirror(s, direction) ? 1.0 : 0.0;
+    code += PATH_MIRROR;
 #ifndef ONWARD
     density = (s.glossy_roughness > traced_roughness) ? FOUND_ELSEWHERE : density;
 #endif

@@ -19,9 +19,10 @@ void main()
   int id = int(hit_triangle_fetch(pixel).x);
   SurfacePoint point = hit_point(pixel, instance_read(id), id);
   point.refracts = glass_bends != 0;
-  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 81 + ray_number);
+  // Evenly over the samples: a pane's two sides are each one lobe of two.
+  uvec3 salt = roll_of(pixel, 0, film_view.seed, 81 + ray_number);
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;
-  Closures c = closures_begin(point.normal, to_unit(roll.x), even_share);
+  Closures c = closures_begin(point.normal, shuffled(film_view.sample_index, salt.xy), even_share);
   evaluate_material(point, c);
   closures_end(c);
   float through = clamp(dot(c.transparency, vec3(1.0 / 3.0)), 0.0, 1.0);

@@ -75,9 +75,50 @@ def no_glare(stage):
     stage.scene.camera.data.candela.glare_mode = "OFF"
 
 
+def no_needs(stage):
+    """Nothing of what this technique alone needs: the room as it is."""
+
+
+# What the room lacks and a technique needs: too dear for the pictures of all the others.
+
+
+def foggy(stage):
+    tree = stage.scene.world.node_tree
+    fog, output = tree.nodes.new("ShaderNodeVolumeScatter"), tree.nodes["World Output"]
+    fog.inputs["Density"].default_value = 0.1
+    tree.links.new(fog.outputs[0], output.inputs["Volume"])
+
+
+def waxen(stage):
+    wax = stage.principled(Subsurface_Weight=1.0, Subsurface_Scale=0.2)
+    stage.rectangle((-0.4, -1.2), (0.4, -0.6), 0.3, material=wax)
+
+
+def edited(stage):
+    own = stage.paper.candela
+    stage.paper.data.materials[0] = stage.principled(Roughness=0.1)
+    one = own.reflection_editing_constraints.add()
+    one.place, one.target = (0.8, 0.0, 0.8), (0.0, 0.0, 2.0)
+    region = own.reflection_editing_regions.add()
+    region.centre, region.radius = (0.8, 0.0, 0.8), 2.0
+
+
+WITH = {
+    "media": foggy,
+    "airlight": foggy,
+    "volume_caustics": foggy,
+    "image_space_subsurface": waxen,
+    "reflection_editing": edited,
+}
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
+    "media": no_needs,
+    "airlight": no_needs,
+    "volume_caustics": no_needs,
+    "image_space_subsurface": no_needs,
+    "reflection_editing": no_needs,
+    "shaded_reflections": no_gloss,
     "light_probes": nothing_lit,
     "accumulated_maps": no_shadow,
     "vssm": no_source_to_shadow,
@@ -186,6 +227,7 @@ def test_a_scene_without_the_need_plans_allocates_compiles_and_draws_nothing_of_
 
 @pytest.mark.parametrize("technique", REGISTRY, ids=lambda t: t.name)
 def test_an_unchanged_frame_redoes_nothing_of_it(room, bound, technique):
+    WITH.get(technique.name, no_needs)(room)
     choose(room, technique)
     room.render(SAMPLES, bounces=room.bounces)
     assert room.ledger.row(technique.name).state == RAN

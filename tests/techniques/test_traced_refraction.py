@@ -156,18 +156,7 @@ def test_surfaces_behind_glass_keep_their_texture(stage):
     assert found[:11].max() < 0.3 * passed < 0.6 * passed < found[-11:].min()
 
 
-# Since what rays meet is shaded by itself (shaded_reflections.py), interfaces of a pane count among the bounces, and
-# hits share the points of lights: the mean is 5 % low with 4 bounces, and right with 12 (squared error .013).
-SHADED_HITS = pytest.mark.xfail(strict=True, reason="interfaces count as bounces where hits are shaded")
-
-
-@pytest.mark.parametrize(
-    "technique",
-    [
-        pytest.param("instant_radiosity", marks=SHADED_HITS),
-        pytest.param("clustered_visibility", marks=(SLOW, SHADED_HITS)),
-    ],
-)
+@pytest.mark.parametrize("technique", ["instant_radiosity", pytest.param("clustered_visibility", marks=SLOW)])
 def test_surfaces_behind_glass_get_the_light_of_other_surfaces_as_in_cycles(stage, technique):
     """A room that only its pane shows. Its ceiling, the upper part of the picture, has no light but that of the floor
     and the wall."""
