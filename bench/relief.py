@@ -28,7 +28,7 @@ PAGE = ROOT / "docs" / "relief.md"
 COMMAND = "python -m bench relief --page"
 SIZE = (96, 64)
 SAMPLES = 16
-OWN_SAMPLES = 64
+OWN_SAMPLES = 32
 REFERENCE_SAMPLES = {"SUN": 64, "AREA": 512, "WORLD": 512}
 JUMP = 0.05  # m: twice a pixel's width
 

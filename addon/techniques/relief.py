@@ -25,9 +25,11 @@ Fails: heights above an edge of a mesh that is not smooth part from those of the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ..frame.run import Frame
 from ..frame.settings import Settings
-from ..frame.technique import MATERIAL, Param, Technique
+from ..frame.technique import MATERIAL, Param, Service, Technique
 from ..scene import displacement
 from ..snapshot.scene import Snapshot
 
@@ -45,9 +47,19 @@ SEARCHES = (
 DEFAULTS = displacement.DEFAULTS
 
 
+@dataclass(frozen=True)
+class Shells(Service):
+    """Which materials of the frame are drawn by a shell, and how many triangles those have."""
+
+    name = "shells"
+    materials: frozenset[int]
+    triangles: int
+
+
 class Relief(Technique):
     name = displacement.OWNER
     label = "Relief"
+    provides = (Shells,)
     params = (
         Param(
             "mode", "Displacement", DEFAULTS["mode"],
@@ -81,5 +93,7 @@ class Relief(Technique):
         return "no material displaces its surface"
 
     def begin(self, frame: Frame) -> None:
-        shells = sum(draw.triangles for draw in frame.geometry.draws if frame.materials.in_shell(draw.material))
-        frame.count(self, "shell triangles", shells)
+        drawn = [draw for draw in frame.geometry.draws if frame.materials.in_shell(draw.material)]
+        shells = Shells(frozenset(draw.material for draw in drawn), sum(draw.triangles for draw in drawn))
+        frame.provide(shells)
+        frame.count(self, "shell triangles", shells.triangles)

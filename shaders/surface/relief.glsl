@@ -49,8 +49,11 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   if (point.backfacing) {
     // A side by which the ray leaves: what it finds it finds where it enters, unless it begins in here.
     vec4 eye = RAYS_BEGIN;
+    if (eye.w < 0.5) {
+      return false;
+    }
     vec3 inside = shell_place(s, eye.xyz, shell_place(s, eye.xyz, guess));
-    if (eye.w < 0.5 || shell_outside(inside.xy) > 0.0 || inside.z <= levels.x || inside.z >= levels.y) {
+    if (shell_outside(inside.xy) > 0.0 || inside.z <= levels.x || inside.z >= levels.y) {
       return false;
     }
     start = eye.xyz;
@@ -109,7 +112,8 @@ bool own_surface(inout SurfacePoint point, Instance instance)
         forward = max(abs(f0) / max(closing, 1e-30), 0.125 * step_m);
       }
       t1 = min(t0 + forward, reach);
-      at1 = shell_place(s, start + t1 * direction, at1 + (t1 - t0) * rate);
+      at1 += (t1 - t0) * rate;
+      at1 = bent ? shell_nearer(s, start + t1 * direction, at1) : at1;
       f1 = at1.z - relief_faded(relief_height(corner, s, at1.xy), middle, share);
       crossed = f1 * side <= 0.0;
       if (crossed || t1 >= reach || shell_outside(at1.xy) > 1e-3) {
@@ -128,7 +132,7 @@ bool own_surface(inout SurfacePoint point, Instance instance)
       float gap = f0 - f1;
       float part = (search == SEARCH_BISECTION || gap < 1e-30) ? 0.5 : f0 / gap;
       float t = t0 + (t1 - t0) * part;
-      at1 = shell_place(s, start + t * direction, at1);
+      at1 = bent ? shell_place(s, start + t * direction, at1) : at + t * rate;
       float f = side * (at1.z - relief_faded(relief_height(corner, s, at1.xy), middle, share));
       if (f > 0.0) {
         t0 = t;
@@ -145,7 +149,7 @@ bool own_surface(inout SurfacePoint point, Instance instance)
     }
     float last = f0 - f1;
     t1 = t0 + (t1 - t0) * ((last > 1e-30) ? f0 / last : 0.5);
-    at1 = shell_place(s, start + t1 * direction, at1);
+    at1 = bent ? shell_place(s, start + t1 * direction, at1) : at + t1 * rate;
     if (shell_outside(at1.xy) > 1e-3 || at1.z < levels.x - 1e-3 * range) {
       return false;
     }

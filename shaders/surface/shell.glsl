@@ -50,15 +50,16 @@ vec3 shell_step(Shell s, vec3 at, vec3 step_m)
              ? vec3(dot(step_m, across), dot(step_m, cross(c, a)), dot(step_m, cross(a, b))) / volume : vec3(0.0);
 }
 
-// Newton's method from a guess nearby: one step is exact where normals are parallel, as on a plane.
+// A step of Newton's method: exact where normals are parallel, as on a plane.
+vec3 shell_nearer(Shell s, vec3 place, vec3 guess)
+{
+  vec3 reached = s.origin + guess.x * s.e1 + guess.y * s.e2 + guess.z * shell_normal(s, guess.xy);
+  return guess + shell_step(s, guess, place - reached);
+}
+
 vec3 shell_place(Shell s, vec3 place, vec3 guess)
 {
-  vec3 at = guess;
-  for (int i = 0; i < 2; i++) {
-    vec3 reached = s.origin + at.x * s.e1 + at.y * s.e2 + at.z * shell_normal(s, at.xy);
-    at += shell_step(s, at, place - reached);
-  }
-  return at;
+  return shell_nearer(s, place, shell_nearer(s, place, guess));
 }
 
 // How far outside of the prism over its triangle a place is, in shares of the triangle; 0 inside.
