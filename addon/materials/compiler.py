@@ -127,6 +127,11 @@ class _Compilation:
         self.code.lines.append("#if !defined(DISPLACED) && !defined(OWN_SURFACE)")
         self.code.lines.append(f"point.normal = displaced_normal(point, {width}, {name}(point), {x}, {y});")
         self.code.lines.append("closures.base_normal = point.normal;")
+        self.code.lines.append("#elif defined(UNDISPLACED_PLACE)")
+        self.code.lines.append("SurfacePoint before = point_before(point, UNDISPLACED_PLACE, UNDISPLACED_NORMAL);")
+        x, y = x.replace("(point,", "(before,"), y.replace("(point,", "(before,")
+        self.code.lines.append(f"point.normal = displaced_normal(before, {width}, {name}(before), {x}, {y});")
+        self.code.lines.append("closures.base_normal = point.normal;")
         self.code.lines.append("#endif")
         self.code.call_it(name, "vec3 material_displacement")
 

@@ -37,7 +37,8 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..materials.attributes import INSTANCE
-from ..materials.compiled import CompiledMaterial, OwnSurface
+from ..materials.compiled import Attribute, CompiledMaterial, OwnSurface
+from ..materials.expressions import MAX_ATTRIBUTES
 from ..materials.nodes.inputs import FLAT
 from ..snapshot.scene import Instance, Mesh, Note, Snapshot
 from .geometry import TEXELS_PER_INSTANCE, corner_attribute, instance_facts
@@ -46,6 +47,8 @@ from .shells import corner_list
 
 OWNER = "relief"  # the technique whose parameters these are
 AUTO, BUMP, MESH, RELIEF = "AUTO", "BUMP", "MESH", "RELIEF"
+PLACE_BEFORE, NORMAL_BEFORE = ".before", ".normal_before"  # attributes of corners, in object space
+BEFORE = (Attribute("NAMED", PLACE_BEFORE), Attribute("NAMED", NORMAL_BEFORE))
 FALSE_POSITION, INTERVAL, BISECTION = "FALSE_POSITION", "INTERVAL", "BISECTION"
 DEFAULTS = {"mode": AUTO, "search": FALSE_POSITION, "steps": 64, "refinements": 4, "safe": False}
 SEARCHES = {FALSE_POSITION: 0, INTERVAL: 1, BISECTION: 2}
@@ -266,12 +269,16 @@ class Displacement:
             self._levels[k] = low - margin, high + margin, max(one.slope for one in ones)
             compiled = materials.compiled[k]
             if self.modes[k] == MESH:
-                materials.compiled[k] = replace(
-                    compiled, glsl=f"#define DISPLACED 1\n{compiled.glsl}", program_key=f"m{compiled.program_key}"
-                )
+                materials.compiled[k] = _moved_program(compiled, self._bumps(snapshot, materials, k))
             else:
                 materials.compiled[k] = replace(compiled, own_surface=relief_surface(compiled), casts_by_lot=True)
         self._settings = {k: snapshot.materials[k].own for k in ranges}
+
+    @staticmethod
+    def _bumps(snapshot: Snapshot, materials: MaterialSet, k: int) -> bool:
+        """Whether moved vertices have the normals of the tree's own detail, for which there must be room."""
+        room = len(materials.compiled[k].attributes) + len(BEFORE) <= MAX_ATTRIBUTES
+        return snapshot.materials[k].graph.displacement_method == "BOTH" and room
 
     def _numbers(self, snapshot: Snapshot, kinds, measured) -> tuple[dict, dict[int, list]]:
         """First number of the triangles of (kind, material) in the material's list; (mesh, triangles) by material."""
@@ -331,6 +338,9 @@ class Displacement:
             mesh, key=name, version=next(_versions), positions=positions, bounds_min=low_end, bounds_max=high_end
         )
         if any(self.modes[k] == MESH for k in own):
+            before = {PLACE_BEFORE: mesh.positions[mesh.corner_vertices], NORMAL_BEFORE: mesh.corner_normals}
+            before = {name: np.pad(values, ((0, 0), (0, 1))) for name, values in before.items()}
+            moved = replace(moved, colors=moved.colors | before)
             moved = with_new_normals(moved, np.any(offsets != 0.0, axis=1))
         return replace(moved, undisplaced=mesh, shells=first) if first else moved
 
@@ -417,6 +427,16 @@ def with_new_normals(mesh: Mesh, moved: np.ndarray) -> Mesh:
         colors={name: values[source] for name, values in mesh.colors.items()},
         tangents={name: values[source] for name, values in mesh.tangents.items()},
     )
+
+
+def _moved_program(compiled: CompiledMaterial, bumps: bool) -> CompiledMaterial:
+    """Of a material whose vertices have been moved."""
+    count, lines, attributes = len(compiled.attributes), ["#define DISPLACED 1"], compiled.attributes
+    if bumps:
+        lines += [f"#define UNDISPLACED_PLACE {count}", f"#define UNDISPLACED_NORMAL {count + 1}"]
+        attributes = (*attributes, *BEFORE)
+    key = f"{'b' if bumps else 'm'}{compiled.program_key}"
+    return replace(compiled, glsl="\n".join([*lines, compiled.glsl]), attributes=attributes, program_key=key)
 
 
 def displacement_program(compiled: CompiledMaterial) -> Program:

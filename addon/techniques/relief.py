@@ -3,10 +3,10 @@
 A material whose displacement is a height is drawn as a shell of prisms over its mesh. Each fragment follows its ray
 through its prism: a linear search finds the first interval in which the ray crosses the heights, then false position
 shrinks it (Risser, Shah & Pattanaik 2007: interval mapping; here with Illinois' halving). Heights are the material's
-own tree, evaluated where the ray is, so that images and procedurals, any UV map and any attribute do. What is found is a
-point of the surface: it has a place, a depth, a slope and the attributes of where it stands, in the camera's picture, in
-views of lights and in depth maps, so relief shadows itself and others, stands in front of or behind other geometry, and
-has its own outline. Where the whole of it is less than a pixel high it fades into the bumped surface.
+own tree, evaluated where the ray is, so that images and procedurals, any UV map and any attribute do. What is found is
+a point of the surface: it has a place, a depth, a slope and the attributes of where it stands, in the camera's picture,
+in views of lights and in depth maps, so relief shadows itself and others, stands in front of or behind other geometry,
+and has its own outline. Where the whole of it is less than a pixel high it fades into the bumped surface.
 
 | cost | per fragment of the shell |
 |---|---|

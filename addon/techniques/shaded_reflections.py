@@ -63,7 +63,13 @@ WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
 STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
-REACH = (("INT", "mirrors"), ("INT", "interfaces"), ("FLOAT", "shaded_roughness"), ("INT", "ray_number"), ("INT", "rays"))
+REACH = (
+    ("INT", "mirrors"),
+    ("INT", "interfaces"),
+    ("FLOAT", "shaded_roughness"),
+    ("INT", "ray_number"),
+    ("INT", "rays"),
+)
 MORE_RAYS = 4  # to lights, of a hit in a picture of one sample
 ONWARD_ROUGHNESS = 0.3  # of lobes of what rays have met, up to which they go on: rougher ones see virtual lights
 ORDERS = ("direct", "indirect")

@@ -340,6 +340,19 @@ def test_moved_vertices_are_those_of_cycles(stage, smooth, space, scale):
     assert np.mean(difference > 0.02 * cycles["combined"][hit][:, 0] + 1e-3) < 0.02
 
 
+def test_detail_between_moved_vertices_is_bump_as_in_cycles(stage):
+    """Displacement and Bump on a mesh that is too coarse for the noise: shape of the vertices, normals of the tree."""
+    placed = lattice(stage, height_material(stage, noise, 0.3, 0.5, method="BOTH", mode="MESH"), 10)
+    placed.rotation_euler = (0.1, 0.2, 0.3)
+    stage.light("SUN", turn=(0.2, 0.3, 0), angle=0.0)
+    stage.camera_above(1.6)
+    own, cycles = both(stage)
+    normals = np.einsum("hwc,hwc->hw", own["normal"], cycles["normal"])
+    assert np.quantile(normals, 0.05) > np.cos(0.03)
+    difference = np.abs(own["combined"] - cycles["combined"])[..., 0]
+    assert np.mean(difference > 0.02 * cycles["combined"][..., 0] + 1e-3) < 0.05
+
+
 @pytest.mark.parametrize("space", ["TANGENT", "OBJECT", "WORLD"])
 def test_vertices_moved_by_vectors_are_those_of_cycles(stage, space):
     made = stage.diffuse(0.5)

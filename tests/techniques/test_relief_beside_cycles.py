@@ -9,7 +9,7 @@ from bench import relief as figures
 def test_relief_is_what_cycles_displaces(registered, name, monkeypatch):
     """Away from edges, at outlines, and where a box stands in it; and so are the moved vertices of a fine mesh."""
     monkeypatch.setattr(figures, "SIZE", (64, 48))
-    monkeypatch.setattr(figures, "OWN_SAMPLES", 16)
+    monkeypatch.setattr(figures, "OWN_SAMPLES", {"SUN": 16})
     monkeypatch.setattr(figures, "REFERENCE_SAMPLES", {"SUN": 16})
     found = dict(figures.errors(name, "SUN"))
     for label, one in found.items():
