@@ -14,6 +14,7 @@
 #define SEARCH_BISECTION 2
 #define PIXELS_A_STEP 2.0  // that a step of the linear search covers on the mesh
 #define FEWEST_STEPS 3.0
+#define OVERLAP 0.25  // pixels
 
 // Height of the relief, m, over a place of the triangle whose first corner `corner` is.
 float relief_height(SurfacePoint corner, Shell s, vec2 b)
@@ -71,11 +72,15 @@ bool own_surface(inout SurfacePoint point, Instance instance)
 
   vec3 at = shell_place(s, start, shell_place(s, start, guess));
   vec3 rate = shell_step(s, at, direction);
+  // Prisms overlap by a fraction of a pixel, or what rounds to outside of one and to below the surface in the next would
+  // be a hole.
+  float shortest = min(min(dot(s.e1, s.e1), dot(s.e2, s.e2)), dot(s.e1 - s.e2, s.e1 - s.e2));
+  float rim = clamp(OVERLAP * width / sqrt(max(shortest, 1e-37)), 1e-4, 0.05);
   // Where the ray leaves, if it ran straight in the prism.
   float reach = 1e30;
-  reach = (rate.x < 0.0) ? min(reach, at.x / -rate.x) : reach;
-  reach = (rate.y < 0.0) ? min(reach, at.y / -rate.y) : reach;
-  reach = (rate.x + rate.y > 0.0) ? min(reach, (1.0 - at.x - at.y) / (rate.x + rate.y)) : reach;
+  reach = (rate.x < 0.0) ? min(reach, (at.x + rim) / -rate.x) : reach;
+  reach = (rate.y < 0.0) ? min(reach, (at.y + rim) / -rate.y) : reach;
+  reach = (rate.x + rate.y > 0.0) ? min(reach, (1.0 + rim - at.x - at.y) / (rate.x + rate.y)) : reach;
   reach = (rate.z < 0.0) ? min(reach, (at.z - levels.x) / -rate.z) : reach;
   reach = (rate.z > 0.0) ? min(reach, (levels.y - at.z) / rate.z) : reach;
   bool bent = dot(s.n1, s.n1) + dot(s.n2, s.n2) > 1e-8;
@@ -116,7 +121,7 @@ bool own_surface(inout SurfacePoint point, Instance instance)
       at1 = bent ? shell_nearer(s, start + t1 * direction, at1) : at1;
       f1 = at1.z - relief_faded(relief_height(corner, s, at1.xy), middle, share);
       crossed = f1 * side <= 0.0;
-      if (crossed || t1 >= reach || shell_outside(at1.xy) > 1e-3) {
+      if (crossed || t1 >= reach || shell_outside(at1.xy) > rim) {
         break;
       }
       t0 = t1;
@@ -150,7 +155,7 @@ bool own_surface(inout SurfacePoint point, Instance instance)
     float last = f0 - f1;
     t1 = t0 + (t1 - t0) * ((last > 1e-30) ? f0 / last : 0.5);
     at1 = bent ? shell_place(s, start + t1 * direction, at1) : at + t1 * rate;
-    if (shell_outside(at1.xy) > 1e-3 || at1.z < levels.x - 1e-3 * range) {
+    if (shell_outside(at1.xy) > rim || at1.z < levels.x - 1e-3 * range) {
       return false;
     }
   }
