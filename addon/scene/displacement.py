@@ -140,7 +140,11 @@ class Displacement:
             for k in sorted(asked.intersection(np.unique(of_triangle).tolist())):
                 compiled = materials.compiled[k]
                 some = _different(instances, INSTANCE in compiled.reads)
-                places = tuple(one.matrix.tobytes() if compiled.reads else one.matrix[:3, :3].tobytes() for one in some)
+                turned = not compiled.along_normal  # a vector may keep its direction when the object turns
+                places = tuple(
+                    one.matrix.tobytes() if compiled.reads else one.matrix[:3, :3].tobytes() if turned
+                    else _shape_of(one) for one in some
+                )  # fmt: skip
                 facts = tuple((one.random, one.color, one.pass_index) for one in some) if compiled.reads else ()
                 key = (mesh.key, mesh.version, kind[1], k, prints[k], prints[count:], places, facts)
                 known[key] = self._measured.get(key) or self._measured_of(materials, k, mesh, of_triangle == k, some)
@@ -352,6 +356,15 @@ def _different(instances: list[Instance], apart: bool) -> list[Instance]:
     size = [abs(np.linalg.det(one.matrix[:3, :3])) for one in instances]
     chosen = dict.fromkeys((0, int(np.argmin(size)), int(np.argmax(size))))
     return [instances[k] for k in chosen if k == 0 or abs(size[k] - size[0]) > 1e-3 * size[0]]
+
+
+def _shape_of(instance: Instance) -> tuple[float, ...]:
+    """Equal for instances that differ in where they stand and how they are turned: lengths and angles of their axes."""
+    axes = instance.matrix[:3, :3]
+    gram = axes.T @ axes
+    size = float(np.trace(gram)) or 1.0
+    shape = (gram / size)[np.triu_indices(3)]
+    return (*np.round(shape, 6).tolist(), float(f"{size:.6g}"), float(np.sign(np.linalg.det(axes))))
 
 
 def _extent(mesh: Mesh, instances: list[Instance]) -> float:

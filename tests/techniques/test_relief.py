@@ -308,6 +308,20 @@ def test_more_steps_draw_anew_and_an_unchanged_scene_measures_nothing(stage):
     assert stage.renderer.displacement._measured == known
 
 
+def test_an_object_that_moves_and_turns_is_measured_once(stage):
+    placed = stage.card(height_material(stage, cone, 0.8), 0, 1)
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(3.0)
+    stage.render()
+    known = dict(stage.renderer.displacement._measured)
+    placed.location, placed.rotation_euler = (0.3, 0, 0), (0, 0, 0.5)
+    moved = stage.render()["depth"][..., 0]
+    assert list(stage.renderer.displacement._measured.values()) == list(known.values())
+    x, y = places((32, 32), 3.0)
+    inside = np.hypot(x - 0.3, y) < 0.7
+    np.testing.assert_allclose(moved[inside], 9.2 + 0.8 * np.hypot(x - 0.3, y)[inside], atol=4e-3)
+
+
 # Beside Cycles -------------------------------------------------------------------------------------------------------
 
 
