@@ -27,8 +27,8 @@ PAGE = ROOT / "docs" / "relief.md"
 COMMAND = "python -m bench relief --page"
 SIZE = (96, 64)
 SAMPLES = 16
-OWN_SAMPLES = {"SUN": 32, "AREA": 16, "WORLD": 32}
-REFERENCE_SAMPLES = {"SUN": 64, "AREA": 512, "WORLD": 512}
+OWN_SAMPLES = {"SUN": 32, "AREA": 8, "WORLD": 16}
+REFERENCE_SAMPLES = {"SUN": 64, "AREA": 256, "WORLD": 256}
 JUMP = 0.05  # m: twice a pixel's width
 
 
