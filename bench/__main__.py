@@ -24,6 +24,7 @@ from bench import (
     profile,
     random_scenes,
     reflections,
+    relief,
     run,
     subsurface,
 )
@@ -42,6 +43,7 @@ VERBS = {
     "edges": edges,
     "random": random_scenes,
     "reflections": reflections,
+    "relief": relief,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,
