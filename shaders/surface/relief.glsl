@@ -14,7 +14,7 @@
 #define SEARCH_BISECTION 2
 #define PIXELS_A_STEP 2.0  // that a step of the linear search covers on the mesh
 #define FEWEST_STEPS 3.0
-#define OVERLAP 0.25  // pixels
+#define OVERLAP 0.02  // pixels
 
 // Height of the relief, m, over a place of the triangle whose first corner `corner` is.
 float relief_height(SurfacePoint corner, Shell s, vec2 b)
