@@ -29,6 +29,7 @@ from bench import (
     profile,
     random_scenes,
     reflections,
+    relief,
     run,
     subsurface,
 )
@@ -52,6 +53,7 @@ VERBS = {
     "edges": edges,
     "random": random_scenes,
     "reflections": reflections,
+    "relief": relief,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,

@@ -18,6 +18,7 @@ from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
+from ..scene.displacement import Displacement
 from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compile_programs
@@ -312,6 +313,7 @@ class Renderer:
         self.techniques = tuple(registry())
         self.geometry = SceneGeometry()
         self.materials = MaterialSet()
+        self.displacement = Displacement()
         self.frame: Frame | None = None
         self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
@@ -346,6 +348,7 @@ class Renderer:
         probe.ensure()
         ledger = Ledger(samples=0)
         self.materials.update(snapshot)
+        snapshot = self.displacement.apply(snapshot, self.materials)
         geometry_changed = self.geometry.update(snapshot, self.materials.compiled)
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
@@ -541,6 +544,7 @@ class Renderer:
         for technique in self.techniques:
             technique.release()
         self.geometry.release()
+        self.displacement.release()
         self.materials.release()
         self._hierarchies.release()
         self._environment = self._view_block = self._frame_key = None

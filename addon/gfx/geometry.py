@@ -45,6 +45,11 @@ def triangle_batch(vertices: gpu.types.GPUVertBuf, indices: np.ndarray) -> Batch
     return Batch(gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=elements), len(flat))
 
 
+def point_batch(vertices: gpu.types.GPUVertBuf) -> gpu.types.GPUBatch:
+    """One point for each vertex of a buffer."""
+    return gpu.types.GPUBatch(type="POINTS", buf=vertices)
+
+
 def numbered_points(count: int) -> gpu.types.GPUBatch:
     """Points with nothing but an int attribute `number`, 0 to count - 1."""
     return gpu.types.GPUBatch(type="POINTS", buf=vertex_buffer(number=np.arange(count, dtype=np.int32)))

@@ -92,15 +92,6 @@ class Program:
     def __hash__(self) -> int:
         return self._hash
 
-    def __hash__(self) -> int:
-        """Of all fields, found once: programs are looked up at each draw, and hold sources."""
-        known = self.__dict__.get("_hash")
-        if known is None:
-            known = hash((self.name, self.vertex, self.fragment, self.compute, self.textures, self.constants,
-                          self.defines, self.outputs, tuple(name for name, _ in self.snippets)))  # fmt: skip
-            object.__setattr__(self, "_hash", known)
-        return known
-
     @property
     def loaded(self) -> tuple[str, ...]:
         """Textures that are bound as images, because this driver loads faster than it fetches."""

@@ -70,6 +70,11 @@ class CompiledMaterial:
     medium: Medium | None  # what its inside does with light
     scatter: float  # about how far light spreads below its surface, m; 0: it does not
     fallbacks: tuple[tuple[str, str], ...]  # (node label, sentence): what could not be translated
+    # `glsl` also has `vec3 material_displacement(SurfacePoint point)`, m in world space; where DISPLACED is defined, or
+    # the program finds the surface itself, evaluate_material leaves the normal alone. With DISPLACED, UNDISPLACED_PLACE
+    # and UNDISPLACED_NORMAL may name attributes: the normal is then that of the tree's own detail.
+    displaces: bool = False
+    along_normal: bool = False  # by a height: what it lifts, it lifts along the normal
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
 
     @property

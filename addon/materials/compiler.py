@@ -99,6 +99,8 @@ class _Compilation:
             medium=medium,
             scatter=summary.scatter,
             fallbacks=tuple(code.fallbacks),
+            displaces=code.exists(self.graph.displacement),
+            along_normal=self._lifts_along_normal(),
         )
 
     def _unused_slots(self, medium: Medium | None, glass: bool) -> None:
@@ -122,8 +124,24 @@ class _Compilation:
         width = glsl_number(BUMP_FILTER_WIDTH, "FLOAT")
         x = f"{name}(surface_point_moved(point, vec2({width}, 0.0)))"
         y = f"{name}(surface_point_moved(point, vec2(0.0, {width})))"
+        self.code.lines.append("#if !defined(DISPLACED) && !defined(OWN_SURFACE)")
         self.code.lines.append(f"point.normal = displaced_normal(point, {width}, {name}(point), {x}, {y});")
         self.code.lines.append("closures.base_normal = point.normal;")
+        self.code.lines.append("#elif defined(UNDISPLACED_PLACE)")
+        self.code.lines.append("SurfacePoint before = point_before(point, UNDISPLACED_PLACE, UNDISPLACED_NORMAL);")
+        x, y = x.replace("(point,", "(before,"), y.replace("(point,", "(before,")
+        self.code.lines.append(f"point.normal = displaced_normal(before, {width}, {name}(before), {x}, {y});")
+        self.code.lines.append("closures.base_normal = point.normal;")
+        self.code.lines.append("#endif")
+        self.code.call_it(name, "vec3 material_displacement")
+
+    def _lifts_along_normal(self) -> bool:
+        link = self.graph.displacement
+        node = self.graph.nodes[link[0]] if self.code.exists(link) else None
+        if node is None or node.type != "ShaderNodeDisplacement":
+            return False
+        normal = node.inputs.get("Normal")
+        return normal is None or not self.code.exists(normal.link)
 
     def _surface(self) -> Summary:
         """Emit the shaders, parents before children, so that a shared shader gets the sum of all weights at once."""

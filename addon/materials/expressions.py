@@ -297,6 +297,10 @@ class Expressions:
             self._function_names[link, kind] = name
         return self._function_names[link, kind]
 
+    def call_it(self, function: str, head: str) -> None:
+        """Give one of the functions of `function` a name that does not depend on the tree."""
+        self._functions.append(f"\n{head}(SurfacePoint point)\n{{\n  return {function}(point);\n}}\n")
+
     def socket(self, node: Node, socket: words.Socket) -> str:
         expression = self._socket_value(node, socket)
         if socket.clamp and (socket.clamp == "*" or node.properties.get(socket.clamp, True)):

@@ -36,4 +36,5 @@ class Graph:
     surface: tuple[str, str] | None = None  # what is linked to the output node: (node key, output identifier)
     volume: tuple[str, str] | None = None
     displacement: tuple[str, str] | None = None
+    displacement_method: str = "BUMP"  # BUMP, DISPLACEMENT or BOTH: what it moves, the normal, the surface or both
     transparent_shadow: bool = True  # light on its way to a surface passes where the surface is transparent

@@ -77,8 +77,6 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     for name in ("Surface", "Volume", "Displacement"):
         socket = output.inputs.get(name)
         links[name.lower()] = None if socket is None else reading.source(place, output, socket).link
-    if links["displacement"] is not None and getattr(owner, "displacement_method", "BUMP") != "BUMP":
-        reading.notes.append((owner.name, "Displacement bends the surface's normal only; its shape stays."))
     reading.read_pending()
     found = reading.cut_cycles(links)
     if isinstance(owner, bpy.types.Material) and links["volume"] is not None and links["surface"] is None:
@@ -86,7 +84,11 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
         clear = Node("No surface", owner.name, "ShaderNodeBsdfTransparent", {"Color": WHITE}, {"BSDF": "SHADER"})
         found[clear.key], links["surface"] = clear, (clear.key, "BSDF")
     shadow = bool(getattr(owner, "use_transparent_shadow", True))
-    return Graph(found, **links, transparent_shadow=shadow), tuple(dict.fromkeys(reading.notes))
+    method = getattr(owner, "displacement_method", "BUMP")
+    return (
+        Graph(found, **links, displacement_method=method, transparent_shadow=shadow),
+        tuple(dict.fromkeys(reading.notes)),
+    )
 
 
 def _uses_nodes(owner) -> bool:

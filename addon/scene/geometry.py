@@ -21,8 +21,10 @@ from ..kernels.morton import morton_codes
 from ..materials.compiled import Attribute, CompiledMaterial
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from . import casters
+from .corners import corner_attribute
 from .culling import Boxes, closed
 from .envelope import normal_envelope
+from .shells import prisms
 
 LARGE, STEPS = 256.0, 16  # m: scenes beyond it are cut into so many places for the origin
 CAMERA_FLAG, SHADOW_FLAG, DIFFUSE_FLAG, GLOSSY_FLAG, HOLDOUT_FLAG = 1, 2, 4, 8, 16
@@ -114,7 +116,7 @@ class SceneGeometry:
         changed = self._update_transforms(instances, snapshot)
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
-            tuple((m.attributes, m.casts_by_lot) for m in materials),
+            tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials),
         )
         self.placed = (instances, snapshot.meshes, materials)
         self.changes += changed or key != self._draw_key
@@ -202,7 +204,7 @@ class SceneGeometry:
             self._written = [None] * len(instances)
         new = [k for k, (instance, written) in enumerate(zip(instances, self._written)) if instance is not written]
         if new:
-            rows[new, 3:7] = _facts_rows([instances[k] for k in new])
+            rows[new, 3:7] = instance_facts([instances[k] for k in new])
         self._written = instances
         if len(instances):
             users = Counter(instance.mesh for instance in instances)
@@ -262,7 +264,7 @@ class SceneGeometry:
                     [(0, mesh, slots)],
                     [(k, length, list(range(k, k + length))) for k, length in spans],
                 )
-        attributes = tuple((m.attributes, m.casts_by_lot) for m in materials)
+        attributes = tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials)
         self._shell = shell
         self._plan: list[tuple[list[int], int, object, int, int, bool]] = []
         kept = {}
@@ -317,7 +319,7 @@ class SceneGeometry:
         self.__init__()
 
 
-def _facts_rows(instances: list[Instance]) -> np.ndarray:
+def instance_facts(instances: list[Instance]) -> np.ndarray:
     """(N, 4, 4) what the instance image holds of each beside its matrix; what depends on others is 0."""
     rows = np.zeros((len(instances), 4, 4), np.float32)
     flags: dict[tuple[int, bool], int] = {}
@@ -381,6 +383,9 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
     surfaces = []
     extra: dict[tuple[int, Attribute], object] = {}
     for material in np.unique(triangle_material):
+        if _in_shell(materials[material]):
+            surfaces.append((int(material), _shell_batch(parts, int(material))))
+            continue
         batch = gfx_geometry.triangle_batch(surface_vertices, corners[triangle_material == material])
         for slot, attribute in enumerate(materials[material].attributes):
             if (slot, attribute) not in extra:
@@ -402,25 +407,20 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
     return surfaces, [gfx_geometry.triangle_batch(vertices, indices[opaque])]
 
 
-def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
-    """A named attribute over the corners as (C, 4) float32; zeros where the mesh does not have it, as in Blender."""
-    out = np.zeros((len(mesh.corner_vertices), 4), np.float32)
-    if attribute.kind == "UV":
-        source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
-        if source is None and attribute.name in mesh.colors:
-            source = mesh.colors[attribute.name][:, :3]  # what is no map, too, may be named
-    elif attribute.kind == "COLOR":
-        source = mesh.colors.get(attribute.name or mesh.active_color)
-        if source is None and attribute.name in mesh.uv_maps:
-            source, out[:, 3] = mesh.uv_maps[attribute.name], 1.0
-    elif attribute.kind == "NAMED":
-        source, out[:, 3] = mesh.colors.get(attribute.name), 1.0
-        if source is None and attribute.name in mesh.uv_maps:
-            source, out[:, 3] = mesh.uv_maps[attribute.name], 2.0  # see material/input.glsl
-    elif attribute.kind == "GENERATED":
-        source = None if mesh.generated is None else mesh.generated[mesh.corner_vertices]
-    else:
-        source = mesh.tangents.get(attribute.name or mesh.active_uv)
-    if source is not None:
-        out[:, : source.shape[1]] = source
-    return out
+def _in_shell(material: CompiledMaterial) -> bool:
+    return material.own_surface is not None and material.own_surface.shell
+
+
+def _shell_batch(parts: list[tuple[int, Mesh, tuple[int, ...]]], material: int) -> gfx_geometry.Batch:
+    """Prisms over the triangles of a material, as the undisplaced mesh has them."""
+    vertices, triangles, count = [], [], 0
+    for k, mesh, slots in parts:
+        own = mesh.triangle_materials(slots) == material
+        if own.any():
+            made, faces = prisms(mesh.undisplaced or mesh, own, dict(mesh.shells).get(material, 0))
+            made["local_instance"] = np.full(len(made["position"]), k, np.int32)
+            vertices.append(made)
+            triangles.append(faces + count)
+            count += len(made["position"])
+    joined = {name: np.concatenate([one[name] for one in vertices]) for name in vertices[0]}
+    return gfx_geometry.triangle_batch(gfx_geometry.vertex_buffer(**joined), np.concatenate(triangles))

@@ -60,7 +60,7 @@ class MaterialSet:
         """Compile and upload what changed."""
         if self.energy_table is None:
             self.energy_table = images.upload(energy_texture())
-        cache, self.compiled, notes = {}, [], []
+        cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
@@ -184,6 +184,11 @@ class MaterialSet:
             "blocks": {"material_values": self._blocks[self._keys[index]], "material_scene": self._scene},
         }
 
+    def in_shell(self, index: int) -> bool:
+        """Whether material `index` is drawn by a shell over its mesh."""
+        own = self.compiled[index].own_surface
+        return own is not None and own.shell
+
     def release(self) -> None:
         self.__init__()
 
@@ -236,15 +241,16 @@ def _shared(compiled: CompiledMaterial) -> dict:
         f"  point.attributes_dy[{k}] = steps_y.x * along_x + steps_y.y * along_y;\n"
         for k in range(count)
     )
+    inputs = (("VEC2", "envelope"), *(("VEC4", f"attribute{k}") for k in range(count)))
+    varyings = tuple(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count))
+    if own is not None and own.shell:  # which finds what corners have in a list
+        fill, inputs, varyings = "", (("VEC2", "shell"),), (("flat", "INT", "shell_triangle"),)
     return {
-        "inputs": (
-            ("VEC3", "position"), ("VEC3", "normal"), ("VEC2", "envelope"), ("INT", "local_instance"),
-            *(("VEC4", f"attribute{k}") for k in range(count)),
-        ),
+        "vertex": "surface/shell.vert.glsl" if own is not None and own.shell else "surface/surface.vert.glsl",
+        "inputs": (("VEC3", "position"), ("VEC3", "normal"), ("INT", "local_instance"), *inputs),
         "varyings": (
             ("smooth", "VEC3", "world_position"), ("smooth", "VEC3", "world_normal"),
-            ("smooth", "VEC3", "normal_heights"), ("flat", "IVEC2", "instance_flat"),
-            *(("smooth", "VEC4", f"varying_attribute{k}") for k in range(count)),
+            ("smooth", "VEC3", "normal_heights"), ("flat", "IVEC2", "instance_flat"), *varyings,
         ),
         "textures": (
             ("RGBA32F", "instances"), ("RGBA32F", "energy_table"),
@@ -283,7 +289,6 @@ def _once(make: Callable[[CompiledMaterial], Program]) -> Callable[[CompiledMate
 def _surface_program(compiled: CompiledMaterial) -> Program:
     return Program(
         name=f"surface {compiled.program_key[:8]}",
-        vertex="surface/surface.vert.glsl",
         fragment="surface/surface.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
         blocks=(
@@ -318,9 +323,13 @@ def _layer_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
     return (("GLOWS", ""),) * compiled.glows + (("ADDED_LOBES", ""),) * compiled.added + _own_defines(compiled)
 
 
-def _own_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
-    """Whether programs look for the surface themselves, see surface/point.glsl."""
-    return (("OWN_SURFACE", ""),) if compiled.own_surface else ()
+EYE = "vec4(film_view.eye.xyz, 1.0 - film_view.eye.w)"
+
+
+def _own_defines(compiled: CompiledMaterial, rays_begin: str = EYE) -> tuple[tuple[str, str], ...]:
+    """Whether programs look for the surface themselves, see surface/point.glsl; `rays_begin`: a place, w 1, or a
+    direction to infinity, w 0."""
+    return (("OWN_SURFACE", ""), ("RAYS_BEGIN", rays_begin)) if compiled.own_surface else ()
 
 
 @_once
@@ -328,7 +337,6 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
     shared = _shared(compiled)
     return Program(
         name=f"tint {compiled.program_key[:8]}",
-        vertex="surface/surface.vert.glsl",
         fragment="surface/tint.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in ("diffuse", "tint", "emission")),
         blocks=(
@@ -373,14 +381,18 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
 def _caster_program(compiled: CompiledMaterial) -> Program:
     return Program(
         name=f"alpha caster {compiled.program_key[:8]}",
-        vertex="surface/surface.vert.glsl",
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
         constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
-        defines=(*PROJECTION_DEFINES, *_own_defines(compiled)),
+        defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
         **_shared(compiled),
     )
+
+
+def caster_like(compiled: CompiledMaterial) -> Program:
+    """The program of casters, to be changed into one that asks a material something else."""
+    return _caster_program(compiled)
 
 
 # What casts no shadow shines, too.
@@ -395,7 +407,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
         constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
-        defines=EVERY_DEFINES,
+        defines=(*EVERY_DEFINES, *_own_defines(compiled, "light_point")),
     )
 
 

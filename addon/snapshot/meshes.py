@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..materials.nodes.inputs import ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
+from ..materials.nodes.inputs import FLAT, ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
 from .cache import next_version
 from .hair import HairSystem, read_hair
 from .scene import Mesh, Note
@@ -302,6 +302,11 @@ def _read_colors(mesh, wanted: Wanted, corner_vertices, face_starts) -> tuple[di
     for name in [*names, *sorted(wanted.attributes - set(names) - {layer.name for layer in mesh.uv_layers})]:
         if name in (POINTINESS, ISLAND):
             colors[name] = np.repeat(_shape(mesh, name)[corner_vertices][:, None], 4, axis=1)
+            continue
+        if name == FLAT:
+            sharp = _attribute(mesh, "sharp_face", "value", len(face_starts), bool, 1)
+            sizes = np.diff(face_starts, append=len(corner_vertices))
+            colors[name] = np.repeat(np.repeat(sharp.astype(np.float32), sizes)[:, None], 4, axis=1)
             continue
         attribute = mesh.attributes.get(name)
         values = None if attribute is None else _as_rgba(attribute)

@@ -54,6 +54,9 @@ class Mesh:
     generated: np.ndarray | None = None  # (V, 3) float32, Generated coordinates, where a material reads them
     bounds_min: np.ndarray = None  # (3,) float64, local space; finite even for an empty mesh (zeros)
     bounds_max: np.ndarray = None
+    # Where materials are relief: the mesh before they move it, and by material the first number of its triangles.
+    undisplaced: Mesh | None = None
+    shells: tuple[tuple[int, int], ...] = ()
 
     @property
     def triangle_count(self) -> int:

@@ -6,6 +6,7 @@ import bpy
 
 from ..materials.attributes import attributes_of
 from ..materials.graph import Graph, Input, Node
+from ..materials.nodes.inputs import FLAT
 from ..materials.reader import read_graph
 from ..materials.sky import Sky
 from ..materials.translucency import names_of, with_maps
@@ -131,6 +132,7 @@ def wanted_by(graph: Graph) -> Wanted:
     """Tangents and attributes that the nodes of a graph look up in the mesh."""
     attributes = attributes_of(graph)
     named = {attribute.name for attribute in attributes if attribute.kind in ("COLOR", "NAMED", "UV")}
+    named |= {FLAT} if graph.displacement is not None else set()
     return Wanted(
         frozenset(attribute.name for attribute in attributes if attribute.kind == "TANGENT"),
         frozenset(named - {""}),

@@ -28,6 +28,7 @@ from .micro_rendering import MicroRendering
 from .multires_radiosity import MultiresRadiosity
 from .penumbra_wedges import PenumbraWedges
 from .reflection_editing import ReflectionEditing
+from .relief import Relief
 from .screen_space_photons import ScreenSpacePhotons
 from .shaded_reflections import ShadedReflections
 from .shadows_by_light import ShadowsByLight
@@ -42,6 +43,7 @@ from .vssm import VarianceSoftShadows
 REGISTRY: tuple[type[Technique], ...] = (
     MediaAttenuation,
     Grass,
+    Relief,
     Surfaces,
     ReflectionEditing,
     LightProbes,

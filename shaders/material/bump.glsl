@@ -64,3 +64,15 @@ vec3 displaced_normal(SurfacePoint point, float width, vec3 here, vec3 moved_x, 
   return bumped_normal(point, point.normal, width, dot(here, point.normal), dot(moved_x, point.normal),
                        dot(moved_y, point.normal));
 }
+
+// The point where it was before its vertices were moved, of which two attributes hold place and normal in object space.
+SurfacePoint point_before(SurfacePoint point, int place, int normal)
+{
+  SurfacePoint before = point;
+  before.position = world_from_object(point, point.attributes[place].xyz) + object_place(point);
+  before.position_dx = world_from_object(point, point.attributes_dx[place].xyz);
+  before.position_dy = world_from_object(point, point.attributes_dy[place].xyz);
+  vec3 turned = world_from_object_normal(point, point.attributes[normal].xyz);
+  before.normal = (dot(turned, turned) > 0.5) ? (point.backfacing ? -turned : turned) : point.normal;
+  return before;
+}

@@ -17,7 +17,7 @@ from addon.materials.compiled import Attribute
 from addon.materials.compiler import compile_material, default_graph
 from addon.materials.graph import Graph, Input, Node
 from addon.materials.volume_program import CompiledVolume, compile_volume
-from addon.scene import materials, media
+from addon.scene import displacement, materials, media
 from addon.scene.world_tree import background_program, bake_program
 from addon.surfaces.hits import hit_program
 from addon.techniques.grass import grass_program
@@ -45,6 +45,22 @@ def fog() -> CompiledVolume:
     return compile_volume("fog", Graph({"Fog": node}, volume=("Fog", "Volume")))
 
 
+def relief_programs() -> list[Program]:
+    """Those of a material that is displaced, asked for its displacement and drawn in a shell."""
+    nodes = default_graph().nodes | {
+        "Noise": Node("Noise", "Noise", "ShaderNodeTexNoise", {}, {"Fac": "FLOAT"}, {}),
+        "Lift": Node(
+            "Lift", "Lift", "ShaderNodeDisplacement", {"Height": Input("FLOAT", 0.0, ("Noise", "Fac"))},
+            {"Displacement": "VECTOR"}, {"space": "OBJECT"},
+        ),
+    }  # fmt: skip
+    lifted = compile_material("lifted", Graph(nodes, ("Default", "BSDF"), displacement=("Lift", "Displacement")))
+    shell = replace(lifted, own_surface=displacement.relief_surface(lifted), program_key=f"r{lifted.program_key}")
+    drawn = (materials._surface_program, materials._caster_program, materials._tint_program, materials._lobe_program)
+    drawn = (*drawn, materials._scatter_program, materials._glow_program, materials._emission_program)
+    return [displacement.displacement_program(lifted), *(program(shell) for program in drawn)]
+
+
 def structs() -> list[Struct]:
     """Every struct that a shader reads; of the materials' blocks, two lengths."""
     used = {id(struct): struct for program in programs() for struct, _ in program.blocks}
@@ -60,6 +76,7 @@ def programs() -> list[Program]:
     made += [materials._lobe_program(plain), hit_program(plain), media.bake_program(fog(), ("density",))]
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
     made += [grass_program(materials._surface_program(plain)), grown(lighting(HARD, False))]
+    made += relief_programs()
     for length, file in enumerate(files, len(plain.values)):  # blocks of several lengths among the structs
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)

@@ -4,6 +4,7 @@ What a technique costs where it is not needed is found by leaving it out: the re
 must bind the same programs in the same order, hold the same images and compile nothing more.
 """
 
+import bpy
 import numpy as np
 import pytest
 
@@ -63,6 +64,11 @@ def no_source_to_shadow(stage):
     no_shadow(stage)
     no_world(stage)
     no_emission(stage)
+
+
+def no_relief(stage):
+    for material in bpy.data.materials:
+        material.displacement_method = "BUMP"
 
 
 def no_glare(stage):
@@ -142,6 +148,7 @@ WITHOUT = {
     "caustics_mapping": no_glass,
     "screen_space_photons": no_glass,
     "grass": no_needs,
+    "relief": no_relief,
     "denoise": dark,
     "eye": no_glare,
     "glare": no_glare,
@@ -180,10 +187,23 @@ def bound(monkeypatch):
     return names
 
 
+def displace(material):
+    """Heights over the surface, on a mesh of two triangles."""
+    nodes, join = material.node_tree.nodes, material.node_tree.links.new
+    noise, node = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeDisplacement")
+    output = next(one for one in nodes if one.type == "OUTPUT_MATERIAL")
+    node.inputs["Scale"].default_value = 0.2
+    join(noise.outputs[0], node.inputs["Height"])
+    join(node.outputs[0], output.inputs["Displacement"])
+    material.displacement_method = "DISPLACEMENT"
+
+
 def choose(stage, technique):
     if technique.name in ("eye", "glare"):
         stage.scene.camera.data.candela.glare_mode = "CONVOLUTION"
         stage.scene.camera.data.candela.glare_white = 0.01
+    if technique.name == "relief":
+        displace(bpy.data.objects["Mesh"].data.materials[0])
     for slot in technique.fills:
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 

@@ -7,6 +7,7 @@ from .entry import POINT, Attribute, Entry, Rows, Setting, Socket
 SURFACE = "material/input.glsl"
 STRAND, WAY, PLACE, MARK = ".strand", ".strand_way", ".point", ".point_mark"  # and snapshot/strands.py
 POINTINESS, ISLAND = ".pointiness", ".island"  # attributes that snapshot/shape.py makes
+FLAT = ".flat"  # 1 at corners of faces that are not smooth, read where a material displaces
 
 GENERATED = Attribute("GENERATED", output="Generated")
 UV = Attribute("UV", output="UV")
