@@ -25,7 +25,7 @@ import numpy as np
 from ..gfx import images
 
 COVER = 1.5  # radius of a disc beside that of the area which it stands for (holes: see area_points.py)
-NORMAL_WEIGHT = 0.25
+NORMAL_WEIGHT = 1.2  # more than one: faces at right angles part before what is longest is cut
 FLAT = 0.7  # cosine of the half angle of a cone of normals, up to which a group is drawn as a disc
 LOOSE = 3.0  # area of a rectangle beside that of the group that it stands for
 NODE_TEXELS = 3

@@ -29,8 +29,9 @@ the tree is walked by parts; eight lanes that walk different ways make it slow: 
 
 Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at
 the room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
-narrower than the points' spacing show discs. A ground of a kilometre takes all points. The room with a shaded emissive
-lamp has .58 of its light, the colonnade .62: the cause is not known yet.
+narrower than the points' spacing show discs. A ground of a kilometre takes all points. Where columns or slats are as
+narrow as the points' spacing, discs that overhang shut the gaps: the colonnade has .64 of its light of one reflection
+with 8192 points, .79 with 65536.
 
 Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
 that, which darkens beside them; between them are 0.4 to 4 % of holes; leaves, grass and hair below the points' spacing
