@@ -557,14 +557,9 @@ def _describe(cells: Cells, first: np.ndarray, last: np.ndarray, skip: np.ndarra
 
 
 def _range_sums(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Sums of rows first..last of each range, exact for ranges of one row."""
-    base = values.mean(axis=0)  # a running sum of what is left loses less
-    running = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values - base, axis=0)])
-    counts = (last - first).reshape(-1, *([1] * (values.ndim - 1)))
-    out = running[last] - running[first] + counts * base
-    single = last - first == 1
-    out[single] = values[first[single]]
-    return out
+    """Sums of rows first..last of each range (not empty), one by one: differences of running sums lose small ones."""
+    padded = np.concatenate([values, np.zeros((1, *values.shape[1:]))])  # a range may end after the last row
+    return np.add.reduceat(padded, np.column_stack([first, last]).reshape(-1), axis=0)[::2]
 
 
 def _octahedral(normal: np.ndarray) -> np.ndarray:

@@ -22,6 +22,9 @@ struct Walk {
 // only some samples look for (`deeper`: the weight that it has in them, 0 in the others).
 vec3 radiance_along(Walk walk, float reach, uvec3 roll)
 {
+  // Where a sample has no virtual lights, rays go as far as one light would leave to them.
+  bool none = virtual_count > 0 && dot(abs(virtual_lights_fetch(ivec2(0))), vec4(1.0)) == 0.0;
+  reach *= none ? sqrt(float(virtual_count)) : 1.0;
   vec3 sum = vec3(0.0);
   vec3 throughput = vec3(1.0);
   for (; walk.bounce <= bounces; walk.bounce++) {

@@ -1,7 +1,9 @@
 """Renders through Blender: pass names, Cycles as a reference, settings put back, the cache."""
 
 import os
+import sys
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -335,8 +337,8 @@ def test_where_references_are_kept(monkeypatch, tmp_path):
     monkeypatch.setenv("CANDELA_CACHE", str(tmp_path))
     assert reference.cache_folder() == tmp_path
     monkeypatch.delenv("CANDELA_CACHE")
-    monkeypatch.setattr(reference.sys, "platform", "linux")
+    monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert reference.cache_folder() == tmp_path / "candela" / "references"
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert reference.cache_folder().is_relative_to(reference.Path.home())
+    assert reference.cache_folder().is_relative_to(Path.home())

@@ -51,7 +51,9 @@ def test_lists_are_sorted_and_equal_keys_keep_their_order(count):
 def test_running_sums_are_those_of_all_entries_before():
     values = np.zeros((5, ordered_lists.COLUMNS, 2), np.float32)
     values[:] = np.random.default_rng(3).integers(0, 9, values.shape)
-    found = images.read(ordered_lists.take_running_sums(images.upload(values, "RG32F"))).reshape(-1, 2)
+    sums = ordered_lists.take_running_sums(images.upload(values, "RG32F"))
+    found = images.read(sums).reshape(-1, 2)
+    images.pool.give(sums)
     np.testing.assert_array_equal(found[1:], np.cumsum(values.reshape(-1, 2), axis=0)[:-1])
 
 
