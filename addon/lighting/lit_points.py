@@ -28,7 +28,8 @@ from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..materials.compiled import CompiledMaterial
 from ..scene.area_points import AreaPoints, Surfaces, spread
-from ..scene.point_tree import PointTree, fitted, octahedral, split
+from ..scene.pieces import octahedral
+from ..scene.point_tree import PointTree, fitted, split
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gfx import images
+from .pieces import octahedral
 
 COVER = 1.5  # radius of a disc beside that of the area which it stands for (holes: see area_points.py)
 NORMAL_WEIGHT = 1.2  # more than one: faces at right angles part before what is longest is cut
@@ -131,10 +132,3 @@ def _sides(axis: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray
     along = longest - axis * (longest * axis).sum(axis=1, keepdims=True)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     return along, np.cross(axis, along)
-
-
-def octahedral(normal: np.ndarray) -> np.ndarray:
-    """(N, 2) numbers in -1..1 of unit vectors; octahedral_decode in shaders/lib/math.glsl."""
-    flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)
-    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
-    return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)

@@ -27,6 +27,7 @@ from ..materials.translucency import maps_of
 from ..materials.values import LUMINANCE
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance, Mesh, Snapshot
+from .pieces import octahedral
 
 ROW = 64  # cells
 RUNS = 8  # points of the cloud for each cell
@@ -141,7 +142,7 @@ class ScatterPoints:
         one = np.ones((len(place), 1))
         for run in range(RUNS):
             self._positions.append(_image(np.concatenate([place[:, run], one], axis=1)))
-            packed = np.concatenate([_octahedral(normal[:, run]), _octahedral(face[:, run])], axis=1)
+            packed = np.concatenate([octahedral(normal[:, run]), octahedral(face[:, run])], axis=1)
             self._normals.append(_image(packed))
             self._entries.append(_image(entry[:, run]))
             self.cells.append(_image(np.concatenate([place[:, run], area[:, None]], axis=1)))
@@ -270,13 +271,6 @@ def _farthest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _unit(v: np.ndarray) -> np.ndarray:
     return v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-30)
-
-
-def _octahedral(normal: np.ndarray) -> np.ndarray:
-    """(N, 2) numbers in -1..1 of unit vectors; octahedral_decode in shaders/lib/math.glsl."""
-    flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)
-    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
-    return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)
 
 
 def _image(values: np.ndarray) -> images.Image:

@@ -22,6 +22,7 @@ import numpy as np
 from ..gfx import images
 from ..sampling.sequence import bits
 from . import acceleration
+from .pieces import halved, octahedral
 
 RUNS = 32
 COVER = 1.2  # radius of a disc beside that of the area which its point stands for
@@ -29,7 +30,6 @@ LARGE = 2.0  # from so many times the area of a point on, a triangle stands for 
 # Middle, squared radius; normal (octahedral), opacity, number of the triangle from 1 on, negative where only its front
 # is seen; three corners of the triangle (w of the first is 1), or two of the bounds of the point's object (w is 0).
 TEXELS = 5
-MOST_PIECES, ROUNDS = 1_000_000, 256  # of triangles that are halved, and how often
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class SurfacePoints:
 
 def spread(surfaces: Surfaces, points: int, eye: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Triangles that stand for themselves, (L, TEXELS, 4), and RUNS x `points` points for the rest, or none."""
-    pieces, triangle = _halved(surfaces.corners.astype(np.float64), eye, reach)
+    pieces, triangle = halved(surfaces.corners.astype(np.float64), eye, reach)
     across = np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])
     double = np.linalg.norm(across, axis=1)
     share = (reach / np.maximum(np.linalg.norm(pieces.mean(axis=1) - eye, axis=1), reach)) ** 2
@@ -132,37 +132,5 @@ def _describe(rows: np.ndarray, surfaces: Surfaces, triangle, across: np.ndarray
     """Fill in what tells which side of a surface is seen, and in how many maps."""
     front = surfaces.fronts[surfaces.owner[triangle]] if len(triangle) else np.zeros(0)
     normal = across / np.maximum(double, 1e-300)[:, None] * np.where(front < 0, -1.0, 1.0)[:, None]
-    rows[:, 1, :2], rows[:, 1, 2] = _octahedral(normal), surfaces.opacity[triangle]
+    rows[:, 1, :2], rows[:, 1, 2] = octahedral(normal), surfaces.opacity[triangle]
     rows[:, 1, 3] = (triangle + 1) * np.where(front != 0, -1.0, 1.0)
-
-
-def _halved(corners: np.ndarray, eye: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles, those halved at their longest edge that are longer than both `reach` and their distance; and which
-    triangle each piece is of. Those that are not finite are left out."""
-    triangle = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
-    corners = corners[triangle]
-    done, done_triangle, pieces = [], [], 0
-    for _ in range(ROUNDS):
-        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-        longest = edges.max(axis=1, initial=0.0)
-        away = np.linalg.norm(corners.mean(axis=1) - eye, axis=1) - longest
-        large = longest > np.maximum(away, reach)
-        done.append(corners[~large])
-        done_triangle.append(triangle[~large])
-        pieces += int((~large).sum())
-        corners, triangle = corners[large], triangle[large]
-        if not len(corners) or pieces + 2 * len(corners) > MOST_PIECES:
-            break
-        first = edges[large].argmax(axis=1)
-        a, b, c = (corners[np.arange(len(corners)), (first + k) % 3] for k in range(3))
-        middle = (a + b) / 2
-        corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-        triangle = np.concatenate([triangle, triangle])
-    return np.concatenate([*done, corners]), np.concatenate([*done_triangle, triangle])
-
-
-def _octahedral(normal: np.ndarray) -> np.ndarray:
-    """(N, 2) numbers in -1..1 of unit vectors; octahedral_decode in shaders/lib/math.glsl."""
-    flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)
-    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
-    return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)

@@ -32,6 +32,7 @@ import numpy as np
 from ..gfx import images
 from ..sampling.sequence import bits
 from . import acceleration
+from .pieces import halved, octahedral
 
 MEMBERS = 8  # points of its cell at which a surfel is lit, in turn
 CLOUD = 16  # points of the cloud for each surfel
@@ -230,7 +231,7 @@ class _Surface:
         corners = self.corners if not self.far(reach, eye) else self.world()[0]
         areas = _areas(corners)[0]
         if self.far(reach, eye):
-            pieces, _ = halved(corners, eye, reach)
+            pieces, _ = halved(corners, eye, reach, ROUNDS, MOST_PIECES)
             areas = _areas(pieces)[0] * _share(pieces, reach, eye)
         return float(areas.sum())
 
@@ -264,31 +265,6 @@ def _share(pieces: np.ndarray, reach: float, eye: np.ndarray) -> np.ndarray:
     return (reach / np.maximum(np.linalg.norm(pieces.mean(axis=1) - eye, axis=1), reach)) ** 4
 
 
-def halved(corners: np.ndarray, eye: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles, those halved at their longest edge that are longer than both `reach` and their distance from `eye`,
-    and which triangle each piece is of."""
-    triangle = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
-    corners = corners[triangle]
-    done, numbers, pieces = [], [], 0
-    for _ in range(ROUNDS):
-        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-        longest = edges.max(axis=1, initial=0.0)
-        away = np.linalg.norm(corners.mean(axis=1) - eye, axis=1) - longest
-        large = longest > np.maximum(away, reach)
-        done.append(corners[~large])
-        numbers.append(triangle[~large])
-        pieces += int((~large).sum())
-        corners, triangle = corners[large], triangle[large]
-        if not len(corners) or pieces + 2 * len(corners) > MOST_PIECES:
-            break
-        first = edges[large].argmax(axis=1)
-        a, b, c = (corners[np.arange(len(corners)), (first + k) % 3] for k in range(3))
-        middle = (a + b) / 2
-        corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-        triangle = np.concatenate([triangle, triangle])
-    return np.concatenate([*done, corners]), np.concatenate([*numbers, triangle])
-
-
 def _together(surfaces: list[_Surface], count: int, reach: float, eye: np.ndarray) -> Cells:
     """Small objects sampled as one; some of them may have no surfel."""
     parts = []
@@ -308,7 +284,7 @@ def sampled(
     edges_of_mesh = borders(corners)
     triangle = np.arange(len(corners))
     if np.isfinite(reach):
-        corners, triangle = halved(corners, eye, reach)
+        corners, triangle = halved(corners, eye, reach, ROUNDS, MOST_PIECES)
     areas, normals = _areas(corners)
     share = _share(corners, reach, eye) if np.isfinite(reach) else np.ones(len(corners))
     edges = np.concatenate([[0.0], np.cumsum(areas * share)])
@@ -533,7 +509,7 @@ def _describe(cells: Cells, first: np.ndarray, last: np.ndarray, skip: np.ndarra
     nodes = np.zeros((len(first), NODE_TEXELS, 4))
     nodes[:, 0, :3], nodes[:, 0, 3] = middle, radius * (1 + 1e-5)
     slab = np.maximum(thickness * (1 + 1e-3), 1e-6 * radius)
-    nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = _octahedral(normal), np.where(stands | leaf, slab, -slab), skip
+    nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = octahedral(normal), np.where(stands | leaf, slab, -slab), skip
     nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, closed == leaves
     nodes[:, 2, 3] = sums(cells.opacity * cells.area) / area
     nodes[:, 3:, 3] = NONE
@@ -560,10 +536,3 @@ def _range_sums(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.n
     """Sums of rows first..last of each range (not empty), one by one: differences of running sums lose small ones."""
     padded = np.concatenate([values, np.zeros((1, *values.shape[1:]))])  # a range may end after the last row
     return np.add.reduceat(padded, np.column_stack([first, last]).reshape(-1), axis=0)[::2]
-
-
-def _octahedral(normal: np.ndarray) -> np.ndarray:
-    """(N, 2) numbers in -1..1 of unit vectors; octahedral_decode in shaders/lib/math.glsl."""
-    flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)
-    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
-    return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)

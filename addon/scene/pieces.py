@@ -1,0 +1,40 @@
+"""Triangles in pieces, and directions in two numbers: what every spreading of points over surfaces needs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def halved(
+    corners: np.ndarray, eye: np.ndarray, reach: float, rounds: int = 256, most: int = 1_000_000
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (N, 3, 3), those halved at their longest edge that are longer than both `reach` and their distance from
+    `eye`; and which triangle each piece is of. At most `rounds` times, into at most about `most` pieces. Those that are
+    not finite are left out."""
+    triangle = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)))
+    corners = corners[triangle]
+    done, numbers, pieces = [], [], 0
+    for _ in range(rounds):
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        longest = edges.max(axis=1, initial=0.0)
+        away = np.linalg.norm(corners.mean(axis=1) - eye, axis=1) - longest
+        large = longest > np.maximum(away, reach)
+        done.append(corners[~large])
+        numbers.append(triangle[~large])
+        pieces += int((~large).sum())
+        corners, triangle = corners[large], triangle[large]
+        if not len(corners) or pieces + 2 * len(corners) > most:
+            break
+        first = edges[large].argmax(axis=1)
+        a, b, c = (corners[np.arange(len(corners)), (first + k) % 3] for k in range(3))
+        middle = (a + b) / 2
+        corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        triangle = np.concatenate([triangle, triangle])
+    return np.concatenate([*done, corners]), np.concatenate([*numbers, triangle])
+
+
+def octahedral(normal: np.ndarray) -> np.ndarray:
+    """(N, 2) numbers in -1..1 of unit vectors; octahedral_decode in shaders/lib/math.glsl."""
+    flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)
+    folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
+    return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)
