@@ -221,6 +221,25 @@ class CANDELA_VIEWLAYER_PT_passes(_CandelaPanel, bpy.types.Panel):
                 part.prop(holder, switch, text=render_pass.name)
 
 
+class CANDELA_VIEWLAYER_PT_override(_CandelaPanel, bpy.types.Panel):
+    """In Blender before 5.1, where the panel of these settings is one of Cycles."""
+
+    bl_label = "Override"
+    bl_context = "view_layer"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and not hasattr(bpy.types, "VIEWLAYER_PT_override")
+
+    def draw(self, context):
+        column = _columns(self, animatable=False)
+        column.prop(context.view_layer, "material_override")
+        if hasattr(context.view_layer, "world_override"):
+            column.prop(context.view_layer, "world_override")
+        column.prop(context.view_layer, "samples")
+
+
 class CANDELA_LIGHT_PT_beam_shape(_CandelaPanel, bpy.types.Panel):
     bl_label = "Beam Shape"
     bl_context = "data"
@@ -400,25 +419,6 @@ def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room
         row.active = not dim
         row.scale_y = 0.8
         row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
-
-
-class CANDELA_VIEWLAYER_PT_override(_CandelaPanel, bpy.types.Panel):
-    """In Blender before 5.1, where the panel of these settings is one of Cycles."""
-
-    bl_label = "Override"
-    bl_context = "view_layer"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and not hasattr(bpy.types, "VIEWLAYER_PT_override")
-
-    def draw(self, context):
-        column = _columns(self, animatable=False)
-        column.prop(context.view_layer, "material_override")
-        if hasattr(context.view_layer, "world_override"):
-            column.prop(context.view_layer, "world_override")
-        column.prop(context.view_layer, "samples")
 
 
 _CLASSES = (

@@ -185,8 +185,10 @@ def chosen_at_random(scene: Scene) -> bool:
     the instance's place in the list or with the lamp: then noise is another, and the mean only stays. So are the points
     of an object below whose surface light scatters drawn (.0009 of the picture's mean, root mean square)."""
     lobes = ("Transmission Weight", "Coat Weight", "Sheen Weight", "Subsurface Weight")
-    layers = ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
-    layers += ("ShaderNodeSubsurfaceScattering",)
+    layers = (
+        *("ShaderNodeBsdfTransparent", "ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction"),
+        "ShaderNodeSubsurfaceScattering",
+    )
     return any(
         surface.node in layers
         or any(
