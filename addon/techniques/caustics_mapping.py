@@ -87,7 +87,10 @@ class CausticsMapping(Technique):
         ),
         Param(
             "by", "Photons by", LOOKUPS, "What tells where bent light goes",
-            items=((LOOKUPS, "Look-ups in the light's images", 0), (RAYS, "Rays", 1)),
+            items=(
+                (LOOKUPS, "Look-Ups", 0, "Steps in images of what the light sees: fast, and blind behind it"),
+                (RAYS, "Rays", 1, "Rays through all triangles"),
+            ),
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -64,7 +64,11 @@ class Grass(Technique):
     params = (
         Param(
             "patch", "Patch", NONE, "What the material's surface is covered with", scope=MATERIAL,
-            items=((NONE, "None", 0), (MEADOW, "Meadow", 1), (FILE, "File", 2)),
+            items=(
+                (NONE, "None", 0, "No grass"),
+                (MEADOW, "Meadow", 1, "The meadow that comes with Candela"),
+                (FILE, "File", 2, "A patch from a file"),
+            ),
         ),
         Param("file", "File", "", "A patch that Render > Candela Grass Patch has made", scope=MATERIAL, file=True),
         Param("size", "Tile", 0.0, "Side of a tile; 0: as it was made", 0.0, 1000.0, "DISTANCE", scope=MATERIAL),

@@ -50,7 +50,10 @@ CONSTRAINT = (
     Param("viewer", "Viewer", (0.0, -5.0, 0.0), "Where the constraint was seen from when it was made"),
     Param(
         "of", "Of", REFLECTION, "Which light is turned",
-        items=((REFLECTION, "Reflection", 0), (REFRACTION, "Refraction", 1)),
+        items=(
+            (REFLECTION, "Reflection", 0, "What the surface mirrors, and highlights of lamps"),
+            (REFRACTION, "Refraction", 1, "What is seen through the surface"),
+        ),
     ),
     Param("triangle", "Triangle", -1, "Triangle that carries the point through deformation; -1: none", -1, 2**31 - 1),
     Param("weights", "Weights", (1.0, 0.0, 0.0), "Where on that triangle the point is"),
@@ -59,7 +62,11 @@ REGION = (
     Param("enabled", "Enabled", True, "Whether constraints act in the region"),
     Param(
         "kind", "Kind", "EUCLIDEAN", "How far a place is from the centre",
-        items=(("EUCLIDEAN", "Ball", 0), ("GEODESIC", "Along Surface", 1), ("PAINTED", "Painted", 2)),
+        items=(
+            ("EUCLIDEAN", "Ball", 0, "All of the object within a radius"),
+            ("GEODESIC", "Along Surface", 1, "As far as the radius, measured along the surface"),
+            ("PAINTED", "Painted", 2, "Where the active color attribute is bright"),
+        ),
     ),
     Param("centre", "Centre", (0.0, 0.0, 0.0), "Middle of the region", handle=POINT),
     Param("radius", "Radius", 1.0, "How far the region reaches", 0.0, 1e6, "DISTANCE"),

@@ -120,7 +120,10 @@ def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
         Param(
             "visibility", "Visibility", BITS,
             "How surfaces hide each other: bits for sectors of half planes, or points in a half ball of a small radius",
-            items=((BITS, "Bits", 0), (POINTS, "Points", 1)),
+            items=(
+                (BITS, "Bits", 0, "One bit for each sector of a half plane: surfaces near and far"),
+                (POINTS, "Points", 1, "Points in a half ball of the radius"),
+            ),
         ),
         Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64, draft=2),
         Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64, draft=12),

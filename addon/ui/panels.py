@@ -15,11 +15,27 @@ from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
 from . import ENGINE, blender_panels, notes
 from .passes import PASSES
-from .properties import slots
+from .properties import slots, titled
 from .quality import CANDELA_PT_quality_presets
 
 MOST_NOTES = 12  # more than these are counted only
 _PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
+# Bounces by kind of light, as far as techniques limit them themselves.
+_BOUNCES = (
+    ("shaded_reflections", "bounces", "Glossy"),
+    ("traced_refraction", "interfaces", "Transmission"),
+    ("airlight", "bounces", "Volume"),
+)
+_SIMPLIFY = (
+    ("simplify_subdivision", "Max Subdivision"),
+    ("simplify_child_particles", "Max Child Particles"),
+    ("simplify_volumes", "Volume Resolution"),
+    ("use_simplify_normals", "Normals"),
+)
+_SIMPLIFY_RENDER = (
+    ("simplify_subdivision_render", "Max Subdivision"),
+    ("simplify_child_particles_render", "Max Child Particles"),
+)
 _WITH_OTHERS = {"film"}  # techniques whose parameters stand in a panel of Blender's settings
 _STATE_ICONS = {ledgers.RAN: "CHECKMARK", ledgers.REUSED: "LOOP_BACK", ledgers.SKIPPED: "REMOVE"}
 
@@ -55,7 +71,37 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
-        column.prop(settings, "bounces")
+
+
+class CANDELA_RENDER_PT_light_paths(_CandelaPanel, bpy.types.Panel):
+    """How often light is reflected, by kind; those of the techniques stand among their parameters, too"""
+
+    bl_label = "Light Paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column, settings = _columns(self), context.scene.candela
+        column.prop(settings, "bounces", text="Max Bounces")
+        for technique, param, text in _BOUNCES:
+            column.prop(settings, identifier(technique, param), text=text)
+
+
+class CANDELA_RENDER_PT_simplify(_CandelaPanel, bpy.types.Panel):
+    """Blender's own settings, behind Candela's: its panel would come before them"""
+
+    bl_label = "Simplify"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context):
+        column, render = _columns(self), context.scene.render
+        column.active = render.use_simplify
+        for heading, names in (("Viewport", _SIMPLIFY), ("Render", _SIMPLIFY_RENDER)):
+            part = column.column(align=True, heading=heading)
+            for name, text in names:
+                part.prop(render, name, text=text)
 
 
 class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
@@ -91,13 +137,17 @@ def _technique_panel(technique) -> type:
 
     def draw(self, context):
         column = _columns(self)
+        if technique.name == "denoise":
+            switches = column.column(align=True, heading="Denoise")
+            switches.prop(context.scene.candela, "use_denoise", text="Render")
+            switches.prop(context.scene.candela, "use_viewport_denoise", text="Viewport")
         for param in technique.params_of(SCENE):
             column.prop(context.scene.candela, identifier(technique.name, param.name))
 
     body = {
         "__doc__": f"Parameters of {technique.label}",
         "__module__": __name__,
-        "bl_label": technique.label,
+        "bl_label": titled(technique.label),
         "bl_parent_id": _PARENTS.get(technique.name, "CANDELA_RENDER_PT_parameters"),
         "bl_options": set() if technique.name in _PARENTS else {"DEFAULT_CLOSED"},
         "poll": poll,
@@ -421,10 +471,19 @@ def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room
         row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
 
 
+def _draw_pause(self, context):
+    """The button in the header of a rendered viewport, as Cycles has one."""
+    space = context.space_data
+    if context.engine == ENGINE and space is not None and space.shading.type == "RENDERED":
+        paused = context.scene.candela.viewport_pause
+        self.layout.prop(context.scene.candela, "viewport_pause", icon="PLAY" if paused else "PAUSE", text="")
+
+
 _CLASSES = (
     CANDELA_OT_select_culprit,
     CANDELA_RENDER_PT_frame_notes,  # first: panels stand in this order
     CANDELA_RENDER_PT_sampling,
+    CANDELA_RENDER_PT_light_paths,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_parameters,
     *(
@@ -433,6 +492,7 @@ _CLASSES = (
         if technique.params_of(SCENE) and technique.name not in _WITH_OTHERS
     ),
     CANDELA_RENDER_PT_film,
+    CANDELA_RENDER_PT_simplify,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,
@@ -449,10 +509,12 @@ _CLASSES = (
 def register() -> None:
     for made in _CLASSES:
         bpy.utils.register_class(made)
+    bpy.types.VIEW3D_HT_header.append(_draw_pause)
     blender_panels.show(ENGINE)
 
 
 def unregister() -> None:
     blender_panels.withdraw(ENGINE)
+    bpy.types.VIEW3D_HT_header.remove(_draw_pause)
     for made in reversed(_CLASSES):
         bpy.utils.unregister_class(made)

@@ -116,7 +116,8 @@ class CANDELA_OT_pick_reflection(_OfAnObject, bpy.types.Operator):
         hit, point, normal, _, met, _ = context.scene.ray_cast(graph, start, direction)
         edited = (met.original or met) if hit else None
         if edited is None or edited.type != "MESH":
-            self.report({"WARNING"}, f"'{edited.name}' is no mesh." if hit else "There is no surface where you clicked.")
+            missing = f"'{edited.name}' is no mesh." if hit else "There is no surface where you clicked."
+            self.report({"WARNING"}, missing)
             return {"CANCELLED"}
         for other in context.view_layer.objects.selected:
             other.select_set(False)
@@ -146,7 +147,6 @@ def _viewport_at(screen, x: int, y: int):
         if main is not None:
             return main, main.data
     return None, None
-
 
 
 class CANDELA_OT_return_to_view(_OfAnObject, bpy.types.Operator):

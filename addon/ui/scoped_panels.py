@@ -13,6 +13,7 @@ from mathutils import Matrix, Quaternion, Vector
 from ..frame.technique import CAMERA, LIGHT, MATERIAL, OBJECT, POINT, SCENE, WORLD, Param, identifier
 from ..techniques import REGISTRY
 from . import ENGINE
+from .properties import titled
 
 # Tab of the Properties editor, and the context's name for the data-block that it shows.
 _TABS = {
@@ -22,6 +23,8 @@ _TABS = {
     MATERIAL: ("material", "material"),
     OBJECT: ("object", "object"),
 }
+
+_WITH_SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "VOLUME"}  # kinds of object
 
 
 def scoped(technique) -> dict[str, list[Param]]:
@@ -38,7 +41,8 @@ def _panel(technique, scope: str, params: list[Param]) -> type:
 
     @classmethod
     def poll(cls, context):
-        return context.engine == ENGINE and getattr(context, name, None) is not None
+        block = getattr(context, name, None)
+        return context.engine == ENGINE and block is not None and (scope != OBJECT or block.type in _WITH_SURFACES)
 
     def draw(self, context):
         group = getattr(context, name).candela
@@ -55,7 +59,7 @@ def _panel(technique, scope: str, params: list[Param]) -> type:
         "bl_space_type": "PROPERTIES",
         "bl_region_type": "WINDOW",
         "bl_context": tab,
-        "bl_label": technique.label,
+        "bl_label": titled(technique.label),
         "bl_options": {"DEFAULT_CLOSED"},
         "COMPAT_ENGINES": {ENGINE},
         "poll": poll,
@@ -73,7 +77,7 @@ class CANDELA_UL_entries(bpy.types.UIList):
 
 def _draw_list(layout, group, technique, scope: str, param: Param) -> None:
     name = identifier(technique.name, param.name)
-    layout.label(text=param.label)
+    layout.label(text=titled(param.label))
     row = layout.row()
     row.template_list("CANDELA_UL_entries", name, group, name, group, f"{name}_active", rows=3)
     buttons = row.column(align=True)

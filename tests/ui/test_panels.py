@@ -84,7 +84,7 @@ def test_every_slot_and_parameter_has_a_place(scene):
     others = scene.render, getattr(scene, "cycles", None)  # settings of Blender's, in the panel of the film
     shown = [name for name in shown if not any(hasattr(other, name) for other in others)]
     assert sorted(shown) == sorted(
-        ["pass_tree"]
+        ["pass_tree", "use_denoise", "use_viewport_denoise"]
         + [f"slot_{slot}" for slot in slots()]
         + [identifier(t.name, p.name) for t in REGISTRY for p in t.params_of(SCENE)]
     )

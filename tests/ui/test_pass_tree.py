@@ -13,7 +13,7 @@ from addon.techniques import REGISTRY
 from addon.ui import ENGINE, pass_tree, shown_images
 from addon.ui.pass_nodes import NODES, SHOWING
 from addon.ui.pass_tree import TREE, checked, graph_of, result
-from addon.ui.properties import settings_of
+from addon.ui.properties import settings_of, titled
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def scene(registered, gpu_context, empty_scene):
 
 @pytest.fixture
 def tree(scene):
-    assert bpy.ops.candela.passes_from_auto(tree="Passes") == {"FINISHED"}
+    assert bpy.ops.candela.passes_from_auto(tree="Passes", use=True) == {"FINISHED"}
     made = bpy.data.node_groups["Passes"]
     made.samples, made.percentage, made.reference_samples = 4, 100, 16
     return made
@@ -57,7 +57,7 @@ def test_every_technique_has_a_node_with_its_sockets(registered, empty_scene):
         inputs, outputs = sockets(technique, REGISTRY)
         assert [socket.identifier for socket in made.inputs] == [socket.name for socket in inputs]
         assert [socket.identifier for socket in made.outputs] == [socket.name for socket in outputs]
-        assert made.bl_label == technique.label
+        assert made.bl_label == titled(technique.label)
     assert len(NODES) == len(REGISTRY) + len(SHOWING)
 
 

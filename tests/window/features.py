@@ -17,7 +17,7 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from stage import ENGINE, FOLDER, main_region, picture, render, result, run, there, viewports, wait_for_rest, window
+from stage import ENGINE, FOLDER, main_region, picture, render, result, run, there, wait_for_rest, window
 
 SAMPLES = 2
 PANEL = 46.0  # percent of the window that the properties take
