@@ -243,7 +243,6 @@ class CandelaEngine(bpy.types.RenderEngine):
     # --------------------------------------------------------------------------------------------------- reports
 
     def _fail(self, sentence: str) -> None:
-        self.error_set(sentence)
         self.report({"ERROR"}, sentence)
 
     def _fail_unforeseen(self, error: Exception) -> None:

@@ -5,8 +5,6 @@ The panels of the techniques are made from the parameters that they declare.
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
 from ..frame import ledger as ledgers
@@ -17,6 +15,7 @@ from . import ENGINE, blender_panels, notes
 from .passes import PASSES
 from .properties import slots, titled
 from .quality import CANDELA_PT_quality_presets
+from .texts import wrapped
 
 MOST_NOTES = 12  # more than these are counted only
 _PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
@@ -187,7 +186,7 @@ class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
             return
         column = self.layout.column(align=True)
         times = ", ".join(f"{name} {_seconds(seconds)}" for name, seconds in ledger.times.items() if seconds >= 0.0005)
-        _text(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
+        wrapped(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
         column.separator()
         for row in ledger.rows:
             if row.state != ledgers.SKIPPED:
@@ -225,9 +224,9 @@ def _ledger_row(column, context, row) -> None:
     value.alignment = "RIGHT"
     value.label(text=_seconds(row.milliseconds / 1000) if row.state == ledgers.RAN else row.state)
     if row.reason:
-        _text(column, context, row.reason, dim=True, indent=True)
+        wrapped(column, context, row.reason, dim=True, indent=True)
     for choice in ledgers.some_of(row.choices):
-        _text(column, context, choice, dim=True, indent=True)
+        wrapped(column, context, choice, dim=True, indent=True)
 
 
 class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
@@ -244,10 +243,10 @@ class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
 
     def draw(self, context):
         if _bad_pixels():
-            _text(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
+            wrapped(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
         for note in notes.by_weight(_notes())[:MOST_NOTES]:
             row = self.layout.row()
-            _text(row.column(align=True), context, str(note), icon="ERROR", room=2)
+            wrapped(row.column(align=True), context, str(note), icon="ERROR", room=2)
             kind, name = notes.target(note)
             if kind:
                 button = row.operator("candela.select_culprit", text="", icon="RESTRICT_SELECT_OFF")
@@ -457,18 +456,6 @@ def _seconds(seconds: float) -> str:
     if seconds >= 1:
         return f"{seconds:.1f} s"
     return f"{seconds * 1000:.1f} ms" if seconds < 0.1 else f"{seconds * 1000:.0f} ms"
-
-
-def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room: int = 0) -> None:
-    """A sentence over as many lines as the panel's width asks for; `room` widgets of a line's height are left free."""
-    widget = 20 * context.preferences.system.ui_scale
-    letters = (context.region.width - (3 + room + (icon != "NONE") + indent) * widget) / (0.29 * widget)
-    blank = "BLANK1" if indent or icon != "NONE" else "NONE"
-    for number, line in enumerate(textwrap.wrap(text, max(int(letters), 16))):
-        row = layout.row()
-        row.active = not dim
-        row.scale_y = 0.8
-        row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
 
 
 def _draw_pause(self, context):
