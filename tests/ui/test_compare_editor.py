@@ -49,7 +49,7 @@ def test_image_shows_what_is_chosen(compared):
 
 def test_the_panel_lists_each_light_once_and_cuts_nothing_off(compared):
     listed = [picture.row.label for _, picture in compare_editor.table_of(compare_editor.latest())]
-    assert len(set(label.removesuffix(" pass") for label in listed)) == len(listed)
+    assert len({label.removesuffix(" pass") for label in listed}) == len(listed)
     assert max(map(len, listed)) <= 22
 
 
