@@ -114,7 +114,8 @@ def _samples(order: Order, frame: Frame) -> Generator[Progress | None, None, Non
             showing += took
             next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
         each = (now - first) / (shown - before) if shown > before else None
-        yield Progress(sentence(shown, wanted, left_of(order, wanted - shown, each)), shown / wanted, picture)
+        left = left_of(order, wanted - shown, each) if order.shows else None
+        yield Progress(sentence(shown, wanted, left), shown / wanted, picture)
         if limit and shown > before:
             with turn:
                 images.finish()
@@ -135,8 +136,8 @@ def left_of(order: Order, samples: int, each: float | None) -> float | None:
 
 
 def sentence(done: int, wanted: int, left: float | None) -> str:
-    """How far a render is."""
-    text = f"Sample {done} of {wanted}"
+    """How far a render is, in the words that render farms read."""
+    text = f"Rendering {done} / {wanted} samples"
     return text if left is None else f"{text}, {clock(left)} left"
 
 

@@ -100,7 +100,7 @@ def _lines(sentence: str, width: int = 36) -> list[str]:
 
 def category_of(technique) -> str:
     """What a technique is for, as colours of nodes tell it."""
-    if technique.only_shows:
+    if technique().only_shows:
         return "SHOW"
     written = {write.name for write in technique.writes}
     if technique.name in ("film", "denoise") or any(name.startswith("film.") for name in written):
