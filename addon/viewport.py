@@ -330,7 +330,8 @@ def draw(engine, context, depsgraph) -> None:
             pass
         elif turn.acquire(timeout=TURN_WAIT_S):
             try:
-                _refine(viewport, engine, context, depsgraph, size)
+                with images.lasting_context():
+                    _refine(viewport, engine, context, depsgraph, size)
             finally:
                 turn.release()
         else:

@@ -19,8 +19,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from stage import ENGINE, FOLDER, main_region, picture, render, result, run, there, wait_for_rest, window
 
-SAMPLES = 2
-PANEL = 46.0  # percent of the window that the properties take
+SAMPLES = 1
+VIEW_SHARE = 0.4  # of the large area, for the viewport: few pixels are drawn soon, and wide panels are read easily
+ONLY = sys.argv[sys.argv.index("--") + 1 : -1]  # names of steps; by default all
 result.update(done=[], failed={}, s={}, renders={})
 
 
@@ -28,8 +29,10 @@ def steps():
     open_panels()
     left, right = yield from two_areas()
     result["properties"] = [right.x, window().height - right.y - right.height, right.width, right.height]
-    for step in (glare, painting, reflections, grass, relief, caustics):
+    for step in (reflections, glare, painting, grass, relief, caustics):
         name, started = step.__name__, time.monotonic()
+        if ONLY and name not in ONLY:
+            continue
         try:
             yield from step(left, right)
             result["done"].append(name)
@@ -63,7 +66,7 @@ def open_panels():
 
 def two_areas():
     with there():
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.6)
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=VIEW_SHARE)
     yield 0.5
     left, right = sorted((a for a in window().screen.areas if a.type == "VIEW_3D"), key=lambda a: a.x)
     right.type = "PROPERTIES"
@@ -82,9 +85,9 @@ def stage(camera_at=(0.0, -6.0, 2.2), look_at=(0.0, 0.0, 0.8)):
     scene.world = bpy.data.worlds.new("World")
     scene.world.color = (0.02, 0.02, 0.02)
     scene.render.engine = ENGINE
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 120, 100
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 120, 90, 100
     scene.candela.samples = scene.candela.viewport_samples = SAMPLES
-    scene.candela.bounces = 1
+    scene.candela.bounces = 0  # indirect light takes its time without a GPU
     camera = new("Camera", bpy.data.cameras.new("Camera"), camera_at)
     camera.rotation_euler = (Vector(look_at) - Vector(camera_at)).to_track_quat("-Z", "Y").to_euler()
     scene.camera = camera
@@ -187,7 +190,7 @@ def glare(left, right):
     yield 0.5
     picture("glare_off.png")
     scene.camera.data.candela.glare_mode = "CONVOLUTION"
-    scene.camera.data.candela.eye_side = "256"
+    scene.camera.data.candela.eye_side = "128"
     yield from wait_for_rest()
     with there(right):
         result["observer"] = list(bpy.ops.candela.eye_preset(preset=observers()[-1]))
@@ -296,6 +299,7 @@ def reflections(left, right):
     shape("plane", size=20.0)
     mirror = shape("plane", principled("Mirror", Metallic=1.0, Roughness=0.0), size=4.0, location=(0.0, 2.0, 1.6),
                    rotation=(math.radians(90.0), 0.0, 0.0))  # fmt: skip
+    scene.candela.bounces = 1
     for x, colour in ((-1.5, (0.8, 0.1, 0.1, 1.0)), (1.5, (0.1, 0.2, 0.8, 1.0))):
         shape("cube", principled(f"Colour {x}", Base_Color=colour), size=0.8, location=(x, 0.0, 0.4))
     activate(mirror)
@@ -391,6 +395,7 @@ def relief(left, right):
 def caustics(left, right):
     scene = stage(camera_at=(0.0, -4.0, 2.5), look_at=(0.0, 0.0, 0.3))
     shape("plane", size=20.0)
+    scene.candela.bounces = 1
     ball = shape("uv_sphere", principled("Glass", Transmission_Weight=1.0, Roughness=0.0), radius=0.6,
                  location=(0.0, 0.0, 0.8))  # fmt: skip
     ball.data.shade_smooth()
