@@ -166,9 +166,9 @@ class _Framebuffers:
 
 
 # A framebuffer works in one GPU context only and must end before it. Images, programs and buffers are shared by all
-# contexts, and outlive the one of a final render, which Blender makes for each render anew. In windows there are several:
-# all 3D regions are drawn in one that lasts, operators and timers run in that of the window that was drawn last. To bind
-# a framebuffer of another context fails, and leaves a place on Blender's short stack of framebuffers taken for ever.
+# contexts, and outlive the one of a final render, which Blender makes for each render anew. Windows have several: all
+# 3D regions are drawn in one that lasts, operators and timers run in that of the window that was drawn last. To bind a
+# framebuffer of another context fails, and leaves a place on Blender's short stack of framebuffers taken for ever.
 _lasting = _Framebuffers()
 _thread = threading.local()
 
