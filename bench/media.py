@@ -178,8 +178,8 @@ def _save(path: Path, ours: np.ndarray, theirs: np.ndarray) -> None:
 def page(rows: list[tuple[str, ...]], profiles: list[tuple[str, ...]], options) -> str:
     """Both tables, and what they are of."""
     width, height = options.size
-    text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two renders
-of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw on a
+    text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two
+renders of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw on a
 software GPU. EEVEE has no such bounces: its bias is partly that.
 
 """
