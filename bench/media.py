@@ -179,8 +179,8 @@ def page(rows: list[tuple[str, ...]], profiles: list[tuple[str, ...]], options) 
     """Both tables, and what they are of."""
     width, height = options.size
     text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two
-renders of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw on a
-software GPU. EEVEE has no such bounces: its bias is partly that.
+renders of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw
+on a software GPU. EEVEE has no such bounces: its bias is partly that.
 
 """
     text += markdown.table([HEAD, *rows])
