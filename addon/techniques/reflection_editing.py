@@ -47,7 +47,9 @@ CONSTRAINT = (
     Param("enabled", "Enabled", True, "Whether the constraint acts"),
     Param("point", "Point", (0.0, 0.0, 0.0), "Place of the surface that shows the target", handle=POINT),
     Param("target", "Target", (0.0, 0.0, 1.0), "What is to be seen there, in the object's space", handle=POINT),
-    Param("viewer", "Viewer", (0.0, -5.0, 0.0), "Where the constraint was seen from when it was made"),
+    Param(
+        "viewer", "Viewer", (0.0, -5.0, 0.0), "Where the constraint was seen from when it was made", unit="TRANSLATION"
+    ),
     Param(
         "of", "Of", REFLECTION, "Which light is turned",
         items=(

@@ -17,6 +17,7 @@ from .properties import slots, titled
 from .quality import CANDELA_PT_quality_presets
 from .texts import wrapped
 
+TAB_S, TAB_TRIES = 0.05, 40  # between tries to show a tab that the editor may not have yet, and how many
 MOST_NOTES = 12  # more than these are counted only
 _PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
 # Bounces by kind of light, as far as techniques limit them themselves.
@@ -428,17 +429,26 @@ def _show_tab(context, tab: str) -> None:
     space = context.space_data
     if space is None or space.type != "PROPERTIES":
         return
-    if not _shows_tab(space, tab):
-        # The editor learns of another active object, and of its tabs, only when it is drawn again.
-        bpy.app.timers.register(lambda: _shows_tab(space, tab) and None, first_interval=0.05)
+    if _shows_tab(space, tab):
+        return
+    # The editor learns of another active object, and of its tabs, only when it is drawn again. Until then it has no
+    # such tab; where none comes, it is hidden, or of no use for the kind of object.
+    left = iter(range(TAB_TRIES))
+
+    def again() -> float | None:
+        return None if _shows_tab(space, tab) or next(left, None) is None else TAB_S
+
+    bpy.app.timers.register(again, first_interval=TAB_S)
 
 
 def _shows_tab(space, tab: str) -> bool:
-    """Whether a Properties editor shows this tab now; it may be hidden, or of no use for the kind of object."""
+    """Whether a Properties editor shows this tab now, or is gone."""
     try:
         space.context = tab
-    except (TypeError, ReferenceError):
+    except TypeError:
         return False
+    except ReferenceError:
+        pass
     return True
 
 

@@ -39,7 +39,7 @@ def _redraw(group, context) -> None:
     group.id_data.update_tag()
 
 
-_SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the", "to", "with"}
+_SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the", "to", "with", "x"}
 
 
 def titled(label: str) -> str:
@@ -52,6 +52,8 @@ def titled(label: str) -> str:
 
 def precision_of(default: float) -> int:
     """Digits behind the point with which a value like the default is not shown as zero."""
+    if default >= 10.0:
+        return 1
     return 3 if default == 0.0 or default >= 0.01 else min(2 - floor(log10(default)), 6)
 
 

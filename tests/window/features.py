@@ -21,6 +21,7 @@ from stage import ENGINE, FOLDER, main_region, picture, render, result, run, the
 
 SAMPLES = 1
 VIEW_SHARE = 0.4  # of the large area, for the viewport: few pixels are drawn soon, and wide panels are read easily
+WARNING_BUTTON = (29, 147)  # of the first warning, in pixels from the upper right corner of the properties
 ONLY = sys.argv[sys.argv.index("--") + 1 : -1]  # names of steps; by default all
 result.update(done=[], failed={}, s={}, renders={})
 
@@ -29,7 +30,7 @@ def steps():
     open_panels()
     left, right = yield from two_areas()
     result["properties"] = [right.x, window().height - right.y - right.height, right.width, right.height]
-    for step in (reflections, glare, painting, grass, relief, caustics):
+    for step in (warning, reflections, glare, painting, grass, relief, caustics):
         name, started = step.__name__, time.monotonic()
         if ONLY and name not in ONLY:
             continue
@@ -176,6 +177,24 @@ def on_screen(area, point):
 # -------------------------------------------------------------------------------------------------------------- steps
 
 
+def warning(left, right):
+    """A click on the button of a warning: its object is selected, and its tab shown, at once."""
+    scene = stage()
+    ledger = sys.modules[next(name for name in sys.modules if name.endswith("candela.addon.frame.ledger"))]
+    note = sys.modules[next(name for name in sys.modules if name.endswith("candela.addon.snapshot.scene"))].Note
+    cube = shape("cube", principled("Odd"), size=1.0)
+    activate(scene.camera)
+    ledger.publish(ledger.Ledger(notes=(note("Material 'Odd'", "A part of it is drawn otherwise.", "Odd"),)))
+    yield 0.3
+    right.spaces.active.context = "RENDER"
+    yield 1.0
+    picture("warning.png")
+    yield from click(right.x + right.width - WARNING_BUTTON[0], right.y + right.height - WARNING_BUTTON[1])
+    yield 2.0
+    picture("warning_clicked.png")
+    result["culprit"] = [window().view_layer.objects.active == cube, cube.select_get(), right.spaces.active.context]
+
+
 def glare(left, right):
     scene = stage()
     shape("plane", size=20.0)
@@ -193,7 +212,7 @@ def glare(left, right):
     scene.camera.data.candela.eye_side = "128"
     yield from wait_for_rest()
     with there(right):
-        result["observer"] = list(bpy.ops.candela.eye_preset(preset=observers()[-1]))
+        result["observer"] = list(bpy.ops.candela.eye_preset(preset=observers()[0]))
         result["eye_pictures"] = list(bpy.ops.candela.eye_pictures("INVOKE_DEFAULT"))
     yield from wait_for_rest()
     yield 0.5
@@ -320,12 +339,21 @@ def reflections(left, right):
     yield from wait_for_rest()
     picture("reflections_picked.png")
     entry = constraints()[0]
-    before = Vector(entry.target)
+    # What is mirrored here lies behind the viewer, and with it the target's handle: the other one is dragged.
+    before = Vector(entry.point)
     x, y = on_screen(left, mirror.matrix_world @ before)
-    result["handle"] = [x, y]
     yield from drag((x, y), (x + 60, y + 10))
     yield 0.5
-    result["dragged"] = (Vector(constraints()[0].target) - before).length
+    result["dragged"] = (Vector(constraints()[0].point) - before).length
+    with there(left):
+        bpy.ops.ed.undo()
+    yield 0.5
+    mirror = window().view_layer.objects.active
+    result["undragged"] = (Vector(constraints()[0].point) - before).length
+    with there(left):
+        bpy.ops.ed.redo()
+    yield 0.5
+    scene, mirror = window().scene, window().view_layer.objects.active
     yield from wait_for_rest()
     picture("reflections_dragged.png")
     entry = constraints()[0]

@@ -376,10 +376,15 @@ def test_every_feature_can_be_used_with_its_panel(tried):
     assert set(result["renders"].values()) == {"complete"}
 
 
+def test_one_click_on_a_warning_shows_its_culprit(tried):
+    _, result = tried
+    assert result["culprit"] == [True, True, "MATERIAL"]
+
+
 def test_a_reflection_is_picked_dragged_keyframed_and_rendered(tried):
     folder, result = tried
     assert result["pick"] == ["RUNNING_MODAL"] and result["picked"] == 1
-    assert result["dragged"] > 0.05
+    assert result["dragged"] > 0.05 and result["undragged"] == pytest.approx(0.0, abs=1e-6)
     assert result["keyframe"] == [True, True]
     first, tenth = (pixels(folder / f"reflections_{frame}_render.png") for frame in (1, 10))
     assert np.abs(first - tenth).max() > 30
