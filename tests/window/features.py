@@ -87,6 +87,7 @@ def stage(camera_at=(0.0, -6.0, 2.2), look_at=(0.0, 0.0, 0.8)):
     scene.world.color = (0.02, 0.02, 0.02)
     scene.render.engine = ENGINE
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 120, 90, 100
+    scene.render.use_border = True  # all of the picture, but nothing around it in the viewport
     scene.candela.samples = scene.candela.viewport_samples = SAMPLES
     scene.candela.bounces = 0  # indirect light takes its time without a GPU
     camera = new("Camera", bpy.data.cameras.new("Camera"), camera_at)
