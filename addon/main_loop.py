@@ -75,7 +75,7 @@ _left_at = _worked_at = 0.0
 def taken(steps: Generator) -> Generator:
     """What the steps yield, wherever they have to be taken; yields None while there is nothing new. Returns what they
     return, raises what they raise. Closed, it gives up the rest."""
-    if bpy.app.background or threading.current_thread() is threading.main_thread():
+    if _is_at_hand():
         with images.passing_context():
             return (yield from steps)
     errand = Errand(steps)
@@ -89,6 +89,11 @@ def taken(steps: Generator) -> Generator:
     if errand.error is not None:
         raise errand.error
     return errand.result
+
+
+def _is_at_hand() -> bool:
+    """Whether the GPU may be used where this is asked, for as long as it takes."""
+    return bpy.app.background or threading.current_thread() is threading.main_thread()
 
 
 def _all(news: deque) -> list:

@@ -198,7 +198,7 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
         return context.engine == ENGINE and context.object is not None and bool(_handles(context.object))
 
     def setup(self, context):
-        self.shown = None
+        self.shown, self.dragged = None, False
         self.refresh(context)
 
     def refresh(self, context):
@@ -222,10 +222,19 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
             gizmo.scale_basis = 0.3
 
     def draw_prepare(self, context):
-        """Dials stand where their object is."""
+        """Dials stand where their object is; a drag that has ended is a step for undo, which Blender makes for its own
+        handles alone."""
+        dragged = any(gizmo.is_modal for gizmo in self.gizmos)
+        if self.dragged and not dragged:
+            bpy.app.timers.register(_push_drag, first_interval=0.0)
+        self.dragged = dragged
         for gizmo, place in zip(self.gizmos, self.shown[1] if self.shown else ()):
             if place.param.handle != POINT and not gizmo.is_modal:
                 gizmo.matrix_basis = _turned(context.object, _vector(place))
+
+
+def _push_drag() -> None:
+    bpy.ops.ed.undo_push(message="Drag Handle")
 
 
 def _vector(place: Place) -> Vector:

@@ -132,8 +132,9 @@ def principled(name, **values):
 def activate(thing):
     with there(left_area()):
         bpy.ops.object.select_all(action="DESELECT")
-    thing.select_set(True)
-    window().view_layer.objects.active = thing
+        thing.select_set(True)
+        window().view_layer.objects.active = thing
+        bpy.ops.ed.undo_push(message="scene")  # what a script makes is no step of itself
 
 
 def rendered(left):

@@ -36,6 +36,8 @@ def steps():
     yield from seen_while_it_grows(left, right)
     yield from ended_by_a_key(left, right)
     yield from pause(left)
+    result["render_by_script"] = list(bpy.ops.render.render())  # in the main loop itself, which waits
+    yield from wait_for_rest()
 
 
 def seen_while_it_grows(left, right):

@@ -362,6 +362,11 @@ def test_a_paused_viewport_is_left_alone_until_it_goes_on(grown):
     assert result["went_on"]
 
 
+def test_a_script_renders_in_the_main_loop(grown):
+    _, result = grown
+    assert result["render_by_script"] == ["FINISHED"]
+
+
 @pytest.fixture(scope="module", params=BACKENDS)
 def tried(request, installed):
     """What needs more than a look: glare, painting, reflections, grass, relief, caustics."""
