@@ -213,6 +213,7 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
         for place in places:
             if place.param.handle == POINT:
                 gizmo = self.gizmos.new("GIZMO_GT_move_3d")
+                gizmo.draw_options = {"FILL_SELECT", "ALIGN_VIEW"}  # a ring is hardly seen from its side
                 gizmo.target_set_handler("offset", get=_reader(place), set=_writer(place))
             else:
                 gizmo = self.gizmos.new("GIZMO_GT_dial_3d")
