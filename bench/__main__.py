@@ -31,6 +31,7 @@ from bench import (
     reflections,
     relief,
     run,
+    strips,
     subsurface,
 )
 
@@ -54,6 +55,7 @@ VERBS = {
     "random": random_scenes,
     "reflections": reflections,
     "relief": relief,
+    "strips": strips,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,
