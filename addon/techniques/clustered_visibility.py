@@ -105,17 +105,24 @@ class ClusteredVisibility(MultiresRadiosity):
     name = "clustered_visibility"
     label = "Clustered visibility"
     params = (
+        Param("virtual_lights", "Virtual lights", 1024, "Virtual lights in each sample", 1, 2048, draft=128),
         Param(
-            "virtual_lights", "Virtual lights", 1024, "Points of surfaces that light the picture in a sample", 1, 2048,
-            draft=128,
-        ),
-        Param(
-            "clusters", "Clusters", 64, "Groups of virtual lights that share a shadow map, at most", 1, 256, draft=16
+            "clusters", "Clusters", 64,
+            "Maximum number of clusters of virtual lights; each has one shadow map",
+            1, 256, draft=16,
         ),
         Param("map_size", "Map size", 64, "Texels along each side of a shadow map", 8, 256, draft=32),
-        Param("shadows", "Shadows", TEXELS, "How the share of a kernel that is blocked is found", items=FILTERS),
-        Param("order", "Order", "8", "Terms of the series that compares depths, for convolution", items=ORDERS),
-        Param("rays", "Rays", 8, "Rays of a region that correct the clusters in a sample; 0: none", 0, 64, draft=4),
+        Param("shadows", "Shadows", TEXELS, "How the blocked share of a filter kernel is found", items=FILTERS),
+        Param(
+            "order", "Order", "8",
+            "Terms of the Fourier series that approximates the depth comparison, for convolution",
+            items=ORDERS,
+        ),
+        Param(
+            "rays", "Rays", 8,
+            "Rays per region and sample that correct the clusters' shadows; 0: none",
+            0, 64, draft=4,
+        ),
         REFINE,
         LEVELS,
         NEAR_BOUNCES,

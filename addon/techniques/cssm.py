@@ -101,9 +101,13 @@ class ConvolutionSoftShadows(SoftMaps):
     params = (
         RESOLUTION,
         CUTOFF,
-        Param("order", "Order", "8", "Terms of the series that compares depths", items=ORDERS),
-        Param("prefilter", "Prefilter", PYRAMID, "How means over boxes of texels are made", items=PREFILTERS),
-        Param("cells", "Cells", 4, "Boxes along each side of a kernel", 1, 6),
+        Param(
+            "order", "Order", "8",
+            "Terms of the Fourier series that approximates the depth comparison",
+            items=ORDERS,
+        ),
+        Param("prefilter", "Prefilter", PYRAMID, "How averages over boxes of texels are precomputed", items=PREFILTERS),
+        Param("cells", "Cells", 4, "Boxes along each side of the filter kernel", 1, 6),
         REFINE,
         CONTACTS,
         SPARSE,

@@ -110,7 +110,8 @@ class Denoise(Technique):
     params = (
         Param(
             "strength", "Strength", 1.0,
-            "How much of what may be noise is taken out of light after the last sample; 0: none", 0.0, 2.0,
+            "Strength of the noise filter that runs after the last sample; 0: off",
+            0.0, 2.0,
         ),
     )  # fmt: skip
     reads = ("surface.position", "surface.normal_sum", "color.diffuse", "color.glossy")

@@ -56,7 +56,8 @@ class DirectLight(Technique):
     params = (
         Param(
             "lights_per_sample", "Lights per sample", 16,
-            "With more lights than this, each sample draws so many of them by lot", 1, 256,
+            "If the scene has more lights, each sample picks this many of them at random",
+            1, 256,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES

@@ -83,7 +83,7 @@ class DirectionalOcclusion(Technique):
     fills = ("environment",)
     params = (
         *fan_params(radius=1.0, thickness=0.02),
-        Param("rays", "Rays", True, "One ray per fan for what the screen does not show"),
+        Param("rays", "Rays", True, "Trace one ray for each screen direction, for what the screen does not show"),
     )
     reads = SURFACES
     writes = DIRECT_WRITES

@@ -59,10 +59,11 @@ class EnvironmentAreaLights(Technique):
     label = "Environment area lights"
     fills = ("environment",)
     params = (
-        Param("lights", "Lights", 45, "Area lights that the world is split into, at most", 24, 64),
+        Param("lights", "Lights", 45, "Maximum number of area lights that the world is split into", 24, 64),
         Param(
             "texels_per_pixel", "Map resolution", 1.0,
-            "Texels of a depth map per pixel of the picture's longer side", 0.125, 4.0,
+            "Shadow map resolution, in texels per pixel of the picture's longer side",
+            0.125, 4.0,
         ),
         Param("shadows", "Shadows", "VARIANCE", "Kind of soft shadow maps", items=SHADOWS),
     )  # fmt: skip

@@ -140,7 +140,7 @@ class EnvironmentLight(Technique):
             "directions",
             "Directions",
             0,
-            "Directions of the world that are drawn per sample, as a power of two; 0: by the error they leave",
+            "Directions of the world in each sample, rounded to a power of two; 0: chosen by the expected error",
             0,
             64,
         ),

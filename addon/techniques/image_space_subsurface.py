@@ -110,21 +110,29 @@ class ImageSpaceSubsurface(Technique):
     params = (
         Param(
             "points", "Points", 4096,
-            "Most points on the surfaces of objects below which light scatters, that are lit in a sample", 64, 65536,
-            draft=512,
-        ),
-        Param("taps", "Taps", 24, "Pixels around each that light below its surface is taken from in a sample", 1, 256),
-        Param(
-            translucency.BLUR, "Blur Map", "", "Painted: how far light spreads below the surface; 0.5 as the material "
-            "says, 1 eight times as far, 0 an eighth", scope=MATERIAL, image=True,
+            "Maximum number of points that are lit in each sample, on all objects with subsurface scattering",
+            64, 65536, draft=512,
         ),
         Param(
-            translucency.TINT, "Tint Map", "", "Painted: colour of light that enters here, below the skin",
+            "taps", "Taps", 24,
+            "Neighbouring pixels from which each pixel gathers scattered light in a sample",
+            1, 256,
+        ),
+        Param(
+            translucency.BLUR, "Blur Map", "",
+            "Painted image: how far light spreads below the surface. 0.5: the material's radius, 1: eight times as "
+            "far, 0: an eighth",
             scope=MATERIAL, image=True,
         ),
         Param(
-            translucency.TRANSLUCENCY, "Translucency Map", "", "Painted: where light scatters below the surface; black "
-            "is plain diffuse", scope=MATERIAL, image=True,
+            translucency.TINT, "Tint Map", "",
+            "Painted image: colour of the light that enters the surface here",
+            scope=MATERIAL, image=True,
+        ),
+        Param(
+            translucency.TRANSLUCENCY, "Translucency Map", "",
+            "Painted image: where light scatters below the surface; black: plain diffuse",
+            scope=MATERIAL, image=True,
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -183,16 +183,23 @@ class ImperfectShadowMaps(MultiresRadiosity):
     label = "Imperfect shadow maps"
     params = (
         Param(
-            "virtual_lights", "Virtual lights", 256, "Points of surfaces that light the picture, each with a map", 1,
-            2048, draft=64,
+            "virtual_lights", "Virtual lights", 256,
+            "Virtual lights in each sample, each with a shadow map",
+            1, 2048, draft=64,
         ),
         Param(
-            "points", "Points", 512, "Points in each map for what is small; rounded to a power of two", 16, 16384,
-            draft=128,
+            "points", "Points", 512,
+            "Points that stand for small geometry in each map; rounded to a power of two",
+            16, 16384, draft=128,
         ),
-        Param("map_size", "Map size", 32, "Texels along a side of a map; rounded to a power of two", 8, 128, draft=16),
         Param(
-            "rays", "Rays", 4, "Pairs of rays of each region in a sample that correct what the maps show; 0: none",
+            "map_size", "Map size", 32,
+            "Texels along each side of a map; rounded to a power of two",
+            8, 128, draft=16,
+        ),
+        Param(
+            "rays", "Rays", 4,
+            "Pairs of rays per region and sample that correct the maps; 0: none",
             0, 128, draft=1,
         ),
         LEVELS,

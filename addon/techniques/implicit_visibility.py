@@ -121,13 +121,16 @@ class ImplicitVisibility(Technique):
     label = "Implicit visibility"
     fills = ("indirect",)
     params = (
-        Param("surfels", "Surfels", 4096, "Discs that stand for all surfaces, both sides counted", 64, 65536),
+        Param("surfels", "Surfels", 4096, "Number of discs that represent all surfaces, both sides counted", 64, 65536),
         Param(
-            "bins", "Bins", 21, "Directions along a side of the square that is a surfel's half ball; 21 are as fine as "
-            "cube maps of 12", 4, 32,
+            "bins", "Bins", 21,
+            "Directions along each side of the square that is mapped to a surfel's hemisphere; 21 are as fine as "
+            "cube maps of 12 texels",
+            4, 32,
         ),
         Param(
-            "orientations", "Orientations", 8, "Solutions with bins turned differently, of which each sample shows one",
+            "orientations", "Orientations", 8,
+            "Number of solutions with differently rotated bins; each sample shows one of them",
             1, 64,
         ),
     )  # fmt: skip

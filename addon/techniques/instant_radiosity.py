@@ -182,12 +182,13 @@ class InstantRadiosity(Technique):
     params = (
         Param(
             "virtual_lights", "Virtual lights", 512,
-            "Points of surfaces that light the picture in a sample; pixels look at every other one", 1, 1024, draft=64,
+            "Virtual lights in each sample; a pixel evaluates every second one",
+            1, 1024, draft=64,
         ),
         Param(
             "rays", "Rays", 2,
-            "How many of the virtual lights each pixel traces in a sample; pictures of few samples trace up to four "
-            "times as many", 1, 64, draft=1,
+            "Shadow rays to virtual lights per pixel and sample; pictures of few samples use up to four times as many",
+            1, 64, draft=1,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES

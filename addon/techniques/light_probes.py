@@ -73,14 +73,15 @@ class LightProbes(Technique):
     label = "Light probes"
     params = (
         Param(
-            "guiding", "Guiding", True, "Draw more directions of the world from where light reaches the picture",
+            "guiding", "Guiding", True,
+            "Sample more directions of the world from where its light reaches the picture",
             draft=False,
         ),
         Param(
             "maps", "Maps per sample", 8.0,
-            "Depth maps that a sample of a final picture shares out among lights and world, by the error of each, "
-            "and more of them where many samples, or few directions of the world, would leave too much of it; "
-            "0: one for every light", 0.0, 64.0,
+            "Number of depth maps in each sample of a final render, distributed among lights and world in proportion "
+            "to their error; more are used where that leaves too much noise. 0: one for every light",
+            0.0, 64.0,
         ),
     )  # fmt: skip
     reads = SURFACES

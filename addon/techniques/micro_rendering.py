@@ -95,31 +95,39 @@ class MicroRendering(MultiresRadiosity):
     label = "Micro-rendering"
     params = (
         Param(
-            "points", "Points", 8192, "Points on all surfaces that light is stored at; rounded to a power of two", 64,
-            1 << 20,
+            "points", "Points", 8192,
+            "Points on all surfaces at which light is stored; rounded to a power of two",
+            64, 1 << 20,
         ),
         Param(
-            "side", "Micro-buffer side", 8, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
-            draft=8,
+            "side", "Micro-buffer side", 8,
+            "Pixels along each side of the micro-buffer, the picture of a hemisphere from which light is gathered",
+            4, 32, draft=8,
         ),
         Param(
-            "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
+            "lobe_side", "Reflections' side", 5,
+            "Pixels along each side of the micro-buffer of a glossy reflection",
+            1, 32, draft=3,
         ),
         Param(
-            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be "
-            "drawn as one disc", 0.05, 16.0,
+            "threshold", "Threshold", 1.0,
+            "Largest group of points that is drawn as one disc, in pixels of the micro-buffer",
+            0.05, 16.0,
         ),
         Param(
-            "centre_test", "Centre test", True, "Draw a disc where the middles of pixels see it; else into the pixel "
-            "that its own middle falls into, which makes silhouettes grow",
+            "centre_test", "Centre test", True,
+            "Draw a disc into the pixels whose centres see it; otherwise into the pixel that holds the disc's own "
+            "centre, which enlarges silhouettes",
         ),
         Param(
-            "groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14,
-            draft=256,
+            "groups", "Groups", 1024,
+            "Groups of points that gather light for further bounces",
+            16, 1 << 14, draft=256,
         ),
         Param(
-            "levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0,
-            5,
+            "levels", "Levels", 2,
+            "Largest regions have 2^levels pixels a side; 0: gather light at every pixel",
+            0, 5,
         ),
     )  # fmt: skip
     provides = ()

@@ -58,10 +58,13 @@ from .instant_radiosity import (
 # From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
 MANY_PIXELS = 60_000
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.4  # ranges within a region: share of its depth, and of each axis of unit normals
-LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
+LEVELS = Param(
+    "levels", "Levels", 3, "Largest regions have 2^levels pixels a side; 0: gather light at every pixel", 0, 5
+)
 NEAR_BOUNCES = Param(
     "near_bounces", "Near bounces", True,
-    "Follow light that close surfaces reflect to each other more than once, as long as it goes", draft=False,
+    "Follow light that close surfaces reflect to each other more than once; slower, brighter corners",
+    draft=False,
 )  # fmt: skip
 BOUNDS_CONSTANTS = (
     ("IVEC2", "grid_offset"), ("FLOAT", "depth_scale"), ("FLOAT", "depth_step"), ("FLOAT", "normal_step"),
@@ -170,12 +173,10 @@ class MultiresRadiosity(InstantRadiosity):
     name = "multires_radiosity"
     label = "Multi-resolution radiosity"
     params = (
+        Param("virtual_lights", "Virtual lights", 1024, "Virtual lights in each sample", 1, 2048, draft=128),
         Param(
-            "virtual_lights", "Virtual lights", 1024, "Points of surfaces that light the picture in a sample", 1, 2048,
-            draft=128,
-        ),
-        Param(
-            "rays", "Rays", 64, "How many of the virtual lights each region traces in a sample; 0: light passes walls",
+            "rays", "Rays", 64,
+            "Shadow rays to virtual lights per region and sample; 0: no shadows of indirect light",
             0, 1024, draft=8,
         ),
         LEVELS,

@@ -104,10 +104,10 @@ class PenumbraWedges(EdgeShadows):
     name = "penumbra_wedges"
     label = "Penumbra wedge blending"
     params = (
-        Param("union", "Union", BOXES, "What is hidden by several objects together", items=UNIONS),
+        Param("union", "Union", BOXES, "How the areas that several objects hide are combined", items=UNIONS),
         Param(
             "accurate", "Accurate edges", True,
-            "Edges are silhouettes from any point of a light, not from its centre alone",
+            "Use silhouette edges seen from any point of a light, not only from its centre",
         ),
         MOST_EDGES,
         CUTOFF,

@@ -95,15 +95,21 @@ def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
     return (
         Param(
             "visibility", "Visibility", BITS,
-            "How surfaces hide each other: bits for sectors of half planes, or points in a half ball of a small radius",
+            "How occlusion is found: by a bit mask of sectors in half planes, or by points in a hemisphere of a "
+            "small radius",
             items=((BITS, "Bits", 0), (POINTS, "Points", 1)),
         ),
-        Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64, draft=2),
-        Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64, draft=12),
-        Param("radius", "Radius", radius, "How far surfaces matter, in median distances of what is seen", 0.01, 100.0),
+        Param("fans", "Fans", 4, "Screen directions that each pixel searches in a sample", 1, 64, draft=2),
+        Param("steps", "Steps", 16, "Steps along each screen direction", 2, 64, draft=12),
+        Param(
+            "radius", "Radius", radius,
+            "Search radius, as a multiple of the median distance of visible surfaces",
+            0.01, 100.0,
+        ),
         Param(
             "thickness", "Thickness", thickness,
-            "How far surfaces reach behind what is seen of them, in median distances of what is seen", 0.0, 10.0,
+            "Assumed thickness of visible surfaces, as a multiple of their median distance",
+            0.0, 10.0,
         ),
     )  # fmt: skip
 
@@ -114,8 +120,8 @@ class ScreenSpaceBounce(Technique):
     fills = ("indirect",)
     params = (
         *fan_params(radius=4.0, thickness=0.1),
-        Param("rays", "Rays", True, "One ray per pixel and sample for what the screen does not show"),
-        Param("bounces", "Bounces", 4, "At most so many of the scene's bounces are gathered", 1, 8, draft=2),
+        Param("rays", "Rays", True, "Trace one ray per pixel and sample for what the screen does not show"),
+        Param("bounces", "Bounces", 4, "Maximum number of bounces, up to that of the scene", 1, 8, draft=2),
     )
     reads = (*SURFACES, "radiance.diffuse_direct")
     writes = (

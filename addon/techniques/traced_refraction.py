@@ -98,7 +98,8 @@ class TracedRefraction(Technique):
     params = (
         Param(
             "interfaces", "Interfaces", 8,
-            "How many more surfaces of glass light may cross or be mirrored at on its way to the first one", 0, 32,
+            "Number of glass surfaces behind the first that a ray may cross or be reflected by",
+            0, 32,
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -92,9 +92,12 @@ class VarianceSoftShadows(SoftMaps):
     params = (
         RESOLUTION,
         CUTOFF,
-        Param("cells", "Cells", 3, "Cells along each side of the kernel in which blockers are looked for", 2, 8),
+        Param("cells", "Cells", 3, "Cells along each side of the blocker search kernel", 2, 8),
         Param(
-            "rule", "Rule", "BOUNDS", "What tells whether the moments of a cell can be trusted", items=RULES,
+            "rule", "Rule", "BOUNDS",
+            "How to decide whether the depth moments of a cell are reliable: by its depth bounds, or by its mean as "
+            "in the source",
+            items=RULES,
         ),
         REFINE,
         CONTACTS,
