@@ -31,6 +31,7 @@ from bench import (
     reflections,
     relief,
     run,
+    soft_sources,
     subsurface,
 )
 
@@ -54,6 +55,7 @@ VERBS = {
     "random": random_scenes,
     "reflections": reflections,
     "relief": relief,
+    "soft_sources": soft_sources,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,
