@@ -164,7 +164,7 @@ class ClusteredVisibility(MultiresRadiosity):
         """Trace the maps, unless they hold these clusters among this geometry."""
         count, hierarchy = len(areas), frame.hierarchy("diffuse")
         key = areas.tobytes(), side
-        varies = any(compiled.transparent for compiled in frame.materials.compiled)  # alpha is met by lot
+        varies = any(compiled.transparent for compiled in frame.materials.compiled)  # alpha is met at random
         if not varies and self._drawn is not None and self._drawn[0]() is hierarchy and self._drawn[1] == key:
             frame.count(self, "maps kept", count)
             return

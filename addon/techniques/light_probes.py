@@ -46,7 +46,7 @@ POINTS, FEWEST_POINTS, RAYS_OF_PROBE = 32, 8, 128  # of each light at most, at l
 # relMSE that one lit sample leaves at edges, by four points of the film: of the sample scenes at 256x192, 16 samples.
 EDGES = 0.04
 ROUNDING = 1e-5  # of sums of POINTS equal numbers and their squares
-MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
+MOST_LIGHTS = 16  # more are drawn at random, and then each sample has a point on each that was drawn
 RAYS = (*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES)
 GUIDE = passes.fullscreen_program(
     "environment guide",
@@ -198,7 +198,7 @@ class LightProbes(Technique):
         if lit:
             rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD], asked, alone)
         if any(material.transparent or material.soft for material in frame.materials.compiled):
-            # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
+            # Layers and soft lobes are drawn at random in each sample: a light that misses samples would see few.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
         frame.count(self, "probing rays", (len(moments) - (seen is not None)) * moments.shape[1] * asked_points)
         keys = [emitter.light.key for emitter in emitters] + [WORLD] * lit
