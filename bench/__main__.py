@@ -31,6 +31,7 @@ from bench import (
     reflections,
     relief,
     run,
+    soft_sources,
     strips,
     subsurface,
 )
@@ -56,6 +57,7 @@ VERBS = {
     "reflections": reflections,
     "relief": relief,
     "strips": strips,
+    "soft_sources": soft_sources,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,

@@ -63,22 +63,27 @@ class Relief(Technique):
     params = (
         Param(
             "mode", "Displacement", DEFAULTS["mode"],
-            "What draws the displacement; Auto: as Cycles' setting says, on coarse meshes by relief",
+            "How displacement is drawn; Auto: as the material's Cycles setting says, with relief on coarse meshes",
             items=MODES, scope=MATERIAL,
         ),
         Param(
-            "search", "Search", DEFAULTS["search"], "How a crossing is narrowed down", items=SEARCHES, scope=MATERIAL
+            "search", "Search", DEFAULTS["search"],
+            "Root-finding method that refines where a ray meets the surface",
+            items=SEARCHES, scope=MATERIAL,
         ),
         Param(
-            "steps", "Steps", DEFAULTS["steps"], "Most steps of a ray through one prism of the shell", 3, 512,
-            scope=MATERIAL,
+            "steps", "Steps", DEFAULTS["steps"],
+            "Maximum number of steps of a ray through one prism of the shell",
+            3, 512, scope=MATERIAL,
         ),
         Param(
-            "refinements", "Refinements", DEFAULTS["refinements"], "Steps that narrow a crossing down", 1, 16,
-            scope=MATERIAL,
+            "refinements", "Refinements", DEFAULTS["refinements"],
+            "Root-finding steps after a ray has crossed the surface",
+            1, 16, scope=MATERIAL,
         ),
         Param(
-            "safe", "Thin Features", DEFAULTS["safe"], "Steps as short as the steepest slope needs; slower",
+            "safe", "Thin Features", DEFAULTS["safe"],
+            "Shorten steps to what the steepest slope needs, so that thin features are not missed; slower",
             scope=MATERIAL,
         ),
     )  # fmt: skip
