@@ -34,15 +34,15 @@ from ..scene import displacement
 from ..snapshot.scene import Snapshot
 
 MODES = (
-    (displacement.AUTO, "Auto", 0),
-    (displacement.RELIEF, "Relief", 1),
-    (displacement.MESH, "Mesh", 2),
-    (displacement.BUMP, "Bump", 3),
+    (displacement.AUTO, "Auto", 0, "As the material's Displacement setting says; on coarse meshes by relief"),
+    (displacement.RELIEF, "Relief", 1, "Rays search the surface within a shell around the mesh"),
+    (displacement.MESH, "Mesh", 2, "The mesh's vertices are moved"),
+    (displacement.BUMP, "Bump", 3, "Only shading changes"),
 )
 SEARCHES = (
-    (displacement.FALSE_POSITION, "False Position", 0),
-    (displacement.INTERVAL, "Interval Mapping", 1),
-    (displacement.BISECTION, "Bisection", 2),
+    (displacement.FALSE_POSITION, "False Position", 0, "By the slope between two steps: few refinements are enough"),
+    (displacement.INTERVAL, "Interval Mapping", 1, "By where the ray and the slope meet, again and again"),
+    (displacement.BISECTION, "Bisection", 2, "In the middle of each step: slow and sure"),
 )
 DEFAULTS = displacement.DEFAULTS
 
