@@ -25,7 +25,7 @@ from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import context, images, passes
 from ..gfx.library import Program
-from .lit_points import ROW, LitPoints, Run
+from .point_runs import ROW, PointRuns, Run
 
 PULLED = 7  # levels of a pass
 NODE_ROW = 128  # groups and sides side by side
@@ -103,7 +103,7 @@ class NodeRadiance:
         self._spare: images.Image | None = None
 
     def update(
-        self, frame: Frame, technique: Technique, points: LitPoints, run: Run, bounces: int, groups: int,
+        self, frame: Frame, technique: Technique, points: PointRuns, run: Run, bounces: int, groups: int,
         threshold: float, centre_test: bool,
     ) -> Iterator[None]:  # fmt: skip
         """Direct light at the points, and what of it has been reflected up to `bounces` times, by `groups` groups."""

@@ -32,7 +32,7 @@ import numpy as np
 from ..gfx import images
 from ..sampling.sequence import bits
 from . import acceleration
-from .pieces import halved, octahedral
+from .pieces import farthest, halved, octahedral
 
 MEMBERS = 8  # points of its cell at which a surfel is lit, in turn
 CLOUD = 16  # points of the cloud for each surfel
@@ -385,7 +385,9 @@ def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...
     """Places, normals, radii, areas, opacities and members of the surfels of a block of the cloud."""
     count = max(len(block) // CLOUD, 1)
     place, normal, area, opacity = place[block], normal[block], area[block], opacity[block]
-    owner = _nearest_of_farthest(np.concatenate([place, turned[block]], axis=1), count)
+    keys = np.concatenate([place, turned[block]], axis=1)
+    _, owner = farthest(keys - keys.mean(axis=0), count)
+    owner = np.unique(owner, return_inverse=True)[1].reshape(-1)
     count = int(owner.max()) + 1
     members = np.maximum(np.bincount(owner, minlength=count), 1)
     middle = np.stack([np.bincount(owner, place[:, k], minlength=count) for k in range(3)], axis=1) / members[:, None]
@@ -402,24 +404,6 @@ def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...
     radius = np.maximum(radius + MARGIN * np.sqrt(sums / members), np.sqrt(sums / np.pi))
     cover = np.bincount(owner, opacity * area, minlength=count) / np.maximum(sums, 1e-300)
     return place[stands], normal[stands], radius, sums, cover, place[some], normal[some]
-
-
-def _nearest_of_farthest(points: np.ndarray, count: int) -> np.ndarray:
-    """(N,) which of `count` points (N, D), each the farthest from those before, is the nearest to each."""
-    points = points - points.mean(axis=0)
-    squares = (points * points).sum(axis=1)
-    distance = np.full(len(points), np.inf)
-    owner = np.zeros(len(points), np.int64)
-    chosen = 0
-    for k in range(count):
-        to_chosen = squares - 2.0 * (points @ points[chosen]) + squares[chosen]
-        nearer = to_chosen < distance
-        distance[nearer] = to_chosen[nearer]
-        owner[nearer] = k
-        distance[chosen] = -1.0
-        owner[chosen] = k
-        chosen = int(distance.argmax())
-    return np.unique(owner, return_inverse=True)[1].reshape(-1)
 
 
 def tree(cells: Cells) -> tuple[Cells, np.ndarray]:

@@ -1,7 +1,7 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
 Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
-by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of flat
+by all lamps, the world and emissive meshes (lighting/point_runs.py). A tree over them has rectangles in place of flat
 groups of points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into
 a micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
 are equal shares of what the surface reflects, so light is a plain mean:
@@ -52,8 +52,8 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting import micro_buffers
-from ..lighting.lit_points import LitPoints, Run
 from ..lighting.micro_buffers import BUFFER_CONSTANTS, BUFFER_IMAGE, BUFFER_TEXTURES, NodeRadiance, buffer_bindings
+from ..lighting.point_runs import PointRuns, Run
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
@@ -137,7 +137,7 @@ class MicroRendering(MultiresRadiosity):
 
     def __init__(self):
         super().__init__()
-        self._points = LitPoints("micro")
+        self._points = PointRuns("micro")
         self._radiance = NodeRadiance()
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
