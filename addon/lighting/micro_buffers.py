@@ -25,6 +25,7 @@ from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import context, images, passes
 from ..gfx.library import Program
+from ..scene.point_tree import COVER
 from .point_runs import ROW, PointRuns, Run
 
 PULLED = 7  # levels of a pass
@@ -58,7 +59,7 @@ SENT = passes.fullscreen_program(
     "micro/leaf.frag.glsl",
     textures=tuple(("RGBA32F", name) for name in ("tree_nodes", "direct", "albedo", "arriving")),
     constants=(("INT", "leaf_count"), ("INT", "group_count")),
-    defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW))),
+    defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW)), ("COVER", str(COVER))),
     outputs=(("VEC4", "out_sent"),),
 )
 PULL_POINTS, PULL = (

@@ -113,8 +113,11 @@ class PointRuns:
         """The run of these points, in the order of a tree that is known or made."""
         surfaces = self._surfaces
         position, normal, area = points.placed(surfaces)
-        order = split(position, normal) if order is None else order
-        tree = fitted(order, position, normal, area)
+        pieces = points.pieces(surfaces)
+        middle = np.where(np.isfinite(pieces[:, 0]), pieces.mean(axis=1), position)
+        sides = points.sides(surfaces)
+        order = split(middle, normal, sides) if order is None else order
+        tree = fitted(order, position, normal, area, pieces, sides)
         hits, rows = frame.kept(Hits), {id(one): row for row, one in enumerate(frame.geometry.placed[0])}
         owner, number = surfaces.owner[points.triangle], surfaces.number[points.triangle]
         instance, of_material, material = (np.zeros(len(points)) for _ in range(3))

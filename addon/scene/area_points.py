@@ -1,17 +1,20 @@
 """Points on all surfaces, spread by area, wherever the camera looks: where light is stored that others gather.
 
 Triangles are laid end to end, each as long as its area times its opacity, and points stand at equal steps along that
-line; those of one triangle are a stretch of the R2 sequence (Roberts 2018), which spreads 2 points as it does 2000. Of
-discs of 1.5 times the area's radius about them, 0.4 % of a square is free; about points of a three-dimensional Sobol'
-sequence 3.7 %, about random ones 11 %. On meshes whose triangles have one to ten points each it is 1 to 4 %: a stretch
-knows nothing of those beside it. A run takes other stretches.
+line. A triangle as large as PIECES points' shares is cut into as many pieces as it has points, always the longest edge
+of a piece and in proportion to the points on both sides; each point stands for its piece, anywhere in it. So light
+neither leaks between points nor overhangs where a thing ends. Of others, some of which have no point at all, and of
+what lets light through, points stand for discs (point_tree.py); those of one triangle are a stretch of the R2 sequence
+(Roberts 2018), which spreads 2 points as it does 2000. Of discs of 1.5 times the area's radius about them, 0.4 % of a
+square is free. On meshes whose triangles have about one point each it is 1 to 4 %: a stretch knows nothing of those
+beside it. A run takes other cuts, places and stretches.
 
-A point knows its triangle and place in it: where a mesh has been deformed or moved,
-it moves along, and what it stands for grows with its triangle.
+A point knows its triangle and place in it: where a mesh has been deformed or moved, it moves along, and what it stands
+for grows with its triangle.
 
 What rays of the diffuse path cannot meet has no points, and neither has clear glass, which lets light pass.
 
-Made on the CPU: about 1 us a point and 0.3 us a triangle. Points that follow a motion cost the same without the search.
+Made on the CPU: about 2 us a point and 0.3 us a triangle. Points that follow a motion cost the same without the search.
 
 Fails: a ground of a kilometre takes all the points of the room that stands on it.
 """
@@ -29,6 +32,10 @@ from . import acceleration
 PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
 ALONE = 0.7  # how much nearer to the middle of its triangle a point lies that is the only one
 CYCLE = 1 << 20  # where stretches of the sequence begin
+PIECES = (
+    3.0  # points' shares in the area of a triangle that is cut; of one, cuts would leave holes beside its neighbours
+)
+OPAQUE = 0.999  # opacity of what is cut into pieces
 
 
 @dataclass(frozen=True)
@@ -73,12 +80,14 @@ class Surfaces:
 @dataclass(frozen=True)
 class AreaPoints:
     """Points by triangle (of Surfaces) and barycentric coordinates (N, 2) of its second and third corner; `density`:
-    the points that fall on a square metre of the triangle (N,), when they were spread."""
+    the points that fall on a square metre of the triangle (N,), when they were spread; `piece` (N, 3, 2): the corners
+    of what each stands for, by the same coordinates, NaN: a disc."""
 
     triangle: np.ndarray
     share: np.ndarray
     density: np.ndarray
     areas: np.ndarray  # (N,) of the triangle then
+    piece: np.ndarray
 
     def __len__(self) -> int:
         return len(self.triangle)
@@ -91,7 +100,21 @@ class AreaPoints:
         double = np.linalg.norm(across, axis=1)
         position = corners[:, 0] + self.share[:, :1] * e1 + self.share[:, 1:] * e2
         area = double / 2 / np.maximum(self.areas, 1e-300) / np.maximum(self.density, 1e-300)
+        own = np.isfinite(self.piece[:, 0, 0])
+        area[own] = double[own] * _share_of(self.piece[own])
         return position, across / np.maximum(double, 1e-300)[:, None], area
+
+    def pieces(self, surfaces: Surfaces) -> np.ndarray:
+        """Corners (N, 3, 3) of what points stand for, NaN where that is a disc."""
+        corners = surfaces.corners[self.triangle][:, None]
+        e1, e2 = corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
+        return corners[:, :, 0] + self.piece[..., :1] * e1 + self.piece[..., 1:] * e2
+
+    def sides(self, surfaces: Surfaces) -> np.ndarray:
+        """(N, 3) the second longest edge of each point's triangle, which of half a rectangle is a side of it."""
+        corners = surfaces.corners[self.triangle]
+        edges = np.roll(corners, -1, axis=1) - corners
+        return edges[np.arange(len(edges)), np.argsort(np.linalg.norm(edges, axis=2), axis=1)[:, 1]]
 
 
 def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
@@ -99,7 +122,7 @@ def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     areas = surfaces.areas()
     edges = np.concatenate([[0.0], np.cumsum(areas * surfaces.opacity)])
     if not edges[-1] > 0:
-        return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+        return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3, 2)))
     marks = (np.arange(count) + bits(run, 0) / 2.0**32) / count
     triangle = np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, len(areas) - 1)
     within = np.arange(count) - np.searchsorted(triangle, triangle)  # number of a point among those of its triangle
@@ -107,9 +130,50 @@ def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     v, w = np.mod(0.5 + number / PLASTIC, 1.0), np.mod(0.5 + number / PLASTIC**2, 1.0)
     root = np.sqrt(v)
     share = np.stack([root * (1 - w), root * w], axis=1)
-    # Where a triangle has one or few, they keep from its rim, so that they do not crowd at that of a neighbour.
-    few = np.bincount(triangle, minlength=len(areas))[triangle]
-    share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few**1.5)[:, None]
     # Where half the light passes, half as many points stand for their own discs.
     density = np.full(count, count / edges[-1])
-    return AreaPoints(triangle, share, density, areas[triangle])
+    piece = np.full((count, 3, 2), np.nan)
+    own = (areas * count >= PIECES * edges[-1])[triangle] & (surfaces.opacity[triangle] > OPAQUE)
+    # Where a triangle has one or few discs, they keep from its rim, so that they do not crowd at that of a neighbour.
+    few = np.bincount(triangle, minlength=len(areas))[triangle]
+    share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few**1.5)[:, None]
+    if own.any():
+        piece[own] = _cut(surfaces.corners, triangle[own], run)
+        first, second, third = piece[own].transpose(1, 0, 2)
+        v, w = (bits(np.flatnonzero(own) + run * count, dimension)[:, None] / 2.0**32 for dimension in (0, 1))
+        root = np.sqrt(v)
+        share[own] = (1 - root) * first + root * (1 - w) * second + root * w * third
+    return AreaPoints(triangle, share, density, areas[triangle], piece)
+
+
+def _cut(corners: np.ndarray, triangle: np.ndarray, run: int) -> np.ndarray:
+    """(N, 3, 2) pieces of triangles: as many of each as its number stands in `triangle` (N,), in order."""
+    number, first, count = np.unique(triangle, return_index=True, return_counts=True)
+    place = np.zeros((len(number), 3, 2))
+    place[:] = (0, 0), (1, 0), (0, 1)
+    found = np.zeros((len(triangle), 3, 2))
+    while len(number):
+        done = count == 1
+        found[first[done]] = place[done]
+        number, first, count, place = number[~done], first[~done], count[~done], place[~done]
+        world = corners[number]
+        at = (
+            world[:, :1]
+            + place[..., :1] * (world[:, 1:2] - world[:, :1])
+            + place[..., 1:] * (world[:, 2:] - world[:, :1])
+        )
+        longest = np.linalg.norm(at - np.roll(at, -1, axis=1), axis=2).argmax(axis=1)
+        a, b, c = (place[np.arange(len(place)), (longest + k) % 3] for k in range(3))
+        # Of an odd number, the larger half lies here or there in turn.
+        half = (count + (first + run) % 2) // 2
+        middle = a + (b - a) * (half / np.maximum(count, 1))[:, None]
+        place = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        number, first = np.concatenate([number, number]), np.concatenate([first, first + half])
+        count = np.concatenate([half, count - half])
+    return found
+
+
+def _share_of(piece: np.ndarray) -> np.ndarray:
+    """Of the triangle's area that pieces have, halved: their areas in barycentric coordinates."""
+    e1, e2 = piece[:, 1] - piece[:, 0], piece[:, 2] - piece[:, 0]
+    return np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]) / 2

@@ -58,12 +58,61 @@ def test_triangles_have_points_by_their_area_and_opacity():
 
 @pytest.mark.parametrize("run", [0, 5])
 def test_their_discs_leave_few_holes_and_lie_where_they_say(run):
-    shown = surfaces(square())
+    shown = surfaces(square(), opacity=0.99)
     position, normal, areas = spread(shown, 1024, run).placed(shown)
     assert (position[:, 2] == 0).all() and (normal == (0, 0, 1)).all()
     asked = np.random.default_rng(1).random((4000, 2)) * 0.9 + 0.05
     nearest = ((asked[:, None] - position[None, :, :2]) ** 2).sum(axis=2).min(axis=1)
     assert (nearest > COVER**2 * areas[0] / np.pi).mean() < 0.012
+
+
+@pytest.mark.parametrize("run", [0, 3])
+def test_pieces_cover_their_triangles_once(run):
+    """As many as there are points; each place of two triangles lies in one piece, and each point in its own."""
+    shown = surfaces(np.array(square()) * (3, 1, 1))
+    points = spread(shown, 500, run)
+    pieces, (position, _, areas) = points.pieces(shown), points.placed(shown)
+    assert areas.sum() == pytest.approx(3.0) and areas.max() < 4.1 * areas.mean()
+    asked = np.random.default_rng(run).random((500, 2)) * (3, 1)
+    assert (inside(pieces, asked).sum(axis=1) == 1).all()
+    assert inside(pieces, position[:, :2]).diagonal().all()
+
+
+def inside(pieces, asked):
+    """(asked, pieces): whether places lie in triangles of the plane."""
+    e1, e2 = (pieces[:, k, :2] - pieces[:, 0, :2] for k in (1, 2))
+    off = asked[:, None] - pieces[None, :, 0, :2]
+    across = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+    u = (off[..., 0] * e2[:, 1] - off[..., 1] * e2[:, 0]) / across
+    v = (e1[:, 0] * off[..., 1] - e1[:, 1] * off[..., 0]) / across
+    return (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+
+
+def test_what_is_smaller_than_few_points_shares_or_lets_light_pass_has_discs():
+    small = np.array(square()) * 1e-2 + (5, 0, 0)
+    shown = surfaces(np.concatenate([square(), *(small + (k, 0, 0) for k in range(40))]))
+    points = spread(shown, 64, 0)
+    assert np.isfinite(points.piece[points.triangle < 2]).all() and np.isnan(points.piece[points.triangle >= 2]).all()
+    assert np.isnan(spread(surfaces(square(), opacity=0.5), 64, 0).piece).all()
+
+
+def test_rectangles_of_groups_end_where_a_turned_wall_does():
+    """No group of pieces reaches over the rim of a turned rectangle, and most of them are drawn as rectangles."""
+    turn = np.array([[np.cos(0.6), np.sin(0.6), 0], [-np.sin(0.6), np.cos(0.6), 0], [0, 0, 1.0]])
+    shown = surfaces((np.array(square()) * (2, 1, 1)) @ turn)
+    points = spread(shown, 512, 0)
+    pieces, (position, normal, areas) = points.pieces(shown), points.placed(shown)
+    order = split(pieces.mean(axis=1), normal, points.sides(shown))
+    tree = fitted(order, position, normal, areas, pieces, points.sides(shown))
+    groups = np.arange(1, 512)
+    assert tree.flat[1:16].all()  # those of 32 points and more, rags at their rims
+    across = np.cross(tree.axis, tree.along)
+    for a in (-1, 1):
+        for b in (-1, 1):
+            corner = tree.centre + a * tree.half[:, :1] * tree.along + b * tree.half[:, 1:] * across
+            back = corner[groups] @ turn.T
+            over = np.maximum(np.maximum(-back, back - (2, 1, 0)), 0)
+            assert over.max() < 1e-9
 
 
 def test_runs_do_not_repeat_each_other():
@@ -130,7 +179,7 @@ def test_points_in_one_place_make_a_tree(places):
 
 
 def test_points_of_nothing_are_none():
-    points = AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    points = AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3, 2)))
     assert len(points.placed(surfaces(np.zeros((0, 3, 3))))[0]) == 0
 
 
