@@ -1,13 +1,13 @@
 """Points on all surfaces, spread by area, wherever the camera looks: where light is stored that others gather.
 
-Triangles are laid end to end, each as long as its area times its opacity, and points stand at equal steps along that
-line. A triangle as large as PIECES points' shares is cut into as many pieces as it has points, always the longest edge
-of a piece and in proportion to the points on both sides; each point stands for its piece, anywhere in it. So light
-neither leaks between points nor overhangs where a thing ends. Of others, some of which have no point at all, and of
-what lets light through, points stand for discs (point_tree.py); those of one triangle are a stretch of the R2 sequence
-(Roberts 2018), which spreads 2 points as it does 2000. Of discs of 1.5 times the area's radius about them, 0.4 % of a
-square is free. On meshes whose triangles have about one point each it is 1 to 4 %: a stretch knows nothing of those
-beside it. A run takes other cuts, places and stretches.
+The largest triangles, up to half as many as there are points, are cut into pieces: one each, and what points are left
+by area; always the longest edge of a piece and in proportion to the points on both sides. Each point stands for its
+piece, anywhere in it. So light neither leaks between points nor overhangs where a thing ends. For the other triangles,
+and those that let light through, points stand for discs (point_tree.py), as many as their area's share: laid end to
+end, each as long as its area times its opacity, they have points at equal steps along that line; those of one triangle
+are a stretch of the R2 sequence (Roberts 2018), which spreads 2 points as it does 2000. Of discs of 1.5 times the
+area's radius about them, 0.4 % of a square is free. On meshes whose triangles have about one point each it is 1 to 4 %:
+a stretch knows nothing of those beside it. A run takes other cuts, places and stretches.
 
 A point knows its triangle and place in it: where a mesh has been deformed or moved, it moves along, and what it stands
 for grows with its triangle.
@@ -32,9 +32,6 @@ from . import acceleration
 PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
 ALONE = 0.7  # how much nearer to the middle of its triangle a point lies that is the only one
 CYCLE = 1 << 20  # where stretches of the sequence begin
-PIECES = (
-    3.0  # points' shares in the area of a triangle that is cut; of one, cuts would leave holes beside its neighbours
-)
 OPAQUE = 0.999  # opacity of what is cut into pieces
 
 
@@ -80,8 +77,8 @@ class Surfaces:
 @dataclass(frozen=True)
 class AreaPoints:
     """Points by triangle (of Surfaces) and barycentric coordinates (N, 2) of its second and third corner; `density`:
-    the points that fall on a square metre of the triangle (N,), when they were spread; `piece` (N, 3, 2): the corners
-    of what each stands for, by the same coordinates, NaN: a disc."""
+    of discs, the points that fall on a square metre of the triangle (N,), when they were spread; `piece` (N, 3, 2): the
+    corners of what each stands for, by the same coordinates, NaN: a disc."""
 
     triangle: np.ndarray
     share: np.ndarray
@@ -91,6 +88,9 @@ class AreaPoints:
 
     def __len__(self) -> int:
         return len(self.triangle)
+
+    def joined(self, other: AreaPoints) -> AreaPoints:
+        return AreaPoints(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values())))
 
     def placed(self, surfaces: Surfaces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions (N, 3), unit normals by the triangles' winding (N, 3) and the area, m2, that each stands for."""
@@ -120,30 +120,57 @@ class AreaPoints:
 def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     """`count` points of this run; none where there is no area."""
     areas = surfaces.areas()
-    edges = np.concatenate([[0.0], np.cumsum(areas * surfaces.opacity)])
-    if not edges[-1] > 0:
+    weights = areas * surfaces.opacity
+    total = float(weights.sum())
+    if not total > 0:
         return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3, 2)))
-    marks = (np.arange(count) + bits(run, 0) / 2.0**32) / count
-    triangle = np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, len(areas) - 1)
+    whole = np.flatnonzero((surfaces.opacity > OPAQUE) & (areas > 0.0))
+    if len(whole) > count // 2:
+        whole = np.sort(whole[np.argsort(-areas[whole], kind="stable")[: count // 2]])
+    rest = np.ones(len(areas), bool)
+    rest[whole] = False
+    left = np.where(rest, weights, 0.0)
+    discs = min(max(round(count * left.sum() / total), int(left.any())), count - len(whole)) if len(whole) else count
+    first = _pieces(surfaces, areas, whole, count - discs, run)
+    return first.joined(_discs(areas, left, discs, run))
+
+
+def _pieces(surfaces: Surfaces, areas: np.ndarray, whole: np.ndarray, count: int, run: int) -> AreaPoints:
+    """`count` points for pieces of the triangles `whole`, one each at least."""
+    # Beyond the first, by what a triangle has more than a point's share.
+    more = np.maximum(areas[whole] - areas[whole].sum() / max(count, 1), 0.0)
+    more = more if more.any() else areas[whole]
+    extra = _marked(more, count - len(whole), run)
+    triangle = np.repeat(whole, 1 + np.bincount(extra, minlength=len(whole)))
+    piece = _cut(surfaces.corners, triangle, run)
+    a, b, c = piece.transpose(1, 0, 2)
+    v, w = (bits(np.arange(count) + run * count, dimension)[:, None] / 2.0**32 for dimension in (0, 1))
+    root = np.sqrt(v)
+    share = (1 - root) * a + root * (1 - w) * b + root * w * c
+    return AreaPoints(triangle, share, np.ones(count), areas[triangle], piece)
+
+
+def _discs(areas: np.ndarray, weights: np.ndarray, count: int, run: int) -> AreaPoints:
+    """`count` points for discs on triangles by weight."""
+    triangle = _marked(weights, count, run)
     within = np.arange(count) - np.searchsorted(triangle, triangle)  # number of a point among those of its triangle
     number = within + (triangle * 7919 + run * count) % CYCLE
     v, w = np.mod(0.5 + number / PLASTIC, 1.0), np.mod(0.5 + number / PLASTIC**2, 1.0)
     root = np.sqrt(v)
     share = np.stack([root * (1 - w), root * w], axis=1)
-    # Where half the light passes, half as many points stand for their own discs.
-    density = np.full(count, count / edges[-1])
-    piece = np.full((count, 3, 2), np.nan)
-    own = (areas * count >= PIECES * edges[-1])[triangle] & (surfaces.opacity[triangle] > OPAQUE)
-    # Where a triangle has one or few discs, they keep from its rim, so that they do not crowd at that of a neighbour.
+    # Where a triangle has one or few, they keep from its rim, so that they do not crowd at that of a neighbour.
     few = np.bincount(triangle, minlength=len(areas))[triangle]
     share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few**1.5)[:, None]
-    if own.any():
-        piece[own] = _cut(surfaces.corners, triangle[own], run)
-        first, second, third = piece[own].transpose(1, 0, 2)
-        v, w = (bits(np.flatnonzero(own) + run * count, dimension)[:, None] / 2.0**32 for dimension in (0, 1))
-        root = np.sqrt(v)
-        share[own] = (1 - root) * first + root * (1 - w) * second + root * w * third
-    return AreaPoints(triangle, share, density, areas[triangle], piece)
+    # Where half the light passes, half as many points stand for their own discs.
+    density = np.full(count, count / max(float(weights.sum()), 1e-300))
+    return AreaPoints(triangle, share, density, areas[triangle], np.full((count, 3, 2), np.nan))
+
+
+def _marked(weights: np.ndarray, count: int, run: int) -> np.ndarray:
+    """(count,) numbers in order: where equal steps fall along weights laid end to end."""
+    edges = np.concatenate([[0.0], np.cumsum(weights)])
+    marks = (np.arange(count) + bits(run, 0) / 2.0**32) / max(count, 1)
+    return np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, max(len(weights) - 1, 0))
 
 
 def _cut(corners: np.ndarray, triangle: np.ndarray, run: int) -> np.ndarray:

@@ -88,12 +88,23 @@ def inside(pieces, asked):
     return (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
 
 
-def test_what_is_smaller_than_few_points_shares_or_lets_light_pass_has_discs():
+def test_the_smallest_of_many_triangles_and_what_lets_light_pass_have_discs():
     small = np.array(square()) * 1e-2 + (5, 0, 0)
     shown = surfaces(np.concatenate([square(), *(small + (k, 0, 0) for k in range(40))]))
     points = spread(shown, 64, 0)
-    assert np.isfinite(points.piece[points.triangle < 2]).all() and np.isnan(points.piece[points.triangle >= 2]).all()
+    assert len(points) == 64
+    whole = np.isfinite(points.piece[:, 0, 0])
+    assert len(np.unique(points.triangle[whole])) == 32 and {0, 1} <= set(points.triangle[whole])
+    assert whole.sum() == 63  # all others have a thousandth of the area
     assert np.isnan(spread(surfaces(square(), opacity=0.5), 64, 0).piece).all()
+
+
+def test_every_triangle_of_few_has_a_piece():
+    small = np.array(square()) * 1e-2 + (5, 0, 0)
+    shown = surfaces(np.concatenate([square(), *(small + (k, 0, 0) for k in range(10))]))
+    points = spread(shown, 64, 0)
+    assert set(points.triangle) == set(range(22))
+    assert points.placed(shown)[2].sum() == pytest.approx(shown.areas().sum())
 
 
 def test_rectangles_of_groups_end_where_a_turned_wall_does():
