@@ -37,14 +37,15 @@ OPAQUE = 0.999  # opacity of what is cut into pieces
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Triangles of the instances `shown`: corners (T, 3, 3) relative to the render origin, what of their area counts
-    (T,), which of `shown` each belongs to and its number in the mesh."""
+    """Triangles of the instances `shown`: corners (T, 3, 3) relative to the render origin, opacity (T,), which of
+    `shown` each belongs to and its number in the mesh; how many points they have for their area beside others (T,)."""
 
     shown: tuple[Instance, ...]
     corners: np.ndarray
     opacity: np.ndarray
     owner: np.ndarray
     number: np.ndarray
+    rate: np.ndarray | float = 1.0
 
     @classmethod
     def of(cls, frame) -> Surfaces:
@@ -120,26 +121,29 @@ class AreaPoints:
 def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     """`count` points of this run; none where there is no area."""
     areas = surfaces.areas()
-    weights = areas * surfaces.opacity
+    rate = np.broadcast_to(surfaces.rate, areas.shape)
+    weights = areas * surfaces.opacity * rate
     total = float(weights.sum())
     if not total > 0:
         return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3, 2)))
     whole = np.flatnonzero((surfaces.opacity > OPAQUE) & (areas > 0.0))
     if len(whole) > count // 2:
-        whole = np.sort(whole[np.argsort(-areas[whole], kind="stable")[: count // 2]])
+        whole = np.sort(whole[np.argsort(-weights[whole], kind="stable")[: count // 2]])
     rest = np.ones(len(areas), bool)
     rest[whole] = False
     left = np.where(rest, weights, 0.0)
     discs = min(max(round(count * left.sum() / total), int(left.any())), count - len(whole)) if len(whole) else count
-    first = _pieces(surfaces, areas, whole, count - discs, run)
-    return first.joined(_discs(areas, left, discs, run))
+    first = _pieces(surfaces, areas, weights, whole, count - discs, run)
+    return first.joined(_discs(areas, left, rate, discs, run))
 
 
-def _pieces(surfaces: Surfaces, areas: np.ndarray, whole: np.ndarray, count: int, run: int) -> AreaPoints:
+def _pieces(
+    surfaces: Surfaces, areas: np.ndarray, weights: np.ndarray, whole: np.ndarray, count: int, run: int
+) -> AreaPoints:
     """`count` points for pieces of the triangles `whole`, one each at least."""
     # Beyond the first, by what a triangle has more than a point's share.
-    more = np.maximum(areas[whole] - areas[whole].sum() / max(count, 1), 0.0)
-    more = more if more.any() else areas[whole]
+    more = np.maximum(weights[whole] - weights[whole].sum() / max(count, 1), 0.0)
+    more = more if more.any() else weights[whole]
     extra = _marked(more, count - len(whole), run)
     triangle = np.repeat(whole, 1 + np.bincount(extra, minlength=len(whole)))
     piece = _cut(surfaces.corners, triangle, run)
@@ -150,7 +154,7 @@ def _pieces(surfaces: Surfaces, areas: np.ndarray, whole: np.ndarray, count: int
     return AreaPoints(triangle, share, np.ones(count), areas[triangle], piece)
 
 
-def _discs(areas: np.ndarray, weights: np.ndarray, count: int, run: int) -> AreaPoints:
+def _discs(areas: np.ndarray, weights: np.ndarray, rate: np.ndarray, count: int, run: int) -> AreaPoints:
     """`count` points for discs on triangles by weight."""
     triangle = _marked(weights, count, run)
     within = np.arange(count) - np.searchsorted(triangle, triangle)  # number of a point among those of its triangle
@@ -162,7 +166,7 @@ def _discs(areas: np.ndarray, weights: np.ndarray, count: int, run: int) -> Area
     few = np.bincount(triangle, minlength=len(areas))[triangle]
     share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few**1.5)[:, None]
     # Where half the light passes, half as many points stand for their own discs.
-    density = np.full(count, count / max(float(weights.sum()), 1e-300))
+    density = count / max(float(weights.sum()), 1e-300) * rate[triangle]
     return AreaPoints(triangle, share, density, areas[triangle], np.full((count, 3, 2), np.nan))
 
 

@@ -1,5 +1,7 @@
 """Points by area and the tree over them: laws that hold for every cloud of points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -97,6 +99,17 @@ def test_the_smallest_of_many_triangles_and_what_lets_light_pass_have_discs():
     assert len(np.unique(points.triangle[whole])) == 32 and {0, 1} <= set(points.triangle[whole])
     assert whole.sum() == 63  # all others have a thousandth of the area
     assert np.isnan(spread(surfaces(square(), opacity=0.5), 64, 0).piece).all()
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_what_nothing_sees_has_few_points_that_stand_for_all_of_it(opacity):
+    both = np.concatenate([square(), square(1.0)])
+    shown = replace(surfaces(both, opacity), rate=np.array([1, 1, 1 / 16, 1 / 16]))
+    points = spread(shown, 1024, 0)
+    assert (points.triangle >= 2).sum() == pytest.approx(1024 / 17, abs=2)
+    _, _, area = points.placed(shown)
+    own = points.triangle >= 2
+    assert area[own].sum() == pytest.approx(opacity, rel=0.05) and area[~own].sum() == pytest.approx(opacity, rel=0.05)
 
 
 def test_every_triangle_of_few_has_a_piece():
