@@ -8,6 +8,7 @@ What points reflect and the light on them is of lit_points.py, once a picture an
 | cost | |
 |---|---|
 | points and tree | on the CPU, when geometry changes; in a viewport they move along and bounds are refitted |
+| where they are few, where their light holds | rays of scene/seen.py and a readback; 3 rays for each side of each |
 | closures, light | of 2 points, as lit_points.py |
 
 Bias: one set of RUNS after the other, so what lies between points is never lit itself; of a mix of closures each point
@@ -16,17 +17,20 @@ has one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..frame.run import Frame
 from ..frame.technique import Technique
-from ..gfx import images
+from ..gfx import images, passes
 from ..materials.compiled import CompiledMaterial
+from ..scene import acceleration
 from ..scene.area_points import AreaPoints, Surfaces, spread
 from ..scene.pieces import octahedral
 from ..scene.point_tree import PointTree, fitted, split
+from ..scene.seen import UNSEEN, seen_triangles
+from ..scene.view import VIEW
 from ..surfaces.hits import Hits
 from .lit_points import LitPoints
 
@@ -34,18 +38,32 @@ ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
 LIGHTS, OTHERS = 4, 4  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+CLIPS = passes.fullscreen_program(
+    "where light of points holds",
+    "micro/clips.frag.glsl",
+    textures=(
+        *acceleration.HIERARCHY_TEXTURES,
+        *(("RGBA32F", name) for name in ("tree_nodes", "point_place", "point_facing")),
+    ),
+    blocks=((VIEW, "film_view"),),
+    constants=(("INT", "leaf_count"), ("FLOAT", "offset_size")),
+    defines=(("POINT_ROW", str(ROW)),),
+    outputs=(("VEC4", "out_clips"),),
+)  # fmt: skip
 SHARPNESS = 64.0  # see PointLight: a bright spot is one of thousands of points that are gathered
 
 
 @dataclass
 class Run:
-    """Points of one run on the GPU, and as a tree. `shaded`: place, normals and albedo of both sides of all."""
+    """Points of one run on the GPU, and as a tree. `clips`: where on its piece light at a point holds; `shaded`: place,
+    normals and albedo of both sides of all."""
 
     points: AreaPoints
     tree: PointTree
     nodes: images.Image
     own: tuple[images.Image, ...]
     facing: images.Image
+    clips: images.Image
     shaded: images.Target | None = None
 
     @property
@@ -77,6 +95,9 @@ class PointRuns:
             before = self._runs if follows else {}
             self._give()
             self._surfaces, self._key, self._moved = Surfaces.of(frame), key, follows
+            if not follows:
+                seen = seen_triangles(frame, self._surfaces).any(axis=1)
+                self._surfaces = replace(self._surfaces, rate=np.where(seen, 1.0, UNSEEN))
             for number, run in before.items():
                 self._runs[number] = self._placed(frame, run.points, run.tree.order)
             frame.count(technique, "trees refitted", len(before))
@@ -140,7 +161,17 @@ class PointRuns:
         own = tuple(images.upload(_both_sides(column[order])) for column in columns)
         facing = np.zeros((2 * len(points), 4), np.float32)
         facing[0::2, :3], facing[1::2, :3] = -normal[order], normal[order]  # from in front, from behind
-        return Run(points, tree, tree.upload(), own, images.upload(facing.reshape(-1, ROW, 4)))
+        nodes, facing = tree.upload(), images.upload(facing.reshape(-1, ROW, 4))
+        clips = images.pool.take(*facing.size, "RGBA32F")
+        passes.fullscreen(
+            CLIPS, images.Target((clips,)), blocks={"film_view": frame.view_block},
+            textures={
+                **frame.hierarchy("diffuse").textures, "tree_nodes": nodes, "point_place": own[0],
+                "point_facing": facing,
+            },
+            constants={"leaf_count": tree.leaves, "offset_size": frame.offset_size},
+        )  # fmt: skip
+        return Run(points, tree, nodes, own, facing, clips)
 
     def _shade(self, frame: Frame, technique: Technique, run: Run) -> None:
         place = lambda hits, records: hits.place(frame, technique, run.own, records)  # noqa: E731
@@ -155,6 +186,7 @@ class PointRuns:
     def _give(self) -> None:
         for run in self._runs.values():
             self._unshade(run)
+            images.pool.give(run.clips)
         self._runs = {}
 
     def release(self) -> None:

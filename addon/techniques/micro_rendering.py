@@ -1,10 +1,11 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
-Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
-by all lamps, the world and emissive meshes (lighting/point_runs.py). A tree over them has rectangles in place of flat
-groups of points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into
-a micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
-are equal shares of what the surface reflects, so light is a plain mean:
+Points are spread over all surfaces by area, wherever the camera looks, each of which stands for its own piece of a
+triangle. They are shaded with their own materials and lit straight by all lamps, the world and emissive meshes
+(lighting/point_runs.py). A tree over them has rectangles in place of flat groups of points (scene/point_tree.py). Every
+place that gathers goes through the tree and draws what it sees of it into a micro-buffer of its hemisphere, down to
+groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels are equal shares of what the surface
+reflects, so light is a plain mean:
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
@@ -21,21 +22,19 @@ the concentric map.
 |---|---|
 | fetches | 2 for each node that is visited, some 10 to 30 K^2 log n; K^2 for the sum |
 | bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
-| rays | 2 n for each point of a light source, and none besides |
+| rays | 2 n for each point of a light source, 2 n for light that is reflected again |
 | passes | 4 x `levels` + 2, and for each bounce 4 |
 
 A dispatch is one thread for each place. Mesa's software rasteriser ends a shader's loops after 65,536 rounds, so there
 the tree is walked by parts; eight lanes that walk different ways make it slow: docs/micro_rendering.md.
 
-Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at
-the room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
-narrower than the points' spacing show discs. A ground of a kilometre takes all points. Where columns or slats are as
-narrow as the points' spacing, discs that overhang shut the gaps: the colonnade has .64 of its light of one reflection
-with 8192 points, .79 with 65536.
+Fails: a mirror needs rays: lobes narrower than the points' spacing show pieces. A ground of a kilometre takes all
+points.
 
-Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
-that, which darkens beside them; between them are 0.4 to 4 % of holes; leaves, grass and hair below the points' spacing
-are wrong.
+Bias, in diffuse and glossy indirect light: a piece sends the light of one place on it, as far as nothing stands between
+(shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, 1.5
+times their area's radius, which reach over edges by half of that and leave .4 to 4 % of holes: leaves, grass and hair
+below the points' spacing are wrong.
 Points reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there.
 Sheen, velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog
 between surfaces dims nothing.
@@ -52,8 +51,16 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting import micro_buffers
-from ..lighting.micro_buffers import BUFFER_CONSTANTS, BUFFER_IMAGE, BUFFER_TEXTURES, NodeRadiance, buffer_bindings
+from ..lighting.micro_buffers import (
+    BUFFER_CONSTANTS,
+    BUFFER_DEFINES,
+    BUFFER_IMAGE,
+    BUFFER_TEXTURES,
+    NodeRadiance,
+    buffer_bindings,
+)
 from ..lighting.point_runs import PointRuns, Run
+from ..scene.seen import SEES
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
@@ -78,7 +85,7 @@ def _regions(listed: bool) -> Program:
         constants=(
             *BUFFER_CONSTANTS, *GRID, ("INT", "first_row"), ("INT", "row_count"), ("INT", "columns"), *constants,
         ),
-        defines=(*RUNS, *(() if listed else (("BY_LEVEL", ""),))),
+        defines=(*RUNS, *BUFFER_DEFINES, *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
     )  # fmt: skip
 
@@ -91,6 +98,7 @@ GLOSSY = Program(
     images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
     blocks=((VIEW, "film_view"),),
     constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
+    defines=BUFFER_DEFINES,
 )
 REFLECTED = passes.fullscreen_program(
     "light of micro-buffers reflected",
@@ -144,7 +152,7 @@ class MicroRendering(MultiresRadiosity):
         return False
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return (*micro_buffers.PROGRAMS, REFLECTED)
+        return (SEES, *micro_buffers.PROGRAMS, REFLECTED)
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is not None and len(frame.receivers.distance):
@@ -165,7 +173,12 @@ class MicroRendering(MultiresRadiosity):
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         bindings = {
-            "textures": {**surface_bindings(frame), "tree_nodes": run.nodes, "node_radiance": self._radiance.image},
+            "textures": {
+                **surface_bindings(frame),
+                "tree_nodes": run.nodes,
+                "piece_clips": run.clips,
+                "node_radiance": self._radiance.image,
+            },
             "blocks": {"film_view": frame.view_block},
             "constants": buffer_bindings(frame, run, frame.settings.get(self, "side"), **settings, use="micro regions"),
         }
@@ -233,7 +246,7 @@ class MicroRendering(MultiresRadiosity):
         try:
             for first in range(0, height, rows):
                 count = min(rows, height - first)
-                for part in micro_buffers.parts(leaves):
+                for part in micro_buffers.parts(leaves, side):
                     passes.compute(
                         program, (columns, count), textures=textures, images={"gathered": atlas, "micro": micro},
                         blocks=bindings["blocks"],

@@ -7,7 +7,7 @@
 // larger leaves cover cast rays afterwards. Here every node is drawn by rays through the middles of pixels (`centre_test`):
 // what a node's ball holds between the middles is left out with all that is below it, and silhouettes do not grow.
 //
-// Binds `tree_nodes`, `node_radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
+// Binds `tree_nodes`, `piece_clips`, `node_radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
 //
 // With GLOSSY the pixels are equal shares of what microfacets reflect to the viewer instead: each has a ray of the lobe, and
 // nodes beside the cone about all rays are left out.
@@ -75,6 +75,14 @@ void micro_store(ivec2 texel, float depth, int node, bool behind)
   }
 }
 
+// Whether something stands between a place on a piece and the point where it was lit (micro/clips.frag.glsl).
+bool beyond_clips(int node, bool behind, vec2 at)
+{
+  int entry = 2 * (node - leaf_count) + (behind ? 1 : 0);
+  vec4 clips = piece_clips_fetch(ivec2(entry % POINT_ROW, entry / POINT_ROW));
+  return dot(at, vec2(cos(clips.x), sin(clips.x))) > clips.y || dot(at, vec2(cos(clips.z), sin(clips.z))) > clips.w;
+}
+
 // A point's piece of a triangle or disc, a flat group's rectangle or a bent one's ball, into the pixels `low` to `high` whose
 // middles see it.
 void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node, vec4 shape, int node)
@@ -109,7 +117,9 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
                           : up >= -SEAM && up <= 1.0 + SEAM && at.x >= edges.x - SEAM * shape.w && at.x <= edges.y + SEAM * shape.w;
     }
     if (depth > nearest && inside && dot(ray, f.plane) > 0.0) {
-      micro_store(corner + pixel, depth, node, cosine > 0.0);
+      bool behind = cosine > 0.0;
+      bool dark = piece && beyond_clips(node, behind, vec2(dot(off, along), dot(off, across)));
+      micro_store(corner + pixel, depth, dark ? 0 : node, behind);
     }
   }
 }
