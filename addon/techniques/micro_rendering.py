@@ -22,7 +22,7 @@ normals.
 | bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
 | passes | 4 x `levels` + 2, and for each bounce 4; the tree in parts on Mesa (docs/micro_rendering.md) |
 
-Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A ground of a kilometre takes all points.
+Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A kilometre of ground takes all points.
 
 Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
 (shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, which
