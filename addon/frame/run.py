@@ -137,7 +137,7 @@ class Frame:
         """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
         point of the aperture. The first sample looks through the middle of both: as in Cycles depth is taken from it,
         and a picture that just began is sharp. `film`: the number of another point of the film, with which layers are
-        drawn by lot anew, too.
+        drawn at random anew, too.
         """
         settings, aperture = self.settings, self.snapshot.camera.aperture
         number = self.sample if film is None else film

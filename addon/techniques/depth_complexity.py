@@ -118,14 +118,22 @@ class DepthComplexity(EdgeShadows):
     label = "Depth complexity sampling"
     requests = (LightRates,)
     params = (
-        Param("points", "Points", "64", "Points of each light to which layers are counted from a pixel", items=COUNTS),
-        Param("mode", "Light", AUTO, "How the points that are seen become light", items=MODES),
+        Param(
+            "points", "Points", "64",
+            "Points on each light for which the layers towards a pixel are counted",
+            items=COUNTS,
+        ),
+        Param(
+            "mode", "Light", AUTO,
+            "How visible light points become light: as a share of the unshadowed light, or shaded point by point",
+            items=MODES,
+        ),
         Param(
             "accurate", "Accurate edges", True,
-            "Edges are silhouettes from any point of a light, not from its centre alone",
+            "Use silhouette edges seen from any point of a light, not only from its centre",
         ),
-        Param("interleaved", "Interleaved", True, "Neighbouring pixels ask different points of the light"),
-        Param("smooth", "Smooth", True, "Take the mean over neighbouring pixels with different points, on one plane"),
+        Param("interleaved", "Interleaved", True, "Neighbouring pixels use different points of the light"),
+        Param("smooth", "Smooth", True, "Average over neighbouring pixels with different points on the same plane"),
         MOST_EDGES,
         CUTOFF,
     )  # fmt: skip
