@@ -23,11 +23,12 @@ from .frame.run import Frame, Renderer
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
 from .snapshot.errors import unforeseen
+from .snapshot.light_groups import REST, Part, parts_of
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
-from .ui import ENGINE
-from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
+from .ui import ENGINE, light_groups
+from .ui.passes import GLARE, RenderPass, cryptomatte_metadata, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
@@ -161,35 +162,37 @@ class CandelaEngine(bpy.types.RenderEngine):
         try:
             check_tree(settings.passes)
             snapshot = self._seen(depsgraph, snapshot, eye)
-            before = shared.renderer.frame
-            with context.turn:
-                _free_old_sessions()
-                frame = shared.renderer.begin(snapshot, settings, self._compiling)
-                if before is not None and before.size != frame.size:
-                    images.pool.trim()  # nobody asks for images of the old size again
-            frame.ledger.times["sync"] = self._sync_seconds
-            missing = missing_passes(layer)
-            if missing and not self.is_preview:
-                text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
-                frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
-            width, height = frame.size
-            result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            drawn = self._drawn(shared.renderer, frame, started)
-            for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
-                if self.test_break():
-                    self.end_result(result, cancel=True)
-                    with context.turn:
-                        shared.renderer.finish(frame, ())
-                    return
-            wanted = wanted_passes(layer, scene)
-            with context.turn:
-                if taken is not None:
-                    taken[layer.name] = slices.taken(frame)
-                pixels = _finished(shared.renderer, frame, wanted)
-            for name, array in pixels.items():
+            parts = [Part(REST, snapshot, True)] if self.is_preview else parts_of(snapshot)
+            wanted, total, result = wanted_passes(layer, scene), light_groups.Sum(snapshot.film), None
+            for number, part in enumerate(parts):
+                before = shared.renderer.frame
+                with context.turn:
+                    _free_old_sessions()
+                    frame = shared.renderer.begin(part.snapshot, settings, self._compiling)
+                    if before is not None and before.size != frame.size:
+                        images.pool.trim()  # nobody asks for images of the old size again
+                frame.ledger.times["sync"] = self._sync_seconds
+                frame.ledger.notes += self._about_passes(layer, parts)
+                if result is None:
+                    result = self.begin_result(0, 0, *frame.size, layer=layer.name, view=eye)
+                drawn = self._drawn(shared.renderer, frame, started, number, len(parts))
+                own = str(number) if len(parts) > 1 else ""  # under which a slice holds the part's images
+                for _ in self._merged(shared.renderer, frame, layer.name, own) or drawn:
+                    if self.test_break():
+                        self.end_result(result, cancel=True)
+                        with context.turn:
+                            shared.renderer.finish(frame, ())
+                        return
+                with context.turn:
+                    if taken is not None:
+                        taken[layer.name] = slices.taken(frame, own, taken.get(layer.name))
+                    total.add(part, _finished(shared.renderer, frame, wanted))
+            for name, array in _pixels(total, frame, wanted).items():
                 render_pass = result.layers[0].passes.find_by_name(name, eye)
                 if render_pass is not None:
                     render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())
+            for field_name, text in cryptomatte_metadata(snapshot, layer.name).items():
+                self.get_result().stamp_data_add_field(field_name, text)
             self.end_result(result)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))
@@ -217,12 +220,29 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
-    def _drawn(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
+    def _about_passes(self, layer, parts: list[Part]) -> tuple[Note, ...]:
+        """What is to be said of the passes that a view layer asks for."""
+        missing, subject = missing_passes(layer), f"View layer '{layer.name}'"
+        if missing and not self.is_preview:
+            text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
+            return (Note(subject, text),)
+        if len(parts) > 1 and light_groups.GLARE in [asked.source for asked in wanted_passes(layer, layer.id_data)]:
+            return (
+                Note(subject, "glare is that of each light group for itself: turn light groups off for all of it."),
+            )
+        return ()
+
+    def _drawn(self, renderer: Renderer, frame: Frame, started: float, number: int = 0, of: int = 1) -> Iterator[None]:
         """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
 
-        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
+        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last. Part
+        `number` of a picture that is drawn in several has its share of the time that is left.
         """
-        limit, first, before = frame.settings.time_limit, time.perf_counter(), frame.samples_done
+        limit = frame.settings.time_limit
+        if limit:
+            passed = time.perf_counter() - started
+            limit = passed + max(limit - passed, 0.0) / (of - number)
+        first, before = time.perf_counter(), frame.samples_done
         parts = _whole_samples if bpy.app.background else samples_in_parts
         shown = -1
         for _ in parts(renderer, frame):
@@ -230,7 +250,7 @@ class CandelaEngine(bpy.types.RenderEngine):
                 shown = frame.samples_done
                 wanted = frame.settings.samples_to_draw
                 self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
-                self.update_progress(shown / wanted)
+                self.update_progress((number + shown / wanted) / of)
                 if limit and shown > before:
                     with context.turn:
                         images.finish()
@@ -241,12 +261,12 @@ class CandelaEngine(bpy.types.RenderEngine):
                             return
             yield
 
-    def _merged(self, renderer: Renderer, frame: Frame, layer: str) -> list[None]:
+    def _merged(self, renderer: Renderer, frame: Frame, layer: str, part: str = "") -> list[None]:
         """Parts in which a picture of samples that were drawn before is finished; none where they are to be drawn."""
         if layer not in given:
             return []
         with context.turn:
-            renderer.merge(frame, given[layer])
+            renderer.merge(frame, slices.images_of_part(given[layer], part))
         return [None]
 
     def _compiling(self, done: int, total: int) -> bool:
@@ -285,10 +305,17 @@ def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
 
 
 def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
-    """Pass pixels by Blender's name, (H, W, channels) float32."""
+    """Mean images of the frame that passes are made from."""
     renderer.show(frame)
-    arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
+    sources = {"film.combined", *(name for asked in wanted for name in asked.images)}
+    arrays = renderer.finish(frame, sorted(light_groups.frame_images(sources)))
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays["film.combined"]
+    return arrays
+
+
+def _pixels(total: light_groups.Sum, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
+    """Pass pixels by Blender's name, (H, W, channels) float32."""
+    arrays = total.finished({name for asked in wanted for name in asked.images})
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays["film.combined"], **pixels}

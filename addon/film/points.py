@@ -30,6 +30,8 @@ the next pixel on the surface; light's own edges are half a pixel wider. It ends
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ..frame.light_paths import MEDIUM, SURFACE, named
 from ..frame.run import Frame
 from ..frame.technique import Param
@@ -49,6 +51,15 @@ MOST = 8  # points of the film that share a sample's light
 PATHS = named(SURFACE)
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
+
+
+class PointStages:
+    """What techniques draw at each point of the film into sums of their own (frame.shared), by technique: called with
+    the frame, which looks there, the surfaces that are seen (as of surface_bindings), the point's place in the pixel
+    (as Frame.film_offset) and its share of the sample."""
+
+    def __init__(self):
+        self.of: dict[str, Callable[[Frame, dict[str, images.Image], tuple[float, float], float], None]] = {}
 
 
 class OwnPoint:

@@ -15,6 +15,9 @@ def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
         source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
         if source is None and attribute.name in mesh.colors:
             source = mesh.colors[attribute.name][:, :3]  # what is no map, too, may be named
+    elif attribute.kind == "UV_PASS":
+        source = mesh.uv_maps.get(mesh.active_uv)
+        out[:, 2] = 1.0 if source is not None else 0.0
     elif attribute.kind == "COLOR":
         source = mesh.colors.get(attribute.name or mesh.active_color)
         if source is None and attribute.name in mesh.uv_maps:

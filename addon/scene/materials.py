@@ -151,6 +151,10 @@ class MaterialSet:
         """Draws what of material `index` light enters elsewhere, where the surface images show it."""
         return _scatter_program(self.compiled[index])
 
+    def aov_program(self, index: int, layout: AovLayout) -> Program:
+        """Draws what AOV Output nodes of material `index` give."""
+        return _aov_program(self.compiled[index], layout)
+
     def glow_program(self, index: int) -> Program:
         """Adds what layers of material `index` emit that this sample passes."""
         return _glow_program(self.compiled[index])
@@ -364,6 +368,52 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
         textures=(*like.textures, ("RGBA32F", "scatter_objects")),
         defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1"), *_own_defines(compiled)),
     )
+
+
+AOV_GROUP = 6  # images that Blender lets a pass draw into
+AovLayout = tuple[tuple[tuple[str, str], ...], ...]  # by image, what its channels hold: name and kind
+_aov_programs: dict[tuple[int, AovLayout], tuple[CompiledMaterial, Program]] = {}
+
+
+def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
+    known = _aov_programs.get((id(compiled), layout))
+    if known is None or known[0] is not compiled:
+        if len(_aov_programs) >= MOST_DECLARED:
+            _aov_programs.clear()
+        layered = (("LAYERED", "1"),) * compiled.transparent
+        shared = _shared(compiled)
+        program = Program(
+            name=f"AOVs {compiled.program_key[:8]}",
+            fragment="surface/aov.frag.glsl",
+            outputs=tuple(("VEC4", f"out_{k}") for k in range(len(layout))),
+            blocks=(
+                (VIEW, "film_view"),
+                (_struct(len(compiled.values)), "material_values"),
+                (MATERIAL_SCENE, "material_scene"),
+            ),
+            constants=(("INT", "first_instance"), ("INT", "layers"), ("FLOAT", "alpha_threshold")),
+            defines=(*CAMERA_DEFINES, *layered, *_own_defines(compiled)),
+            **{
+                **shared,
+                "textures": (*shared["textures"], ("RGBA32F", "surface_position")),
+                "snippets": (*shared["snippets"], ("generated/aovs", _aov_texts(compiled.aovs, layout))),
+            },
+        )
+        known = _aov_programs[id(compiled), layout] = (compiled, program)
+    return known[1]
+
+
+def _aov_texts(given: tuple[tuple[str, str], ...], layout: AovLayout) -> str:
+    """GLSL that sets the images of a layout from the AOVs that a material gives."""
+    none = " ".join(f"out_{k} = vec4(0.0);" for k in range(len(layout)))
+    written = []
+    for k, held in enumerate(layout):
+        for channel, aov in enumerate(held):
+            if aov in given:
+                value = f"material_aov{given.index(aov)}(point)"
+                to = f"out_{k}.{'xyzw'[channel]} = {value};" if aov[1] == "VALUE" else f"out_{k} = vec4({value}, 1.0);"
+                written.append(to)
+    return f"#define AOV_NONE {none}\n#define AOV_WRITE {' '.join(written)}\n"
 
 
 @_once

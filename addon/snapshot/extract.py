@@ -6,6 +6,7 @@ import gc
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import reduce
 from operator import or_
 
@@ -17,7 +18,21 @@ from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
-from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
+from .scene import (
+    CRYPTOMATTES,
+    Aov,
+    Camera,
+    Film,
+    Instance,
+    Light,
+    Mesh,
+    Mist,
+    Moment,
+    Note,
+    Snapshot,
+    Visibility,
+    World,
+)
 from .shading import ShadingTable
 from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
@@ -64,7 +79,7 @@ def take(
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)
-    shading = ShadingTable(cache, images)
+    shading = ShadingTable(cache, images, aovs_of(depsgraph.view_layer_eval))
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
@@ -175,7 +190,8 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 Instance(
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
-                    of_object.terminator, of_object.own, of_object.caustics_caster,
+                    of_object.terminator, of_object.own, of_object.caustics_caster, of_object.asset,
+                    of_object.group,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
@@ -260,7 +276,7 @@ def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable, 
             notes.extend(remarks)
         light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint)
         if light is not None:
-            made.append(light)
+            made.append(replace(light, group=facts.group) if facts.group else light)
     return tuple(made)
 
 
@@ -281,7 +297,7 @@ def _world(
     graph, sun = sun_of(graph, visibility)
     world, remarks = read_world(graph, block.name, images.images, visibility)
     notes.extend(remarks)
-    return world, sun
+    return replace(world, group=block.lightgroup), sun and replace(sun, group=block.lightgroup)
 
 
 # Exponents of the Mist pass, as Cycles has them.
@@ -303,7 +319,18 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,
+        aovs=aovs_of(layer),
+        alpha_threshold=layer.pass_alpha_threshold,
+        cryptomattes=tuple(kind for kind in CRYPTOMATTES if getattr(layer, f"use_pass_cryptomatte_{kind}")),
+        cryptomatte_levels=layer.pass_cryptomatte_depth,
+        light_groups=tuple(group.name for group in layer.lightgroups),
     )
+
+
+def aovs_of(layer) -> tuple[Aov, ...]:
+    """What a view layer asks for of the surfaces seen, its UV pass first."""
+    named = [Aov(aov.name, aov.type) for aov in layer.aovs if aov.is_valid]
+    return (*([Aov("", "UV")] if layer.use_pass_uv else []), *named)
 
 
 def _clear_glass(cycles) -> float:

@@ -101,6 +101,8 @@ class Instance:
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
     caustics_caster: bool = False  # set to cast shadow caustics
+    asset: str = ""  # name of the topmost parent, if it has one
+    group: str = ""  # light group of the object
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +131,7 @@ class VolumeInstance:
     visibility: Visibility = Visibility()
     key: str = ""
     density: float = 1.0  # factor of all coefficients, so that a scaled object stays as opaque
+    group: str = ""  # light group of the object
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,7 @@ class Light:
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
+    group: str = ""  # light group of the object
 
 
 @dataclass(frozen=True)
@@ -231,11 +235,26 @@ class World:
     visibility: Visibility = Visibility()
     medium: Medium | None = None  # what fills all space
     volume: Graph | None = None  # the tree that says so
+    group: str = ""  # its light group
 
     @property
     def even(self) -> bool:
         """Whether it has the same colour all around."""
         return self.image is None and self.graph is None
+
+
+@dataclass(frozen=True)
+class Aov:
+    """A value of the surface seen that the view layer asks for: what AOV Output nodes of this name give, or its UV."""
+
+    name: str
+    kind: str  # COLOR, VALUE; UV: the map that renders, by no name
+
+
+CRYPTOMATTES = ("object", "material", "asset")
+MOST_LEVELS = 16
+RANKED = "crypto."  # names of images that hold pairs of ids and weights (kernels/ranks.py) begin so
+CRYPTO_DEFAULT = "default_surface"  # name of the material of empty slots, as in Cycles
 
 
 @dataclass(frozen=True)
@@ -254,6 +273,20 @@ class Film:
     mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
     position: bool = False
     indices: bool = False
+    aovs: tuple[Aov, ...] = ()
+    alpha_threshold: float = 0.5  # opacity from which on a layer is what passes of surfaces show
+    cryptomattes: tuple[str, ...] = ()  # of CRYPTOMATTES
+    cryptomatte_levels: int = 6  # names that a pixel of a Cryptomatte holds
+    light_groups: tuple[str, ...] = ()  # names; see light_groups.py
+
+    @property
+    def cryptomatte_images(self) -> int:
+        """Of a Cryptomatte: each holds two levels."""
+        return (min(self.cryptomatte_levels, MOST_LEVELS) + 1) // 2
+
+    def cryptomatte_names(self, kind: str) -> list[str]:
+        """Names of the frame's images of a Cryptomatte."""
+        return [f"{RANKED}{kind}.{k}" for k in range(self.cryptomatte_images)]
 
     @property
     def border_size(self) -> tuple[int, int]:

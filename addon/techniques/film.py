@@ -258,6 +258,8 @@ class Film(Technique):
         seen = {name: image for name, image in seen.items() if name in self._shown}
         media = frame.service(MediaService)
         offset = frame.film_offset(point)
+        for stage in frame.shared(film_points.PointStages).of.values():
+            stage(frame, surfaces, offset, share)
         if media is None:
             frame.count(self, "passes", film_filter.add(frame, seen, offset, share))
             return

@@ -90,6 +90,12 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "split_light_groups": bpy.props.BoolProperty(
+            name="Direct and Indirect",
+            update=_redraw,
+            description="Write two more passes for each light group: its direct light with what is seen of it, and its "
+            "indirect light",
+        ),
     }
     out["pass_tree"] = bpy.props.PointerProperty(
         type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE, update=_redraw,
