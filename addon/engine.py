@@ -24,6 +24,7 @@ from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
 from .snapshot.errors import unforeseen
 from .snapshot.light_groups import REST, Part, parts_of
+from .snapshot.motion import STEPS, Moment, read_moment
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
@@ -123,14 +124,30 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._snapshot = None
         self.update_stats("Candela", "Reading the scene")
         try:
-            self._snapshot = take(
-                depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override
-            )
+            around = self._frames_around(depsgraph) if depsgraph.view_layer.use_pass_vector else None
+            size = self.resolution_x, self.resolution_y
+            self._snapshot = take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
         except UnsupportedScene as error:
             self._fail(str(error))
         except Exception as error:  # Blender would print it and go on with a black picture
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
+
+    def _frames_around(self, depsgraph) -> tuple[Moment, ...] | None:
+        """The scene in the frames before and after, for the Vector pass. It stands at its own frame again afterwards."""
+        if self.is_preview:
+            return None
+        scene, camera = depsgraph.scene, self.camera_override or depsgraph.scene_eval.camera
+        camera = camera and camera.original
+        frame, part = scene.frame_current, scene.frame_subframe
+        found = []
+        try:
+            for step in STEPS:
+                self.frame_set(frame + step, part)
+                found.append(read_moment(depsgraph, self.resolution_x, self.resolution_y, camera))
+        finally:
+            self.frame_set(frame, part)
+        return tuple(found)
 
     def render(self, depsgraph):
         """Draw all samples and hand the passes to Blender. The GPU context is active, and ends afterwards."""
@@ -227,16 +244,14 @@ class CandelaEngine(bpy.types.RenderEngine):
             text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
             return (Note(subject, text),)
         if len(parts) > 1 and light_groups.GLARE in [asked.source for asked in wanted_passes(layer, layer.id_data)]:
-            return (
-                Note(subject, "glare is that of each light group for itself: turn light groups off for all of it."),
-            )
+            return (Note(subject, "glare is that of each light group for itself: without groups it is whole."),)
         return ()
 
     def _drawn(self, renderer: Renderer, frame: Frame, started: float, number: int = 0, of: int = 1) -> Iterator[None]:
         """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
 
-        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last. Part
-        `number` of a picture that is drawn in several has its share of the time that is left.
+        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
+        Part `number` of a picture that is drawn in several has its share of the time that is left.
         """
         limit = frame.settings.time_limit
         if limit:

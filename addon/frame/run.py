@@ -274,7 +274,8 @@ class Frame:
         return found[:height, : image.width] if image is not None else pixels
 
     def add_write(self, write: Write) -> images.Image:
-        """An image that this picture alone has, as for passes that its view layer asks for by name; empty. In `begin`."""
+        """An image that this picture alone has, as for passes that its view layer asks for by name; empty.
+        In `begin`."""
         if write.name not in self.images:
             self.images[write.name] = images.pool.take(*self.size, write.format)
             self.more_writes.append(write)
@@ -631,6 +632,7 @@ class Renderer:
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
+            snapshot.motion and snapshot.motion.key,
         )  # fmt: skip
 
     def _clear_sums(self, frame: Frame) -> None:

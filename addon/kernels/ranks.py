@@ -1,8 +1,8 @@
 """Ranked coverage: for each pixel pairs (id, weight), the heaviest first, as Cryptomatte stores which objects cover it.
 
-Images hold two pairs each, (id, weight, id, weight); an id of 0 is none. Ids are hashes of names, MurmurHash3 of 32 bits,
-whose bits are those of a float: "Cryptomatte Specification" 1.2 (Friedman and Jones, Psyop, 2015-2016). Weights of
-slices of one picture are added by id, not by rank; what has no room in the end is the lightest.
+Images hold two pairs each, (id, weight, id, weight); an id of 0 is none. Ids are hashes of names, MurmurHash3 of 32
+bits, whose bits are those of a float: "Cryptomatte Specification" 1.2 (Friedman and Jones, Psyop, 2015-2016). Weights
+of slices of one picture are added by id, not by rank; what has no room in the end is the lightest.
 """
 
 from __future__ import annotations

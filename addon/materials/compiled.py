@@ -14,7 +14,8 @@ from .volume import Medium
 class Attribute:
     """A per-corner attribute that a material reads; arrives in the shader as `vec4`."""
 
-    # UV, COLOR, TANGENT by name ("" = the active one), NAMED (colour, UV or any other), GENERATED, UV_PASS (UV, 1)
+    # UV, COLOR, TANGENT by name ("" = the active one), NAMED (colour, UV or any other), GENERATED, UV_PASS (UV, 1),
+    # MOTION_BEFORE, MOTION_AFTER (from where the mesh is to where it was and will be)
     kind: str
     name: str
 

@@ -142,7 +142,13 @@ class _Compilation:
         for number, (name, kind, socket) in enumerate(self.graph.aovs):
             wanted = "FLOAT" if kind == "VALUE" else "COLOR"
             node = Node(f"AOV {name}", name, "ShaderNodeOutputAOV", {"Value": socket})
-            if kind == "UV":
+            if kind == "HIT":
+                continue
+            if kind == "VECTOR":
+                value = f"{self.code.attribute(node, 'MOTION_BEFORE', '')}.xyz"
+                after = f"{self.code.attribute(node, 'MOTION_AFTER', '')}.xyz"
+                self.code.returns(after, f"vec3 material_aov{number}_after")
+            elif kind == "UV":
                 value = f"{self.code.attribute(node, 'UV_PASS', '')}.xyz"
             elif self.code.exists(socket.link):
                 value = f"{self.code.function(socket.link, wanted)}(point)"

@@ -70,7 +70,7 @@ def read_graph(owner, image_key: ImageKey, aovs: Aovs = ()) -> tuple[Graph, Note
     tree = getattr(owner, "node_tree", None)
     if not isinstance(owner, bpy.types.Material):
         aovs = ()
-    uv = tuple((name, kind, Input("VECTOR")) for name, kind in aovs if kind == "UV")
+    uv = tuple((name, kind, Input("VECTOR")) for name, kind in aovs if not name)
     if tree is None or not _uses_nodes(owner):
         return replace(_graph_without_nodes(owner), aovs=uv), ()
     output = _active_output(tree)
@@ -82,7 +82,7 @@ def read_graph(owner, image_key: ImageKey, aovs: Aovs = ()) -> tuple[Graph, Note
     for name in ("Surface", "Volume", "Displacement"):
         socket = output.inputs.get(name)
         links[name.lower()] = None if socket is None else reading.source(place, output, socket).link
-    given = reading.aovs(place, {name: kind for name, kind in aovs if kind != "UV"}) if aovs else ()
+    given = reading.aovs(place, {name: kind for name, kind in aovs if name}) if aovs else ()
     reading.read_pending()
     roots = {**links, **{f"AOV {name}": socket.link for name, _, socket in given}}
     found = reading.cut_cycles(roots)

@@ -382,6 +382,7 @@ def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
             _aov_programs.clear()
         layered = (("LAYERED", "1"),) * compiled.transparent
         shared = _shared(compiled)
+        moving = any(kind == "VECTOR" for held in layout for _, kind in held)
         program = Program(
             name=f"AOVs {compiled.program_key[:8]}",
             fragment="surface/aov.frag.glsl",
@@ -392,10 +393,14 @@ def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
                 (MATERIAL_SCENE, "material_scene"),
             ),
             constants=(("INT", "first_instance"), ("INT", "layers"), ("FLOAT", "alpha_threshold")),
-            defines=(*CAMERA_DEFINES, *layered, *_own_defines(compiled)),
+            defines=(*CAMERA_DEFINES, *layered, *((("MOTION", "1"),) if moving else ()), *_own_defines(compiled)),
             **{
                 **shared,
-                "textures": (*shared["textures"], ("RGBA32F", "surface_position")),
+                "textures": (
+                    *shared["textures"],
+                    ("RGBA32F", "surface_position"),
+                    *((("RGBA32F", "motion_table"),) if moving else ()),
+                ),
                 "snippets": (*shared["snippets"], ("generated/aovs", _aov_texts(compiled.aovs, layout))),
             },
         )
@@ -409,10 +414,18 @@ def _aov_texts(given: tuple[tuple[str, str], ...], layout: AovLayout) -> str:
     written = []
     for k, held in enumerate(layout):
         for channel, aov in enumerate(held):
-            if aov in given:
-                value = f"material_aov{given.index(aov)}(point)"
-                to = f"out_{k}.{'xyzw'[channel]} = {value};" if aov[1] == "VALUE" else f"out_{k} = vec4({value}, 1.0);"
-                written.append(to)
+            if aov not in given:
+                continue
+            value, to = f"material_aov{given.index(aov)}", f"out_{k}.{'xyzw'[channel]}"
+            written.append(
+                {
+                    "VALUE": f"{to} = {value}(point);",
+                    "HIT": f"{to} = surface;",
+                    "UV": f"out_{k} = surface * vec4({value}(point), 1.0);",
+                    "VECTOR": f"out_{k} = surface * motion_vector(point.position, instance_flat.x, {value}(point), "
+                    f"{value}_after(point));",
+                }.get(aov[1], f"out_{k} = vec4({value}(point), 1.0);")
+            )
     return f"#define AOV_NONE {none}\n#define AOV_WRITE {' '.join(written)}\n"
 
 

@@ -13,11 +13,13 @@ from operator import or_
 import numpy as np
 
 from . import camera as cameras
+from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
+from .motion import with_motion
 from .scene import (
     CRYPTOMATTES,
     Aov,
@@ -60,6 +62,7 @@ def take(
     view: Camera | None = None,
     border: tuple[int, int, int, int] | None = None,
     shown: Callable | None = None,
+    around: tuple[motions.Moment, motions.Moment] | None = None,
 ) -> Snapshot:
     """Read the evaluated scene for a picture of `width` x `height` pixels.
 
@@ -67,7 +70,8 @@ def take(
     in renders, a viewport's leaves out what is hidden there. `camera`: object that overrides the scene's camera.
     `view`: a ready view (see `camera_of_view`), no camera is needed then. `border`: pixels (x0, y0, x1, y1);
     without one the scene's render border counts, unless `view` is given. `shown`: predicate on objects, for a
-    viewport's local view. Raises UnsupportedScene when there is nothing to look through.
+    viewport's local view. `around`: the frames before and after, for the Vector pass. Raises UnsupportedScene when
+    there is nothing to look through.
     """
     start = time.perf_counter()
     scene = depsgraph.scene_eval
@@ -107,7 +111,7 @@ def take(
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start
-    return snapshot
+    return snapshot if around is None else with_motion(snapshot, *around)
 
 
 def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np.ndarray]:
@@ -328,9 +332,10 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
 
 
 def aovs_of(layer) -> tuple[Aov, ...]:
-    """What a view layer asks for of the surfaces seen, its UV pass first."""
+    """What a view layer asks for of the surfaces seen, passes without a name first."""
     named = [Aov(aov.name, aov.type) for aov in layer.aovs if aov.is_valid]
-    return (*([Aov("", "UV")] if layer.use_pass_uv else []), *named)
+    wanted = (("UV", layer.use_pass_uv), ("VECTOR", layer.use_pass_vector), ("HIT", layer.use_pass_vector))
+    return (*(Aov("", kind) for kind, asked in wanted if asked), *named)
 
 
 def _clear_glass(cycles) -> float:

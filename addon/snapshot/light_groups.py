@@ -1,9 +1,9 @@
 """Light groups: one snapshot as several, each lit by a group of its lights alone.
 
 Light adds up: what a picture shows is the sum of what it shows lit by each part of its lights. A part has the lamps,
-objects that emit and the world of one group that the view layer lists; lights of no such group are a part, too, so that
-all parts together are the picture. Objects of other groups keep their surfaces and media but do not shine: what emits in
-their trees is set to black. Where all objects that show a material shine or none does, no tree differs between parts.
+objects that emit and the world of one group that the view layer lists; lights of no such group are a part, too, so
+that all parts together are the picture. Objects of other groups keep their surfaces and media but do not shine: what
+emits in their trees is set to black.
 """
 
 from __future__ import annotations

@@ -57,6 +57,7 @@ class Mesh:
     # Where materials are relief: the mesh before they move it, and by material the first number of its triangles.
     undisplaced: Mesh | None = None
     shells: tuple[tuple[int, int], ...] = ()
+    motion: tuple[np.ndarray, np.ndarray] | None = None  # (V, 3) each: to where vertices were a frame ago, and will be
 
     @property
     def triangle_count(self) -> int:
@@ -248,7 +249,13 @@ class Aov:
     """A value of the surface seen that the view layer asks for: what AOV Output nodes of this name give, or its UV."""
 
     name: str
-    kind: str  # COLOR, VALUE; UV: the map that renders, by no name
+    # COLOR, VALUE; by no name UV, the map that renders, VECTOR, how the surface moves, and HIT, 1 where one is.
+    kind: str
+
+    @property
+    def of_surface(self) -> bool:
+        """Whether a layer that is too thin to be what passes of surfaces show has no part in it."""
+        return self.kind in ("UV", "VECTOR", "HIT")
 
 
 CRYPTOMATTES = ("object", "material", "asset")
@@ -303,6 +310,20 @@ class Mist:
     exponent: float
 
 
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """How a scene moves from a frame before to a frame after; vertices: Mesh.motion."""
+
+    cameras: tuple[Camera, Camera]
+    matrices: dict[str, tuple[np.ndarray, np.ndarray]]  # (4, 4) each, by key of the instance
+
+    @cached_property
+    def key(self) -> tuple:
+        """Equal for motions that are alike."""
+        cameras = [(one.matrix.tobytes(), one.kind, one.frame) for one in self.cameras]
+        return (*cameras, *((name, *(one.tobytes() for one in pair)) for name, pair in self.matrices.items()))
+
+
 @dataclass(frozen=True)
 class Moment:
     """When the scene is looked at: its frame, with a fraction between frames, and how many make a second."""
@@ -330,6 +351,7 @@ class Snapshot:
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
     moment: Moment = Moment()
+    motion: Motion | None = None  # where the view layer asks for it
     volumes: tuple[VolumeInstance, ...] = ()
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 

@@ -59,7 +59,7 @@ class ShadingTable:
         self.notes: list[Note] = []
         self.graphs: set[str] = set()
         self._cache, self._images, self._aovs = cache, images, aovs
-        uv = tuple((aov.name, aov.kind, Input("VECTOR")) for aov in aovs if aov.kind == "UV")
+        uv = tuple((aov.name, aov.kind, Input("VECTOR")) for aov in aovs if aov.of_surface)
         self.materials[0] = replace(self.materials[0], graph=replace(self.materials[0].graph, aovs=uv))
         self._index: dict[int, int] = {}
         self._images_by_uid: dict[int, object] | None = None

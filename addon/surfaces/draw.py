@@ -62,7 +62,7 @@ def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> N
 
 
 def draw_numbers(frame: Frame, technique: Technique, target: images.Target) -> None:
-    """The same of numbers: y of the material, z of the instance (a row of frame.geometry.placed); w: 0 where is none."""
+    """The same of numbers: y of the material, z of the instance (a row of frame.geometry.placed), w 0 for none."""
     _draw_indices(frame, technique, target, list(range(len(frame.snapshot.materials))))
 
 
@@ -126,10 +126,15 @@ def add_glow(frame: Frame, technique: Technique, position: images.Image, emissio
 
 
 def draw_aovs(
-    frame: Frame, technique: Technique, target: images.Target, layout: AovLayout, position: images.Image
+    frame: Frame,
+    technique: Technique,
+    target: images.Target,
+    layout: AovLayout,
+    position: images.Image,
+    motion: images.Image | None = None,
 ) -> None:
     """Draw what AOV Output nodes give of the surfaces that the camera sees now, before or at those at `position` (of
-    SURFACE_IMAGES), into images of this layout with a depth buffer."""
+    SURFACE_IMAGES), into images of this layout with a depth buffer. `motion`: see shaders/surface/motion.glsl."""
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
 
     def program_of(material: int) -> Program:
@@ -137,6 +142,8 @@ def draw_aovs(
 
     threshold = frame.snapshot.film.alpha_threshold
     textures = {"surface_position": position}
+    if any(kind == "VECTOR" for held in layout for _, kind in held):
+        textures["motion_table"] = motion
     thin = {k for k, material in enumerate(frame.materials.compiled) if material.transparent and threshold > 0.0}
     for layers, wanted in ((0, None), (1, thin)):
         if wanted is None or wanted:

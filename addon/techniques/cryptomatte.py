@@ -1,13 +1,13 @@
 """Cryptomatte: which objects, materials or assets cover each pixel, and how much of it.
 
 Source: Friedman and Jones, "Fully automatic ID mattes with support for motion blur and transparency", SIGGRAPH 2015
-posters; the specification's hashes, ranks and manifest stand in kernels/ranks.py. Names are those of Cycles: objects and
-materials by their own, assets by the name of an object's topmost parent.
+posters; the specification's hashes, ranks and manifest stand in kernels/ranks.py. Names are those of Cycles: objects
+and materials by their own, assets by the name of an object's topmost parent.
 
-At each point of the film the surfaces are drawn once more by the surface pass's own programs, which leave the numbers of
-instance and material instead of a place. A dispatch for each kind looks their ids up in a table and adds the point's
-weight to the pairs of all pixels whose filter covers it: the point's share of a pixel is that in light, so that edges of
-mattes are edges of the picture. Transparent layers count by their opacity, as each sample either meets or passes them.
+At each point of the film the surfaces are drawn once more by the surface pass's own programs, which leave the numbers
+of instance and material instead of a place. A dispatch for each kind looks their ids up in a table and adds the point's
+weight to the pairs of all pixels whose filter covers it: the point's share of a pixel is that in light, so that edges
+of mattes are edges of the picture. Transparent layers count by their opacity: each sample either meets or passes them.
 
 | cost | per point of the film |
 |---|---|

@@ -29,7 +29,7 @@ def frame_images(sources: set[str]) -> set[str]:
 
 
 def rows(layer: bpy.types.ViewLayer, split: bool) -> list[tuple[str, str]]:
-    """(name, image) of each pass: a group's share of Combined and, where it is `split`, of direct and indirect light."""
+    """(name, image) of each pass: a group's share of Combined and, if `split`, of direct and of indirect light."""
     orders = ("", *ORDERS) if split else ("",)
     return [
         (f"Combined_{group.name}{f' {order.capitalize()}' if order else ''}", share_image(group.name, order))

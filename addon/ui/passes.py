@@ -37,6 +37,8 @@ class RenderPass:
         """The pass, (H, W, channels) float32, from the frame's mean images."""
         image, *color = self.images
         pixels = arrays[image][..., self.first : self.first + len(self.channels)]
+        if image == "aov.vector":  # of a mean over samples that of those which have one
+            return pixels / np.maximum(arrays[color[0]][..., :1], 1e-6)
         if color:
             pixels = divide_by_color(pixels, arrays[color[0]][..., :3])
         return pixels * exposure if image.startswith("radiance.") else pixels
@@ -48,6 +50,7 @@ _SURFACES = (
     ("use_pass_mist", "Mist", "Mist", "Z", "VALUE", "color.diffuse", 3),
     ("use_pass_position", "Position", "Position", "XYZ", "VECTOR", "film.position"),
     ("use_pass_normal", "Normal", "Normal", "XYZ", "VECTOR", "surface.normal_sum"),
+    ("use_pass_vector", "Vector", "Vector", "XYZW", "VECTOR", "aov.vector / aov.values.0"),
     ("use_pass_uv", "UV", "UV", "UVA", "VECTOR", "aov.uv"),
     ("use_pass_diffuse_color", "Diffuse Color", "DiffCol", "RGB", "COLOR", "color.diffuse"),
     ("use_pass_glossy_color", "Glossy Color", "GlossCol", "RGB", "COLOR", "color.glossy"),
@@ -100,9 +103,9 @@ def wanted_passes(layer: bpy.types.ViewLayer, scene: bpy.types.Scene | None = No
 
 def _aov_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     """Those that the view layer has by name."""
-    aovs = [aov for aov in aovs_of(layer) if aov.kind != "UV"]
-    kinds = {"VALUE": ("X", "VALUE"), "COLOR": ("RGBA", "COLOR")}
-    return [RenderPass("", aov.name, *kinds[aov.kind], *place) for aov, place in zip(aovs, places(aovs))]
+    aovs, kinds = aovs_of(layer), {"VALUE": ("X", "VALUE"), "COLOR": ("RGBA", "COLOR")}
+    named = [(aov, place) for aov, place in zip(aovs, places(aovs)) if aov.name]
+    return [RenderPass("", aov.name, *kinds[aov.kind], *place) for aov, place in named]
 
 
 @dataclass(frozen=True)
@@ -125,8 +128,8 @@ def _matte(kind: str) -> str:
 
 
 def cryptomatte_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
-    """Those of the mattes that a view layer asks for. Their channels are in lower case, so that no writer of files takes
-    them for colours that may be compressed with losses."""
+    """Those of the mattes that a view layer asks for. Their channels are in lower case, so that no writer of files
+    takes them for colours that may be compressed with losses."""
     found = []
     for kind in CRYPTOMATTES:
         if getattr(layer, f"use_pass_cryptomatte_{kind}"):
@@ -166,7 +169,6 @@ def glare_is_on(scene: bpy.types.Scene) -> bool:
 
 # Passes of Blender and Cycles that Candela does not write: switch of the view layer or of what it has of Cycles.
 _OTHERS = (
-    ("use_pass_vector", "Vector"),
     ("use_pass_shadow", "Shadow"), ("use_pass_ambient_occlusion", "Ambient Occlusion"),
     ("use_pass_subsurface_direct", "Subsurface Direct"), ("use_pass_subsurface_indirect", "Subsurface Indirect"),
     ("use_pass_subsurface_color", "Subsurface Color"),

@@ -7,6 +7,9 @@
 #include "lib/instance.glsl"
 #include "generated/material"
 #include "surface/point.glsl"
+#ifdef MOTION
+#include "surface/motion.glsl"
+#endif
 #include "generated/aovs"
 
 void main()
@@ -40,5 +43,6 @@ void main()
     discard;
   }
 #endif
+  float surface = (layers != 0) ? 0.0 : 1.0;  // passes of surfaces show no thin layers
   AOV_WRITE
 }

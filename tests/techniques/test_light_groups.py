@@ -38,7 +38,8 @@ def room(stage):
 def grouped(written):
     yield room(written)
     written.scene.candela.split_light_groups = False
-    written.scene.candela.denoise_enabled = True if hasattr(written.scene.candela, "denoise_enabled") else None
+    for thing in (*written.scene.objects, written.scene.world):
+        thing.lightgroup = ""
 
 
 def share(passes, name):
