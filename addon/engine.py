@@ -134,7 +134,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._sync_seconds = time.perf_counter() - started
 
     def _frames_around(self, depsgraph) -> tuple[Moment, ...] | None:
-        """The scene in the frames before and after, for the Vector pass. It stands at its own frame again afterwards."""
+        """The scene in the frames before and after, for the Vector pass. It stands at its own again afterwards."""
         if self.is_preview:
             return None
         scene, camera = depsgraph.scene, self.camera_override or depsgraph.scene_eval.camera
