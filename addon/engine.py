@@ -29,7 +29,7 @@ from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE, light_groups
-from .ui.passes import GLARE, RenderPass, cryptomatte_metadata, missing_passes, wanted_passes
+from .ui.passes import CAMERA_AXES, GLARE, RenderPass, cryptomatte_metadata, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
@@ -332,5 +332,6 @@ def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dic
 def _pixels(total: light_groups.Sum, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     arrays = total.finished({name for asked in wanted for name in asked.images})
+    arrays[CAMERA_AXES] = frame.snapshot.camera.matrix[:3, :3] * (1.0, 1.0, -1.0)
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays["film.combined"], **pixels}

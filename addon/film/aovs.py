@@ -14,7 +14,7 @@ def places(aovs: Sequence[Aov]) -> list[tuple[str, int]]:
     the sum over what has one, whose number HIT counts."""
     found, colors, values = [], 0, 0
     for aov in aovs:
-        if aov.kind in ("VALUE", "HIT"):
+        if aov.kind in ("VALUE", "HIT", "DISTANCE"):
             found.append((f"aov.values.{values // CHANNELS}", values % CHANNELS))
             values += 1
         elif aov.kind in ("UV", "VECTOR"):

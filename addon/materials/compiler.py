@@ -142,7 +142,7 @@ class _Compilation:
         for number, (name, kind, socket) in enumerate(self.graph.aovs):
             wanted = "FLOAT" if kind == "VALUE" else "COLOR"
             node = Node(f"AOV {name}", name, "ShaderNodeOutputAOV", {"Value": socket})
-            if kind == "HIT":
+            if kind in ("HIT", "DISTANCE"):
                 continue
             if kind == "VECTOR":
                 value = f"{self.code.attribute(node, 'MOTION_BEFORE', '')}.xyz"

@@ -421,6 +421,7 @@ def _aov_texts(given: tuple[tuple[str, str], ...], layout: AovLayout) -> str:
                 {
                     "VALUE": f"{to} = {value}(point);",
                     "HIT": f"{to} = surface;",
+                    "DISTANCE": f"{to} = surface * aov_distance(point.position);",
                     "UV": f"out_{k} = surface * vec4({value}(point), 1.0);",
                     "VECTOR": f"out_{k} = surface * motion_vector(point.position, instance_flat.x, {value}(point), "
                     f"{value}_after(point));",

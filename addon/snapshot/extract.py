@@ -334,7 +334,9 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
 def aovs_of(layer) -> tuple[Aov, ...]:
     """What a view layer asks for of the surfaces seen, passes without a name first."""
     named = [Aov(aov.name, aov.type) for aov in layer.aovs if aov.is_valid]
-    wanted = (("UV", layer.use_pass_uv), ("VECTOR", layer.use_pass_vector), ("HIT", layer.use_pass_vector))
+    vector, cycles = layer.use_pass_vector, getattr(layer, "cycles", None)  # there while the Cycles add-on is enabled
+    denoising = getattr(cycles, "denoising_store_passes", False)
+    wanted = (("UV", layer.use_pass_uv), ("VECTOR", vector), ("HIT", vector), ("DISTANCE", denoising))
     return (*(Aov("", kind) for kind, asked in wanted if asked), *named)
 
 

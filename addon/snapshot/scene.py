@@ -249,13 +249,14 @@ class Aov:
     """A value of the surface seen that the view layer asks for: what AOV Output nodes of this name give, or its UV."""
 
     name: str
-    # COLOR, VALUE; by no name UV, the map that renders, VECTOR, how the surface moves, and HIT, 1 where one is.
+    # COLOR, VALUE; by no name UV, the map that renders, VECTOR, how the surface moves, HIT, 1 where one is, and
+    # DISTANCE of it from where the camera's rays begin.
     kind: str
 
     @property
     def of_surface(self) -> bool:
         """Whether a layer that is too thin to be what passes of surfaces show has no part in it."""
-        return self.kind in ("UV", "VECTOR", "HIT")
+        return self.kind in ("UV", "VECTOR", "HIT", "DISTANCE")
 
 
 CRYPTOMATTES = ("object", "material", "asset")

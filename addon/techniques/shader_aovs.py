@@ -12,6 +12,7 @@ before both are added to it, but not to UV and Vector, which are that surface's 
 Vector is how far what is seen was a frame ago from where it is seen, and how far it is from there to where it will be,
 in pixels: by the camera's motion, the object's, and that of the mesh's vertices, which each corner has as an attribute
 (snapshot/motion.py, shaders/surface/motion.glsl). It is the mean over the samples that meet a surface.
+Denoising Depth is the distance from where the camera's rays begin; albedo and normal of that data are sums of the film.
 
 | cost | per point of the film |
 |---|---|
@@ -43,12 +44,12 @@ from ..surfaces.draw import draw_aovs
 
 class ShaderAovs(Technique):
     name = "shader_aovs"
-    label = "Shader AOVs, UV and Vector"
+    label = "Values of surfaces"
 
     def skip(self, snapshot, settings):
         if not settings.whole:
             return "a viewport shows no passes"
-        return None if snapshot.film.aovs else "the view layer asks for no AOV, UV or Vector pass"
+        return None if snapshot.film.aovs else "the view layer asks for no AOV, no UV, Vector or denoising data"
 
     def begin(self, frame: Frame) -> None:
         aovs = frame.snapshot.film.aovs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bl_ui.properties_view_layer import (
     ViewLayerAOVPanelHelper,
+    ViewLayerButtonsPanel,
     ViewLayerCryptomattePanelHelper,
     ViewLayerLightgroupsPanelHelper,
 )
@@ -22,6 +23,24 @@ class CANDELA_VIEWLAYER_PT_passes_aov(ViewLayerAOVPanelHelper, bpy.types.Panel):
         column.use_property_split = True
         column.use_property_decorate = False
         column.prop(context.view_layer, "pass_alpha_threshold")
+
+
+class CANDELA_VIEWLAYER_PT_passes_denoising(ViewLayerButtonsPanel, bpy.types.Panel):
+    """Of a switch that Cycles brings: it is there while that is enabled."""
+
+    bl_label = "Denoising Data"
+    bl_parent_id = "CANDELA_VIEWLAYER_PT_passes"
+    COMPAT_ENGINES = {ENGINE}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and getattr(context.view_layer, "cycles", None) is not None
+
+    def draw(self, context):
+        column = self.layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(context.view_layer.cycles, "denoising_store_passes", text="Albedo, Normal, Depth")
 
 
 class CANDELA_VIEWLAYER_PT_passes_cryptomatte(ViewLayerCryptomattePanelHelper, bpy.types.Panel):
@@ -78,6 +97,7 @@ class CANDELA_WORLD_PT_light_group(_GroupPanel, bpy.types.Panel):
 CLASSES = (
     CANDELA_VIEWLAYER_PT_passes_aov,
     CANDELA_VIEWLAYER_PT_passes_cryptomatte,
+    CANDELA_VIEWLAYER_PT_passes_denoising,
     CANDELA_VIEWLAYER_PT_passes_lightgroups,
     CANDELA_OBJECT_PT_light_group,
     CANDELA_WORLD_PT_light_group,

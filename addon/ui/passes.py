@@ -88,6 +88,8 @@ PASSES = tuple(
 )
 
 
+CAMERA_AXES = "camera axes"  # (3, 3) beside the images that passes are made from: right, up, forward
+
 # The picture as an eye sees it, beside a Combined that stays as it is; written where glare is on.
 GLARE = RenderPass("", "Glare", "RGBA", "COLOR", "film.lens")
 
@@ -104,8 +106,35 @@ def wanted_passes(layer: bpy.types.ViewLayer, scene: bpy.types.Scene | None = No
 def _aov_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     """Those that the view layer has by name."""
     aovs, kinds = aovs_of(layer), {"VALUE": ("X", "VALUE"), "COLOR": ("RGBA", "COLOR")}
-    named = [(aov, place) for aov, place in zip(aovs, places(aovs)) if aov.name]
-    return [RenderPass("", aov.name, *kinds[aov.kind], *place) for aov, place in named]
+    placed = list(zip(aovs, places(aovs)))
+    named = [RenderPass("", aov.name, *kinds[aov.kind], *place) for aov, place in placed if aov.name]
+    distance = [place for aov, place in placed if aov.kind == "DISTANCE"]
+    if not distance:
+        return named
+    return [
+        DenoisingAlbedo("", "Denoising Albedo", "RGB", "COLOR", "color.diffuse color.glossy color.transmission"),
+        DenoisingNormal("", "Denoising Normal", "XYZ", "VECTOR", "surface.normal_sum"),
+        RenderPass("", "Denoising Depth", "Z", "VALUE", *distance[0]),
+        *named,
+    ]
+
+
+class DenoisingAlbedo(RenderPass):
+    """What a denoiser is told of the surfaces' colours: their sum."""
+
+    @property
+    def images(self) -> list[str]:
+        return self.source.split()
+
+    def pixels(self, arrays: dict[str, np.ndarray], exposure: float) -> np.ndarray:
+        return np.sum([arrays[name][..., :3] for name in self.images], axis=0, dtype=np.float32)
+
+
+class DenoisingNormal(RenderPass):
+    """What a denoiser is told of the surfaces' normals: in the camera's space, which looks along +Z."""
+
+    def pixels(self, arrays: dict[str, np.ndarray], exposure: float) -> np.ndarray:
+        return (arrays[self.source][..., :3] @ arrays[CAMERA_AXES]).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -172,7 +201,6 @@ _OTHERS = (
     ("use_pass_shadow", "Shadow"), ("use_pass_ambient_occlusion", "Ambient Occlusion"),
     ("use_pass_subsurface_direct", "Subsurface Direct"), ("use_pass_subsurface_indirect", "Subsurface Indirect"),
     ("use_pass_subsurface_color", "Subsurface Color"),
-    ("cycles.denoising_store_passes", "Denoising Data"),
     ("cycles.use_pass_shadow_catcher", "Shadow Catcher"),
 )  # fmt: skip
 

@@ -10,6 +10,14 @@
 #ifdef MOTION
 #include "surface/motion.glsl"
 #endif
+// How far a camera's ray goes to a place from the near end of what is seen, where it begins.
+float aov_distance(vec3 position)
+{
+  vec3 away = position - film_view.eye.xyz;
+  float depth = -dot(away, film_view.backward.xyz);
+  return (film_view.eye.w > 0.5) ? depth - film_view.film.z : length(away) * (1.0 - film_view.film.z / depth);
+}
+
 #include "generated/aovs"
 
 void main()
