@@ -182,7 +182,8 @@ READ = {
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
     "view_layer": (
         *("material_override", "use_solid", "use_strand", "use_pass_mist", "samples", "aovs", "pass_alpha_threshold"),
-        *("use_pass_cryptomatte_object", "pass_cryptomatte_depth", "lightgroups", "use_pass_uv", "denoising_store_passes"),
+        *("use_pass_cryptomatte_object", "pass_cryptomatte_depth", "lightgroups", "use_pass_uv"),
+        "denoising_store_passes",
     ),
     "particle": ("root_radius", "tip_radius", "radius_scale", "use_close_tip"),
 }  # fmt: skip
