@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import cache
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..scene.culling import calls
 from ..scene.materials import SURFACE_IMAGES, AovLayout
+from ..scene.view import VIEW
 
 STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
 TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
@@ -125,6 +127,25 @@ def add_glow(frame: Frame, technique: Technique, position: images.Image, emissio
     frame.count(technique, "passes")
 
 
+@cache
+def motion_behind(layout: AovLayout) -> Program:
+    """Draws the motion of the background into images of a layout that holds VECTOR and HIT."""
+    outs = {kind: f"out_{k}" + (f".{'xyzw'[c]}" if kind == "HIT" else "")
+            for k, held in enumerate(layout) for c, (_, kind) in enumerate(held)}  # fmt: skip
+    none = " ".join(f"out_{k} = vec4(0.0);" for k in range(len(layout)))
+    return passes.fullscreen_program(
+        "motion behind all",
+        "surface/motion_behind.frag.glsl",
+        textures=(("RGBA32F", "motion_table"),),
+        blocks=((VIEW, "film_view"),),
+        defines=(("AOV_NONE", none), ("VECTOR_OUT", outs["VECTOR"]), ("HIT_OUT", outs["HIT"])),
+        outputs=tuple(("VEC4", f"out_{k}") for k in range(len(layout))),
+    )
+
+
+MOTION_BEHIND = motion_behind(((("", "VECTOR"),), (("", "HIT"),)))
+
+
 def draw_aovs(
     frame: Frame,
     technique: Technique,
@@ -144,6 +165,10 @@ def draw_aovs(
     textures = {"surface_position": position}
     if any(kind == "VECTOR" for held in layout for _, kind in held):
         textures["motion_table"] = motion
+        blocks = {"film_view": frame.view_block}
+        passes.fullscreen(
+            motion_behind(layout), images.Target(target.colors), textures={"motion_table": motion}, blocks=blocks
+        )
     thin = {k for k, material in enumerate(frame.materials.compiled) if material.transparent and threshold > 0.0}
     for layers, wanted in ((0, None), (1, thin)):
         if wanted is None or wanted:

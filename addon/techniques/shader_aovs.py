@@ -11,7 +11,8 @@ before both are added to it, but not to UV and Vector, which are that surface's 
 
 Vector is how far what is seen was a frame ago from where it is seen, and how far it is from there to where it will be,
 in pixels: by the camera's motion, the object's, and that of the mesh's vertices, which each corner has as an attribute
-(snapshot/motion.py, shaders/surface/motion.glsl). It is the mean over the samples that meet a surface.
+(snapshot/motion.py, shaders/surface/motion.glsl). Behind all it is what the camera's turn and zoom
+make of what is infinitely far away.
 Denoising Depth is the distance from where the camera's rays begin; albedo and normal of that data are sums of the film.
 
 | cost | per point of the film |
