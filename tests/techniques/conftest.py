@@ -12,6 +12,7 @@ from addon import engine
 from addon.compare import reference
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.kernels.ranks import ids_of
 
 
 class Stage:
@@ -207,7 +208,16 @@ def read_with_openexr(path) -> dict[str, np.ndarray]:
 def all_of(layers: dict, view_layer: str) -> dict:
     prefix = view_layer + "."
     named = {name.removeprefix(prefix): pixels for name, pixels in layers.items() if name.startswith(prefix)}
-    return {**named, "combined": named["Combined"], "header": layers["header"]}
+    made = next((layers[name] for name in ("Composite.Combined", "") if name in layers), None)  # by the compositor
+    return {**named, "combined": named["Combined"], "composed": made, "header": layers["header"]}
+
+
+def coverage(passes, kind, name) -> np.ndarray:
+    """(H, W) what a reader of the standard finds for a name."""
+    ranks = [passes[key] for key in sorted(passes) if key.startswith(f"Crypto{kind}")]
+    pairs = np.concatenate(ranks, axis=-1)
+    wanted = ids_of([name])[0]
+    return np.where(pairs[..., 0::2] == wanted, pairs[..., 1::2], 0.0).sum(axis=-1)
 
 
 @pytest.fixture
@@ -221,7 +231,7 @@ def written(stage, monkeypatch):
         return reference.render_passes(stage.scene, engine, samples, 1, size=size, **options).images
 
     stage.written = rendered
-    stage.layer = layer
+    stage.layer, stage.coverage = layer, coverage
     stage.both = lambda samples, cycles_samples=None, **options: (
         rendered("CANDELA", samples, **options), rendered("CYCLES", cycles_samples or samples, **options)
     )  # fmt: skip

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from addon.frame.ledger import SKIPPED
-from addon.kernels.ranks import ids_of
 
 ONE_STEP = 1.0 / 255.0
 KINDS = ("Object", "Material", "Asset")
@@ -17,14 +16,6 @@ def ask(stage, levels=6):
     for kind in KINDS:
         setattr(stage.layer, f"use_pass_cryptomatte_{kind.lower()}", True)
     stage.layer.pass_cryptomatte_depth = levels
-
-
-def coverage(passes, kind, name) -> np.ndarray:
-    """(H, W) what a reader of the standard finds for a name."""
-    ranks = [passes[key] for key in sorted(passes) if key.startswith(f"Crypto{kind}")]
-    pairs = np.concatenate(ranks, axis=-1)
-    wanted = ids_of([name])[0]
-    return np.where(pairs[..., 0::2] == wanted, pairs[..., 1::2], 0.0).sum(axis=-1)
 
 
 def crowd(stage, opacity=1.0):
@@ -66,7 +57,7 @@ def assert_like_cycles(stage, objects, samples, most, in_the_mean):
     for kind in KINDS:
         total = np.zeros((40, 48))
         for name in names[kind]:
-            ours, theirs = coverage(own, kind, name), coverage(cycles, kind, name)
+            ours, theirs = stage.coverage(own, kind, name), stage.coverage(cycles, kind, name)
             assert ours.max() > 0.3, name
             worst = max(worst, np.abs(ours - theirs).max())
             mean = max(mean, np.sqrt(((ours - theirs) ** 2).mean()))
@@ -132,7 +123,7 @@ def test_names_beyond_the_levels_are_left_out(written):
     ask(stage, 2)
     few = stage.written("CANDELA", 16)
     for name in objects:
-        ours, all_of_it = coverage(few, "Object", name), coverage(whole, "Object", name)
+        ours, all_of_it = stage.coverage(few, "Object", name), stage.coverage(whole, "Object", name)
         assert (ours <= all_of_it + 1e-5).all()
 
 
