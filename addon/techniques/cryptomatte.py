@@ -28,7 +28,7 @@ from functools import cache
 import numpy as np
 
 from ..film import filter as film_filter
-from ..film.points import PointStages
+from ..film.points import Coverage
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
@@ -75,6 +75,7 @@ DECLARED = tuple(adding(kind, count, pixels) for kind in ID for count, pixels in
 class Cryptomatte(Technique):
     name = "cryptomatte"
     label = "Cryptomatte"
+    provides = (Coverage,)
 
     def skip(self, snapshot, settings):
         if not settings.whole:
@@ -96,7 +97,7 @@ class Cryptomatte(Technique):
         self._objects = images.upload_list(_columns(*names))
         shown = [CRYPTO_DEFAULT if k == 0 else one.name for k, one in enumerate(frame.snapshot.materials)]
         self._materials = images.upload_list(_columns(ids_of(shown)))
-        frame.shared(PointStages).of[self.name] = self._add
+        frame.provide(Coverage(self._add))
 
     def _add(self, frame: Frame, surfaces: dict, place: tuple[float, float], share: float) -> None:
         film = frame.snapshot.film

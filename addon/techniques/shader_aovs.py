@@ -35,7 +35,7 @@ import numpy as np
 
 from ..film import aovs as film_aovs
 from ..film import filter as film_filter
-from ..film.points import PointStages
+from ..film.points import SurfaceValues
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images
@@ -46,6 +46,7 @@ from ..surfaces.draw import draw_aovs
 class ShaderAovs(Technique):
     name = "shader_aovs"
     label = "Values of surfaces"
+    provides = (SurfaceValues,)
 
     def skip(self, snapshot, settings):
         if not settings.whole:
@@ -61,7 +62,7 @@ class ShaderAovs(Technique):
             frame.add_write(Write(image, "RGBA32F", f"AOVs: {', '.join(name or 'UV' for name, _ in held)}", True))
         motion = frame.snapshot.motion
         self._motion = images.upload_list(_motion_rows(frame)) if motion is not None else None
-        frame.shared(PointStages).of[self.name] = self._draw
+        frame.provide(SurfaceValues(self._draw))
 
     def _draw(self, frame: Frame, surfaces: dict, place: tuple[float, float], share: float) -> None:
         names = list(self._images)
