@@ -44,7 +44,8 @@ from ..surfaces.draw import refracts
 
 POINTS = Param(
     "points", "Film points", 8,
-    "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
+    "Points of the pixel filter per picture; with fewer samples than this, each sample is shown at several points, "
+    "at most eight",
     1, 1024, draft=1,
 )  # fmt: skip
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
@@ -56,9 +57,9 @@ GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
 
 @dataclass(frozen=True)
 class AtPoints(Service):
-    """What a technique draws at each point of the film into sums of its own: `add` is called with the frame, which looks
-    there, the surfaces that are seen (as of surface_bindings), the point's place in the pixel (as Frame.film_offset) and
-    its share of the sample."""
+    """What a technique draws at each point of the film into sums of its own: `add` is called with the frame, which
+    looks there, the surfaces that are seen (as of surface_bindings), the point's place in the pixel (as
+    Frame.film_offset) and its share of the sample."""
 
     add: Callable[[Frame, dict[str, images.Image], tuple[float, float], float], None]
 
