@@ -1,4 +1,4 @@
-"""Points on all surfaces with what they reflect and the light that reaches them straight, for who gathers from points.
+"""Lit points: points on all surfaces with reflectance and direct light, for techniques that gather from them.
 
 A run is a set of points by area (scene/area_points.py) in the order of a tree (scene/point_tree.py). Each point has
 two sides, entries 2 i and 2 i + 1 of the images here, ROW a row: the one that its triangle faces by its winding, and

@@ -1,4 +1,4 @@
-"""Triangles in pieces, and directions in two numbers: what every spreading of points over surfaces needs."""
+"""Subdivided triangles and octahedral directions, for techniques that spread points over surfaces."""
 
 from __future__ import annotations
 

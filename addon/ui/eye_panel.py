@@ -1,4 +1,4 @@
-"""The eye in the camera's tab: observers to begin with, and a picture of its pupil and of what it makes of a light.
+"""The eye in the camera's tab: presets of observers, and previews of the pupil and of its glare.
 
 The pictures are image data-blocks, "Candela Pupil" and "Candela Glare": the Image Editor shows them, and the compositor
 convolves with the second one (Convolve node, or an Image node for older ones), which sums up to 1 in each channel. They
