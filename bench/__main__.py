@@ -32,6 +32,7 @@ from bench import (
     relief,
     run,
     soft_sources,
+    strips,
     subsurface,
 )
 
@@ -56,6 +57,7 @@ VERBS = {
     "reflections": reflections,
     "relief": relief,
     "soft_sources": soft_sources,
+    "strips": strips,
     "subsurface": subsurface,
     "page": page,
     "ages": ages,
