@@ -38,7 +38,11 @@ BY_COST, BY_MAPS, BY_RAYS = "COST", "MAPS", "RAYS"
 SHADOWS_BY = Param(
     "by", "Shadows by", BY_COST,
     "How visibility of a point on a light is tested. Rays need opaque casters and a hierarchy of all triangles",
-    items=((BY_COST, "What costs less", 0), (BY_MAPS, "Depth maps", 1), (BY_RAYS, "Rays", 2)),
+    items=(
+        (BY_COST, "What Costs Less", 0, "As measured on this device, for each light"),
+        (BY_MAPS, "Depth Maps", 1, "Pictures of the scene as seen from points of the light"),
+        (BY_RAYS, "Rays", 2, "A ray to a point of the light from each pixel"),
+    ),
 )  # fmt: skip
 PIXEL_SHARE = 0.1  # of a pixel's side on the nearest surfaces, by which rays may begin off them
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds

@@ -24,8 +24,9 @@ a list of corner attributes by that number, made when it is first met. Bumps use
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
 
 Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
-Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits. A material with more
-than MOST_IMAGES images is its mean reflectance instead.
+Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits. Relief goes on over
+the edges of its mesh (shaders/hits/relief.glsl); grass is its ground. A material with more than MOST_IMAGES images is
+its mean reflectance instead.
 """
 
 from __future__ import annotations
@@ -108,27 +109,37 @@ def depth_of(material: int) -> float:
 
 
 def _program_key(compiled: CompiledMaterial) -> str:
-    return MEAN.name if len(compiled.images) > MOST_IMAGES else compiled.program_key
+    if len(compiled.images) > MOST_IMAGES:
+        return MEAN.name
+    return f"{compiled.program_key} relief" if _has_relief(compiled) else compiled.program_key
+
+
+def _has_relief(compiled: CompiledMaterial) -> bool:
+    """Whether its heights are looked for at hits (shaders/hits/relief.glsl)."""
+    own = compiled.own_surface
+    return own is not None and own.shell and len(compiled.images) + bool(compiled.attributes) <= MOST_IMAGES
 
 
 def hit_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a material where rays met it."""
-    if compiled.program_key not in _programs:
+    key = _program_key(compiled)
+    if key not in _programs:
         if len(_programs) >= MOST_PROGRAMS:
             del _programs[next(iter(_programs))]
-        _programs[compiled.program_key] = _hit_program(compiled)
-    return _programs[compiled.program_key]
+        _programs[key] = _hit_program(compiled)
+    return _programs[key]
 
 
 def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
-    room = len(compiled.images) + len(listed) < MOST_IMAGES + 1
+    relief = (("RGBA32F", "shell_corners"),) if _has_relief(compiled) else ()
+    room = len(compiled.images) + len(listed) + len(relief) < MOST_IMAGES + 1
     return Program(
-        name=f"hits {compiled.program_key[:8]}",
+        name=f"hits {compiled.program_key[:8]}{' relief' * len(relief)}",
         fragment="hits/surface.frag.glsl",
         textures=(
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
-            *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *relief, *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
         ),
         blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
@@ -136,7 +147,13 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             ("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth"), ("INT", "material_number"),
         ),
         snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
-        **{**MASKED, "defines": (*MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()))},
+        **{
+            **MASKED,
+            "defines": (
+                *MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()),
+                *((("OWN_SURFACE", ""),) if relief else ()),
+            ),
+        },
     )  # fmt: skip
 
 
@@ -305,6 +322,8 @@ class Hits:
             return MEAN, {"textures": textures, "blocks": {}, "constants": constants}
         bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
         textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
+        if _has_relief(compiled):
+            textures |= frame.materials.own_images[material]
         if compiled.attributes:
             textures["hit_attributes"] = self._attributes_of(material, compiled)
         constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}

@@ -79,9 +79,11 @@ class CausticsMapping(Technique):
             1.0, 16.0,
         ),
         Param(
-            "by", "Photons by", LOOKUPS,
-            "How the end of a photon's path is found",
-            items=((LOOKUPS, "Look-ups in the light's images", 0), (RAYS, "Rays", 1)),
+            "by", "Photons by", LOOKUPS, "How the end of a photon's path is found",
+            items=(
+                (LOOKUPS, "Look-Ups", 0, "Steps in images of what the light sees: fast, and blind behind it"),
+                (RAYS, "Rays", 1, "Rays through all triangles"),
+            ),
         ),
     )  # fmt: skip
     reads = SURFACES

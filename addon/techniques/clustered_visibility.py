@@ -53,7 +53,10 @@ from .cssm import ORDERS, SEARCH_OFFSET
 from .multires_radiosity import LEVELS, MANY_PIXELS, NEAR_BOUNCES, MultiresRadiosity, pixels_shown_alone, regions
 
 TEXELS, CONVOLUTION = "TEXELS", "CONVOLUTION"
-FILTERS = ((TEXELS, "Texels", 0), (CONVOLUTION, "Convolution", 1))
+FILTERS = (
+    (TEXELS, "Texels", 0, "Compare the depths of some texels of the kernel one by one"),
+    (CONVOLUTION, "Convolution", 1, "Look up a filtered map, whose cost does not depend on the kernel's size"),
+)
 TAPS, CELLS = 4, 2  # along each side of a kernel: texels that are looked at; boxes of the filtered map
 AREA_ROWS = 5  # texels of a cluster, see shaders/cluster/lights.glsl
 MAPS = passes.fullscreen_program(

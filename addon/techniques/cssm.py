@@ -51,8 +51,15 @@ from ..lighting.soft_maps import (
 )
 from ..lighting.visibility import RESOLUTION, Lookup, Maps
 
-ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
-PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
+ORDERS = (
+    ("4", "4 Terms", 0, "Fast; shadows begin gradually behind what casts them"),
+    ("8", "8 Terms", 1, "Shadows begin close behind what casts them"),
+    ("16", "16 Terms", 2, "The sharpest contacts, for twice the memory of 8"),
+)
+PREFILTERS = (
+    (PYRAMID, "Pyramid", 0, "Mip levels: fast, and a little blocky"),
+    (TABLE, "Summed-Area Table", 1, "Exact means over boxes of any size; needs more memory"),
+)
 BASIS = {
     PYRAMID: ("RGBA16F", "basis_means"),
     TABLE: ("RGBA32UI", "basis_table"),
@@ -87,7 +94,7 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
     )  # fmt: skip
 
 
-DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, _, _ in PREFILTERS)
+DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, *_ in PREFILTERS)
 LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 SHARED = tuple(program for lookup in DEFAULTS for program in programs_of(with_contacts(lookup)))
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)

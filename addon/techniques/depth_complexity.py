@@ -58,9 +58,16 @@ from ..scene.view import VIEW
 from ..sources.rates import Rate
 from .accumulated_maps import AccumulatedMaps
 
-COUNTS = (("16", "16", 0), ("64", "64", 1))
+COUNTS = (
+    ("16", "16", 0, "Four by four points: fast, with visible steps in wide penumbrae"),
+    ("64", "64", 1, "Eight by eight points"),
+)
 AUTO, SHARE, POINTS = "AUTO", "SHARE", "POINTS"
-MODES = ((AUTO, "By samples", 0), (SHARE, "Share of the light", 1), (POINTS, "Point by point", 2))
+MODES = (
+    (AUTO, "By Samples", 0, "The share of the light in pictures of few samples, else point by point"),
+    (SHARE, "Share of the Light", 1, "The whole light, as much of it as is seen: smooth at once"),
+    (POINTS, "Point by Point", 2, "The light of each point that is seen: exact over many samples"),
+)
 FEW_SAMPLES = 4  # pictures of fewer take the light as a whole
 NORMAL = ("RGBA32F", "surface_normal")
 

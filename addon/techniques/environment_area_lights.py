@@ -50,7 +50,10 @@ from .cssm import ConvolutionSoftShadows
 from .environment_light import EnvironmentLight
 from .vssm import VarianceSoftShadows
 
-SHADOWS = (("VARIANCE", "Variance", 0), ("CONVOLUTION", "Convolution", 1))
+SHADOWS = (
+    ("VARIANCE", "Variance", 0, "Variance soft shadow maps"),
+    ("CONVOLUTION", "Convolution", 1, "Convolution soft shadow maps"),
+)
 NO_SHARE = 1e-9  # of traced lobes: rays bring all of the world's light to them
 
 

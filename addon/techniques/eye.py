@@ -32,13 +32,20 @@ from ..snapshot.scene import Snapshot
 GLARE = "glare"  # the technique that asks for the point spread, and its choice of how
 OFF, CONVOLUTION, BILLBOARDS = "OFF", "CONVOLUTION", "BILLBOARDS"
 MODE = Param(
-    "mode", "Glare", OFF,
-    "Show glare as a human eye sees it",
-    items=((OFF, "Off", 0), (CONVOLUTION, "Convolution", 1), (BILLBOARDS, "Billboards", 2)), scope=CAMERA,
+    "mode", "Glare", OFF, "Show glare as a human eye sees it",
+    items=(
+        (OFF, "Off", 0, "The picture as a camera takes it"),
+        (CONVOLUTION, "Convolution", 1, "The light of every pixel is spread, by Fourier transform"),
+        (BILLBOARDS, "Billboards", 2, "Only the brightest spots are spread, each as a picture of its own"),
+    ),
+    scope=CAMERA,
 )  # fmt: skip
 LUMINANCE_STEP = 0.02  # decades; as much as noise of the first samples changes the mean, and 0.02 mm of a pupil
 DRAFT_SIDE = 256
-SIDES = tuple((str(side), f"{side} x {side}", side) for side in (128, 256, 512, 1024, 2048))
+SIDES = tuple(
+    (str(side), f"{side} x {side}", side, f"The pattern has {side} texels along each side")
+    for side in (128, 256, 512, 1024, 2048)
+)
 
 
 class PointSpread(Service):

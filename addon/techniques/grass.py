@@ -63,9 +63,12 @@ class Grass(Technique):
     label = "Grass"
     params = (
         Param(
-            "patch", "Patch", NONE,
-            "Grass patch that covers the material's surface",
-            scope=MATERIAL, items=((NONE, "None", 0), (MEADOW, "Meadow", 1), (FILE, "File", 2)),
+            "patch", "Patch", NONE, "Grass patch that covers the material's surface", scope=MATERIAL,
+            items=(
+                (NONE, "None", 0, "No grass"),
+                (MEADOW, "Meadow", 1, "The meadow that comes with Candela"),
+                (FILE, "File", 2, "A patch from a file"),
+            ),
         ),
         Param("file", "File", "", "Grass patch file, made by Render > Candela Grass Patch", scope=MATERIAL, file=True),
         Param(

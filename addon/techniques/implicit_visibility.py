@@ -20,7 +20,7 @@ Source: Dong, Kautz, Theobalt and Seidel, "Interactive Global Illumination Using
 
 | cost, R receivers | |
 |---|---|
-| surfels, when surfaces change | CPU, scene/surfels.py |
+| surfels, when surfaces change | CPU, scene/surfels.py; 200,000 rays and a readback, scene/seen.py |
 | links, for each solution, when surfaces change | R bins^2 walks down the tree; 4 R bins^2 bytes are kept |
 | light, for each solution, when it changes | lighting/surfels.py; a bounce fetches 2 R bins^2 texels |
 | each sample | 1 pass, about 150 nodes per pixel of 2 fetches |
@@ -44,6 +44,7 @@ from ..lighting import surfels as surfel_light
 from ..lighting.surfels import SurfelLight
 from ..lighting.virtual_lights import VirtualLights
 from ..scene import acceleration
+from ..scene.seen import SEES
 from ..scene.surfels import Surfels
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, MARKS, SURFACE_TEXTURES, surface_bindings
@@ -146,7 +147,7 @@ class ImplicitVisibility(Technique):
         return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return (*PROGRAMS, *surfel_light.PROGRAMS)
+        return (SEES, *PROGRAMS, *surfel_light.PROGRAMS)
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is None or not len(frame.receivers.distance):

@@ -1,10 +1,10 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
-Points are spread over all surfaces by area, shaded with their own materials and lit by all lamps, the world and
-emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of flat groups of points
-(scene/point_tree.py). Every place that gathers walks the tree and draws what it sees of it into a micro-buffer of its
-hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Pixels of the buffer are equal
-shares of what the surface reflects, so light is a plain mean:
+Points are spread over all surfaces by area, each for its own piece of a triangle, shaded with their own materials and
+lit by all lamps, the world and emissive meshes (lighting/point_runs.py). A tree over them has rectangles in place of
+flat groups of points (scene/point_tree.py). Every place that gathers walks the tree and draws what it sees of it into a
+micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Pixels of the
+buffer are equal shares of what the surface reflects, so light is a plain mean:
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
@@ -22,12 +22,12 @@ normals.
 | bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
 | passes | 4 x `levels` + 2, and for each bounce 4; the tree in parts on Mesa (docs/micro_rendering.md) |
 
-Fails: discs overhang by the points' spacing, so light leaks at the edges of a dark room beside a bright one, and narrow
-gaps close (the colonnade keeps .64 of its light of one reflection with 8192 points, .79 with 65536). Mirrors need rays.
+Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A kilometre of ground takes all points.
 
-Bias (diffuse and glossy indirect light): darker beside edges, 0.4 to 4 % of holes between discs; leaves, grass and hair
-below the points' spacing are wrong. Points reflect gloss as diffuse; sheen and translucent lobes get none, clear glass
-is not there, rough diffuse counts as Lambertian, fog between surfaces dims nothing.
+Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
+(shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, which
+reach over edges: leaves, grass and hair below the points' spacing are wrong. Points reflect gloss as diffuse; sheen and
+translucent lobes get none, clear glass is not there, rough diffuse counts as Lambertian, fog between dims nothing.
 """
 
 from __future__ import annotations
@@ -41,8 +41,16 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting import micro_buffers
-from ..lighting.lit_points import LitPoints, Run
-from ..lighting.micro_buffers import BUFFER_CONSTANTS, BUFFER_IMAGE, BUFFER_TEXTURES, NodeRadiance, buffer_bindings
+from ..lighting.micro_buffers import (
+    BUFFER_CONSTANTS,
+    BUFFER_DEFINES,
+    BUFFER_IMAGE,
+    BUFFER_TEXTURES,
+    NodeRadiance,
+    buffer_bindings,
+)
+from ..lighting.point_runs import PointRuns, Run
+from ..scene.seen import SEES
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
@@ -67,7 +75,7 @@ def _regions(listed: bool) -> Program:
         constants=(
             *BUFFER_CONSTANTS, *GRID, ("INT", "first_row"), ("INT", "row_count"), ("INT", "columns"), *constants,
         ),
-        defines=(*RUNS, *(() if listed else (("BY_LEVEL", ""),))),
+        defines=(*RUNS, *BUFFER_DEFINES, *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
     )  # fmt: skip
 
@@ -80,6 +88,7 @@ GLOSSY = Program(
     images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
     blocks=((VIEW, "film_view"),),
     constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
+    defines=BUFFER_DEFINES,
 )
 REFLECTED = passes.fullscreen_program(
     "light of micro-buffers reflected",
@@ -134,14 +143,14 @@ class MicroRendering(MultiresRadiosity):
 
     def __init__(self):
         super().__init__()
-        self._points = LitPoints("micro")
+        self._points = PointRuns("micro")
         self._radiance = NodeRadiance()
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return False
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return (*micro_buffers.PROGRAMS, REFLECTED)
+        return (SEES, *micro_buffers.PROGRAMS, REFLECTED)
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is not None and len(frame.receivers.distance):
@@ -162,7 +171,12 @@ class MicroRendering(MultiresRadiosity):
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         bindings = {
-            "textures": {**surface_bindings(frame), "tree_nodes": run.nodes, "node_radiance": self._radiance.image},
+            "textures": {
+                **surface_bindings(frame),
+                "tree_nodes": run.nodes,
+                "piece_clips": run.clips,
+                "node_radiance": self._radiance.image,
+            },
             "blocks": {"film_view": frame.view_block},
             "constants": buffer_bindings(frame, run, frame.settings.get(self, "side"), **settings, use="micro regions"),
         }
@@ -230,7 +244,7 @@ class MicroRendering(MultiresRadiosity):
         try:
             for first in range(0, height, rows):
                 count = min(rows, height - first)
-                for part in micro_buffers.parts(leaves):
+                for part in micro_buffers.parts(leaves, side):
                     passes.compute(
                         program, (columns, count), textures=textures, images={"gathered": atlas, "micro": micro},
                         blocks=bindings["blocks"],

@@ -55,7 +55,11 @@ SQUARE_OF_DISC = np.sqrt(np.pi) / 2  # half a square's side, by the radius of a 
 FEW_BORDERS = 0.15  # share of the edges of a body that may be borders
 CARD_POINTS = 64
 BOXES, PRODUCT, SUM = "BOXES", "PRODUCT", "SUM"
-UNIONS = ((BOXES, "By boxes", 0), (PRODUCT, "Product of shares", 1), (SUM, "Plain sum", 2))
+UNIONS = (
+    (BOXES, "By Boxes", 0, "From where on the light each object lies: what two hide together counts once"),
+    (PRODUCT, "Product of Shares", 1, "As if objects lay before the light by chance"),
+    (SUM, "Plain Sum", 2, "Too dark where objects lie before one another"),
+)
 COUNTS = tuple(("RGBA32F", f"counts_{letter}") for letter in "abcd")
 CARDS_SHARE = ("R32F", "cards_share")
 

@@ -47,11 +47,15 @@ CONSTRAINT = (
     Param("enabled", "Enabled", True, "Whether the constraint acts"),
     Param("point", "Point", (0.0, 0.0, 0.0), "Point of the surface that shows the target", handle=POINT),
     Param("target", "Target", (0.0, 0.0, 1.0), "Point that is seen there, in object space", handle=POINT),
-    Param("viewer", "Viewer", (0.0, -5.0, 0.0), "Viewpoint from which the constraint was made"),
     Param(
-        "of", "Of", REFLECTION,
-        "Which light the edit redirects",
-        items=((REFLECTION, "Reflection", 0), (REFRACTION, "Refraction", 1)),
+        "viewer", "Viewer", (0.0, -5.0, 0.0), "Viewpoint from which the constraint was made", unit="TRANSLATION"
+    ),
+    Param(
+        "of", "Of", REFLECTION, "Which light the edit redirects",
+        items=(
+            (REFLECTION, "Reflection", 0, "What the surface mirrors, and highlights of lamps"),
+            (REFRACTION, "Refraction", 1, "What is seen through the surface"),
+        ),
     ),
     Param("triangle", "Triangle", -1, "Triangle that the point follows under deformation; -1: none", -1, 2**31 - 1),
     Param("weights", "Weights", (1.0, 0.0, 0.0), "Barycentric coordinates of the point on that triangle"),
@@ -59,9 +63,12 @@ CONSTRAINT = (
 REGION = (
     Param("enabled", "Enabled", True, "Whether constraints act in the region"),
     Param(
-        "kind", "Kind", "EUCLIDEAN",
-        "How distance from the centre is measured",
-        items=(("EUCLIDEAN", "Ball", 0), ("GEODESIC", "Along Surface", 1), ("PAINTED", "Painted", 2)),
+        "kind", "Kind", "EUCLIDEAN", "How distance from the centre is measured",
+        items=(
+            ("EUCLIDEAN", "Ball", 0, "All of the object within a radius"),
+            ("GEODESIC", "Along Surface", 1, "As far as the radius, measured along the surface"),
+            ("PAINTED", "Painted", 2, "Where the active color attribute is bright"),
+        ),
     ),
     Param("centre", "Centre", (0.0, 0.0, 0.0), "Centre of the region", handle=POINT),
     Param("radius", "Radius", 1.0, "Radius of the region", 0.0, 1e6, "DISTANCE"),

@@ -97,7 +97,10 @@ def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
             "visibility", "Visibility", BITS,
             "How occlusion is found: by a bit mask of sectors in half planes, or by points in a hemisphere of a "
             "small radius",
-            items=((BITS, "Bits", 0), (POINTS, "Points", 1)),
+            items=(
+                (BITS, "Bits", 0, "One bit for each sector of a half plane: surfaces near and far"),
+                (POINTS, "Points", 1, "Points in a half ball of the radius"),
+            ),
         ),
         Param("fans", "Fans", 4, "Screen directions that each pixel searches in a sample", 1, 64, draft=2),
         Param("steps", "Steps", 16, "Steps along each screen direction", 2, 64, draft=12),

@@ -45,7 +45,11 @@ from ..snapshot.scene import Camera, Snapshot
 from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
 
 LENS = "film.lens"
-RESOLUTIONS = (("FULL", "Full", 1), ("HALF", "Half", 2), ("QUARTER", "Quarter", 4))
+RESOLUTIONS = (
+    ("FULL", "Full", 1, "Every pixel of the picture"),
+    ("HALF", "Half", 2, "Pixels of twice the side: about a quarter of the time"),
+    ("QUARTER", "Quarter", 4, "Pixels of four times the side: about a sixteenth of the time"),
+)
 LEAST_CONTRAST = 10.0  # of the brightest pixel to white, below which nobody sees glare
 LEAST_VEIL = 0.5 / 255.0  # of white
 ORTHOGRAPHIC_DEGREES = 39.6  # of a lens of 50 mm before a sensor of 36 mm
@@ -120,7 +124,7 @@ class TemporalGlare(Technique):
         white, strength, magnification, luminance, sharp = (
             frame.settings.get(self, name) for name in ("white", "strength", "magnification", "luminance", "sharp")
         )
-        factor = {name: number for name, _, number in RESOLUTIONS}[frame.settings.get(self, "resolution")]
+        factor = {name: number for name, _, number, _ in RESOLUTIONS}[frame.settings.get(self, "resolution")]
         billboards = frame.settings.get(self, "mode") == BILLBOARDS
         factor = 1 if billboards else factor
         measured = scatter.measure(picture, white)

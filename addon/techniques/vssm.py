@@ -53,7 +53,10 @@ from ..lighting.soft_maps import (
 )
 from ..lighting.visibility import RESOLUTION, Lookup, Maps
 
-RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
+RULES = (
+    ("BOUNDS", "Bounds", 0, "The nearest and farthest depths of a cell tell whether its moments hold"),
+    ("MEAN", "Mean", 1, "The mean depth of a cell alone tells: faster, with light at some contacts"),
+)
 FINE, COARSE = 1, 2  # texels along each side of the blocks that a table has entries for
 MOMENTS = {
     block: tables.TableSource(
@@ -79,7 +82,7 @@ def _lookup(rule: str, cells: int, block: int) -> Lookup:
     )  # fmt: skip
 
 
-DEFAULTS = tuple(_lookup(rule, 3, block) for rule, _, _ in RULES for block in MOMENTS)
+DEFAULTS = tuple(_lookup(rule, 3, block) for rule, *_ in RULES for block in MOMENTS)
 LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 SHARED = programs_of(with_contacts(_lookup("BOUNDS", 3, COARSE)))
 MOMENT_VALUES = tuple(tables.values_program(source) for source in MOMENTS.values())
