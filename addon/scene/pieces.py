@@ -1,4 +1,4 @@
-"""Triangles in pieces, well-spaced points and octahedral directions, for techniques that spread points over surfaces."""
+"""Triangles in pieces, well-spaced points and octahedral directions, for spreading points over surfaces."""
 
 from __future__ import annotations
 

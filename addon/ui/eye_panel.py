@@ -29,7 +29,7 @@ _ICON_SCALE = 7.0
 
 
 class CANDELA_OT_eye_preset(bpy.types.Operator):
-    """Set the eye of this camera to one of some observers; keyframes of what it sets are left as they are"""
+    """Set the eye of this camera to a preset observer; keyframes of its settings are kept"""
 
     bl_idname = "candela.eye_preset"
     bl_label = "Observer"
@@ -66,7 +66,7 @@ class CANDELA_OT_eye_pictures(bpy.types.Operator):
 
     whole: bpy.props.BoolProperty(
         name="With Core", default=True,
-        description="With the light that is not scattered, so that a convolution of the whole picture keeps its light",
+        description="Include the light that is not scattered, so that convolution with the image preserves energy",
     )  # fmt: skip
 
     @classmethod
@@ -152,7 +152,7 @@ def _camera(context):
 
 
 class CANDELA_CAMERA_PT_eye_pictures(bpy.types.Panel):
-    """Observers to begin with, the pupil, and what the eye makes of a point of light"""
+    """Presets of observers, the pupil, and the glare of a point of light"""
 
     bl_label = "Observer"
     bl_space_type = "PROPERTIES"
