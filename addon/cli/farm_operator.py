@@ -19,7 +19,7 @@ class CandelaFarmJob(bpy.types.Operator):
     bl_idname = "candela.farm_job"
     bl_label = "Candela Farm Job"
 
-    directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", description="Name of the job")
+    directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", description="Folder for the job description")
     chunk: bpy.props.IntProperty(name="Frames per Task", default=5, min=1)
     split_samples: bpy.props.IntProperty(
         name="Slices",

@@ -85,7 +85,8 @@ class CandelaComparison(bpy.types.PropertyGroup):
         max=65536,
     )  # fmt: skip
     percentage: bpy.props.IntProperty(
-        name="Resolution", description="Size of the compared pictures, in percent of the render resolution", default=50, min=1, max=100,
+        name="Resolution", description="Size of the compared pictures, in percent of the render resolution",
+        default=50, min=1, max=100,
         subtype="PERCENTAGE",
     )  # fmt: skip
     view: bpy.props.EnumProperty(name="View", description="What the image shows", items=VIEWS, update=_show)

@@ -15,7 +15,7 @@ from .jobs import Job
 
 
 class CandelaGrassPatch(Job, bpy.types.Operator):
-    """Render a tile of grass with Cycles from all directions, as a patch for materials; continues where it was stopped"""
+    """Render a tile of grass with Cycles from all directions, as a patch for materials; continues after a stop"""
 
     bl_idname = "candela.grass_patch"
     bl_label = "Candela Grass Patch"

@@ -91,11 +91,13 @@ class CandelaTuning(bpy.types.PropertyGroup):
         soft_max=60000.0, precision=0,
     )  # fmt: skip
     percentage: bpy.props.IntProperty(
-        name="Resolution", description="Size of the pictures, in percent of the render resolution", default=25, min=1, max=100,
+        name="Resolution", description="Size of the pictures, in percent of the render resolution",
+        default=25, min=1, max=100,
         subtype="PERCENTAGE",
     )  # fmt: skip
     budget: bpy.props.IntProperty(
-        name="Search", description="Duration of the search in seconds, after Cycles has rendered the reference", default=120, min=1,
+        name="Search", description="Duration of the search in seconds, after Cycles has rendered the reference",
+        default=120, min=1,
         soft_max=600,
     )  # fmt: skip
     reference_samples: bpy.props.IntProperty(
