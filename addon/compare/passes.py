@@ -1,4 +1,4 @@
-"""The names under which render passes are compared, and how each is compared.
+"""Names of the render passes that are compared, and the metric of each.
 
 One table holds, for every picture, Candela's name, Blender's two spellings (the render passes were renamed in 5.0)
 and the view-layer switch that makes Blender produce it. Everything else in this package reads the table.

@@ -1,4 +1,4 @@
-"""Film points: where a picture has few samples, each reaches the eye from several points of the film.
+"""Film points: with few samples, each is drawn at several points of a pixel.
 
 Light costs more than what reflects it, and is smoother. So each of a few samples draws its surfaces K times, and lights
 them once:

@@ -17,6 +17,7 @@ from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
+from ..materials.reader import FINE_LAYERS
 from ..snapshot.scene import Image, Note, Snapshot
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
@@ -59,7 +60,7 @@ class MaterialSet:
     def update(self, snapshot: Snapshot) -> None:
         """Compile and upload what changed."""
         if self.energy_table is None:
-            self.energy_table = images.upload(energy_texture())
+            self.energy_table = images.upload(energy_texture(FINE_LAYERS))
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())

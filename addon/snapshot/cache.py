@@ -1,4 +1,4 @@
-"""What one sync may take over from the last one, and the rule that decides it.
+"""What a sync may reuse from the previous one, and the rule that decides it.
 
 Meshes. Blender gives an evaluated mesh a new `session_uid` each time it evaluates the geometry, so the same
 number means the same content, and nothing is read. A new number, or a data-block that an update names, only

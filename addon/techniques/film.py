@@ -1,4 +1,4 @@
-"""Film: gathers the samples that need no light (emission, the visible world, colours, normals), depth, and the sum.
+"""Film: samples that need no light (emission, visible world, colours, normals), depth, and the sum of all.
 
 Colours are what Cycles puts into its colour passes: diffuse albedo with all layer weights, and the estimated albedo
 of the glossy lobe. Light is stored with its colour; engine.py divides, after the mean, as Cycles does. Lights with

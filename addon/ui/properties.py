@@ -124,15 +124,15 @@ def _annotations() -> dict:
         ),
         "use_denoise": bpy.props.BoolProperty(
             name="Denoise Render", default=True, update=_redraw,
-            description="Take what is left of noise out of final renders, after their last sample",
+            description="Filter the remaining noise of final renders after the last sample",
         ),
         "use_viewport_denoise": bpy.props.BoolProperty(
             name="Denoise Viewport", default=True, update=_redraw,
-            description="Take what is left of noise out of the viewport's picture, after its last sample",
+            description="Filter the remaining noise of the viewport after its last sample",
         ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,
-            description="Leave the pictures of rendered viewports as they are, so that the GPU is free for other work",
+            description="Stop updating rendered viewports, so that the GPU is free for other work",
         ),
     }  # fmt: skip
     out["pass_tree"] = bpy.props.PointerProperty(
