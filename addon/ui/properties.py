@@ -44,10 +44,11 @@ _SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "
 
 def titled(label: str) -> str:
     """A label as Blender writes its own: Title Case but for small words in its middle."""
-    words = label.split(" ")
-    return " ".join(
-        word if number and word in _SMALL else word[:1].upper() + word[1:] for number, word in enumerate(words)
-    )
+    words = [
+        word if number and word in _SMALL else "-".join(part[:1].upper() + part[1:] for part in word.split("-"))
+        for number, word in enumerate(label.split(" "))
+    ]
+    return " ".join(words)
 
 
 def precision_of(default: float) -> int:
