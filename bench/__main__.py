@@ -32,6 +32,8 @@ from bench import (
     reflections,
     relief,
     run,
+    soft_sources,
+    strips,
     subsurface,
 )
 
@@ -55,6 +57,8 @@ VERBS = {
     "random": random_scenes,
     "reflections": reflections,
     "relief": relief,
+    "strips": strips,
+    "soft_sources": soft_sources,
     "subsurface": subsurface,
     "page": page,
     "points_motion": points_motion,

@@ -1,36 +1,32 @@
 """Shading of hits: what rays meet, as closures of the materials there, laid out like the surface images.
 
-A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record of
-some numbers per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates,
-normals. For each material among them one pass over the screen runs *its own* program at its records (textures,
-procedurals, bumps, vertex colours, emission, alpha) into six images as those of surfaces/draw.py, masked by depth: the
-trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
-reads surface images (lighting, indirect light) then reads hits.
+A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record
+per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates, normals. For
+each material met, one pass over the screen runs *its own* program at its records (textures, procedurals, bumps, vertex
+colours, emission, alpha) into six images like those of surfaces/draw.py. The trace writes the material as depth and the
+pass tests for EQUAL, so a driver skips blocks of other pixels. Whatever reads surface images then reads hits.
 
-The first picture asks which materials were met, by a flag for each, and compiles their programs alone. Asking stops the
-queue, so where rays can meet no more than MOST_UNASKED, later pictures compile the rest (in a viewport one each) and
-then draw all of them without asking; the vertices of one that was not met leave the screen, by the same flags. Scenes
-of more materials ask in each round.
+The first picture flags the materials that were met and compiles those programs alone. Reading flags stops the queue, so
+where rays can meet no more than MOST_UNASKED materials, later pictures compile the rest (in a viewport one each) and
+draw all of them without asking: vertices of a material that was not met leave the screen by the same flags. Scenes of
+more materials read the flags in each round.
 
-Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
-of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
-attributes by that number, made when it is first met. Derivatives are those of the ray's footprint, for bumps.
+`owners` gives for each triangle of the hierarchy its instance and its number within its material, and each material has
+a list of corner attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
 
     rays (origin, direction)  --trace-->  Records  --shade-->  closures
 
 | cost | per round of rays |
 |---|---|
-| passes | 1 trace, 1 that flags the materials met, 1 for each of those |
-| draws that end at their vertices | 1 for each other material that rays can meet; with many materials none |
+| passes | 1 trace, 1 that flags the materials met, 1 for each of those; 1 that ends at its vertices for others |
 | readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
 
-One with more than MOST_IMAGES images is its mean reflectance instead.
-
 Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
 Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits. Relief goes on over
-the edges of its mesh (shaders/hits/relief.glsl); grass is its ground.
+the edges of its mesh (shaders/hits/relief.glsl); grass is its ground. A material with more than MOST_IMAGES images is
+its mean reflectance instead.
 """
 
 from __future__ import annotations
