@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 
 from .graph import Graph, Input, Node
+from .ies import Profile
 from .sky import sky_of
 from .values import to_kind
 
 Notes = tuple[tuple[str, str], ...]
-ImageKey = Callable[[object, object], str]  # (bpy Image or Sky, ImageUser or None) -> Image.key
+# (bpy Image or Sky, ImageUser or None) or (Profile, label of its node) -> Image.key
+ImageKey = Callable[[object, object], str]
 
 KINDS = {
     "VALUE": "FLOAT",
@@ -33,6 +36,7 @@ KINDS = {
 # An output's constant may go by another name.
 CONSTANT_NODES = {"ShaderNodeRGB": {}, "ShaderNodeValue": {}, "ShaderNodeNormal": {"Normal": "Direction"}}
 
+MOST_OF_PROFILE = 1 << 22  # bytes of an IES file: they have some kilobytes
 TABLE_ROWS = 129  # points at which curves, and colour ramps that are no plain blends, are tabulated
 
 SUBSURFACE_SETTINGS = {"subsurface_method", "falloff"}
@@ -259,6 +263,9 @@ class _Reading:
         label = node.label or node.name
         settings = _settings(node)
         image = sky_of(settings) if node.bl_idname == "ShaderNodeTexSky" else getattr(node, "image", None)
+        user = getattr(node, "image_user", None)
+        if node.bl_idname == "ShaderNodeTexIES":
+            image, user = _profile(node), label
         return Node(
             key,
             " / ".join((*place.path, label)),
@@ -266,7 +273,7 @@ class _Reading:
             inputs,
             outputs,
             {**settings, **self._surroundings(node)},
-            "" if image is None else self.image_key(image, getattr(node, "image_user", None)),
+            "" if image is None else self.image_key(image, user),
         )
 
     def _surroundings(self, node) -> dict[str, object]:
@@ -316,6 +323,17 @@ class _Reading:
             node.image,
         )
         self.notes.append((node.label, f"The link into '{identifier}' closes a circle and was cut."))
+
+
+def _profile(node) -> Profile:
+    """What an IES Texture reads, from a text in the file or from one beside it."""
+    if node.mode == "INTERNAL":
+        return Profile(node.ies.as_string() if node.ies is not None else "")
+    path = Path(bpy.path.abspath(node.filepath, library=node.id_data.library))
+    try:
+        return Profile(path.read_bytes()[:MOST_OF_PROFILE].decode("latin-1"))
+    except (OSError, ValueError):
+        return Profile("")
 
 
 def _pass_through(conversions: list[str], kind: str) -> None:

@@ -111,6 +111,16 @@ class MaterialSet:
             self._scene.update(**values)
 
     @property
+    def scene_block(self) -> Block:
+        """From where the scene is seen, for node trees; once `set_view` was called."""
+        return self._scene
+
+    @property
+    def view_key(self) -> tuple:
+        """Equal in two frames if they are seen alike."""
+        return self._view
+
+    @property
     def soft(self) -> bool:
         """Some material has a lobe of shaders/lib/soft_lobe.glsl, so that programs which light surfaces need it."""
         return any(compiled.soft for compiled in self.compiled)
@@ -384,7 +394,13 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
+        constants=(
+            *PROJECTION_CONSTANTS,
+            ("INT", "sample_index"),
+            ("VEC4", "light_point"),
+            ("INT", "glass_blocks"),
+            ("INT", "channel_asked"),
+        ),
         defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
         **_shared(compiled),
     )
@@ -406,7 +422,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
-        constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
+        constants=tuple(one for one in like.constants if one[1] not in ("glass_blocks", "channel_asked")),
         defines=(*EVERY_DEFINES, *_own_defines(compiled, "light_point")),
     )
 

@@ -36,10 +36,10 @@ def _constant(graph: Graph, node: Node, socket: str):
     if linked is not None and linked.type == "ShaderNodeBlackbody":
         temperature, exact = constant_number(graph, linked, "Temperature")
         return blackbody(temperature), exact
-    if linked is not None and linked.type == "ShaderNodeLightFalloff":
+    if linked is not None and linked.type == "ShaderNodeLightFalloff" and source.link[1] == "Quadratic":
         strength, exact = constant_number(graph, linked, "Strength")
-        smooth, _ = constant_number(graph, linked, "Smooth")
-        return strength, exact and source.link[1] == "Quadratic" and smooth == 0.0
+        smooth, constant = constant_number(graph, linked, "Smooth")
+        return strength, exact and constant and smooth == 0.0
     return source.value, False
 
 

@@ -69,7 +69,7 @@ def take(
     notes += walk_notes
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
-    lights = _lights(*_at_a_place(light_places, notes), shading, notes)
+    lights = _lights(*_at_a_place(light_places, notes), shading)
     volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
@@ -248,17 +248,21 @@ def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> 
     return entry, True
 
 
-def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
+def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable) -> tuple[Light, ...]:
     made = []
     for place, matrix in zip(places, transforms, strict=True):
         facts, block = place.source.facts, place.source.data
-        tint = np.ones(3)
+        tint, of_tree = np.ones(3), {}
         if uses_nodes(block):
             key = f"light {(block.original or block).session_uid}"
             graph = shading.graph_of(block, key, f"Light '{facts.name}'")
-            tint, remarks = emission_of_graph(graph, facts.name)
-            notes.extend(remarks)
-        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint)
+            tint = emission_of_graph(graph)
+            if tint is None:
+                tint = np.ones(3)
+                of_tree = {
+                    "graph": graph, "random": place.random, "pass_index": facts.pass_index, "color": facts.color,
+                }  # fmt: skip
+        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint, **of_tree)
         if light is not None:
             made.append(light)
     return tuple(made)

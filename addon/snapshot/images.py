@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 
 from ..materials.atlas import layout, packed
+from ..materials.ies import Profile, profile_pixels
 from ..materials.sky import Sky, sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
 from .image_files import frame_of, read_file, read_layer, sequence_path, tile_path, to_scene_linear
@@ -64,6 +65,19 @@ class ImageTable:
         key = sky.name
         if key not in self.images:
             self.images[key] = Image(key, 0, sky_pixels(sky), "LINEAR", "NONE", "Sky")
+        return key
+
+    def key_of_profile(self, profile: Profile, label: str) -> str:
+        """Image.key of the table of an IES Texture, which depends on the file's text alone."""
+        key = profile.name
+        pixels, read = profile_pixels(profile)
+        if not read:
+            text = (
+                "the light profile is missing or cannot be read; the node gives 100 times its strength, as in Cycles."
+            )
+            self.notes.append(Note(f"Node '{label}'", text))
+        if key not in self.images:
+            self.images[key] = Image(key, 0, pixels, "LINEAR", "NONE", "IES")
         return key
 
     def _read(self, key: str, original, part: Part, old: ImageEntry | None) -> ImageEntry:

@@ -186,6 +186,10 @@ class Light:
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
+    graph: Graph | None = None  # a tree that is more than one colour and strength; `strength` is then without it
+    random: float = 0.0  # what the tree may ask of the object
+    pass_index: int = 0
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
