@@ -7,6 +7,7 @@ treated as if nothing were linked. Node settings are read generically, so that a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,7 @@ KINDS = {
 # An output's constant may go by another name.
 CONSTANT_NODES = {"ShaderNodeRGB": {}, "ShaderNodeValue": {}, "ShaderNodeNormal": {"Normal": "Direction"}}
 
+OF_INLINED = re.compile(r"^\d+_")  # before the names of nodes that Blender dissolved from groups and zones
 MOST_OF_PROFILE = 1 << 22  # bytes of an IES file: they have some kilobytes
 TABLE_ROWS = 129  # points at which curves, and colour ramps that are no plain blends, are tabulated
 
@@ -72,6 +74,8 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     tree = getattr(owner, "node_tree", None)
     if tree is None or not _uses_nodes(owner):
         return _graph_without_nodes(owner), ()
+    inlined = _inlined(owner, tree)  # holds the tree that is read
+    tree = tree if inlined is None else inlined.node_tree
     output = _active_output(tree)
     if output is None:
         return Graph(), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
@@ -92,6 +96,35 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     return (
         Graph(found, **links, displacement_method=method, transparent_shadow=shadow),
         tuple(dict.fromkeys(reading.notes)),
+    )
+
+
+# What only Blender dissolves, as it does before Cycles sees the tree: zones, closures, bundles, switches by menu.
+DISSOLVED = {
+    "GeometryNodeRepeatOutput", "NodeClosureOutput", "NodeEvaluateClosure", "NodeCombineBundle", "NodeSeparateBundle",
+    "NodeJoinBundle", "GeometryNodeMenuSwitch", "FunctionNodeInputBool", "FunctionNodeInputInt",
+}  # fmt: skip
+
+
+def _inlined(owner, tree):
+    """Blender's own flat copy of a tree, which lives as long as what comes back; None where the tree can be read as it
+    is, in which nodes keep their names."""
+    makers = getattr(bpy.types, "InlineShaderNodes", None)
+    if makers is None or not _has_dissolved(tree, set()):
+        return None
+    if isinstance(owner, bpy.types.Material):
+        return makers.from_material(owner)
+    return makers.from_world(owner) if isinstance(owner, bpy.types.World) else makers.from_light(owner)
+
+
+def _has_dissolved(tree, seen: set) -> bool:
+    """Whether some node of the tree, or of a group in it, is one that Blender dissolves."""
+    if tree is None or tree.as_pointer() in seen:
+        return False
+    seen.add(tree.as_pointer())
+    return any(
+        node.bl_idname in DISSOLVED or (node.bl_idname == "ShaderNodeGroup" and _has_dissolved(node.node_tree, seen))
+        for node in tree.nodes
     )
 
 
@@ -260,7 +293,7 @@ class _Reading:
                 if hasattr(socket, "default_value") and name not in inputs:
                     inputs[name] = Input(_kind(socket), _default(socket))
         outputs = {socket.identifier: _kind(socket) for socket in node.outputs}
-        label = node.label or node.name
+        label = node.label or OF_INLINED.sub("", node.name)
         settings = _settings(node)
         image = sky_of(settings) if node.bl_idname == "ShaderNodeTexSky" else getattr(node, "image", None)
         user = getattr(node, "image_user", None)

@@ -44,7 +44,8 @@ def same(pictures, places=np.s_[8:24, 8:24]):
 
 @pytest.mark.parametrize("material", MATERIALS)
 @pytest.mark.parametrize(("kind", "settings"), [
-    ("SUN", {"angle": 0.05}), ("POINT", {"shadow_soft_size": 0.2}), ("SPOT", {"spot_size": 2.0}), ("AREA", {"size": 1.0}),
+    ("SUN", {"angle": 0.05}), ("POINT", {"shadow_soft_size": 0.2}), ("SPOT", {"spot_size": 2.0}),
+    ("AREA", {"size": 1.0}),
 ])  # fmt: skip
 def test_of_lamps(stage, beside, material, kind, settings):
     stage.floor()
