@@ -15,6 +15,7 @@ from ..gfx.readback import Readback, Reading, put
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
+from ..materials.working_space import current
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
@@ -574,7 +575,10 @@ class Renderer:
         if world.graph is not None:
             named = (snapshot.images.get(node.image) for node in world.graph.nodes.values())
             tree = (world.graph, tuple((shown.key, shown.version) for shown in named if shown is not None))
-        key = (image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent)
+        key = (
+            image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent,
+            current().name,
+        )  # fmt: skip
         if self._environment is None or self._environment[0] != key:
             compiled = WorldTree(world, snapshot.images, self.materials.energy_table) if tree else None
             self._environment = (key, Environment(world, snapshot.film.transparent, compiled))

@@ -17,6 +17,7 @@ from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
+from ..materials.working_space import current
 from ..snapshot.scene import Image, Note, Snapshot
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
@@ -64,9 +65,10 @@ class MaterialSet:
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
-            if cached is None or cached[0] != (material.graph, versions):
+            key = material.graph, versions, current().name
+            if cached is None or cached[0] != key:
                 cached = (
-                    (material.graph, versions),
+                    key,
                     compile_material(material.name, material.graph, snapshot.images, lean=to_hold(True, False)),
                 )
             cache[material.key] = cached

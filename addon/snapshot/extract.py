@@ -9,8 +9,10 @@ from contextlib import contextmanager
 from functools import reduce
 from operator import or_
 
+import bpy
 import numpy as np
 
+from ..materials import working_space
 from . import camera as cameras
 from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
@@ -57,6 +59,7 @@ def take(
     start = time.perf_counter()
     scene = depsgraph.scene_eval
     notes: list[Note] = []
+    working_space.follow(getattr(getattr(bpy.data, "colorspace", None), "working_space", working_space.REC709))
     if view is None:
         camera = camera or scene.camera
         view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)

@@ -26,6 +26,7 @@ import numpy as np
 from ..gfx import images
 from ..gfx.struct import Block
 from ..materials.attributes import CAMERA, INSTANCE
+from ..materials.working_space import current
 from ..scene.lamp_trees import (
     AREA,
     CONE,
@@ -80,7 +81,7 @@ class LampMaps:
             named = [
                 snapshot.images[node.image] for node in light.graph.nodes.values() if node.image in snapshot.images
             ]
-            key = light.graph, tuple((image.key, image.version) for image in named)
+            key = light.graph, tuple((image.key, image.version) for image in named), current().name
             kept = self._trees.get(light.key)
             if kept is None or kept[0] != key:
                 kept = key, LampTree(light, snapshot.images, materials.energy_table)
