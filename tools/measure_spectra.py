@@ -13,7 +13,7 @@ import numpy as np
 
 from addon.compare.reference import render_passes
 from addon.materials.spectra import BLACKBODY, TABLE, WAVELENGTH
-from addon.materials.working_space import REC709
+from addon.materials.working_space import REC709, SPACES
 from bench.node_cases import Case, tile_scene
 
 
@@ -28,7 +28,7 @@ def measured(cases: list[Case], space: str) -> np.ndarray:
 def main() -> None:
     kelvin = [Case("", "Blackbody", "Color", {}, {"Temperature": 1.0 / place}) for place in BLACKBODY.places()]
     tables = {}
-    for space in bpy.data.colorspace.bl_rna.properties["working_space"].enum_items.keys():
+    for space in SPACES:
         end = "" if space == REC709 else f" {space}"
         tables[f"blackbody{end}"] = measured(kelvin, space)
         tables[f"wavelength{end}"] = unclamped_wavelengths(space)

@@ -149,8 +149,8 @@ class MappedRow(np.ndarray):
 
 
 def emitters(snapshot: Snapshot, origin: np.ndarray, maps: LampMaps | None = None) -> list[Emitter]:
-    """The scene's lights that give something, in an order of their own: choices by lot then do not depend on names and
-    on the order in the scene. `maps`: what their node trees make of their light."""
+    """The scene's lights that give something, in an order of their own, so that random choices do not depend on names
+    and on the order in the scene. `maps`: what their node trees make of their light."""
     found = (
         emitter(light, origin) if light.graph is None else _mapped(light, origin, maps) for light in snapshot.lights
     )

@@ -67,7 +67,7 @@ def test_luminance(stage, beside, space, kind):
 @pytest.mark.parametrize("floats", [False, True])
 @pytest.mark.parametrize("named", ["sRGB", "Linear Rec.709", "Non-Color"])
 def test_texture(stage, beside, space, floats, named):
-    tree, node = shown(stage, "ShaderNodeTexImage", "Color")
+    _, node = shown(stage, "ShaderNodeTexImage", "Color")
     image = bpy.data.images.new("Texture", 4, 4, float_buffer=floats)
     image.colorspace_settings.name = named
     image.pixels.foreach_set(np.tile(np.array([0.9, 0.3, 0.1, 1.0], np.float32), 16))
