@@ -149,7 +149,9 @@ class Expressions:
             settled = node.inputs.get(approximation.unless_linked)
             if socket is None or (settled is not None and self.exists(settled.link)):
                 continue
-            if self.exists(socket.link) or to_kind(socket.value, socket.kind, "FLOAT") != approximation.harmless:
+            value = to_kind(socket.value, socket.kind, "FLOAT")
+            harmless = round(value) if approximation.harmless == "whole" else approximation.harmless
+            if self.exists(socket.link) or value != harmless:
                 self.note(node, approximation.sentence)
         if node.properties.get("texture_mapping", PLAIN_MAPPING) != PLAIN_MAPPING:
             self.note(node, "The node's own Texture Mapping panel is not read; use a Mapping node.")
