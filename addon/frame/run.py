@@ -15,6 +15,7 @@ from ..gfx.readback import Readback, Reading, put
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
+from ..materials.working_space import current
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
@@ -30,6 +31,7 @@ from ..scene.view import VIEW, View, blackman_harris_offset
 from ..scene.world_tree import WorldTree
 from ..snapshot.scene import RANKED, Snapshot
 from ..sources.environment import Environment
+from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
 from . import probe
@@ -66,6 +68,7 @@ class Frame:
     surface_means: SurfaceMeans
     measured_opacity: OpacityMaps
     measured_emission: EmissionMaps
+    lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -112,7 +115,7 @@ class Frame:
     @cached_property
     def emitters(self) -> list[Emitter]:
         """The scene's lights that give something, in an order of their own."""
-        return emitters(self.snapshot, self.geometry.origin)
+        return emitters(self.snapshot, self.geometry.origin, self.lamp_maps)
 
     def random(self, use: str) -> tuple[float, float]:
         """This sample's point of the sequence for `use`."""
@@ -338,6 +341,7 @@ class Renderer:
         self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
         self._glow = EmissionMaps()
+        self._lamp_maps = LampMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
@@ -382,12 +386,15 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         environment = self._update_environment(snapshot)
+        self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)
         compile_started = time.perf_counter()
         ledger.times["upload"] = compile_started - started
         yield from compiling(self._programs(plan, snapshot, settings))
         ledger.times["compile"] = time.perf_counter() - compile_started
-        ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes)))
+        ledger.notes = tuple(
+            dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes))
+        )
 
         key = self._content_key(snapshot, settings, plan)
         if self.frame is not None and not geometry_changed and key == self._frame_key:
@@ -410,7 +417,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means, self._opacity, self._glow, lasting=self._lasting,
+            self._surface_means, self._opacity, self._glow, self._lamp_maps, lasting=self._lasting,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -582,6 +589,7 @@ class Renderer:
         self.displacement.release()
         self.materials.release()
         self._hierarchies.release()
+        self._lamp_maps.release()
         self._environment = self._view_block = self._frame_key = None
         self._keys.clear()
         for kept in self._lasting.values():
@@ -602,7 +610,10 @@ class Renderer:
         if world.graph is not None:
             named = (snapshot.images.get(node.image) for node in world.graph.nodes.values())
             tree = (world.graph, tuple((shown.key, shown.version) for shown in named if shown is not None))
-        key = (image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent)
+        key = (
+            image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent,
+            current().name,
+        )  # fmt: skip
         if self._environment is None or self._environment[0] != key:
             compiled = WorldTree(world, snapshot.images, self.materials.energy_table) if tree else None
             self._environment = (key, Environment(world, snapshot.film.transparent, compiled))
@@ -637,7 +648,7 @@ class Renderer:
         # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights_key(snapshot), casters, self._environment[0], self.materials.fingerprint(),
+            lights_key(snapshot), self._lamp_maps.changes, casters, self._environment[0], self.materials.fingerprint(),
             volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
             settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
@@ -683,6 +694,7 @@ def lights_key(snapshot: Snapshot) -> tuple:
     return tuple(
         (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
          light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
+         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own,
+         *(() if light.graph is None else (light.graph, light.random, light.pass_index, light.color)))
         for light in snapshot.lights
     )  # fmt: skip

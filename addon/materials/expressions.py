@@ -18,6 +18,7 @@ from .nodes.entry import Entry
 from .nodes.image import FUNCTIONS, MISSING_COLOR, part_functions, tiled_functions
 from .nodes.image import SOURCE as IMAGE_SOURCE
 from .values import ValueBlock, glsl_number, to_kind
+from .working_space import current
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
 DEEPEST_BUMP = 3  # bump nodes within the heights of bump nodes: each level is evaluated three times
@@ -38,6 +39,19 @@ def convert(expression: str, kind: str, wanted: str) -> str:
     if wanted == "FLOAT":
         return f"color_luminance({expression})" if kind == "COLOR" else f"vector_average({expression})"
     return f"vec3({expression})"
+
+
+def _working_luminance() -> str:
+    """What tells the luminance of colours in the generated text, where they are no Rec. 709."""
+    space = current()
+    if space.usual:
+        return ""
+    weights = glsl_number(tuple(space.luminance), "COLOR")
+    return (
+        f"float working_luminance(vec3 color)\n{{\n  return dot(color, {weights});\n}}\n"
+        "#define color_luminance(color) working_luminance(color)\n"
+        "#define rgb_to_bw(color, result) result = working_luminance(color)\n"
+    )
 
 
 class _Scope:
@@ -83,6 +97,7 @@ class Expressions:
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
         wanted = [(k, source) for k, sources in enumerate(self.image_keys.values()) for source in sources]
         keys = list(self.image_keys)
+        includes += _working_luminance()
         functions = "".join("\n" + self._image_functions(keys[k], k, source) for k, source in wanted)
         functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
@@ -134,7 +149,9 @@ class Expressions:
             settled = node.inputs.get(approximation.unless_linked)
             if socket is None or (settled is not None and self.exists(settled.link)):
                 continue
-            if self.exists(socket.link) or to_kind(socket.value, socket.kind, "FLOAT") != approximation.harmless:
+            value = to_kind(socket.value, socket.kind, "FLOAT")
+            harmless = round(value) if approximation.harmless == "whole" else approximation.harmless
+            if self.exists(socket.link) or value != harmless:
                 self.note(node, approximation.sentence)
         if node.properties.get("texture_mapping", PLAIN_MAPPING) != PLAIN_MAPPING:
             self.note(node, "The node's own Texture Mapping panel is not read; use a Mapping node.")

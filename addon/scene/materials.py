@@ -18,6 +18,7 @@ from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..materials.reader import FINE_LAYERS
+from ..materials.working_space import current
 from ..snapshot.scene import Image, Note, Snapshot
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
@@ -65,9 +66,10 @@ class MaterialSet:
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
-            if cached is None or cached[0] != (material.graph, versions):
+            key = material.graph, versions, current().name
+            if cached is None or cached[0] != key:
                 cached = (
-                    (material.graph, versions),
+                    key,
                     compile_material(material.name, material.graph, snapshot.images, lean=to_hold(True, False)),
                 )
             cache[material.key] = cached
@@ -110,6 +112,16 @@ class MaterialSet:
             self._scene = Block(MATERIAL_SCENE, **values)
         else:
             self._scene.update(**values)
+
+    @property
+    def scene_block(self) -> Block:
+        """From where the scene is seen, for node trees; once `set_view` was called."""
+        return self._scene
+
+    @property
+    def view_key(self) -> tuple:
+        """Equal in two frames if they are seen alike."""
+        return self._view
 
     @property
     def soft(self) -> bool:
@@ -449,7 +461,13 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
+        constants=(
+            *PROJECTION_CONSTANTS,
+            ("INT", "sample_index"),
+            ("VEC4", "light_point"),
+            ("INT", "glass_blocks"),
+            ("INT", "channel_asked"),
+        ),
         defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
         **_shared(compiled),
     )
@@ -471,7 +489,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
-        constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
+        constants=tuple(one for one in like.constants if one[1] not in ("glass_blocks", "channel_asked")),
         defines=(*EVERY_DEFINES, *_own_defines(compiled, "light_point")),
     )
 

@@ -10,8 +10,10 @@ from dataclasses import replace
 from functools import reduce
 from operator import or_
 
+import bpy
 import numpy as np
 
+from ..materials import working_space
 from . import camera as cameras
 from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
@@ -76,6 +78,7 @@ def take(
     start = time.perf_counter()
     scene = depsgraph.scene_eval
     notes: list[Note] = []
+    working_space.follow(getattr(getattr(bpy.data, "colorspace", None), "working_space", working_space.REC709))
     if view is None:
         camera = camera or scene.camera
         view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)
@@ -88,7 +91,7 @@ def take(
     notes += walk_notes
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
-    lights = _lights(*_at_a_place(light_places, notes), shading, notes)
+    lights = _lights(*_at_a_place(light_places, notes), shading)
     volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
@@ -268,17 +271,21 @@ def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> 
     return entry, True
 
 
-def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
+def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable) -> tuple[Light, ...]:
     made = []
     for place, matrix in zip(places, transforms, strict=True):
         facts, block = place.source.facts, place.source.data
-        tint = np.ones(3)
+        tint, of_tree = np.ones(3), {}
         if uses_nodes(block):
             key = f"light {(block.original or block).session_uid}"
             graph = shading.graph_of(block, key, f"Light '{facts.name}'")
-            tint, remarks = emission_of_graph(graph, facts.name)
-            notes.extend(remarks)
-        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint)
+            tint = emission_of_graph(graph)
+            if tint is None:
+                tint = np.ones(3)
+                of_tree = {
+                    "graph": graph, "random": place.random, "pass_index": facts.pass_index, "color": facts.color,
+                }  # fmt: skip
+        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint, **of_tree)
         if light is not None:
             made.append(replace(light, group=facts.group) if facts.group else light)
     return tuple(made)

@@ -191,6 +191,10 @@ class Light:
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
     group: str = ""  # light group of the object
+    graph: Graph | None = None  # a tree that is more than one colour and strength; `strength` is then without it
+    random: float = 0.0  # what the tree may ask of the object
+    pass_index: int = 0
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import bpy
 
 from ..materials.attributes import attributes_of
 from ..materials.graph import Graph, Input, Node
+from ..materials.ies import Profile
 from ..materials.nodes.inputs import FLAT
 from ..materials.reader import read_graph
 from ..materials.sky import Sky
@@ -99,6 +100,8 @@ class ShadingTable:
                 key = self._images.key_of_sky(image)
                 shown.append((image, key))
                 return key
+            if isinstance(image, Profile):
+                return self._images.key_of_profile(image, user)
             key = self._images.key_of(image, user)
             shown.append(((image.original or image).session_uid, key))
             return key
@@ -122,6 +125,8 @@ class ShadingTable:
             return False
         if any("object_matrix" in node.properties for node in entry.graph.nodes.values()):
             return False  # another object's place is part of it
+        if any(node.type == "ShaderNodeTexIES" for node in entry.graph.nodes.values()):
+            return False  # its file, or text, changes without a trace
         if entry.images and self._images_by_uid is None:
             self._images_by_uid = {image.session_uid: image for image in bpy.data.images}
         for uid, key in entry.images:
