@@ -118,17 +118,22 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "split_light_groups": bpy.props.BoolProperty(
+            name="Direct and Indirect", update=_redraw,
+            description="Write two more passes for each light group: its direct light with what is seen of it, and its "
+            "indirect light",
+        ),
         "use_denoise": bpy.props.BoolProperty(
             name="Denoise Render", default=True, update=_redraw,
-            description="Take what is left of noise out of final renders, after their last sample",
+            description="Filter the remaining noise of final renders after the last sample",
         ),
         "use_viewport_denoise": bpy.props.BoolProperty(
             name="Denoise Viewport", default=True, update=_redraw,
-            description="Take what is left of noise out of the viewport's picture, after its last sample",
+            description="Filter the remaining noise of the viewport after its last sample",
         ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,
-            description="Leave the pictures of rendered viewports as they are, so that the GPU is free for other work",
+            description="Stop updating rendered viewports, so that the GPU is free for other work",
         ),
     }  # fmt: skip
     out["pass_tree"] = bpy.props.PointerProperty(
