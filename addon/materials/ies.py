@@ -54,7 +54,7 @@ def profile_pixels(profile: Profile) -> tuple[np.ndarray, str]:
 
 
 def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Vertical angles (V) and horizontal ones from 0 to 360 (H), degrees, watts (H, V), type. ValueError: no profile."""
+    """Vertical angles (V) and horizontal ones from 0 to 360 (H), degrees, watts (H, V), type. Raises ValueError."""
     tilt = re.search(r"^\s*TILT\s*=\s*(\S+).*$", text, re.MULTILINE)
     if tilt is None:
         raise ValueError("no TILT line")
