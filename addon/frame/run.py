@@ -29,7 +29,7 @@ from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View, blackman_harris_offset
 from ..scene.world_tree import WorldTree
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import RANKED, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
@@ -39,7 +39,7 @@ from .bands import Bands
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
-from .technique import Service, Technique
+from .technique import Service, Technique, Write
 
 ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
@@ -81,6 +81,7 @@ class Frame:
     needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
+    more_writes: list[Write] = field(default_factory=list)  # see `add_write`
     readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -274,6 +275,25 @@ class Frame:
                 row[name] = row.get(name, 0) + factor * round(float(amount))
         self._texels.clear()
         return found[:height, : image.width] if image is not None else pixels
+
+    def add_write(self, write: Write) -> images.Image:
+        """An image that this picture alone has, as for passes that its view layer asks for by name; empty.
+        In `begin`."""
+        if write.name not in self.images:
+            self.images[write.name] = images.pool.take(*self.size, write.format)
+            self.more_writes.append(write)
+        self.target(write.name).clear()
+        return self.images[write.name]
+
+    @property
+    def writes(self) -> list[Write]:
+        """What the plan's techniques write, and what was added for this picture."""
+        return [*(write for technique in self.plan.techniques for write in technique.writes), *self.more_writes]
+
+    @property
+    def sums(self) -> set[str]:
+        """Names of what adds up over samples."""
+        return {write.name for write in self.writes if write.accumulates}
 
     def drop(self) -> None:
         """Give back the images of the frame."""
@@ -513,7 +533,7 @@ class Renderer:
         else:  # the wait for the GPU, with what comes of it first
             read = frame.read_with_counters(frame.to_show(first))
         waited = time.perf_counter()
-        sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
+        sums = frame.sums
         out, bad = {}, 0
         for name in names:
             if name not in frame.images:  # no technique of the plan brings such light
@@ -526,6 +546,8 @@ class Renderer:
                 pixels = np.where(finite, pixels, 0.0).astype(np.float32)
             if name in sums and frame.samples_done:
                 pixels /= frame.samples_done
+            if name.startswith(RANKED) and frame.samples_done:
+                pixels[..., 1::2] /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
         took = frame.drawn_s + frame.profiler.awaited + waited - started
@@ -634,13 +656,13 @@ class Renderer:
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
+            snapshot.motion and snapshot.motion.key,
         )  # fmt: skip
 
     def _clear_sums(self, frame: Frame) -> None:
-        for technique in frame.plan.techniques:
-            for write in technique.writes:
-                if write.accumulates and write.name in frame.images:
-                    frame.target(write.name).clear()
+        for write in frame.writes:
+            if (write.accumulates or write.ranked) and write.name in frame.images:
+                frame.target(write.name).clear()
 
 
 def _stage(frame: Frame, stage: str) -> Iterator[None]:

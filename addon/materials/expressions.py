@@ -81,7 +81,7 @@ class Expressions:
         self._function_names: dict[tuple[tuple[str, str], str], str] = {}
         self._function_depths: dict[str, int] = {}
         self._constants: dict[tuple[str, words.Argument], str] = {}
-        self._read_outputs = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+        self._read_outputs = graph.read
 
     @property
     def lines(self) -> list[str]:
@@ -269,7 +269,7 @@ class Expressions:
             if argument.output and (node.key, argument.output) not in self._read_outputs:
                 return "vec4(0.0)"
             name = argument.name or str(node.properties.get(argument.property, ""))
-            return self._attribute(node, argument.kind, name)
+            return self.attribute(node, argument.kind, name)
         if isinstance(argument, words.Used):
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
         if isinstance(argument, words.Rows):
@@ -316,7 +316,11 @@ class Expressions:
 
     def call_it(self, function: str, head: str) -> None:
         """Give one of the functions of `function` a name that does not depend on the tree."""
-        self._functions.append(f"\n{head}(SurfacePoint point)\n{{\n  return {function}(point);\n}}\n")
+        self.returns(f"{function}(point)", head)
+
+    def returns(self, value: str, head: str) -> None:
+        """A function of the surface point of that name whose value is an expression."""
+        self._functions.append(f"\n{head}(SurfacePoint point)\n{{\n  return {value};\n}}\n")
 
     def socket(self, node: Node, socket: words.Socket) -> str:
         expression = self._socket_value(node, socket)
@@ -343,12 +347,12 @@ class Expressions:
         implicit = "" if given is not None and given.given else socket.implicit
         if implicit == "@RADIAL":
             self.includes["material/input.glsl"] = None
-            generated = self._attribute(node, "GENERATED", "")
+            generated = self.attribute(node, "GENERATED", "")
             return f"surface_tangent(point, vec3(0.5 - {generated}.y, {generated}.x - 0.5, 0.0))"
         if implicit == "@UV":
-            return f"vec3({self._attribute(node, 'UV', '')}.xy, 0.0)"
+            return f"vec3({self.attribute(node, 'UV', '')}.xy, 0.0)"
         if implicit == "@GENERATED":
-            return f"{self._attribute(node, 'GENERATED', '')}.xyz"
+            return f"{self.attribute(node, 'GENERATED', '')}.xyz"
         if implicit:
             return implicit
         value, kind = (socket.default, socket.kind) if given is None else (given.value, given.kind)
@@ -357,7 +361,7 @@ class Expressions:
             return glsl_number(0.0, socket.kind)
         return self._constant(node, socket, constant, socket.kind)
 
-    def _attribute(self, node: Node, kind: str, name: str) -> str:
+    def attribute(self, node: Node, kind: str, name: str) -> str:
         attribute = Attribute(kind, name)
         if attribute not in self.attributes:
             if len(self.attributes) >= MAX_ATTRIBUTES:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -20,6 +20,7 @@ from .sky import sky_of
 from .values import to_kind
 
 Notes = tuple[tuple[str, str], ...]
+Aovs = tuple[tuple[str, str], ...]
 # (bpy Image or Sky, ImageUser or None) or (Profile, label of its node) -> Image.key
 ImageKey = Callable[[object, object], str]
 
@@ -49,6 +50,7 @@ _settings_of_type: dict[str, tuple] = {}
 WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
 
 
+FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # Cycles has the fine table of dielectric layers (energy.py)
 INLINES = bpy.app.version >= (5, 0, 0)  # Blender dissolves groups itself before Cycles sees the tree
 
 
@@ -65,28 +67,34 @@ class _Place:
         return () if self.parent is None else (*self.parent.path, self.group.name)
 
 
-def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
-    """The node tree of a material, world or light as a flat graph, and sentences about what could not be read.
+def read_graph(owner, image_key: ImageKey, aovs: Aovs = ()) -> tuple[Graph, Notes]:
+    """The node tree of a material, world or light as a flat graph, and sentences about what could not be read. Of a
+    material with what its AOV Output nodes give for `aovs`, the names and kinds that are wanted.
 
     `image_key(image, image_user)` names the pixels of an image node. An ID without a usable tree gives the graph that
     Blender means by it: diffuse in the viewport colour for a material, the plain colour for a world.
     """
     tree = getattr(owner, "node_tree", None)
+    if not isinstance(owner, bpy.types.Material):
+        aovs = ()
+    uv = tuple((name, kind, Input("VECTOR")) for name, kind in aovs if not name)
     if tree is None or not _uses_nodes(owner):
-        return _graph_without_nodes(owner), ()
+        return replace(_graph_without_nodes(owner), aovs=uv), ()
     inlined = _inlined(owner, tree)  # holds the tree that is read
     tree = tree if inlined is None else inlined.node_tree
     output = _active_output(tree)
     if output is None:
-        return Graph(), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
+        return Graph(aovs=uv), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
     reading = _Reading(image_key, getattr(owner, "pass_index", 0))
     place = _Place(tree)
     links = {}
     for name in ("Surface", "Volume", "Displacement"):
         socket = output.inputs.get(name)
         links[name.lower()] = None if socket is None else reading.source(place, output, socket).link
+    given = reading.aovs(place, {name: kind for name, kind in aovs if name}) if aovs else ()
     reading.read_pending()
-    found = reading.cut_cycles(links)
+    roots = {**links, **{f"AOV {name}": socket.link for name, _, socket in given}}
+    found = reading.cut_cycles(roots)
     if isinstance(owner, bpy.types.Material) and links["volume"] is not None and links["surface"] is None:
         # A volume alone has no surface; only a tree without either is black.
         clear = Node("No surface", owner.name, "ShaderNodeBsdfTransparent", {"Color": WHITE}, {"BSDF": "SHADER"})
@@ -94,7 +102,7 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     shadow = bool(getattr(owner, "use_transparent_shadow", True))
     method = getattr(owner, "displacement_method", "BUMP")
     return (
-        Graph(found, **links, displacement_method=method, transparent_shadow=shadow),
+        Graph(found, **links, displacement_method=method, transparent_shadow=shadow, aovs=(*uv, *given)),
         tuple(dict.fromkeys(reading.notes)),
     )
 
@@ -245,6 +253,22 @@ class _Reading:
         texture = asked.node.bl_idname.startswith("ShaderNodeTex")
         given = INLINES and socket != asked and socket.node.bl_idname == "ShaderNodeGroup"
         return Input(wanted, _converted(value, kind, wanted), given=given and (texture or not socket.hide_value))
+
+    def aovs(self, place: _Place, wanted: dict[str, str]) -> tuple[tuple[str, str, Input], ...]:
+        """What AOV Output nodes of a tree and the groups in it give for the wanted names, of kinds COLOR and VALUE."""
+        found: dict[str, tuple[str, str, Input]] = {}
+        for node in place.tree.nodes:
+            if node.mute:
+                continue
+            if node.bl_idname == "ShaderNodeOutputAOV" and node.aov_name in wanted:
+                kind = wanted[node.aov_name]
+                socket = node.inputs["Color" if kind == "COLOR" else "Value"]
+                found[node.aov_name] = node.aov_name, kind, self.source(place, node, socket)
+            elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+                inside = self._inside(place, node)
+                if inside is not None:
+                    found = {entry[0]: entry for entry in self.aovs(inside, wanted)} | found
+        return tuple(found.values())
 
     def _inside(self, place: _Place, group) -> _Place | None:
         """The tree of a group node; None, with a sentence, for a missing tree or one that contains itself."""

@@ -6,6 +6,7 @@ import gc
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import reduce
 from operator import or_
 
@@ -14,12 +15,28 @@ import numpy as np
 
 from ..materials import working_space
 from . import camera as cameras
+from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
-from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
+from .motion import with_motion
+from .scene import (
+    CRYPTOMATTES,
+    Aov,
+    Camera,
+    Film,
+    Instance,
+    Light,
+    Mesh,
+    Mist,
+    Moment,
+    Note,
+    Snapshot,
+    Visibility,
+    World,
+)
 from .shading import ShadingTable
 from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
@@ -47,6 +64,7 @@ def take(
     view: Camera | None = None,
     border: tuple[int, int, int, int] | None = None,
     shown: Callable | None = None,
+    around: tuple[motions.Moment, motions.Moment] | None = None,
 ) -> Snapshot:
     """Read the evaluated scene for a picture of `width` x `height` pixels.
 
@@ -54,7 +72,8 @@ def take(
     in renders, a viewport's leaves out what is hidden there. `camera`: object that overrides the scene's camera.
     `view`: a ready view (see `camera_of_view`), no camera is needed then. `border`: pixels (x0, y0, x1, y1);
     without one the scene's render border counts, unless `view` is given. `shown`: predicate on objects, for a
-    viewport's local view. Raises UnsupportedScene when there is nothing to look through.
+    viewport's local view. `around`: the frames before and after, for the Vector pass. Raises UnsupportedScene when
+    there is nothing to look through.
     """
     start = time.perf_counter()
     scene = depsgraph.scene_eval
@@ -67,7 +86,7 @@ def take(
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)
-    shading = ShadingTable(cache, images)
+    shading = ShadingTable(cache, images, aovs_of(depsgraph.view_layer_eval))
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
@@ -95,7 +114,7 @@ def take(
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start
-    return snapshot
+    return snapshot if around is None else with_motion(snapshot, *around)
 
 
 def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np.ndarray]:
@@ -178,7 +197,8 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 Instance(
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
-                    of_object.terminator, of_object.own, of_object.caustics_caster,
+                    of_object.terminator, of_object.own, of_object.caustics_caster, of_object.asset,
+                    of_object.group,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
@@ -267,7 +287,7 @@ def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable) 
                 }  # fmt: skip
         light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint, **of_tree)
         if light is not None:
-            made.append(light)
+            made.append(replace(light, group=facts.group) if facts.group else light)
     return tuple(made)
 
 
@@ -288,7 +308,7 @@ def _world(
     graph, sun = sun_of(graph, visibility)
     world, remarks = read_world(graph, block.name, images.images, visibility)
     notes.extend(remarks)
-    return world, sun
+    return replace(world, group=block.lightgroup), sun and replace(sun, group=block.lightgroup)
 
 
 # Exponents of the Mist pass, as Cycles has them.
@@ -310,7 +330,21 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,
+        aovs=aovs_of(layer),
+        alpha_threshold=layer.pass_alpha_threshold,
+        cryptomattes=tuple(kind for kind in CRYPTOMATTES if getattr(layer, f"use_pass_cryptomatte_{kind}")),
+        cryptomatte_levels=layer.pass_cryptomatte_depth,
+        light_groups=tuple(group.name for group in layer.lightgroups),
     )
+
+
+def aovs_of(layer) -> tuple[Aov, ...]:
+    """What a view layer asks for of the surfaces seen, passes without a name first."""
+    named = [Aov(aov.name, aov.type) for aov in layer.aovs if aov.is_valid]
+    vector, cycles = layer.use_pass_vector, getattr(layer, "cycles", None)  # there while the Cycles add-on is enabled
+    denoising = getattr(cycles, "denoising_store_passes", False)
+    wanted = (("UV", layer.use_pass_uv), ("VECTOR", vector), ("HIT", vector), ("DISTANCE", denoising))
+    return (*(Aov("", kind) for kind, asked in wanted if asked), *named)
 
 
 def _clear_glass(cycles) -> float:
