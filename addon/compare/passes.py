@@ -36,6 +36,7 @@ PASS_NAMES = (
 OTHER_NAMES = (
     PassName("mist", "Mist", "Mist", "use_pass_mist"),
     PassName("position", "Position", "Position", "use_pass_position"),
+    PassName("uv", "UV", "UV", "use_pass_uv"),
     PassName("object_index", "Object Index", "IndexOB", "use_pass_object_index"),
     PassName("material_index", "Material Index", "IndexMA", "use_pass_material_index"),
 )
