@@ -29,7 +29,7 @@ Bias: none. Wider and very narrow filters (below half a pixel) have own points o
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -58,6 +58,14 @@ def taps(place: float, width: float) -> tuple[int, np.ndarray]:
     pixel = int(np.floor(place + 0.5))
     weights = blackman_harris((np.arange(-pixels, pixels + 1) + place - pixel) / width)
     return pixel, weights / weights.sum()
+
+
+@lru_cache(maxsize=4096)
+def _constants_of(place: float, width: float) -> tuple[int, tuple[float, ...], float]:
+    """The pixel of `taps`, the first four of five weights, and the last."""
+    pixel, weights = taps(place, width)
+    padded = [*weights.tolist(), *[0.0] * (2 * FARTHEST + 1 - len(weights))]
+    return pixel, tuple(padded[:4]), padded[4]
 
 
 # What media let pass of an image on its way to the eye: nothing is lost of it, colours are, and of the image that holds
@@ -107,8 +115,7 @@ def add(
     """Add `share` of the images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset),
     to the frame's images of these names. `through`: what media let pass there. Returns the number of passes."""
     width = frame.snapshot.film.filter_width
-    (x, across), (y, up) = (taps(one, width) for one in place)
-    across, up = (np.append(weights, np.zeros(2 * FARTHEST + 1 - len(weights))) for weights in (across, up))
+    (x, across, last_across), (y, up, last_up) = (_constants_of(one, width) for one in place)
     count = -(-len(seen) // MOST_IMAGES)
     for part in range(count):
         names = tuple(seen)[part::count]
@@ -122,8 +129,8 @@ def add(
                 **({"through": through} if dimmed else {}),
             },
             constants={
-                "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
-                "last_weights": (across[4], up[4]),
+                "film_share": share, "film_pixel": (x, y), "weights_x": across, "weights_y": up,
+                "last_weights": (last_across, last_up),
             },
         )  # fmt: skip
     return count

@@ -121,35 +121,36 @@ def point_views(
         return views
     views = []
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
-    for face_forward, face_u, face_v in (
+    faces = np.array((
         (forward, u, v), (u, v, forward), (-u, v, -forward), (v, forward, u), (-v, forward, -u), (-forward, u, -v),
-    ):  # fmt: skip
-        # A box meets the face's pyramid if its sphere lies on the inner side of all four planes.
-        inside = np.ones(len(centre), bool)
-        for side in (face_u, -face_u, face_v, -face_v):
-            inside &= (centre @ (face_forward - side)) > -np.sqrt(2.0) * radius
-        if axis is not None and face_forward is not forward and not (offsets[inside] @ axis > 0).any():
+    ))  # fmt: skip
+    # A box meets the face's pyramid if its sphere lies on the inner side of all four planes.
+    along, beside = centre @ faces[:, 0].T, np.abs(centre @ faces[:, 1:].reshape(12, 3).T).reshape(-1, 6, 2)
+    inside = along - beside.max(axis=2) > (-np.sqrt(2.0) * radius)[:, None]
+    size = max(resolution // 2, 1)
+    slack = 2.0 / size  # faces overlap by more than their jitter
+    low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
+    shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
+    low, high = low + shift, high + shift
+    for number, ((face_forward, face_u, face_v), met) in enumerate(zip(faces, inside.T)):
+        if not met.any():
             continue
-        if inside.any():
-            size = max(resolution // 2, 1)
-            slack = 2.0 / size  # faces overlap by more than their jitter
-            low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
-            shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
-            far = (offsets[inside] @ face_forward).max()
-            views.append(
-                _perspective(position, face_u, face_v, face_forward, low + shift, high + shift, geometry.size, far, 2)
-            )
+        reached = offsets[met]
+        if axis is not None and number and not (reached @ axis > 0).any():
+            continue
+        far = (reached @ face_forward).max()
+        views.append(_perspective(position, face_u, face_v, face_forward, low, high, geometry.size, far, 2))
     return views
 
 
 def _perspective(position, u, v, forward, low, high, size, far, scale=1) -> MapView:
     near = 1e-4 * min(size, max(float(far), 1e-6 * size))  # what is seen may be small in a scene with a far background
-    row_w = np.append(forward, -forward @ position)
-    x, y = np.append(u, -u @ position), np.append(v, -v @ position)
-    row_x = (2 * x - (low[0] + high[0]) * row_w) / (high[0] - low[0])
-    row_y = (2 * y - (low[1] + high[1]) * row_w) / (high[1] - low[1])
-    one = np.array([0.0, 0.0, 0.0, 1.0])
-    return MapView(np.stack([row_x, row_y, row_w, one]), near, (*position, 1.0), scale, 1.0 / max(float(far), near))
+    rows = np.zeros((4, 4))
+    rows[:3, :3] = u, v, forward
+    rows[:3, 3] = -(rows[:3, :3] @ position)
+    rows[:2] = (2 * rows[:2] - (low + high)[:, None] * rows[2]) / (high - low)[:, None]
+    rows[3, 3] = 1.0
+    return MapView(rows, near, (*position, 1.0), scale, 1.0 / max(float(far), near))
 
 
 def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float):

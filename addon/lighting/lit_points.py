@@ -59,6 +59,7 @@ class Run:
     nodes: images.Image
     own: tuple[images.Image, ...]
     facing: images.Image
+    materials: frozenset[int]
     shaded: images.Target | None = None
 
     @property
@@ -158,13 +159,14 @@ class LitPoints:
         own = tuple(images.upload(_both_sides(column[order])) for column in columns)
         facing = np.zeros((2 * len(points), 4), np.float32)
         facing[0::2, :3], facing[1::2, :3] = -normal[order], normal[order]  # from in front, from behind
-        return Run(points, tree, tree.upload(), own, images.upload(facing.reshape(-1, ROW, 4)))
+        materials = frozenset(material[np.isfinite(position).all(axis=1)].astype(int).tolist())
+        return Run(points, tree, tree.upload(), own, images.upload(facing.reshape(-1, ROW, 4)), materials)
 
     def _shade(self, frame: Frame, technique: Technique, run: Run) -> None:
         hits, records = frame.kept(Hits), Records.take(run.size)
         closures = take_closures(run.size, records.target.depth)
-        met = hits.place(frame, technique, run.own, records)
-        hits.shade(frame, technique, run.facing, records, met, closures)
+        hits.place(frame, technique, run.own, records)
+        hits.shade(frame, technique, run.facing, records, run.materials, closures)
         run.shaded = images.Target(tuple(images.pool.take(*run.size, "RGBA32F") for _ in range(3)))
         passes.fullscreen(
             REFLECT, run.shaded, blocks={"film_view": frame.view_block},

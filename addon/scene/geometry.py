@@ -79,6 +79,7 @@ class SceneGeometry:
         self.origin = np.zeros(3)
         self.bounds_min = np.zeros(3)  # of all instances, world space, float64
         self.bounds_max = np.zeros(3)
+        self.size = 1.0  # diagonal of the bounds in metres; 1 for an empty scene
         self.instances: images.Image | None = None
         self.draws: list[Draw] = []  # by material, corner attributes: surfaces, and casters with alpha
         self.opaque_casters: list[Draw] = []  # positions only, materials ignored
@@ -98,12 +99,6 @@ class SceneGeometry:
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
         self._clusters: tuple[int, list[casters.Clusters] | None] = (-1, None)
-
-    @property
-    def size(self) -> float:
-        """Diagonal of the scene's bounds in metres; 1 for an empty scene."""
-        diagonal = float(np.linalg.norm(self.bounds_max - self.bounds_min))
-        return diagonal if diagonal > 0.0 else 1.0
 
     @property
     def triangles(self) -> int:
@@ -191,6 +186,8 @@ class SceneGeometry:
             reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
             self._low, self._high = world - reach, world + reach  # per instance
             self.bounds_min, self.bounds_max = self._low.min(axis=0), self._high.max(axis=0)
+        diagonal = float(np.linalg.norm(self.bounds_max - self.bounds_min))
+        self.size = diagonal if diagonal > 0.0 else 1.0
         camera = self._where_seen(snapshot.camera)
         # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
         # In a landscape the steps are smaller: at its rim float32 knows a place to .2 mm only.

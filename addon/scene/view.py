@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -128,6 +128,7 @@ def _blackman_harris() -> tuple[np.ndarray, np.ndarray]:
     return t, np.concatenate([[0.0], cumulative / cumulative[-1]])
 
 
+@lru_cache(maxsize=4096)
 def blackman_harris_offset(u: float, width: float) -> float:
     """Film offset in pixels for a uniform number, distributed as the Blackman-Harris filter of support +-width."""
     places, cumulative = _blackman_harris()

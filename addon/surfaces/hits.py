@@ -254,14 +254,13 @@ class Hits:
 
     def place(
         self, frame: Frame, technique: Technique, points: tuple[images.Image, ...], records: Records
-    ) -> set[int]:  # fmt: skip
-        """Take points that are known as hits, and return their materials: images as the first three of RECORDS, and
-        one of the number of the material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
+    ) -> None:  # fmt: skip
+        """Take points that are known as hits: images as the first three of RECORDS, and one of the number of the
+        material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
         names = (name for _, name in PLACE.textures)
         passes.fullscreen(PLACE, records.target, textures=dict(zip(names, points)))
         frame.count(technique, "passes")
         self._flag_met(frame, records)
-        return set(np.flatnonzero(images.read(records.met)).tolist())
 
     def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
         """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
