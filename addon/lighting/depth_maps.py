@@ -9,14 +9,16 @@ Every view is shifted and turned at random each sample, so that texel edges aver
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..gfx import images, passes
+from ..gfx.geometry import Batch
 from ..gfx.library import Program, Shader
 from ..scene.casters import Clusters
-from ..scene.culling import CORNERS, Boxes, calls
+from ..scene.culling import CORNERS, Boxes, calls, joined
 from ..scene.geometry import Draw, SceneGeometry
 from ..scene.projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES, ROWS
 from ..scene.receivers import Receivers
@@ -310,6 +312,7 @@ def draw_views(
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What has not moved since the first sample is worth being written out; a view that turns finds it so.
     resting = geometry.resting_casters(make=sample > 0 and lasting)
+    together = geometry.casters_together() if resting is None else []
     boxes, alpha_boxes = geometry.caster_boxes, Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
     for view, (x, y, side) in zip(views, cells):
@@ -321,13 +324,23 @@ def draw_views(
         if resting is not None:
             for clusters in resting:
                 sent += _draw_resting(atlas, viewport, constants, clusters, view, light_point)
+        elif together:
+            for casters, chunks, closed in together:
+                seen = chunks.seen(view.rows, view.least_q)
+                one_sided = seen & closed & (True if light_point is None else chunks.without(light_point))
+                for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
+                    runs = joined(casters.first, drawn)
+                    sent += _draw_runs(atlas, viewport, constants, geometry, casters.batch, runs, cull)
         else:
             seen = boxes.seen(view.rows, view.least_q)
             one_sided = seen & shells & (True if light_point is None else boxes.without(light_point))
             for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
                 sent += _draw_instanced(atlas, viewport, constants, geometry, np.flatnonzero(drawn), cull)
-        with passes.drawing(atlas.target, viewport=viewport):
-            for call in calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q))):
+        layered = (
+            [*calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q)))] if alpha.draws else []
+        )
+        with passes.drawing(atlas.target, viewport=viewport) if layered else nullcontext():
+            for call in layered:
                 shader, bindings = alpha.programs[call.draw.material]
                 own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point,
                        "glass_blocks": int(view.glass_blocks)}  # fmt: skip
@@ -343,17 +356,32 @@ def _draw_resting(atlas: Atlas, viewport, constants: dict, clusters: Clusters, v
     one_sided = seen & clusters.one_sided(light_point)
     sent = 0
     for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
-        with passes.drawing(atlas.target, viewport=viewport, cull=cull):
-            shader.bind(constants=constants)
-            for first, count in clusters.runs(drawn):
-                passes.draw_range(shader, clusters.batch, first, count)
-                sent += count
+        runs = clusters.calls(drawn)
+        if runs:
+            with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+                shader.bind(constants=constants)
+                for first, count in runs:
+                    passes.draw_range(shader, clusters.batch, first, count)
+                    sent += count
     return sent
+
+
+def _draw_runs(atlas: Atlas, viewport, constants: dict, geometry: SceneGeometry, batch: Batch, runs, cull) -> int:
+    if not runs:
+        return 0
+    shader = passes.get(OPAQUE)
+    with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+        shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
+        for first, count in runs:
+            passes.draw_range(shader, batch, first, count)
+    return sum(count for _, count in runs)
 
 
 def _draw_instanced(atlas: Atlas, viewport, constants: dict, geometry: SceneGeometry, seen: np.ndarray, cull) -> int:
     shader = passes.get(OPAQUE)
     sent = 0
+    if not len(seen):
+        return sent
     with passes.drawing(atlas.target, viewport=viewport, cull=cull):
         shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
         for call in calls(geometry.opaque_casters, seen):

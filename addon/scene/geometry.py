@@ -32,6 +32,7 @@ TRANSMISSION_FLAG = 32  # no shader asks for it, but the frame begins anew when 
 TEXELS_PER_INSTANCE = 8  # layout in shaders/lib/instance.glsl
 MOST_MOVED = 32  # instances; for more the whole list is uploaded, sorted anew
 JOINED_TRIANGLES = 2000  # about so many triangles of joined meshes make one draw: enough to fill a GPU, few to cull
+FEW_DRAWS = 4  # of casters, which need not be joined
 GROUP_TRIANGLES = 600  # the same for groups of instances
 
 
@@ -88,6 +89,7 @@ class SceneGeometry:
         # Instances with triangles, by their rows in `instances`; meshes; materials.
         self.placed: tuple[list[Instance], dict[str, Mesh], list[CompiledMaterial]] = ([], {}, [])
         self.changes = 0  # updates that changed anything: what was drawn of the same number still stands
+        self.drawn = 0  # the same for which meshes and materials instances show, wherever they stand
         self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
         self._draw_key = None
         self.instance_rows = np.zeros((0, TEXELS_PER_INSTANCE, 4), np.float32)
@@ -98,6 +100,8 @@ class SceneGeometry:
         self._moved: list[Block] = []
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
+        self._together: tuple[int, list[casters.Together]] = (-1, [])
+        self._chunks: tuple[int, list] = (-1, [])
         self._clusters: tuple[int, list[casters.Clusters] | None] = (-1, None)
 
     @property
@@ -120,9 +124,15 @@ class SceneGeometry:
                 self._set_bounds()
             return changed
         self._draw_key = None  # until they are there
+        self.drawn += 1
         self._make_draws(instances, snapshot.meshes, materials)
         self._draw_key = key
         return True
+
+    @property
+    def instance_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 3) ends of the boxes of the placed instances, relative to the origin."""
+        return self._low - self.origin, self._high - self.origin
 
     def rows_showing(self, material: int) -> bytes:
         """What the instance image holds of the instances that show a material."""
@@ -137,6 +147,25 @@ class SceneGeometry:
                 return None
             self._clusters = (self.changes, casters.clusters(*self.placed, self.origin))
         return self._clusters[1]
+
+    def casters_together(self) -> list[tuple[casters.Together, Boxes, np.ndarray]]:
+        """Opaque casters in few batches, with the boxes of their chunks and (C,) whether back faces of a chunk may be
+        left out; none where there are too many triangles, or few draws anyhow."""
+        if len(self.opaque_casters) <= FEW_DRAWS:
+            return []
+        if self._together[0] != self.drawn:
+            self._together = (self.drawn, casters.together(*self.placed, self._shell))
+            self._chunks = (-1, [])
+        if self._chunks[0] != self.changes:
+            low, high, found = *self.instance_bounds, []
+            for one in self._together[1]:
+                lows, highs = (
+                    f.reduceat(ends[one.rows], one.edges) for f, ends in ((np.minimum, low), (np.maximum, high))
+                )
+                turned = np.maximum.reduceat(self._mirrored[one.rows], one.edges)
+                found.append((one, Boxes.between(lows, highs), ~turned & one.closed))
+            self._chunks = (self.changes, found)
+        return self._chunks[1]
 
     def is_closed(self, mesh: Mesh) -> bool:
         """Whether a mesh that is shown bounds a volume and faces outwards."""

@@ -48,7 +48,7 @@ from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..scene.acceleration import Hierarchy
 from ..scene.geometry import corner_attribute
-from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, values_struct
+from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, may_share, shared_struct, values_struct
 from ..scene.view import VIEW
 from ..snapshot.scene import Instance, Mesh
 from .draw import refracts
@@ -58,6 +58,8 @@ MOST_IMAGES = 9  # of a material: 16 textures less those of records
 MOST_UNASKED = 64  # materials that are all evaluated, without a readback that tells which were met
 MOST_MATERIALS = 8000  # that depth tells apart, see trace.frag.glsl
 ROW = 256  # of lists by material
+MET_ROWS = -(-MOST_MATERIALS // ROW)
+LEADER_BITS = 13  # of numbers that hold two, as in hits/shared.glsl
 RECORDS = ("place", "triangle", "normals", "passed")
 RECORD_TEXTURES = tuple(("RGBA32F", f"hit_{name}") for name in RECORDS[:3])
 RAYS = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"))
@@ -75,7 +77,7 @@ TRACE = passes.fullscreen_program(
 MATERIALS_MET = Program(
     name="materials met",
     compute="hits/met.comp.glsl",
-    textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material")),
+    textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material"), ("RGBA32F", "absorption")),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
 COUNT_MET = passes.fullscreen_program(
@@ -85,7 +87,10 @@ COUNT_MET = passes.fullscreen_program(
 PLACE = passes.fullscreen_program(
     "points as hits",
     "hits/place.frag.glsl",
-    textures=tuple(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
+    textures=(
+        *(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
+        ("RGBA32F", "absorption"),
+    ),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
     writes_depth=True,
 )
@@ -126,6 +131,7 @@ def hit_program(compiled: CompiledMaterial) -> Program:
 
 def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
+    shared = may_share(compiled)
     room = len(compiled.images) + len(listed) < MOST_IMAGES + 1
     return Program(
         name=f"hits {compiled.program_key[:8]}",
@@ -134,13 +140,23 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
             *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
+            *((("R32F", "hit_material"), ("RGBA32F", "absorption")) if shared else ()),
         ),
-        blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
+        blocks=(
+            (VIEW, "film_view"), (shared_struct() if shared else values_struct(compiled), "material_values"),
+            (MATERIAL_SCENE, "material_scene"),
+        ),
         constants=(
             ("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth"), ("INT", "material_number"),
         ),
         snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
-        **{**MASKED, "defines": (*MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()))},
+        **{
+            **MASKED,
+            "defines": (
+                *MASKED["defines"], *((("ASKS_IF_MET", str(MET_ROWS)),) if room else ()),
+                *((("SHARED_VALUES", "1"), ("MATERIAL_BASE", "material_base")) if shared else ()),
+            ),
+        },
     )  # fmt: skip
 
 
@@ -175,13 +191,14 @@ class Records:
     """What rays of a round met: RECORDS, the number of the material, and that as depth."""
 
     target: images.Target
-    met: images.Image  # by material, in rows of ROW: 1 if any ray has met it
+    # By material, in rows of ROW: 1 if any ray has met it; in the second half, if any has met one of its program.
+    met: images.Image
 
     @classmethod
     def take(cls, size: tuple[int, int]) -> Records:
         """Images of the pool, undefined."""
         colors = [images.pool.take(*size, "RGBA32F") for _ in RECORDS] + [images.pool.take(*size, "R32F")]
-        met = images.pool.take(ROW, -(-MOST_MATERIALS // ROW), "R32UI")
+        met = images.pool.take(ROW, 2 * MET_ROWS, "R32UI")
         return cls(images.Target(tuple(colors), images.pool.take(*size, "DEPTH_COMPONENT32F")), met)
 
     @property
@@ -257,8 +274,8 @@ class Hits:
     ) -> None:  # fmt: skip
         """Take points that are known as hits: images as the first three of RECORDS, and one of the number of the
         material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
-        names = (name for _, name in PLACE.textures)
-        passes.fullscreen(PLACE, records.target, textures=dict(zip(names, points)))
+        textures = {name: image for (_, name), image in zip(PLACE.textures, points)}
+        passes.fullscreen(PLACE, records.target, textures={**textures, "absorption": self._absorption_of(frame)})
         frame.count(technique, "passes")
         self._flag_met(frame, records)
 
@@ -277,10 +294,12 @@ class Hits:
         found = records.images
         shared = {f"hit_{name}": found[f"hit_{name}"] for name in RECORDS[:3]}
         shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
+        lists = {"hit_material": found["hit_material"], "absorption": self._absorption_of(frame)}
         view, shader = {"film_view": frame.view_block}, None
+        leaders = {frame.materials.leaders[k] for k in materials}
         with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
             # One program after the other: between materials that share one, only what differs is bound.
-            for material in sorted(materials, key=lambda k: (_program_key(frame.materials.compiled[k]), k)):
+            for material in sorted(leaders, key=lambda k: (_program_key(frame.materials.compiled[k]), k)):
                 program, own = self._own_bindings(frame, material, number)
                 if program.textures and ("UINT_2D", "materials_met") in program.textures:
                     own["textures"]["materials_met"] = records.met
@@ -290,6 +309,8 @@ class Hits:
                 else:
                     shader = wanted
                     textures, blocks = own["textures"] | shared, own["blocks"] | view
+                    if ("R32F", "hit_material") in program.textures:
+                        textures |= lists
                     shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
@@ -297,7 +318,7 @@ class Hits:
             number_of_all = {"material_count": len(frame.materials.compiled)}
             passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
             frame.count_texel(technique, "materials", count.colors[0])
-        frame.count(technique, "passes", len(materials) + 1)
+        frame.count(technique, "passes", len(leaders) + 1)
 
     def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
         """The program of a material, and what it binds besides records, rays, instances and the view."""
@@ -306,7 +327,9 @@ class Hits:
         if len(compiled.images) > MOST_IMAGES:
             textures = {"reflectance": self._mean_reflectance(frame)}
             return MEAN, {"textures": textures, "blocks": {}, "constants": constants}
-        bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
+        bound = frame.materials.bindings(
+            material, frame.geometry.instances, own=False, shared=may_share(compiled)
+        )  # fmt: skip
         textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
         if compiled.attributes:
             textures["hit_attributes"] = self._attributes_of(material, compiled)
@@ -329,13 +352,13 @@ class Hits:
                 unknown -= unknown if frame.settings.whole else {min(unknown)}
             if not unknown:
                 return possible
-        return set(np.flatnonzero(images.read(records.met)).tolist())
+        return set(np.flatnonzero(images.read(records.met)[:MET_ROWS]).tolist())
 
-    @staticmethod
-    def _flag_met(frame: Frame, records: Records) -> None:
+    def _flag_met(self, frame: Frame, records: Records) -> None:
         """Write flags of the materials of these records."""
         records.met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
+        textures["absorption"] = self._absorption_of(frame)
         passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
 
     def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:
@@ -413,13 +436,16 @@ class Hits:
         return known[1]
 
     def _absorption_of(self, frame: Frame) -> images.Image:
-        """What insides of solids absorb, per metre, by material."""
-        media = [material.medium if material.glass else None for material in frame.materials.compiled]
-        key = tuple(medium and medium.key for medium in media)
+        """By material: what insides of solids absorb, per metre; which material leads those of its program, and where
+        its values begin among theirs."""
+        materials = frame.materials
+        media = [material.medium if material.glass else None for material in materials.compiled]
+        key = (*(medium and medium.key for medium in media), *materials.leaders, *materials.first_rows)
         if self._absorption is None or self._absorption[0] != key:
             table = np.zeros((-(-max(len(media), 1) // ROW) * ROW, 4), np.float32)
-            for row, medium in zip(table, media):
-                row[:3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
+            for k, medium in enumerate(media[:MOST_MATERIALS]):
+                table[k, :3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
+                table[k, 3] = materials.leaders[k] + (materials.first_rows[k] << LEADER_BITS)
             self._absorption = (key, images.upload(table.reshape(-1, ROW, 4)))
         return self._absorption[1]
 

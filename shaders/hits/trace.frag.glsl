@@ -8,8 +8,9 @@
 //              triangle emits, times distance squared over cosine: a density per steradian times the power of all
 //   material   its number
 //
-// Depth: 0 where there is no ray, 0.5 where one meets nothing, above where one does, by material.
+// Depth: 0 where there is no ray, 0.5 where one meets nothing, above where one does, by program.
 #include "trace/hierarchy.glsl"
+#include "hits/shared.glsl"
 
 vec4 owner_texel(int index)
 {
@@ -60,5 +61,5 @@ void main()
     out_passed.rgb = exp(-absorption_fetch(ivec2(material_index & 255, material_index >> 8)).rgb * t);
   }
   out_material = float(material_index);
-  gl_FragDepth = 0.5 + float(material_index + 1) * (1.0 / 16384.0);
+  gl_FragDepth = shared_depth(material_index);
 }
