@@ -121,7 +121,6 @@ def point_views(
             far = float(depth[_that_meet(tangents, low, high)].max())
             views.append(_perspective(position, u, v, forward, low, high, geometry.size, far))
         return views
-    views = []
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
     faces = np.array((
         (forward, u, v), (u, v, forward), (-u, v, -forward), (v, forward, u), (-v, forward, -u), (-forward, u, -v),
@@ -129,20 +128,20 @@ def point_views(
     # A box meets the face's pyramid if its sphere lies on the inner side of all four planes.
     along, beside = centre @ faces[:, 0].T, np.abs(centre @ faces[:, 1:].reshape(12, 3).T).reshape(-1, 6, 2)
     inside = along - beside.max(axis=2) > (-np.sqrt(2.0) * radius)[:, None]
+    met = inside.any(axis=0)
+    if axis is not None:  # beside the first face, what lies behind the light is not lit
+        lit = (offsets @ axis > 0).any(axis=1)
+        met[1:] &= inside[lit, 1:].any(axis=0)
+    far = np.where(inside, (offsets @ faces[:, 0].T).max(axis=1), -np.inf).max(axis=0)
     size = max(resolution // 2, 1)
     slack = 2.0 / size  # faces overlap by more than their jitter
     low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
     shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
     low, high = low + shift, high + shift
-    for number, ((face_forward, face_u, face_v), met) in enumerate(zip(faces, inside.T)):
-        if not met.any():
-            continue
-        reached = offsets[met]
-        if axis is not None and number and not (reached @ axis > 0).any():
-            continue
-        far = (reached @ face_forward).max()
-        views.append(_perspective(position, face_u, face_v, face_forward, low, high, geometry.size, far, 2))
-    return views
+    return [
+        _perspective(position, *faces[k, 1:], faces[k, 0], low, high, geometry.size, far[k], 2)
+        for k in np.flatnonzero(met)
+    ]
 
 
 def _perspective(position, u, v, forward, low, high, size, far, scale=1) -> MapView:
