@@ -52,7 +52,7 @@ class PathSources:
         """Once per picture, before `rows`."""
         wanted = sum(PATHS[path] for path in self.paths)
         self._emitters = [emitter for emitter in frame.emitters if emitter.flags & wanted]
-        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        used = frame.snapshot.used_materials
         self._triangles = None
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
             triangles = EmissiveTriangles(frame, self.paths)

@@ -92,6 +92,8 @@ class SceneGeometry:
         self.drawn = 0  # the same for which meshes and materials instances show, wherever they stand
         self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
         self._draw_key = None
+        self._any = False  # whether there is any instance
+        self._told: tuple = (None, ())  # the instances of the last update, and what of meshes and materials was asked
         self.instance_rows = np.zeros((0, TEXELS_PER_INSTANCE, 4), np.float32)
         self._order: list[int] = []  # of the snapshot's instances with triangles
         self._kinds: tuple = ()
@@ -110,6 +112,20 @@ class SceneGeometry:
 
     def update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""
+        told = (
+            tuple((key, mesh.version) for key, mesh in snapshot.meshes.items()),
+            tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials),
+        )
+        known = snapshot.instances is self._told[0] and told == self._told[1]
+        if known and np.array_equal(self.origin, self._origin(snapshot.camera)):  # the camera alone has moved
+            self.placed = (self.placed[0], snapshot.meshes, materials)
+            return False
+        self._told = (None, ())  # until they are there
+        changed = self._update(snapshot, materials)
+        self._told = (snapshot.instances, told)
+        return changed
+
+    def _update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         instances = [i for i in snapshot.instances if snapshot.meshes[i.mesh].triangle_count]
         instances = self._ordered(instances)
         changed = self._update_transforms(instances, snapshot)
@@ -195,6 +211,13 @@ class SceneGeometry:
             return place
         return place + forward * np.clip((middle - place) @ forward, camera.clip_start, camera.clip_end)
 
+    def _origin(self, camera) -> np.ndarray:
+        """Near the camera, where float32 has most digits; snapping keeps the origin, and with it all uploads, over
+        small moves. In a landscape the steps are smaller: at its rim float32 knows a place to .2 mm only."""
+        step = np.clip(self.size / STEPS, min(self.size, LARGE), self.size)
+        grid = 2.0 ** np.ceil(np.log2(step)) if self._any else 1.0
+        return np.round(self._where_seen(camera) / grid) * grid
+
     def _update_transforms(self, instances: list[Instance], snapshot: Snapshot) -> bool:
         if not instances:
             self.bounds_min = self.bounds_max = np.zeros(3)
@@ -217,12 +240,8 @@ class SceneGeometry:
             self.bounds_min, self.bounds_max = self._low.min(axis=0), self._high.max(axis=0)
         diagonal = float(np.linalg.norm(self.bounds_max - self.bounds_min))
         self.size = diagonal if diagonal > 0.0 else 1.0
-        camera = self._where_seen(snapshot.camera)
-        # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
-        # In a landscape the steps are smaller: at its rim float32 knows a place to .2 mm only.
-        step = np.clip(self.size / STEPS, min(self.size, LARGE), self.size)
-        grid = 2.0 ** np.ceil(np.log2(step)) if instances else 1.0
-        self.origin = np.round(camera / grid) * grid
+        self._any = bool(instances)
+        self.origin = self._origin(snapshot.camera)
         rows = np.zeros((max(len(instances), 1), TEXELS_PER_INSTANCE, 4), np.float32)
         if len(self._written) == len(instances) and len(self.instance_rows) == len(rows):
             rows[:, 3:] = self.instance_rows[:, 3:]

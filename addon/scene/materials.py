@@ -498,7 +498,7 @@ def _emission_map_program(compiled: CompiledMaterial) -> Program:
 
 def may_be_glossy(snapshot: Snapshot) -> bool:
     """Whether a material that is shown may have a glossy lobe; that of empty slots has one since Blender 5.0."""
-    shown = {index for instance in snapshot.instances for index in instance.materials or (0,)}
+    shown = {index for slots in snapshot.material_sets for index in slots or (0,)}
     return any(_material_may_be_glossy(snapshot.materials[index]) for index in shown)
 
 

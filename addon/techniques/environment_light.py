@@ -346,4 +346,4 @@ def _patch(
 
 
 def _cast_shadows(frame: Frame) -> bool:
-    return any(instance.visibility.shadow for instance in frame.snapshot.instances)
+    return frame.snapshot.casts_shadows

@@ -186,7 +186,7 @@ class ShadedReflections(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
             return "the scene has no surface"
-        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        used = snapshot.used_materials
         if not may_be_glossy(snapshot) and not any(may_refract(snapshot.materials[slot].graph) for slot in used):
             return "no material mirrors or bends light"
         if settings.bounces == 0:
