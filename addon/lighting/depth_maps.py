@@ -311,7 +311,7 @@ def draw_views(
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What has not moved since the first sample is worth being written out; a view that turns finds it so.
     resting = geometry.resting_casters(make=sample > 0 and lasting)
-    together = geometry.casters_together() if resting is None else []
+    together = geometry.casters_together() if resting is None else None
     boxes, alpha_boxes = geometry.caster_boxes, Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
     for view, (x, y, side) in zip(views, cells):
@@ -323,12 +323,13 @@ def draw_views(
         if resting is not None:
             for clusters in resting:
                 sent += _draw_resting(atlas, viewport, constants, clusters, view, light_point)
-        elif together:
-            for casters, chunks, closed in together:
-                seen = chunks.seen(view.rows, view.least_q)
-                one_sided = seen & closed & (True if light_point is None else chunks.without(light_point))
-                for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
-                    runs = joined(casters.first, drawn)
+        elif together is not None:
+            parts, chunks, closed = together
+            seen = chunks.seen(view.rows, view.least_q)
+            one_sided = seen & closed & (True if light_point is None else chunks.without(light_point))
+            for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
+                for casters, own in parts:
+                    runs = joined(casters.first, drawn[own])
                     sent += _draw_runs(atlas, viewport, constants, geometry, casters.batch, runs, cull)
         else:
             seen = boxes.seen(view.rows, view.least_q)

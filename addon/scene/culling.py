@@ -99,10 +99,10 @@ def joined(first: np.ndarray, seen: np.ndarray) -> list[tuple[int, int]]:
     """First triangle and number of triangles of the calls that draw the chunks of a mask `seen` (C,), which begin with
     triangles `first` (C + 1,): what lies between two runs is drawn, too, where that costs this device less than a
     call."""
+    if not seen.any():
+        return []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]])))
     starts, ends = first[edges[0::2]].tolist(), first[edges[1::2]].tolist()
-    if not starts:
-        return []
     costs = device.current()
     most = CALL_OF_PASS * costs.python / max(costs.triangle, 1e-9)
     runs, begin, end = [], starts[0], ends[0]

@@ -103,7 +103,7 @@ class SceneGeometry:
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
         self._together: tuple[int, list[casters.Together]] = (-1, [])
-        self._chunks: tuple[int, list] = (-1, [])
+        self._chunks: tuple[int, tuple | None] = (-1, None)
         self._clusters: tuple[int, list[casters.Clusters] | None] = (-1, None)
 
     @property
@@ -164,23 +164,27 @@ class SceneGeometry:
             self._clusters = (self.changes, casters.clusters(*self.placed, self.origin))
         return self._clusters[1]
 
-    def casters_together(self) -> list[tuple[casters.Together, Boxes, np.ndarray]]:
-        """Opaque casters in few batches, with the boxes of their chunks and (C,) whether back faces of a chunk may be
-        left out; none where there are too many triangles, or few draws anyhow."""
+    def casters_together(self) -> tuple[list[tuple[casters.Together, slice]], Boxes, np.ndarray] | None:
+        """Opaque casters in few batches, each with its part of all chunks; the boxes of those, and (C,) whether back
+        faces of a chunk may be left out. None where there are too many triangles, or few draws anyhow."""
         if len(self.opaque_casters) <= FEW_DRAWS:
-            return []
+            return None
         if self._together[0] != self.drawn:
             self._together = (self.drawn, casters.together(*self.placed, self._shell))
-            self._chunks = (-1, [])
+            self._chunks = (-1, None)
+        if not self._together[1]:
+            return None
         if self._chunks[0] != self.changes:
-            low, high, found = *self.instance_bounds, []
+            low, high, count = *self.instance_bounds, 0
+            lows, highs, closed, parts = [], [], [], []
             for one in self._together[1]:
-                lows, highs = (
-                    f.reduceat(ends[one.rows], one.edges) for f, ends in ((np.minimum, low), (np.maximum, high))
-                )
-                turned = np.maximum.reduceat(self._mirrored[one.rows], one.edges)
-                found.append((one, Boxes.between(lows, highs), ~turned & one.closed))
-            self._chunks = (self.changes, found)
+                lows.append(np.minimum.reduceat(low[one.rows], one.edges))
+                highs.append(np.maximum.reduceat(high[one.rows], one.edges))
+                closed.append(~np.maximum.reduceat(self._mirrored[one.rows], one.edges) & one.closed)
+                parts.append((one, slice(count, count + len(one.edges))))
+                count += len(one.edges)
+            boxes = Boxes.between(np.concatenate(lows), np.concatenate(highs))
+            self._chunks = (self.changes, (parts, boxes, np.concatenate(closed)))
         return self._chunks[1]
 
     def is_closed(self, mesh: Mesh) -> bool:

@@ -20,6 +20,7 @@ Anew where meshes, materials of meshes, or instances come and go, not where they
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,11 +46,7 @@ class Part:
     leader: int  # the first of those materials
     batch: gfx_geometry.Batch
     first: np.ndarray  # (C + 1,) triangle with which each chunk begins; at the end their number
-    boxes: Boxes  # of the chunks
-
-    def runs(self, seen: np.ndarray) -> list[tuple[int, int]]:
-        """First triangle and number of triangles of calls that draw the chunks of the mask `seen`."""
-        return joined(self.first, seen)
+    own: slice  # of the chunks of all parts
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,16 @@ class Joint:
     """What is drawn together, and the mask of the geometry's draws that are left."""
 
     parts: list[Part]
+    boxes: Boxes  # of the chunks of all parts
     left: np.ndarray
+
+    def calls(self, rows: np.ndarray) -> Iterator[tuple[Part, list[tuple[int, int]]]]:
+        """Parts of which a view may see something, with the runs of triangles (first, count) that draw it."""
+        seen = self.boxes.seen(rows)
+        for part in self.parts:
+            runs = joined(part.first, seen[part.own])
+            if runs:
+                yield part, runs
 
 
 class JointDraws:
@@ -84,12 +90,14 @@ class JointDraws:
             self._joint = None
             return None
         low, high = geometry.instance_bounds
-        parts = []
+        parts, lows, highs, count = [], [], [], 0
         for leader, batch, first, rows, edges in self._made:
-            boxes = Boxes.between(np.minimum.reduceat(low[rows], edges), np.maximum.reduceat(high[rows], edges))
-            parts.append(Part(leader, batch, first, boxes))
+            lows.append(np.minimum.reduceat(low[rows], edges))
+            highs.append(np.maximum.reduceat(high[rows], edges))
+            parts.append(Part(leader, batch, first, slice(count, count + len(edges))))
+            count += len(edges)
         left = np.array([not together[draw.material] for draw in geometry.draws], bool)
-        self._joint = Joint(parts, left)
+        self._joint = Joint(parts, Boxes.between(np.concatenate(lows), np.concatenate(highs)), left)
         return self._joint
 
     def release(self) -> None:

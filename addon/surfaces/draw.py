@@ -150,14 +150,17 @@ def _submit(
     by material, what is shown instead of where surfaces lie."""
     rows = frame.view_rows if rows is None else rows
     geometry, view = frame.geometry, view or frame.view_block
-    seen = geometry.boxes.seen(rows)
+    left = None
     of_surfaces = program_of == frame.materials.surface_program
     stand_ins = frame.shared(StandIns).of if of_surfaces else {}
     if of_surfaces and materials is None and indices is None and not stand_ins:
         joint = frame.kept(JointDraws).update(geometry, frame.materials)
         if joint is not None:
             _submit_joint(frame, technique, joint, constants, view, rows)
-            seen = seen & joint.left
+            left = joint.left
+    if left is not None and not left.any():
+        return
+    seen = geometry.boxes.seen(rows) if left is None else geometry.boxes.seen(rows) & left
     material = None
     unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
     for call in calls(geometry.draws, np.flatnonzero(seen)):
@@ -184,10 +187,7 @@ def _submit(
 
 def _submit_joint(frame: Frame, technique: Technique, joint: Joint, constants: dict, view: Block, rows) -> None:
     """The same of materials that are drawn together."""
-    for part in joint.parts:
-        runs = part.runs(part.boxes.seen(rows))
-        if not runs:
-            continue
+    for part, runs in joint.calls(rows):
         program = frame.materials.surface_program(part.leader)
         shader = passes.get(program)
         bindings, _ = frame.materials.drawing(part.leader, program, frame.geometry.instances)

@@ -17,9 +17,10 @@ picture, 256x192, 1, 4 and 16 samples, without and with: product .0558 .0134 .00
 1.029 1.016 .997 and .993 1.000 .999 of Cycles'; instances .113 .0367 and .112 .0357; garden, foliage 0 to 3 % less.
 
 Where many pixels see little of the world (a gallery behind columns), most of the shared directions bring them nothing.
-There each pixel of a final picture traces a ray instead of each two directions, drawn from a table of its tile
-(addon/sources/world_tiles.py). The probes tell beforehand which of the two leaves less: an open sky and a sun in a
-picture of the sky are shared. The noise of rays differs from pixel to pixel, so Denoise takes out more of it.
+There each pixel of a final picture traces rays drawn from a table of its tile (addon/sources/world_tiles.py): as many
+as leave the noise of the directions that would be shared, and no more than take the time of their maps. The probes tell
+beforehand which of the two leaves less: an open sky and a sun in a picture of the sky are shared. The noise of rays
+differs from pixel to pixel, so Denoise takes out more of it.
 relMSE of 256x192 pixels, denoised, by shared directions and by rays:
 
 | | hall, 16 samples | hall, 64 | courtyard, 16 | courtyard, 64 |
@@ -33,7 +34,7 @@ Where a ray of each pixel costs less than a map (accumulated_maps.py), rays answ
 |---|---|
 | maps | `directions` orthographic views (more where the picture is deep), or as many rays per pixel |
 | passes | 2 over the screen |
-| rays | 1 per pixel instead of each 2 maps |
+| rays | per pixel, about 1 instead of each 4 or more maps |
 
 Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
 
@@ -171,6 +172,7 @@ class EnvironmentLight(Technique):
         self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
+        self._rays_for_direction = 1.0  # rays of a pixel that leave as little noise as a shared direction does
         self._traced = False  # directions are shared, and rays take the place of their maps
         self._openness: list[images.Target] = []  # sums before this sample, and a place for those after it
 
@@ -202,7 +204,9 @@ class EnvironmentLight(Technique):
         if self._edges is not None:
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
-            rays = max(1, int(rate.per_sample * min(self._maps_per_ray(frame, resolution), 1.0)))
+            affordable = min(self._maps_per_ray(frame, resolution), 1.0)
+            needed = np.ceil(rate.per_sample * self._rays_for_direction)
+            rays = max(1, int(min(rate.per_sample * affordable, needed)))
             points = [LightPoint(row, self._rays)] * rays
             yield from light_surfaces(
                 frame, self, points, 1 << lights.DIRECTION, self._sources, lambda *_: self._own_rays(frame)
@@ -303,6 +307,7 @@ class EnvironmentLight(Technique):
             return None
         if frame.hierarchy("shadow") is None:
             return None
+        self._rays_for_direction = own / (UNSHARED * shared)
         chance = world_tiles.tables(world_tiles.arriving(useful, moments[0]), moments[0])
         self._tiles = (useful.shape[1], useful.shape[0])
         return images.upload(world_tiles.lower_edges(chance), "R32F")
