@@ -459,3 +459,43 @@ def test_odd_casters_leave_finite_light(stage, technique_name, build):
         stage.render(samples=1, size=(8, 8), bounces=2)  # so that the next one is drawn anew
     assert (images[0] >= 0).all()
     assert images[0] == pytest.approx(images[1], rel=1e-3, abs=1e-5)  # sums in another order
+
+
+def seen_directly_and_in_a_mirror(stage, technique, ior, samples=4):
+    """What a floor below a glass ball shows from above, and in a mirror above a camera that looks up."""
+    stage.floor(1.5)
+    made = ball(stage, glass(stage, ior), place=(0, 0, 1.0))
+    made.visible_glossy = False
+    mirror = stage.rectangle(
+        (-2, -2), (2, 2), 4.0, material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    )
+    mirror.visible_camera = True
+    stage.light("SPOT", location=(0, 0, 3.5), shadow_soft_size=0.2, spot_size=0.6, spot_blend=0.0)
+    camera = stage.camera_above(1.6, height=2.5)
+    stage.scene.candela.slot_indirect = "OFF"
+    stage.scene.candela.slot_caustics = technique
+    pictures = []
+    for turn in ((0, 0, 0), (np.pi, 0, 0)):
+        camera.rotation_euler = turn
+        found = stage.render(samples=samples, size=(48, 48), bounces=3)
+        pictures.append(found["combined"][..., 0].astype(float))
+    assert stage.ledger.row("shaded_reflections").state == stage.ledger.row(technique).state == RAN
+    return pictures
+
+
+def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
+    seen, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.5)
+    mirrored = mirrored[::-1]
+    middle = slice(16, 32)
+    assert mirrored[middle, middle].sum() == pytest.approx(seen[middle, middle].sum(), rel=0.05)
+    assert mirrored.sum() == pytest.approx(seen.sum(), rel=0.05)
+    spread = [float((one * np.hypot(*places((48, 48), 1.6)) ** 2).sum() / one.sum()) for one in (seen, mirrored)]
+    assert spread[1] == pytest.approx(spread[0], rel=0.1)
+
+
+def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_name):
+    _, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.0)
+    x, y = places((48, 48), 1.6)
+    inside = mirrored[np.hypot(x, y) < 0.3].mean()
+    around = mirrored[(np.hypot(x, y) > 0.75) & (np.hypot(x, y) < 0.8)].mean()
+    assert inside == pytest.approx(around, rel=0.12)  # by the cosine and the distance of the spot
