@@ -77,7 +77,9 @@ TRACE = passes.fullscreen_program(
 MATERIALS_MET = Program(
     name="materials met",
     compute="hits/met.comp.glsl",
-    textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material"), ("RGBA32F", "absorption")),
+    textures=(
+        ("RGBA32F", "hit_place"), ("R32F", "hit_material"), ("RGBA32F", "rays"), ("RGBA32F", "absorption"),
+    ),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
 COUNT_MET = passes.fullscreen_program(
@@ -253,6 +255,7 @@ class Hits:
         they meet, and return the materials that may be there. `number` below 20 tells rounds of a sample apart."""
         hierarchy = frame.hierarchy(path)
         owners = self._owners_of(frame, hierarchy)
+        images.Target((), records.target.depth).clear(depth=0.0)
         passes.fullscreen(
             TRACE,
             records.target,
@@ -267,6 +270,7 @@ class Hits:
             },
         )  # fmt: skip
         frame.count(technique, "passes")
+        self._flag_met(frame, records, rays[1])
         return self._to_shade(frame, hierarchy, records, path)
 
     def place(
@@ -277,7 +281,7 @@ class Hits:
         textures = {name: image for (_, name), image in zip(PLACE.textures, points)}
         passes.fullscreen(PLACE, records.target, textures={**textures, "absorption": self._absorption_of(frame)})
         frame.count(technique, "passes")
-        self._flag_met(frame, records)
+        self._flag_met(frame, records, records.images["hit_place"])
 
     def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
         """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
@@ -287,10 +291,11 @@ class Hits:
 
     def shade(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
-        closures: images.Target, number: int = 0,
+        closures: images.Target, number: int = 0, masked: bool = False,
     ) -> None:  # fmt: skip
-        """Evaluate these materials at the records into `closures` (take_closures), which is cleared before."""
-        images.Target(closures.colors).clear()
+        """Evaluate these materials at the records into `closures` (take_closures), which is cleared before; `masked`:
+        of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0."""
+        images.Target(closures.colors[:1] if masked else closures.colors).clear()
         found = records.images
         shared = {f"hit_{name}": found[f"hit_{name}"] for name in RECORDS[:3]}
         shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
@@ -341,7 +346,6 @@ class Hits:
     def _to_shade(self, frame: Frame, hierarchy: Hierarchy, records: Records, path: str) -> set[int]:
         """Materials that are to be evaluated at these records: all that the rays may have met, without asking which,
         once their programs exist; else those that they have met."""
-        self._flag_met(frame, records)
         possible = self._possible_of(frame, hierarchy, path)
         if len(possible) <= MOST_UNASKED:
             unknown = {_program_key(frame.materials.compiled[k]) for k in possible} - self._compiled
@@ -354,11 +358,11 @@ class Hits:
                 return possible
         return set(np.flatnonzero(images.read(records.met)[:MET_ROWS]).tolist())
 
-    def _flag_met(self, frame: Frame, records: Records) -> None:
-        """Write flags of the materials of these records."""
+    def _flag_met(self, frame: Frame, records: Records, rays: images.Image) -> None:
+        """Write flags of the materials of these records. `rays`: zero where there is none."""
         records.met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        textures["absorption"] = self._absorption_of(frame)
+        textures |= {"rays": rays, "absorption": self._absorption_of(frame)}
         passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
 
     def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:

@@ -232,7 +232,7 @@ class ShadedReflections(Technique):
                 round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
                 met = hits.trace(frame, self, rays.colors[:2], records, number=number)
                 yield
-                hits.shade(frame, self, rays.colors[1], records, met, closures, number)
+                hits.shade(frame, self, rays.colors[1], records, met, closures, number, masked=True)
                 yield
                 self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
                 if not met:
@@ -263,7 +263,7 @@ class ShadedReflections(Technique):
 
     def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before) -> None:
         """Rays of the lobes of `surfaces`, into `rays`."""
-        rays.clear()
+        images.Target(rays.colors[1:2]).clear()  # a ray without direction is none, whatever else stands there
         passes.fullscreen(
             scatter_program(bool(before)),
             images.Target(rays.colors, depth),

@@ -5,7 +5,11 @@ void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
   ivec2 size = hit_place_size();
-  if (pixel.x >= size.x || pixel.y >= size.y || hit_place_fetch(pixel).w == 0.0) {
+  if (pixel.x >= size.x || pixel.y >= size.y) {
+    return;
+  }
+  vec4 ray = rays_fetch(pixel);
+  if (dot(ray, ray) == 0.0 || hit_place_fetch(pixel).w == 0.0) {
     return;
   }
   int material_index = int(hit_material_fetch(pixel).r + 0.5);
