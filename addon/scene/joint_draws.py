@@ -119,7 +119,7 @@ def _made(geometry: SceneGeometry, materials: MaterialSet, together: list[bool])
     among those each chunk begins."""
     instances, meshes, _ = geometry.placed
     leaders, joins = np.array(materials.leaders), np.array(together, bool)
-    if not joins.any() or len(instances) >> INSTANCE_BITS:
+    if not instances or not joins.any() or len(instances) >> INSTANCE_BITS:
         return []
     if sum(meshes[instance.mesh].triangle_count for instance in instances) > MOST_TRIANGLES:
         return []
@@ -145,6 +145,8 @@ def _made(geometry: SceneGeometry, materials: MaterialSet, together: list[bool])
             of_leader.setdefault(leader, []).extend((k + j, own + (start + j * size)) for j in range(count))
         start += count * size
         k += count
+    if not of_leader:
+        return []
     vertices = gfx_geometry.vertex_buffer(**{name: np.concatenate(parts) for name, parts in corners.items()})
     made = []
     for leader, parts in sorted(of_leader.items()):
