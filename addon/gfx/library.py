@@ -158,12 +158,20 @@ class Shader:
             self._refuse(textures, images, blocks, constants)
         self.handle.bind()
         try:
-            self.change(textures, blocks, constants)
-            if images:
-                _set_all(self._images, [(name, image.texture) for name, image in images.items()])
+            for name, block in blocks.items():
+                self._blocks[name](name, block.buffer)
+            for name, image in textures.items():
+                self._textures[name](name, image.texture)
+            for name, image in images.items():
+                self._images[name](name, image.texture)
+            for name, value in constants.items():
+                self._constants[name](name, value)
         except KeyError:
             self._refuse(textures, images, blocks, constants)
             raise
+        except ValueError:  # some are not used, which `change` finds out
+            self.change(textures, blocks, constants)
+            _set_all(self._images, [(name, image.texture) for name, image in images.items()])
 
     def change(self, textures=None, blocks=None, constants=None) -> None:
         """Bind some of what `bind` has bound anew, between draws."""

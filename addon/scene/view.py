@@ -81,7 +81,7 @@ class View:
         eye = eye - self.origin + lens[0] * right_axis + lens[1] * up
 
         def affine(direction, constant=0.0):
-            return np.append(direction, constant - direction @ eye)
+            return np.array((*direction.tolist(), constant - float(direction @ eye)))
 
         depth = affine(-backward)  # distance along the axis
         one = np.array([0.0, 0.0, 0.0, 1.0])

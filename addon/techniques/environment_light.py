@@ -215,8 +215,9 @@ class EnvironmentLight(Technique):
             return
         shadows = _cast_shadows(frame)
         points, patches = [], self._patches(frame)
-        for number in rate.points(frame.sample):
-            direction, radiance, density = frame.environment.draw(*frame.random_at(number, "environment"))
+        numbers = list(rate.points(frame.sample))
+        chosen = np.array([frame.random_at(number, "environment") for number in numbers]).reshape(-1, 2)
+        for number, direction, radiance, density in zip(numbers, *frame.environment.draw(*chosen.T), strict=True):
             if patches is not None:
                 points.append(_patch(frame, patches, flags, rate, number, direction, radiance, density, shadows))
                 continue
