@@ -9,8 +9,11 @@ reads surface images (lighting, indirect light) then reads hits.
 
 The first picture asks which materials were met, by a flag for each, and compiles their programs alone. Asking stops the
 queue, so where rays can meet no more than MOST_UNASKED, later pictures compile the rest (in a viewport one each) and
-then draw all of them without asking; the vertices of one that was not met leave the screen, by the same flags. Scenes
-of more materials ask in each round.
+then draw all of them without asking; of many programs the vertices of one that was not met leave the screen, by the
+same flags. Scenes of more materials ask in each round.
+
+Materials that differ in values alone are one pass: the trace writes the first one's depth for all of them, and a pixel
+finds its own values in their block (scene/materials.py).
 
 Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
 of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
@@ -20,8 +23,8 @@ attributes by that number, made when it is first met. Derivatives are those of t
 
 | cost | per round of rays |
 |---|---|
-| passes | 1 trace, 1 that flags the materials met, 1 for each of those |
-| draws that end at their vertices | 1 for each other material that rays can meet; with many materials none |
+| passes | 1 trace, 1 for each program; of many programs those met, and 1 that flags them |
+| draws that end at their vertices | of many programs those not met |
 | readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
@@ -56,6 +59,7 @@ from .reflectance import Reflectance
 
 MOST_IMAGES = 9  # of a material: 16 textures less those of records
 MOST_UNASKED = 64  # materials that are all evaluated, without a readback that tells which were met
+MOST_UNFLAGGED = 12  # programs that are drawn over the screen without a flag for each that tells whether it was met
 MOST_MATERIALS = 8000  # that depth tells apart, see trace.frag.glsl
 ROW = 256  # of lists by material
 MET_ROWS = -(-MOST_MATERIALS // ROW)
@@ -78,7 +82,10 @@ MATERIALS_MET = Program(
     name="materials met",
     compute="hits/met.comp.glsl",
     textures=(
-        ("RGBA32F", "hit_place"), ("R32F", "hit_material"), ("RGBA32F", "rays"), ("RGBA32F", "absorption"),
+        ("RGBA32F", "hit_place"),
+        ("R32F", "hit_material"),
+        ("RGBA32F", "rays"),
+        ("RGBA32F", "absorption"),
     ),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
@@ -243,6 +250,8 @@ class Hits:
         self._attributes: dict[int, tuple[object, images.Image]] = {}
         self._absorption: tuple[object, images.Image] | None = None
         self._possible: tuple[object, set[int]] | None = None
+        self._rays: images.Image | None = None  # of the last records; zero where there is none
+        self._flagged = False  # which materials they met is told by flags
         self._compiled: set[str] = set()  # keys of programs that have been drawn with
         self._asked: weakref.ref[Frame] | None = None  # the first picture
         self._ahead: object = None  # the view of the last picture that compiled a program ahead
@@ -270,7 +279,7 @@ class Hits:
             },
         )  # fmt: skip
         frame.count(technique, "passes")
-        self._flag_met(frame, records, rays[1])
+        self._rays = rays[1]
         return self._to_shade(frame, hierarchy, records, path)
 
     def place(
@@ -281,7 +290,8 @@ class Hits:
         textures = {name: image for (_, name), image in zip(PLACE.textures, points)}
         passes.fullscreen(PLACE, records.target, textures={**textures, "absorption": self._absorption_of(frame)})
         frame.count(technique, "passes")
-        self._flag_met(frame, records, records.images["hit_place"])
+        self._rays = records.images["hit_place"]
+        self._flag_met(frame, records)
 
     def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
         """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
@@ -319,10 +329,12 @@ class Hits:
                     shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
-        with images.borrowed(1, 1, "R32F") as count:
-            number_of_all = {"material_count": len(frame.materials.compiled)}
-            passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
-            frame.count_texel(technique, "materials", count.colors[0])
+        if self._flagged:
+            with images.borrowed(1, 1, "R32F") as count:
+                number_of_all = {"material_count": len(frame.materials.compiled)}
+                passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
+                frame.count_texel(technique, "materials", count.colors[0])
+        frame.count(technique, "programs", len(leaders))
         frame.count(technique, "passes", len(leaders) + 1)
 
     def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
@@ -355,14 +367,21 @@ class Hits:
                 self._ahead = frame.view  # one for each picture that has to move at once
                 unknown -= unknown if frame.settings.whole else {min(unknown)}
             if not unknown:
+                if len({frame.materials.leaders[k] for k in possible}) > MOST_UNFLAGGED:
+                    self._flag_met(frame, records)
+                else:
+                    records.met.texture.clear(format="UINT", value=(1,))
+                    self._flagged = False
                 return possible
+        self._flag_met(frame, records)
         return set(np.flatnonzero(images.read(records.met)[:MET_ROWS]).tolist())
 
-    def _flag_met(self, frame: Frame, records: Records, rays: images.Image) -> None:
-        """Write flags of the materials of these records. `rays`: zero where there is none."""
+    def _flag_met(self, frame: Frame, records: Records) -> None:
+        """Write flags of the materials of these records."""
+        self._flagged = True
         records.met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        textures |= {"rays": rays, "absorption": self._absorption_of(frame)}
+        textures |= {"rays": self._rays, "absorption": self._absorption_of(frame)}
         passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
 
     def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:
