@@ -60,7 +60,7 @@ test-window: package ## the packaged extension in a real Blender with a window (
 	$(PYTHON) -m pytest -m window tests/window
 
 screenshots: package ## the manual's pictures, taken in a real Blender with a window
-	$(PYTHON) -m pytest -m window tests/window -k "opengl and (nothing_failed or pass_tree or first_steps or tune)"
+	$(PYTHON) -m pytest -m window tests/window -k "opengl and (nothing_failed or pass_tree or first_steps or tune or as_it_grows or every_feature)"
 	$(PYTHON) tools/screenshots.py
 
 window-walk: package ## ten minutes of random edits in a real Blender with a window

@@ -11,15 +11,16 @@ import time
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import bpy
 import numpy as np
 
-from . import viewport
-from .frame import ledger as ledgers
+from . import final, main_loop, viewport
 from .frame import slices
 from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
+from .frame.settings import Settings
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
 from .snapshot.errors import unforeseen
@@ -27,10 +28,9 @@ from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
+from .ui.passes import missing_passes, wanted_passes
 from .ui.properties import settings_of
 
-AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
@@ -69,6 +69,7 @@ def _free_old_sessions() -> None:
 
 def free_sessions() -> None:
     """Free what renders of scenes hold; compiled programs stay."""
+    main_loop.close_all()
     viewport.free_all()
     for shared in _sessions.values():
         shared.renderer.release()
@@ -84,9 +85,11 @@ def _another_file(*_) -> None:
 def register() -> None:
     bpy.utils.register_class(CandelaEngine)
     bpy.app.handlers.load_post.append(_another_file)
+    main_loop.register()
 
 
 def unregister() -> None:
+    main_loop.unregister()
     bpy.app.handlers.load_post.remove(_another_file)
     bpy.utils.unregister_class(CandelaEngine)
     free_sessions()
@@ -99,7 +102,7 @@ class CandelaEngine(bpy.types.RenderEngine):
     bl_idname = ENGINE
     bl_label = "Candela"
     bl_use_preview = True
-    bl_use_gpu_context = True
+    bl_use_gpu_context = bpy.app.background  # in a window every viewport would wait for the render: see main_loop.py
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True
 
@@ -132,14 +135,14 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._sync_seconds = time.perf_counter() - started
 
     def render(self, depsgraph):
-        """Draw all samples and hand the passes to Blender. The GPU context is active, and ends afterwards."""
+        """Draw all samples and hand the passes to Blender. In background mode in the engine's own GPU context, which
+        ends afterwards; in a window by its main loop (main_loop.py)."""
         snapshot = getattr(self, "_snapshot", None)
         if snapshot is not None:
-            with images.passing_context():
-                for eye in eyes(depsgraph.scene):
-                    self._render(depsgraph, snapshot, eye)
-                    if self.test_break():
-                        break
+            for eye in eyes(depsgraph.scene):
+                self._render(depsgraph, snapshot, eye)
+                if self.test_break():
+                    break
 
     def _seen(self, depsgraph, snapshot: Snapshot, eye: str) -> Snapshot:
         """The same scene through the camera of a view, where there are several."""
@@ -156,40 +159,29 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph, snapshot: Snapshot, eye: str) -> None:
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
-        shared = session(scene, "preview" if self.is_preview else "final")
         settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer, depsgraph=depsgraph)
+        result = None
         try:
             check_tree(settings.passes)
-            snapshot = self._seen(depsgraph, snapshot, eye)
-            before = shared.renderer.frame
-            with context.turn:
-                _free_old_sessions()
-                frame = shared.renderer.begin(snapshot, settings, self._compiling)
-                if before is not None and before.size != frame.size:
-                    images.pool.trim()  # nobody asks for images of the old size again
-            frame.ledger.times["sync"] = self._sync_seconds
-            missing = missing_passes(layer)
-            if missing and not self.is_preview:
-                text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
-                frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
-            width, height = frame.size
-            result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            drawn = self._drawn(shared.renderer, frame, started)
-            for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
+            order = self._order(scene, layer, self._seen(depsgraph, snapshot, eye), settings, started)
+            parts = main_loop.taken(final.steps(order))
+            while True:
+                try:
+                    progress = next(parts)
+                except StopIteration as end:
+                    pixels, ledger = end.value
+                    break
+                if progress is not None:
+                    result = self._tell(progress, result, layer.name, eye)
                 if self.test_break():
-                    self.end_result(result, cancel=True)
-                    with context.turn:
-                        shared.renderer.finish(frame, ())
+                    parts.close()
+                    if result is not None:
+                        self.end_result(result, cancel=True, do_merge_results=True)  # what is there stays in view
                     return
-            wanted = wanted_passes(layer, scene)
-            with context.turn:
-                if taken is not None:
-                    taken[layer.name] = slices.taken(frame)
-                pixels = _finished(shared.renderer, frame, wanted)
+            if result is None:
+                result = self._begun(pixels["Combined"], layer.name, eye)
             for name, array in pixels.items():
-                render_pass = result.layers[0].passes.find_by_name(name, eye)
-                if render_pass is not None:
-                    render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())
+                _fill(result, name, eye, array)
             self.end_result(result)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))
@@ -197,13 +189,46 @@ class CandelaEngine(bpy.types.RenderEngine):
         except Exception as error:
             self._fail_unforeseen(error)
             return
-        ledger = ledgers.latest()
         ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
         if not self.is_preview:
             for note in ledger.notes:
                 self.report({"WARNING"}, str(note))
             if ledger.bad_pixels:
                 self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
+
+    def _order(self, scene, layer, snapshot: Snapshot, settings: Settings, started: float) -> final.Order:
+        """What this render asks for."""
+        shared = session(scene, "preview" if self.is_preview else "final")
+        missing, notes = missing_passes(layer), ()
+        if missing and not self.is_preview:
+            text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
+            notes = (Note(f"View layer '{layer.name}'", text),)
+        keep = None
+        if taken is not None:
+            keep = partial(taken.__setitem__, layer.name)
+        return final.Order(
+            shared.renderer, snapshot, settings, wanted_passes(layer, scene),
+            parts=_whole_samples if bpy.app.background else samples_in_parts, notes=notes,
+            shows=not bpy.app.background and not self.is_preview, started=started, sync_seconds=self._sync_seconds,
+            before=_free_old_sessions, given=given.get(layer.name), take=keep,
+        )  # fmt: skip
+
+    def _begun(self, picture: np.ndarray, layer: str, eye: str):
+        """A result of Blender's for a picture of this size."""
+        height, width = picture.shape[:2]
+        return self.begin_result(0, 0, width, height, layer=layer, view=eye)
+
+    def _tell(self, progress: final.Progress, result, layer: str, eye: str):
+        """Show how far the render is; returns the result that shows its picture, if there is one yet."""
+        self.update_stats("Candela", progress.text)
+        if progress.share is not None:
+            self.update_progress(progress.share)
+        if progress.picture is not None:
+            if result is None:
+                result = self._begun(progress.picture, layer, eye)
+            _fill(result, "Combined", eye, progress.picture)
+            self.update_result(result)
+        return result
 
     # -------------------------------------------------------------------------------------------------- viewport
 
@@ -217,44 +242,7 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
-    def _drawn(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
-        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
-
-        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
-        """
-        limit, first, before = frame.settings.time_limit, time.perf_counter(), frame.samples_done
-        parts = _whole_samples if bpy.app.background else samples_in_parts
-        shown = -1
-        for _ in parts(renderer, frame):
-            if frame.samples_done != shown:
-                shown = frame.samples_done
-                wanted = frame.settings.samples_to_draw
-                self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
-                self.update_progress(shown / wanted)
-                if limit and shown > before:
-                    with context.turn:
-                        images.finish()
-                        now = time.perf_counter()
-                        each = (now - first) / (shown - before)
-                        if shown < wanted and now - started + (1 + AFTER_LAST) * each > limit:
-                            renderer.stop(frame)
-                            return
-            yield
-
-    def _merged(self, renderer: Renderer, frame: Frame, layer: str) -> list[None]:
-        """Parts in which a picture of samples that were drawn before is finished; none where they are to be drawn."""
-        if layer not in given:
-            return []
-        with context.turn:
-            renderer.merge(frame, given[layer])
-        return [None]
-
-    def _compiling(self, done: int, total: int) -> bool:
-        self.update_stats("Candela", f"Compiling shaders {done} of {total}")
-        return self.test_break()
-
     def _fail(self, sentence: str) -> None:
-        self.error_set(sentence)
         self.report({"ERROR"}, sentence)
 
     def _fail_unforeseen(self, error: Exception) -> None:
@@ -273,22 +261,17 @@ def eyes(scene) -> list[str]:
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
     leash = Leash(frame.profiler, BEHIND_S)
+    yield
     while frame.samples_done < frame.settings.samples_to_draw:
-        yield
         with context.turn:
             renderer.advance(frame)
             if frame.samples_done < frame.settings.samples_to_draw:  # the picture is read next, which waits
                 leash.sample()
+        yield
 
 
-# ------------------------------------------------------------------------------------------------------------- passes
-
-
-def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
-    """Pass pixels by Blender's name, (H, W, channels) float32."""
-    renderer.show(frame)
-    arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
-    if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
-        arrays[GLARE.source] = arrays["film.combined"]
-    pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
-    return {"Combined": arrays["film.combined"], **pixels}
+def _fill(result, name: str, eye: str, array: np.ndarray) -> None:
+    """Write the pixels of a pass, if Blender has asked for it."""
+    render_pass = result.layers[0].passes.find_by_name(name, eye)
+    if render_pass is not None:
+        render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())

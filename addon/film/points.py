@@ -41,7 +41,8 @@ from ..surfaces.draw import refracts
 
 POINTS = Param(
     "points", "Film points", 8,
-    "Points of the pixel filter in a picture: of fewer samples each shows its light at several, at most eight",
+    "Points of the pixel filter per picture; with fewer samples than this, each sample is shown at several points, "
+    "at most eight",
     1, 1024, draft=1,
 )  # fmt: skip
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
@@ -21,7 +21,7 @@ from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.displacement import Displacement
 from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
-from ..scene.materials import MaterialSet, compile_programs
+from ..scene.materials import MaterialSet, compiling
 from ..scene.media import volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.receivers import Receivers
@@ -137,7 +137,7 @@ class Frame:
         """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
         point of the aperture. The first sample looks through the middle of both: as in Cycles depth is taken from it,
         and a picture that just began is sharp. `film`: the number of another point of the film, with which layers are
-        drawn by lot anew, too.
+        drawn at random anew, too.
         """
         settings, aperture = self.settings, self.snapshot.camera.aperture
         number = self.sample if film is None else film
@@ -325,19 +325,28 @@ class Renderer:
         self._view_block: Block | None = None
         context.on_release(self.release)
 
-    def begin(self, snapshot: Snapshot, settings: Settings, progress=None) -> Frame:
+    def begin(self, snapshot: Snapshot, settings: Settings) -> Frame:
         """Make everything ready for samples of this snapshot. Raises ValueError if there is no camera.
 
         If nothing differs from the frame before, that frame comes back with the samples it already has. Where something
         is raised, the next frame begins anew.
         """
+        parts = self.beginning(snapshot, settings)
+        while True:
+            try:
+                next(parts)
+            except StopIteration as end:
+                return end.value
+
+    def beginning(self, snapshot: Snapshot, settings: Settings) -> Generator[tuple[int, int], None, Frame]:
+        """The same in parts: yields (done, total) after each program that had to be compiled; returns the frame."""
         try:
-            return self._begin(snapshot, settings, progress)
+            return (yield from self._begin(snapshot, settings))
         except BaseException:
             self._frame_key = None  # what is half made, or made of half of a change, is not to be taken for it
             raise
 
-    def _begin(self, snapshot: Snapshot, settings: Settings, progress) -> Frame:
+    def _begin(self, snapshot: Snapshot, settings: Settings) -> Generator[tuple[int, int], None, Frame]:
         if snapshot.camera is None:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
         if settings.samples_to_draw < 1:
@@ -356,7 +365,7 @@ class Renderer:
         plan = make_plan(self.techniques, snapshot, settings)
         compile_started = time.perf_counter()
         ledger.times["upload"] = compile_started - started
-        compile_programs(self._programs(plan, snapshot, settings), progress)
+        yield from compiling(self._programs(plan, snapshot, settings))
         ledger.times["compile"] = time.perf_counter() - compile_started
         ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes)))
 
@@ -396,6 +405,10 @@ class Renderer:
                     technique.prepare(frame)
                 self._keys[technique.name] = wanted
         return frame
+
+    def forget(self) -> None:
+        """Begin the next frame anew, though nothing may have changed."""
+        self._frame_key = None
 
     def advance(self, frame: Frame) -> None:
         """Render the next sample of the frame."""

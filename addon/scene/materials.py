@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import wraps
 
@@ -509,9 +509,9 @@ def _material_may_be_glossy(material) -> bool:
 _NEVER_GLOSSY = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfTranslucent"}
 
 
-def compile_programs(programs: list[Program], progress=None) -> None:
-    """Compile what is not compiled yet. `progress(done, total)` returns True to stop."""
-    for done, program in enumerate(programs):
+def compiling(programs: list[Program]) -> Iterator[tuple[int, int]]:
+    """Compile what is not compiled yet; yields (done, total) of those after each."""
+    fresh = [program for program in programs if not library.has(program)]
+    for done, program in enumerate(fresh, 1):
         library.get(program)
-        if progress is not None and progress(done + 1, len(programs)):
-            return
+        yield done, len(fresh)

@@ -138,8 +138,8 @@ class Emitter:
 
 
 def emitters(snapshot: Snapshot, origin: np.ndarray) -> list[Emitter]:
-    """The scene's lights that give something, in an order of their own: choices by lot then do not depend on names and
-    on the order in the scene."""
+    """The scene's lights that give something, in an order of their own, so that random choices do not depend on names
+    and on the order in the scene."""
     found = (emitter(light, origin) for light in snapshot.lights)
     return sorted((one for one in found if one is not None), key=_order)
 

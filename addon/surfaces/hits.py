@@ -1,23 +1,21 @@
 """Shading of hits: what rays meet, as closures of the materials there, laid out like the surface images.
 
-A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record of
-some numbers per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates,
-normals. For each material among them one pass over the screen runs *its own* program at its records (textures,
-procedurals, bumps, vertex colours, emission, alpha) into six images as those of surfaces/draw.py, masked by depth: the
-trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
-reads surface images (lighting, indirect light) then reads hits.
+A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record
+per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates, normals. For
+each material met, one pass over the screen runs *its own* program at its records (textures, procedurals, bumps, vertex
+colours, emission, alpha) into six images like those of surfaces/draw.py. The trace writes the material as depth and the
+pass tests for EQUAL, so a driver skips blocks of other pixels. Whatever reads surface images then reads hits.
 
-The first picture asks which materials were met, by a flag for each, and compiles their programs alone. Asking stops the
-queue, so where rays can meet no more than MOST_UNASKED, later pictures compile the rest (in a viewport one each) and
-then draw all of them without asking; of many programs the vertices of one that was not met leave the screen, by the
-same flags. Scenes of more materials ask in each round.
+The first picture flags the materials that were met and compiles those programs alone. Reading flags stops the queue, so
+where rays can meet no more than MOST_UNASKED materials, later pictures compile the rest (in a viewport one each) and
+draw all of them without asking; of many programs the vertices of one that was not met leave the screen by the same
+flags. Scenes of more materials read the flags in each round.
 
 Materials that differ in values alone are one pass: the trace writes the first one's depth for all of them, and a pixel
 finds its own values in their block (scene/materials.py).
 
-Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
-of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
-attributes by that number, made when it is first met. Derivatives are those of the ray's footprint, for bumps.
+`owners` gives for each triangle of the hierarchy its instance and its number within its material, and each material has
+a list of corner attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
 
     rays (origin, direction)  --trace-->  Records  --shade-->  closures
 
@@ -29,10 +27,10 @@ attributes by that number, made when it is first met. Derivatives are those of t
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
 
-One with more than MOST_IMAGES images is its mean reflectance instead.
-
 Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
-Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits.
+Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits. Relief goes on over
+the edges of its mesh (shaders/hits/relief.glsl); grass is its ground. A material with more than MOST_IMAGES images is
+its mean reflectance instead.
 """
 
 from __future__ import annotations
@@ -126,28 +124,38 @@ def depth_of(material: int) -> float:
 
 
 def _program_key(compiled: CompiledMaterial) -> str:
-    return MEAN.name if len(compiled.images) > MOST_IMAGES else compiled.program_key
+    if len(compiled.images) > MOST_IMAGES:
+        return MEAN.name
+    return f"{compiled.program_key} relief" if _has_relief(compiled) else compiled.program_key
+
+
+def _has_relief(compiled: CompiledMaterial) -> bool:
+    """Whether its heights are looked for at hits (shaders/hits/relief.glsl)."""
+    own = compiled.own_surface
+    return own is not None and own.shell and len(compiled.images) + bool(compiled.attributes) <= MOST_IMAGES
 
 
 def hit_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a material where rays met it."""
-    if compiled.program_key not in _programs:
+    key = _program_key(compiled)
+    if key not in _programs:
         if len(_programs) >= MOST_PROGRAMS:
             del _programs[next(iter(_programs))]
-        _programs[compiled.program_key] = _hit_program(compiled)
-    return _programs[compiled.program_key]
+        _programs[key] = _hit_program(compiled)
+    return _programs[key]
 
 
 def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
+    relief = (("RGBA32F", "shell_corners"),) if _has_relief(compiled) else ()
     shared = may_share(compiled)
-    room = len(compiled.images) + len(listed) < MOST_IMAGES + 1
+    room = len(compiled.images) + len(listed) + len(relief) < MOST_IMAGES + 1
     return Program(
-        name=f"hits {compiled.program_key[:8]}",
+        name=f"hits {compiled.program_key[:8]}{' relief' * len(relief)}",
         fragment="hits/surface.frag.glsl",
         textures=(
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
-            *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *relief, *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
             *((("R32F", "hit_material"), ("RGBA32F", "absorption")) if shared else ()),
         ),
@@ -164,6 +172,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             "defines": (
                 *MASKED["defines"], *((("ASKS_IF_MET", str(MET_ROWS)),) if room else ()),
                 *((("SHARED_VALUES", "1"), ("MATERIAL_BASE", "material_base")) if shared else ()),
+                *((("OWN_SURFACE", ""),) if relief else ()),
             ),
         },
     )  # fmt: skip
@@ -348,6 +357,8 @@ class Hits:
             material, frame.geometry.instances, own=False, shared=may_share(compiled)
         )  # fmt: skip
         textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
+        if _has_relief(compiled):
+            textures |= frame.materials.own_images[material]
         if compiled.attributes:
             textures["hit_attributes"] = self._attributes_of(material, compiled)
         constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}

@@ -133,13 +133,14 @@ class Airlight(Technique):
     params = (
         Param(
             "rays", "Rays", 4,
-            "Places on each pixel's ray that are asked what light reaches them, in a sample, shared by all lights",
+            "Points on each pixel's ray at which in-scattered light is evaluated in a sample, shared by all lights",
             1, 64, draft=2,
         ),
         Param(
             "bounces", "Volume bounces", 8,
-            "How often light is scattered or reflected before a medium sends it to the eye, at most; 0: none but "
-            "that of lamps and world", 0, MOST_BOUNCES, draft=2,
+            "Maximum number of times light is scattered or reflected before a medium scatters it to the camera; 0: "
+            "light of lamps and world only",
+            0, MOST_BOUNCES, draft=2,
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -37,7 +37,9 @@ class MediaAttenuation(Technique):
     params = (
         Param(
             "resolution", "Resolution", 96,
-            "Cells along the longest side of a volume that varies; OpenVDB objects keep their voxels", 4, 256, draft=48,
+            "Grid cells along the longest side of a volume whose density varies; OpenVDB objects keep their own "
+            "voxels",
+            4, 256, draft=48,
         ),
     )  # fmt: skip
     provides = (MediaService,)

@@ -74,7 +74,8 @@ class TracedGlossy(Technique):
     params = (
         Param(
             "roughness", "Roughness", 0.6,
-            "Lobes up to this roughness trace a ray per sample; rougher ones are lit by light samples alone", 0.0, 1.0,
+            "Glossy lobes up to this roughness trace a ray in each sample; rougher ones use light samples only",
+            0.0, 1.0,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES

@@ -58,5 +58,5 @@ void main()
   if (to_unit(bits.x) < dot(c.transparency, vec3(1.0 / 3.0))) {
     discard;
   }
-  out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn by lot
+  out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn at random
 }

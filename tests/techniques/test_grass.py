@@ -198,6 +198,35 @@ def test_other_things_cast_shadows_on_it(stage):
     assert shown[:, 20:].max() == 0.0 and shown[:, :10].mean() > 0.02
 
 
+def test_in_a_hollow_nothing_is_seen_below_the_ground(stage):
+    """A bowl of three metres' radius seen at a slant, where rays meet rising ground ahead."""
+
+    def depth(patch):
+        stage.clear()
+        mesh = bpy.data.meshes.new("Bowl")
+        made = bmesh.new()
+        bmesh.ops.create_uvsphere(made, u_segments=96, v_segments=96, radius=3.0)
+        bmesh.ops.delete(made, geom=[vertex for vertex in made.verts if vertex.co.z > -1.5], context="VERTS")
+        bmesh.ops.reverse_faces(made, faces=made.faces)
+        for face in made.faces:
+            face.smooth = True
+        made.to_mesh(mesh)
+        made.free()
+        material = stage.diffuse(0.5)
+        material.candela.grass_patch = patch
+        mesh.materials.append(material)
+        stage.link("Bowl", mesh, (0, 0, 3))
+        sun(stage, 0, 0)
+        camera = towards(stage, 62, 30, 1.2)
+        shown = stage.render(4, (48, 48))
+        return shown["depth"][..., 0], shown["combined"][..., :3].mean(axis=2), camera
+
+    ground_depth, _, _ = depth("NONE")
+    found, light, _ = depth("MEADOW")
+    assert (found - ground_depth).max() < 0.01
+    assert (light < 0.1 * light.mean()).mean() < 0.02
+
+
 # Invariants ----------------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,167 @@
+"""A final picture step by step: what a render draws, apart from Blender's result, so that any thread may follow it.
+
+The steps yield None between two parts, and `Progress` where there is something to tell: a program compiled, a sample
+done, and the picture as it grows. It is shown so rarely that reading it back takes a small share of the render.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .frame import ledger as ledgers
+from .frame import slices
+from .frame.run import Frame, Renderer
+from .frame.settings import Settings
+from .gfx import images
+from .gfx.context import turn
+from .snapshot.scene import Note, Snapshot
+from .ui.passes import GLARE, RenderPass
+
+AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
+SHOW_S = 1.0  # at least, between two pictures of a render that goes on
+SHOW_SHARE = 0.04  # of the render's time, at most, that is spent on showing it
+COMBINED = "film.combined"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What there is to tell."""
+
+    text: str
+    share: float | None = None
+    picture: np.ndarray | None = None  # (H, W, 4) float32: the mean of the samples so far
+
+
+@dataclass
+class Order:
+    """What is to be rendered, and how its samples are drawn."""
+
+    renderer: Renderer
+    snapshot: Snapshot
+    settings: Settings
+    wanted: list[RenderPass]
+    parts: Callable  # of all samples: (renderer, frame) -> iterator
+    notes: tuple[Note, ...] = ()
+    shows: bool = False  # whether anybody looks at the picture while it grows
+    started: float = 0.0  # time.perf_counter() from which the time limit counts
+    sync_seconds: float = 0.0
+    before: Callable[[], None] = lambda: None  # in the GPU's context, first of all
+    given: dict[str, np.ndarray] | None = None  # sums of samples that were drawn before, in place of drawing
+    take: Callable[[slices.Slice], None] | None = None  # what is drawn, as a slice
+
+
+def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.ndarray], ledgers.Ledger]]:
+    """Draw the picture; returns pass pixels by Blender's name, (H, W, channels) float32, and the ledger.
+
+    Closed before its end it leaves a frame that the next picture begins anew.
+    """
+    renderer = order.renderer
+    before = renderer.frame
+    with turn:
+        order.before()
+    beginning = renderer.beginning(order.snapshot, order.settings)
+    frame = None
+    while frame is None:
+        with turn:
+            try:
+                done, total = next(beginning)
+            except StopIteration as end:
+                frame = end.value
+                break
+        yield Progress(f"Compiling shaders, {done} of {total}")
+    if before is not None and before.size != frame.size:
+        with turn:
+            images.pool.trim()  # nobody asks for images of the old size again
+    frame.ledger.times["sync"] = order.sync_seconds
+    frame.ledger.notes += order.notes
+    if order.given is not None:
+        with turn:
+            renderer.merge(frame, order.given)
+        yield None
+    else:
+        try:
+            yield from _samples(order, frame)
+        except GeneratorExit:
+            with turn:
+                renderer.finish(frame, ())  # what was done stands in the ledger
+            raise
+    with turn:
+        if order.take is not None:
+            order.take(slices.taken(frame))
+        return finished(renderer, frame, order.wanted), frame.ledger
+
+
+def _samples(order: Order, frame: Frame) -> Generator[Progress | None, None, None]:
+    """Draw all samples. With a time limit only as many as it allows: room is left for what follows the last."""
+    renderer, limit = order.renderer, frame.settings.time_limit
+    wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
+    shown, showing, next_picture = -1, 0.0, first + SHOW_S
+    for _ in order.parts(renderer, frame):
+        if frame.samples_done == shown:
+            yield None
+            continue
+        shown = frame.samples_done
+        picture, now = None, time.perf_counter()
+        # The last picture comes with its passes at once; a first one is worth more than its time.
+        if order.shows and before < shown < wanted and (now >= next_picture or shown == before + 1):
+            with turn:
+                picture = picture_of(renderer, frame)
+            took = time.perf_counter() - now
+            showing += took
+            next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
+        each = (now - first) / (shown - before) if shown > before else None
+        left = left_of(order, wanted - shown, each) if order.shows else None
+        yield Progress(sentence(shown, wanted, left), shown / wanted, picture)
+        if limit and shown > before:
+            with turn:
+                images.finish()
+                now = time.perf_counter()
+                each = (now - first) / (shown - before)
+                if shown < wanted and now - order.started + (1 + AFTER_LAST) * each > limit:
+                    renderer.stop(frame)
+                    return
+
+
+def left_of(order: Order, samples: int, each: float | None) -> float | None:
+    """Seconds that are left, by what a sample takes and by the time limit; None before the first sample."""
+    if each is None:
+        return None
+    limit = order.settings.time_limit
+    left = samples * each
+    return min(left, max(order.started + limit - time.perf_counter(), 0.0)) if limit else left
+
+
+def sentence(done: int, wanted: int, left: float | None) -> str:
+    """How far a render is, in the words that render farms read."""
+    text = f"Rendering {done} / {wanted} samples"
+    return text if left is None else f"{text}, {clock(left)} left"
+
+
+def clock(seconds: float) -> str:
+    """A time as clocks show it: 0:07, 12:30, 1:02:30."""
+    whole = round(seconds)
+    hours, minutes = whole // 3600, whole // 60 % 60
+    return f"{hours}:{minutes:02}:{whole % 60:02}" if hours else f"{minutes}:{whole % 60:02}"
+
+
+def picture_of(renderer: Renderer, frame: Frame) -> np.ndarray:
+    """The mean of the samples so far, (H, W, 4) float32, without what only shows it otherwise (an eye's glare)."""
+    shown = renderer.show(frame)
+    if shown is None:
+        return np.zeros((*frame.size[::-1], 4), np.float32)
+    image = frame.images.get(COMBINED)
+    return np.nan_to_num(images.read(image if image is not None else shown), posinf=0.0, neginf=0.0)
+
+
+def finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
+    """Pass pixels by Blender's name, (H, W, channels) float32."""
+    renderer.show(frame)
+    arrays = renderer.finish(frame, sorted({COMBINED, *(name for asked in wanted for name in asked.images)}))
+    if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
+        arrays[GLARE.source] = arrays[COMBINED]
+    pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
+    return {"Combined": arrays[COMBINED], **pixels}
