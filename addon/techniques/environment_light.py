@@ -189,8 +189,7 @@ class EnvironmentLight(Technique):
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
             affordable = min(self._maps_per_ray(frame, resolution), 1.0)
-            needed = np.ceil(rate.per_sample * self._rays_for_direction)
-            rays = max(1, int(min(rate.per_sample * affordable, needed)))
+            rays = max(1, int(min(rate.per_sample * affordable, self._needed(rate))))
             points = [LightPoint(row, self._rays)] * rays
             yield from light_surfaces(
                 frame, self, points, 1 << lights.DIRECTION, self._sources, lambda *_: self._own_rays(frame)
@@ -226,6 +225,10 @@ class EnvironmentLight(Technique):
         yield from light_surfaces(frame, self, points, 1 << lights.DIRECTION, self._sources, known)
         if self._openness and points and frame.sample + 1 < frame.settings.samples:
             self._sum_openness(frame)
+
+    def _needed(self, rate: Rate) -> float:
+        """Rays of a pixel in a sample that leave as little noise as the shared directions do."""
+        return float(np.ceil(rate.per_sample * self._rays_for_direction))
 
     def _resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
