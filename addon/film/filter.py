@@ -77,6 +77,22 @@ _SEEN = (
 )  # fmt: skip
 
 
+# Of programs that read shaders/film/filter_weights.glsl.
+CONSTANTS = (
+    ("FLOAT", "film_share"), ("IVEC2", "film_pixel"), ("VEC4", "weights_x"), ("VEC4", "weights_y"),
+    ("VEC2", "last_weights"),
+)  # fmt: skip
+
+
+def place_constants(frame: Frame, place: tuple[float, float], share: float) -> dict:
+    """Values of CONSTANTS for one point of the film, which counts `share` and lies at `place` of every pixel."""
+    (x, *across), (y, *up) = (_constants_of(one, frame.snapshot.film.filter_width) for one in place)
+    return {
+        "film_share": share, "film_pixel": (x, y), "weights_x": across[0], "weights_y": up[0],
+        "last_weights": (across[1], up[1]),
+    }  # fmt: skip
+
+
 @cache
 def program(count: int, pixels: int, dimmed: tuple[int, ...] = ()) -> Program:
     """Adds `count` images of a sample to as many sums; `pixels` as of `reach`. `dimmed`: what media do to each; the
@@ -87,10 +103,7 @@ def program(count: int, pixels: int, dimmed: tuple[int, ...] = ()) -> Program:
         f"film filter, {count} images, {2 * pixels + 1} pixels wide",
         "film/filter.frag.glsl",
         textures=(*(("RGBA32F", f"seen_{i}") for i in each), *((("RGBA32F", "through"),) if dimmed else ())),
-        constants=(
-            ("FLOAT", "film_share"), ("IVEC2", "film_pixel"), ("VEC4", "weights_x"), ("VEC4", "weights_y"),
-            ("VEC2", "last_weights"),
-        ),
+        constants=CONSTANTS,
         defines=(
             ("PIXELS", str(pixels)),
             ("BEGIN_ALL", " ".join(f"vec4 sum_{i} = vec4(0.0);" for i in each)),
@@ -115,7 +128,7 @@ def add(
     """Add `share` of the images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset),
     to the frame's images of these names. `through`: what media let pass there. Returns the number of passes."""
     width = frame.snapshot.film.filter_width
-    (x, across, last_across), (y, up, last_up) = (_constants_of(one, width) for one in place)
+    constants = place_constants(frame, place, share)
     count = -(-len(seen) // MOST_IMAGES)
     for part in range(count):
         names = tuple(seen)[part::count]
@@ -128,11 +141,8 @@ def add(
                 **{f"seen_{i}": seen[name] for i, name in enumerate(names)},
                 **({"through": through} if dimmed else {}),
             },
-            constants={
-                "film_share": share, "film_pixel": (x, y), "weights_x": across, "weights_y": up,
-                "last_weights": (last_across, last_up),
-            },
-        )  # fmt: skip
+            constants=constants,
+        )
     return count
 
 

@@ -1,4 +1,4 @@
-"""What shadow techniques share that see a light as a whole, or a part of it, from one depth map.
+"""Soft shadow maps: what techniques share that see a light, or a part of it, from one depth map.
 
 Which part a map stands for follows from the samples: all of the light with one, a part whose extents shrink by sqrt(n)
 with n (PointMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they

@@ -2,8 +2,8 @@
 
 POINTS points are spread over all surfaces by area (area_points.py), and from both sides of each RAYS rays go out evenly
 in cosine-weighted directions. A side of a triangle counts as unseen where less than LEAST of all the rays from it meet
-something. Triangles without a point are small, and count as seen from both sides. The walls of a room in an empty world
-have outer faces that see nothing: half of their area.
+something. Triangles without a point are small, and see what either of their neighbours in the mesh's order sees. The
+walls of a room in an empty world have outer faces that see nothing: half of their area.
 
 | cost, when something moves | |
 |---|---|
@@ -55,8 +55,22 @@ def seen_triangles(frame, surfaces: Surfaces) -> np.ndarray:
         asked = np.bincount(points.triangle, good, minlength=len(seen))
         for side in range(2):
             sums = np.bincount(points.triangle, hits[:, side] * good, minlength=len(seen))
-            seen[:, side] = (asked == 0) | (sums / np.maximum(asked, 1) >= LEAST)
+            seen[:, side] = sums / np.maximum(asked, 1) >= LEAST
+        _fill(seen, asked > 0, surfaces.owner)
     return seen
+
+
+def _fill(seen: np.ndarray, known: np.ndarray, owner: np.ndarray) -> None:
+    """What is not known is as the known triangles of the same instance before it and behind it; True where none is."""
+    unknown, places = np.flatnonzero(~known), np.flatnonzero(known)
+    if not len(places):
+        seen[unknown] = True
+        return
+    behind = np.minimum(np.searchsorted(places, unknown), len(places) - 1)
+    beside = [places[np.maximum(behind - 1, 0)], places[behind]]
+    own = [owner[one] == owner[unknown] for one in beside]
+    found = [seen[one] & same[:, None] for one, same in zip(beside, own)]
+    seen[unknown] = found[0] | found[1] | ~(own[0] | own[1])[:, None]
 
 
 def _share_that_meets(frame, position: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -447,7 +447,7 @@ def tree(cells: Cells) -> tuple[Cells, np.ndarray]:
     - middle, radius of a ball that holds the discs of all its leaves
     - mean normal (octahedral), how far its discs lie off the plane through its middle, negative where no disc may stand
       for it; node to go on with
-    - first leaf, number of leaves, 0 for both sides or 1 where only fronts are seen, opacity
+    - first leaf, number of leaves, 0 for both sides or 1 where only fronts are seen, 2 of sheets, opacity
     - two edges at which the disc ends: direction in its plane, distance from its middle
     """
     count = len(cells)
@@ -529,7 +529,8 @@ def _describe(cells: Cells, first: np.ndarray, last: np.ndarray, skip: np.ndarra
     nodes[:, 0, :3], nodes[:, 0, 3] = middle, radius * (1 + 1e-5)
     slab = np.maximum(thickness * (1 + 1e-3), 1e-6 * radius)
     nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = octahedral(normal), np.where(stands | leaf, slab, -slab), skip
-    nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, closed == leaves
+    sheets = sums(cells.sheet.astype(float)) == leaves
+    nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, (closed == leaves) * 1.0 + sheets
     nodes[:, 2, 3] = sums(cells.opacity * cells.area) / area
     nodes[:, 3:, 3] = NONE
     nodes[leaf, 3:] = cells.clips[first[leaf]]

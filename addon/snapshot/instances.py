@@ -66,6 +66,8 @@ class ObjectFacts:
     terminator: float
     own: Own
     caustics_caster: bool
+    asset: str
+    group: str
     notes: tuple[Note, ...]
 
 
@@ -132,6 +134,8 @@ def walk(
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
+                        asset=_topmost(owner),
+                        group=owner.lightgroup,
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:
@@ -187,6 +191,14 @@ def _collections_say(top) -> tuple[bool, bool]:
         holdout |= one.holdout
         waiting += one.children
     return indirect_only, holdout
+
+
+def _topmost(owner) -> str:
+    """Name of the topmost parent of an object, empty without one."""
+    parent = owner.parent
+    while parent is not None and parent.parent is not None:
+        parent = parent.parent
+    return "" if parent is None else parent.name
 
 
 def _is_holdout(owner, parent, view_layer) -> bool:

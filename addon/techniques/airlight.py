@@ -1,4 +1,4 @@
-"""Airlight: light of every lamp, the world and shining meshes that media scatter once towards the eye, with shadows.
+"""Airlight: light of lamps, the world and emissive meshes that media scatter towards the camera, with shadows.
 
     L(v) = integral over the view ray of  T(eye, x) sum over lights of  sigma_s(x) p(x, w, v) T(x, y) V(x, y) L(y) dw
 

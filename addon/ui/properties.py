@@ -44,10 +44,11 @@ _SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "
 
 def titled(label: str) -> str:
     """A label as Blender writes its own: Title Case but for small words in its middle."""
-    words = label.split(" ")
-    return " ".join(
-        word if number and word in _SMALL else word[:1].upper() + word[1:] for number, word in enumerate(words)
-    )
+    words = [
+        word if number and word in _SMALL else "-".join(part[:1].upper() + part[1:] for part in word.split("-"))
+        for number, word in enumerate(label.split(" "))
+    ]
+    return " ".join(words)
 
 
 def precision_of(default: float) -> int:
@@ -117,17 +118,22 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "split_light_groups": bpy.props.BoolProperty(
+            name="Direct and Indirect", update=_redraw,
+            description="Write two more passes for each light group: its direct light with what is seen of it, and its "
+            "indirect light",
+        ),
         "use_denoise": bpy.props.BoolProperty(
             name="Denoise Render", default=True, update=_redraw,
-            description="Take what is left of noise out of final renders, after their last sample",
+            description="Filter the remaining noise of final renders after the last sample",
         ),
         "use_viewport_denoise": bpy.props.BoolProperty(
             name="Denoise Viewport", default=True, update=_redraw,
-            description="Take what is left of noise out of the viewport's picture, after its last sample",
+            description="Filter the remaining noise of the viewport after its last sample",
         ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,
-            description="Leave the pictures of rendered viewports as they are, so that the GPU is free for other work",
+            description="Stop updating rendered viewports, so that the GPU is free for other work",
         ),
     }  # fmt: skip
     out["pass_tree"] = bpy.props.PointerProperty(

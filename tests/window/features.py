@@ -30,7 +30,7 @@ def steps():
     open_panels()
     left, right = yield from two_areas()
     result["properties"] = [right.x, window().height - right.y - right.height, right.width, right.height]
-    for step in (warning, reflections, glare, painting, grass, relief, caustics):
+    for step in (warning, painting, reflections, glare, grass, relief, caustics):
         name, started = step.__name__, time.monotonic()
         if ONLY and name not in ONLY:
             continue
@@ -266,7 +266,11 @@ def painting(left, right):
     brush = scene.tool_settings.image_paint.brush
     result["brush"] = brush.name if brush else ""
     picture("painting_mode.png")
-    scene.tool_settings.unified_paint_settings.color = (0.0, 0.0, 0.0)
+    tools = scene.tool_settings
+    for holder in (tools, tools.image_paint):  # of the brush, of all brushes, and of all since Blender 5.0
+        unified = getattr(holder, "unified_paint_settings", None)
+        if unified is not None:
+            unified.color = (0.0, 0.0, 0.0)
     if brush:
         brush.color = (0.0, 0.0, 0.0)
     x, y = on_screen(left, (0.0, -1.0, 1.0))
