@@ -17,11 +17,11 @@ import numpy as np
 
 from . import viewport
 from .frame import ledger as ledgers
-from .frame import slices
+from .frame import slices, time_steps
 from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .gfx import context, images
-from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
+from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, motion, take
 from .snapshot.errors import unforeseen
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
@@ -119,17 +119,33 @@ class CandelaEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         scene = depsgraph.scene
         shared = session(scene, "preview" if self.is_preview else "final")
-        self._snapshot = None
+        self._snapshot = self._moments = None
         self.update_stats("Candela", "Reading the scene")
         try:
-            self._snapshot = take(
-                depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override
-            )
+            self._snapshot = self._take(depsgraph, shared)
+            if motion.is_blurred(scene, depsgraph.view_layer) and not self.is_preview:
+                self._moments = self._take_moments(depsgraph, shared)
         except UnsupportedScene as error:
             self._fail(str(error))
         except Exception as error:  # Blender would print it and go on with a black picture
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
+
+    def _take(self, depsgraph, shared: Session) -> Snapshot:
+        return take(depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override)
+
+    def _take_moments(self, depsgraph, shared: Session) -> motion.Moments | None:
+        """The scene while the shutter is open, where anything moves. It is evaluated now, while Blender keeps it."""
+        scene = depsgraph.scene
+        settings = settings_of(scene, viewport=False, layer=depsgraph.view_layer, depsgraph=depsgraph)
+        own = scene.frame_current + scene.frame_subframe
+
+        def moved_to(time: float) -> None:
+            frame, subframe = divmod(own + time, 1.0)
+            self.frame_set(int(frame), subframe)
+
+        times = motion.shutter_times(scene, min(settings.motion_steps, settings.samples))
+        return motion.take_moments(self._snapshot, times, moved_to, lambda: self._take(depsgraph, shared))
 
     def render(self, depsgraph):
         """Draw all samples and hand the passes to Blender. The GPU context is active, and ends afterwards."""
@@ -162,9 +178,15 @@ class CandelaEngine(bpy.types.RenderEngine):
             check_tree(settings.passes)
             snapshot = self._seen(depsgraph, snapshot, eye)
             before = shared.renderer.frame
+            steps = [] if layer.name in given else self._steps(snapshot, settings, eye)
             with context.turn:
                 _free_old_sessions()
-                frame = shared.renderer.begin(snapshot, settings, self._compiling)
+                if steps:
+                    unlimited = replace(settings, time_limit=0.0)  # what is kept for one counts samples of one step
+                    begun = (steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
+                    frame = shared.renderer.begin(*begun)
+                else:
+                    frame = shared.renderer.begin(snapshot, settings, self._compiling)
                 if before is not None and before.size != frame.size:
                     images.pool.trim()  # nobody asks for images of the old size again
             frame.ledger.times["sync"] = self._sync_seconds
@@ -174,14 +196,21 @@ class CandelaEngine(bpy.types.RenderEngine):
                 frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            drawn = self._drawn(shared.renderer, frame, started)
+            if steps:
+                drawn = self._drawn_in_steps(shared.renderer, steps, settings, started)
+            else:
+                drawn = self._drawn(shared.renderer, frame, started)
             for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
                 if self.test_break():
                     self.end_result(result, cancel=True)
                     with context.turn:
-                        shared.renderer.finish(frame, ())
+                        shared.renderer.finish(shared.renderer.frame, ())
                     return
             wanted = wanted_passes(layer, scene)
+            if frame is not shared.renderer.frame:  # the last of several, one for each time step
+                ledger, frame = frame.ledger, shared.renderer.frame
+                frame.ledger.times |= ledger.times
+                frame.ledger.notes = ledger.notes
             with context.turn:
                 if taken is not None:
                     taken[layer.name] = slices.taken(frame)
@@ -241,6 +270,39 @@ class CandelaEngine(bpy.types.RenderEngine):
                             return
             yield
 
+    def _steps(self, snapshot: Snapshot, settings, eye: str) -> list[time_steps.Step]:
+        """Time steps of a picture with motion blur; none where nothing moves. All are seen through the camera of an
+        eye, where there are several, which is that of the frame itself."""
+        moments = self._moments
+        if moments is None:
+            return []
+        snapshots = moments.snapshots
+        if eye:
+            snapshots = [replace(one, camera=snapshot.camera) for one in snapshots]
+        return time_steps.shared_out(snapshots, moments.steps, settings)
+
+    def _drawn_in_steps(
+        self, renderer: Renderer, steps: list[time_steps.Step], settings, started: float
+    ) -> Iterator[None]:
+        """The same of a picture with motion blur."""
+        parts = _whole_samples if bpy.app.background else samples_in_parts
+        first, wanted, shown = time.perf_counter(), settings.samples_to_draw, -1
+        unlimited = replace(settings, time_limit=0.0)
+        for done, stop in time_steps.drawn(renderer, steps, unlimited, parts, self._compiling):
+            if done != shown:
+                shown = done
+                self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
+                self.update_progress(shown / wanted)
+                if settings.time_limit and shown:
+                    with context.turn:
+                        images.finish()
+                    now = time.perf_counter()
+                    each = (now - first) / shown
+                    # A step that follows learns in one more sample.
+                    if shown < wanted and now - started + (2 + AFTER_LAST) * each > settings.time_limit:
+                        stop()
+            yield
+
     def _merged(self, renderer: Renderer, frame: Frame, layer: str) -> list[None]:
         """Parts in which a picture of samples that were drawn before is finished; none where they are to be drawn."""
         if layer not in given:
@@ -273,11 +335,11 @@ def eyes(scene) -> list[str]:
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
     leash = Leash(frame.profiler, BEHIND_S)
-    while frame.samples_done < frame.settings.samples_to_draw:
+    while frame.samples_done < frame.samples_to_draw:
         yield
         with context.turn:
             renderer.advance(frame)
-            if frame.samples_done < frame.settings.samples_to_draw:  # the picture is read next, which waits
+            if frame.samples_done < frame.samples_to_draw:  # the picture is read next, which waits
                 leash.sample()
 
 

@@ -69,6 +69,8 @@ class Frame:
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
+    numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
+    first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
     drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     find_receivers: Callable[[], Receivers] | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -95,6 +97,14 @@ class Frame:
     def is_first(self) -> bool:
         """Whether the first sample is running: for counters that are the same in each sample, read once."""
         return self.sample == 0
+
+    @property
+    def samples_to_draw(self) -> int:
+        return self.settings.samples_to_draw if self.numbers is None else len(self.numbers)
+
+    def number_of(self, drawn: int) -> int:
+        """Which of the picture's samples is drawn after `drawn` others."""
+        return self.settings.sample_offset + drawn if self.numbers is None else self.numbers[drawn]
 
     @property
     def receivers(self) -> Receivers | None:
@@ -325,14 +335,19 @@ class Renderer:
         self._view_block: Block | None = None
         context.on_release(self.release)
 
-    def begin(self, snapshot: Snapshot, settings: Settings, progress=None) -> Frame:
-        """Make everything ready for samples of this snapshot. Raises ValueError if there is no camera.
+    def begin(
+        self, snapshot: Snapshot, settings: Settings, progress=None, numbers: tuple[int, ...] | None = None
+    ) -> Frame:
+        """Make everything ready for samples of this snapshot: the settings' slice of them, or those of the `numbers`
+        in ascending order. Raises ValueError if there is no camera.
 
         If nothing differs from the frame before, that frame comes back with the samples it already has. Where something
         is raised, the next frame begins anew.
         """
         try:
-            return self._begin(snapshot, settings, progress)
+            frame = self._begin(snapshot, settings, progress)
+            frame.numbers = numbers
+            return frame
         except BaseException:
             self._frame_key = None  # what is half made, or made of half of a change, is not to be taken for it
             raise
@@ -416,24 +431,22 @@ class Renderer:
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
         settings, profiler = frame.settings, frame.profiler
-        measured = settings.samples_to_draw if settings.whole else 0
+        measured = frame.samples_to_draw if settings.whole else 0
         if frame.samples_done == 0:
             with profiler.once(measured):
                 yield from self._begin_samples(frame)
-                if settings.sample_offset:
+                if frame.number_of(0):
                     # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
                     # picture; its light is that of another slice.
                     yield from _stage(frame, "sample")
-                    self._clear_sums(frame)
-                    for name in frame.shown.values():
-                        frame.target(name).clear()
-        if frame.samples_done or settings.sample_offset:
-            frame.sample = settings.sample_offset + frame.samples_done
+                    self._clear_all_sums(frame)
+        if frame.samples_done or frame.number_of(0):
+            frame.sample = frame.number_of(frame.samples_done)
             frame.look()
             frame.shown.clear()
         with profiler.measured(frame.samples_done, measured):
             yield from _stage(frame, "sample")
-        if frame.samples_done + 1 == settings.samples:
+        if frame.samples_done + 1 == settings.samples and frame.numbers is None:
             with profiler.once(measured):
                 yield from _stage(frame, "end")
         frame.samples_done += 1
@@ -444,6 +457,31 @@ class Renderer:
         frame.settings = replace(frame.settings, samples=frame.samples_done)
         for _ in _stage(frame, "end"):
             pass
+
+    def forget(self) -> None:
+        """Take no later picture for the frame that is there, whose samples are not those of its snapshot alone."""
+        self._frame_key = None
+
+    def draw_surfaces(self, frame: Frame, number: int) -> None:
+        """Draw what the picture's first sample and sample `number` see, without light, in a frame without samples."""
+        for _ in self._begin_samples(frame):
+            pass
+        for drawn in (0, number):
+            frame.sample = drawn
+            frame.look()
+            for _ in _stage(frame, "sample"):
+                pass
+        self._clear_all_sums(frame)
+
+    def end_with(self, frame: Frame, done: int, samples: int | None) -> None:
+        """End a picture of whose samples `done` are in the frame's sums, most of them drawn in other frames (see
+        time_steps.py). `samples`: how many it is made of; None where those of other slices are missing."""
+        frame.samples_done = done
+        if samples is not None:
+            frame.settings = replace(frame.settings, samples=samples)
+            for _ in _stage(frame, "end"):
+                pass
+        frame.ledger.rows = []
 
     def _begin_samples(self, frame: Frame) -> Iterator[None]:
         frame.sample = 0
@@ -611,6 +649,11 @@ class Renderer:
             tuple(t.name for t in plan.techniques),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
+
+    def _clear_all_sums(self, frame: Frame) -> None:
+        self._clear_sums(frame)
+        for name in frame.shown.values():
+            frame.target(name).clear()
 
     def _clear_sums(self, frame: Frame) -> None:
         for technique in frame.plan.techniques:

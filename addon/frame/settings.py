@@ -25,7 +25,11 @@ TIME_LIMIT = Param(
     "time_limit", "Time Limit", 0.0,
     "Seconds after which a final render ends with the samples that it has by then; 0: none", 0.0, 1e6,
 )  # fmt: skip
-SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT)
+MOTION_STEPS = Param(
+    "motion_steps", "Time Steps", 16,
+    "Moments at which a final render with motion blur looks at the scene, at most one for each sample", 1, 256,
+)  # fmt: skip
+SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, MOTION_STEPS)
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 
@@ -45,6 +49,7 @@ class Settings:
     sample_offset: int = SAMPLE_OFFSET.default  # `samples` stays the number of the whole picture, for all techniques
     sample_count: int = SAMPLE_COUNT.default
     time_limit: float = TIME_LIMIT.default  # s; the picture may end with fewer samples than it asks for
+    motion_steps: int = MOTION_STEPS.default  # asked of by the engine alone, where motion blur is on
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):

@@ -60,7 +60,6 @@ def take(
     if view is None:
         camera = camera or scene.camera
         view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)
-        notes += cameras.camera_notes(camera.evaluated_get(depsgraph), scene.render)
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)

@@ -125,6 +125,35 @@ class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
         column.prop(context.scene.candela, "film_edges")
 
 
+class CANDELA_RENDER_PT_motion_blur(_CandelaPanel, bpy.types.Panel):
+    """Of final renders"""
+
+    bl_label = "Motion Blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context):
+        render = context.scene.render
+        column = _columns(self)
+        column.active = render.use_motion_blur
+        column.prop(render, "motion_blur_position", text="Position")
+        column.prop(render, "motion_blur_shutter")
+        column.prop(context.scene.candela, "motion_steps")
+
+
+class CANDELA_RENDER_PT_motion_blur_curve(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Shutter Curve"
+    bl_parent_id = "CANDELA_RENDER_PT_motion_blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        render = context.scene.render
+        self.layout.active = render.use_motion_blur
+        self.layout.template_curve_mapping(render, "motion_blur_shutter_curve")
+
+
 class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
     """What ran for the last picture, and what of it was reused"""
 
@@ -433,6 +462,8 @@ _CLASSES = (
         if technique.params_of(SCENE) and technique.name not in _WITH_OTHERS
     ),
     CANDELA_RENDER_PT_film,
+    CANDELA_RENDER_PT_motion_blur,
+    CANDELA_RENDER_PT_motion_blur_curve,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,

@@ -6,7 +6,18 @@ from functools import cache
 
 import bpy
 
-from ..frame.settings import AUTO, BOUNCES, OFF, SAMPLE_COUNT, SAMPLE_OFFSET, SAMPLES, SEED, TIME_LIMIT, Settings
+from ..frame.settings import (
+    AUTO,
+    BOUNCES,
+    MOTION_STEPS,
+    OFF,
+    SAMPLE_COUNT,
+    SAMPLE_OFFSET,
+    SAMPLES,
+    SEED,
+    TIME_LIMIT,
+    Settings,
+)
 from ..frame.technique import (
     CAMERA,
     DIRECTION,
@@ -90,6 +101,7 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "motion_steps": _property(MOTION_STEPS),
     }
     out["pass_tree"] = bpy.props.PointerProperty(
         type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE, update=_redraw,
@@ -191,6 +203,7 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
         sample_offset=0 if viewport or preview else group.sample_offset,
         sample_count=0 if viewport or preview else group.sample_count,
         time_limit=0.0 if viewport or preview or group.sample_offset or group.sample_count else group.time_limit,
+        motion_steps=group.motion_steps,
         passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
         values=_values(scene, depsgraph),

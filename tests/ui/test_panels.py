@@ -177,7 +177,8 @@ READ = {
     ),
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
-        "use_simplify",
+        *("use_simplify", "use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
+        "motion_blur_shutter_curve",
     ),
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
     "view_layer": ("material_override", "use_solid", "use_strand", "use_pass_mist", "samples"),
