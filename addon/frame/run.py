@@ -28,7 +28,7 @@ from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View, blackman_harris_offset
 from ..scene.world_tree import WorldTree
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import NO_LINKS, Snapshot
 from ..sources.environment import Environment
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
@@ -84,7 +84,7 @@ class Frame:
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
     _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
-    _hierarchies: dict[str, Hierarchy | None] = field(default_factory=dict)  # by path, of this frame
+    _hierarchies: dict[tuple, Hierarchy | None] = field(default_factory=dict)  # of this frame, see `hierarchy`
     _receivers: Receivers | None = None
     _texels: list[tuple[str, str, int]] = field(default_factory=list)  # technique, name and factor; see `count_texel`
     _texel_sums: images.Target | None = None
@@ -181,6 +181,12 @@ class Frame:
         return 1e-6 * min(self.geometry.size, reach)
 
     @cached_property
+    def blocker_sets(self) -> frozenset[frozenset[int]]:
+        """Groups of blockers that lights let pass, all that differ."""
+        snapshot = self.snapshot
+        return frozenset(one.links.passing for one in (*snapshot.lights, *snapshot.instances) if one.links.passing)
+
+    @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:
         """The scene's materials, with the means that they have on the surfaces that show them."""
         return self.surface_means.of(self.materials, self.geometry)
@@ -197,12 +203,13 @@ class Frame:
         self.measured_emission.update(self.materials, self.geometry)
         return self.measured_emission
 
-    def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
-        """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
-        first call."""
-        if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
-            self._hierarchies[path] = self.hierarchies.get(self, path)
-        return self._hierarchies[path]
+    def hierarchy(self, path: str = "glossy", passing: frozenset[int] = frozenset()) -> Hierarchy | None:
+        """Triangles that rays of a path (a name of Visibility) can meet, without objects of the groups of blockers
+        `passing` (snapshot/linking.py); None where there are too many. Built on the first call."""
+        key = path, passing
+        if key not in self._hierarchies:  # to find it again each sample would mean to go through all instances
+            self._hierarchies[key] = self.hierarchies.get(self, path, passing)
+        return self._hierarchies[key]
 
     def provide(self, service: Service, kind: type[Service] | None = None) -> None:
         """Hand a service to the other techniques of this picture, as one of its class, or of the base `kind`."""
@@ -647,6 +654,7 @@ class Renderer:
             settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
+            tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
             tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
         )  # fmt: skip
 
@@ -691,6 +699,7 @@ def lights_key(snapshot: Snapshot) -> tuple:
     return tuple(
         (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
          light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
+         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own,
+         light.links)
         for light in snapshot.lights
     )  # fmt: skip

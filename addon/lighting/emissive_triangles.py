@@ -20,6 +20,7 @@ class EmissiveTriangles:
 
     def __init__(self, frame: Frame, paths: Sequence[str]):
         corners, radiance, normals, sided, flags = [], [], [], [], []
+        self.passing: list[frozenset[int]] = []  # by triangle: groups of blockers that let its light pass
         front, behind = (
             np.array([_emission(m, side) for m in frame.measured_materials]).reshape(-1, 3) for side in (0, 1)
         )
@@ -47,7 +48,8 @@ class EmissiveTriangles:
                 # A mirrored triangle's corners run the other way round.
                 normals.append(np.full(len(shining), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
                 sided.append(np.full(len(shining), chosen is not alike))
-                flags.append(np.full(len(shining), seen))
+                flags.append(np.full(len(shining), seen + lights.unlit_bits(instance.links)))
+                self.passing += [instance.links.passing] * len(shining)
         self.corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
         self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
         self.sided = np.concatenate(sided) if sided else np.zeros(0, bool)

@@ -47,6 +47,7 @@ class Source:
     pointer: int  # its address
     owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
     materials: tuple  # evaluated bpy materials (or None), one per slot
+    parent: object = None  # evaluated instancer
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,7 @@ class ObjectFacts:
     terminator: float
     own: Own
     caustics_caster: bool
+    linked: bool  # it, or its instancer, has collections of light linking
     notes: tuple[Note, ...]
 
 
@@ -129,6 +131,7 @@ def walk(
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
+                        linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
                         notes=_object_notes(owner, kind, original.name),
                     )
                     if made != facts:
@@ -137,7 +140,7 @@ def walk(
                 materials = tuple([slot.material for slot in found.material_slots])
                 if hair and materials:
                     materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
-                source = known[identity] = Source(facts, data, pointer, owner, materials)
+                source = known[identity] = Source(facts, data, pointer, owner, materials, parent)
                 for note in facts.notes:
                     notes[note] = None
             facts = source.facts
@@ -212,12 +215,16 @@ def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
     return Visibility(*flags)
 
 
+def _is_linked(owner) -> bool:
+    linking = getattr(owner, "light_linking", None)
+    return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
+
+
 def _object_notes(owner, kind: str, name: str) -> tuple[Note, ...]:
     """What of the object is not drawn as Cycles draws it."""
     said = []
-    linking = getattr(owner, "light_linking", None)
-    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-        said.append("light linking is not followed: its light reaches and is blocked by every object.")
+    if _is_linked(owner):
+        said.append("light linking counts for light that reaches surfaces straight; bounced light follows none.")
     if kind in _DRAWN:
         if owner.is_shadow_catcher:
             said.append("is a shadow catcher, which is drawn as an ordinary surface.")

@@ -79,6 +79,19 @@ class Visibility:
     shadow: bool = True
 
 
+@dataclass(frozen=True)
+class Links:
+    """Light and shadow linking of an object, by groups of objects that all lights treat alike (linking.py)."""
+
+    receiver: int = 0  # the group of receivers that it belongs to
+    blocker: int = 0  # and of blockers
+    unlit: tuple[int, ...] = ()  # of what gives light: groups of receivers that it does not light
+    passing: frozenset[int] = frozenset()  # and of blockers that let its light pass
+
+
+NO_LINKS = Links()
+
+
 @dataclass(frozen=True, eq=False)
 class Instance:
     """One placement of a mesh. Instances of the same mesh and materials stand next to each other.
@@ -101,6 +114,7 @@ class Instance:
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
     caustics_caster: bool = False  # set to cast shadow caustics
+    links: Links = NO_LINKS
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +200,7 @@ class Light:
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
+    links: Links = NO_LINKS
 
 
 @dataclass(frozen=True)

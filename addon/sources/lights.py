@@ -12,7 +12,7 @@ import numpy as np
 
 from ..gfx.context import to_hold
 from ..gfx.struct import Block, Struct
-from ..snapshot.scene import Light, Snapshot
+from ..snapshot.scene import Light, Links, Snapshot
 
 TEXELS = 8
 VIEW_TEXELS = 5
@@ -32,6 +32,7 @@ NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for i
 TRANSMISSION_FLAG = 256
 SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
 EVEN_FLAG = 1024  # of a world of one colour
+LINK_BIT = 4096  # bits from here on, 12 of them: groups of receivers that a light does not light (snapshot/linking.py)
 GLASS_BLOCKS_FLAG = 2048  # what passes glass arrives as photons of caustics
 
 
@@ -150,7 +151,7 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
     flags = (
         DIFFUSE_FLAG * light.visibility.diffuse + GLOSSY_FLAG * light.visibility.glossy
         + SHADOW_FLAG * light.cast_shadow + CAMERA_FLAG * light.visibility.camera
-        + TRANSMISSION_FLAG * light.visibility.transmission
+        + TRANSMISSION_FLAG * light.visibility.transmission + unlit_bits(light.links)
     )  # fmt: skip
     power = float(np.abs(strength).max())
     smallest = max(SMALLEST, np.sqrt(power / BRIGHTEST) if light.normalize else 0.0)
@@ -200,6 +201,11 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
             inverse[2],
         ]
     return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
+
+
+def unlit_bits(links: Links) -> int:
+    """Flags for the groups of receivers that are not lit."""
+    return sum(LINK_BIT << group for group in links.unlit)
 
 
 def footprint(area: float, points: float) -> float:

@@ -36,7 +36,7 @@ from ..lighting import shared_visibility
 from ..lighting.caustic_casters import answered
 from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, NEAR, RAYS_WHERE_NEAR, light_surfaces, lighting
-from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, VisibilityProvider
+from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, ShadowLinks, VisibilityProvider
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -100,7 +100,10 @@ class DirectLight(Technique):
             provider = service.serving(emitter) if service else self._unshadowed
             rate = self._rate(frame, emitter, weight, provider)
             points = rate.per_sample * frame.settings.samples / weight
-            if service and self._has_rays(frame, emitter, provider):
+            linked = frame.shared(ShadowLinks).of(frame, emitter.light.links.passing)
+            if service and linked and emitter.light.cast_shadow:
+                provider = linked
+            elif service and self._has_rays(frame, emitter, provider):
                 provider = self._rays
             flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
             flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)

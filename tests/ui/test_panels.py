@@ -173,7 +173,7 @@ READ = {
     "material": ("pass_index", "Volume", "Displacement", "Surface", "use_transparent_shadow"),
     "object": (
         *("pass_index", "color", "is_holdout", "shadow_terminator_geometry_offset", "visible_transmission"),
-        *("visible_volume_scatter", "visible_camera"),
+        *("visible_volume_scatter", "visible_camera", "receiver_collection", "blocker_collection"),
     ),
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
