@@ -16,6 +16,8 @@ import bpy
 import numpy as np
 
 from . import viewport
+from .film import catcher
+from .film.noise import NoiseMeter
 from .frame import ledger as ledgers
 from .frame import slices, time_steps
 from .frame.bands import Leash, samples_in_parts
@@ -27,11 +29,12 @@ from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import GLARE, RenderPass, missing_passes, wanted_passes
+from .ui.passes import CATCHER, GLARE, RenderPass, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
+PICTURES_OF_CATCHERS = 3  # of which a picture with shadow catchers is made: each has a part of the time
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
@@ -178,11 +181,23 @@ class CandelaEngine(bpy.types.RenderEngine):
             check_tree(settings.passes)
             snapshot = self._seen(depsgraph, snapshot, eye)
             before = shared.renderer.frame
-            steps = [] if layer.name in given else self._steps(snapshot, settings, eye)
+            plates = None
+            if catcher.has_catchers(snapshot) and not self.is_preview:
+                if taken is not None or given:
+                    raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
+                settings = replace(settings, time_limit=settings.time_limit / PICTURES_OF_CATCHERS)
+                plates = self._plates(shared.renderer, snapshot, settings, eye)
+                if plates is None:
+                    return
+                snapshot, started = catcher.catchers_unseen(snapshot), time.perf_counter()
+            seen_as = catcher.catchers_unseen if plates else None
+            steps = [] if layer.name in given else self._steps(snapshot, settings, eye, seen_as)
             with context.turn:
                 _free_old_sessions()
                 if steps:
-                    unlimited = replace(settings, time_limit=0.0)  # what is kept for one counts samples of one step
+                    unlimited = replace(
+                        settings, time_limit=0.0, noise_threshold=0.0
+                    )  # what is kept for one counts samples of one step
                     begun = (steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
                     frame = shared.renderer.begin(*begun)
                 else:
@@ -190,6 +205,9 @@ class CandelaEngine(bpy.types.RenderEngine):
                 if before is not None and before.size != frame.size:
                     images.pool.trim()  # nobody asks for images of the old size again
             frame.ledger.times["sync"] = self._sync_seconds
+            if steps and settings.noise_threshold:
+                text = "the noise threshold does not count where something moves: all samples are drawn."
+                frame.ledger.notes += (Note("Motion blur", text),)
             missing = missing_passes(layer)
             if missing and not self.is_preview:
                 text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
@@ -214,7 +232,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             with context.turn:
                 if taken is not None:
                     taken[layer.name] = slices.taken(frame)
-                pixels = _finished(shared.renderer, frame, wanted)
+                pixels = _finished(shared.renderer, frame, wanted, plates)
             for name, array in pixels.items():
                 render_pass = result.layers[0].passes.find_by_name(name, eye)
                 if render_pass is not None:
@@ -252,6 +270,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
         """
         limit, first, before = frame.settings.time_limit, time.perf_counter(), frame.samples_done
+        meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
         parts = _whole_samples if bpy.app.background else samples_in_parts
         shown = -1
         for _ in parts(renderer, frame):
@@ -260,6 +279,11 @@ class CandelaEngine(bpy.types.RenderEngine):
                 wanted = frame.settings.samples_to_draw
                 self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
                 self.update_progress(shown / wanted)
+                if meter is not None and shown < wanted:
+                    with context.turn:
+                        if meter.look(frame):
+                            renderer.stop(frame)
+                            return
                 if limit and shown > before:
                     with context.turn:
                         images.finish()
@@ -270,13 +294,35 @@ class CandelaEngine(bpy.types.RenderEngine):
                             return
             yield
 
-    def _steps(self, snapshot: Snapshot, settings, eye: str) -> list[time_steps.Step]:
+    def _plates(self, renderer: Renderer, snapshot: Snapshot, settings, eye: str) -> tuple | None:
+        """The pictures with all and with shadow catchers alone (catcher.Layer); None if the render was cancelled."""
+        found = []
+        for changed in (None, catcher.catchers_alone):
+            shown = changed(snapshot) if changed else snapshot
+            steps, started = self._steps(shown, settings, eye, changed), time.perf_counter()
+            with context.turn:
+                if steps:
+                    unlimited = replace(settings, time_limit=0.0, noise_threshold=0.0)
+                    frame = renderer.begin(steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
+                else:
+                    frame = renderer.begin(shown, settings, self._compiling)
+            drawing = self._drawn_in_steps(renderer, steps, settings, started) if steps else None
+            for _ in drawing or self._drawn(renderer, frame, started):
+                if self.test_break():
+                    return None
+            with context.turn:
+                frame = renderer.frame
+                renderer.show(frame)
+                found.append(catcher.layer(renderer.finish(frame, catcher.IMAGES), shown))
+        return tuple(found)
+
+    def _steps(self, snapshot: Snapshot, settings, eye: str, changed=None) -> list[time_steps.Step]:
         """Time steps of a picture with motion blur; none where nothing moves. All are seen through the camera of an
         eye, where there are several, which is that of the frame itself."""
         moments = self._moments
         if moments is None:
             return []
-        snapshots = moments.snapshots
+        snapshots = [changed(one) for one in moments.snapshots] if changed else moments.snapshots
         if eye:
             snapshots = [replace(one, camera=snapshot.camera) for one in snapshots]
         return time_steps.shared_out(snapshots, moments.steps, settings)
@@ -287,7 +333,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         """The same of a picture with motion blur."""
         parts = _whole_samples if bpy.app.background else samples_in_parts
         first, wanted, shown = time.perf_counter(), settings.samples_to_draw, -1
-        unlimited = replace(settings, time_limit=0.0)
+        unlimited = replace(settings, time_limit=0.0, noise_threshold=0.0)
         for done, stop in time_steps.drawn(renderer, steps, unlimited, parts, self._compiling):
             if done != shown:
                 shown = done
@@ -346,10 +392,23 @@ def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
 # ------------------------------------------------------------------------------------------------------------- passes
 
 
-def _finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
-    """Pass pixels by Blender's name, (H, W, channels) float32."""
+def _finished(
+    renderer: Renderer, frame: Frame, wanted: list[RenderPass], plates: tuple | None = None
+) -> dict[str, np.ndarray]:
+    """Pass pixels by Blender's name, (H, W, channels) float32. `plates`: the two other pictures of a scene with shadow
+    catchers."""
     renderer.show(frame)
-    arrays = renderer.finish(frame, sorted({"film.combined", *(name for asked in wanted for name in asked.images)}))
+    names = {"film.combined", *(name for asked in wanted for name in asked.images)} | set(
+        catcher.IMAGES if plates else ()
+    )
+    arrays = renderer.finish(frame, sorted(names - set(CATCHER.images)))
+    arrays[CATCHER.source] = np.ones_like(arrays["film.combined"][..., :3])
+    if plates:
+        things, transparent = catcher.layer(arrays, frame.snapshot), frame.snapshot.film.transparent
+        arrays[CATCHER.source] = change = catcher.change_of(*plates, things, transparent)
+        arrays["film.combined"] = catcher.composed(
+            change, plates[0], things, arrays["film.combined"], transparent, CATCHER in wanted
+        )
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays["film.combined"]
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}

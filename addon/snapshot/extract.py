@@ -205,6 +205,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
                     of_object.terminator, of_object.own, of_object.caustics_caster, links,
+                    of_object.shadow_catcher,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.

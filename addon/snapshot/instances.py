@@ -67,6 +67,7 @@ class ObjectFacts:
     terminator: float
     own: Own
     caustics_caster: bool
+    shadow_catcher: bool
     linked: bool  # it, or its instancer, has collections of light linking
     notes: tuple[Note, ...]
 
@@ -131,8 +132,9 @@ def walk(
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
+                        shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
-                        notes=_object_notes(owner, kind, original.name),
+                        notes=_object_notes(owner, kind, original.name, final),
                     )
                     if made != facts:
                         facts = made
@@ -220,14 +222,14 @@ def _is_linked(owner) -> bool:
     return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
 
 
-def _object_notes(owner, kind: str, name: str) -> tuple[Note, ...]:
+def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
     """What of the object is not drawn as Cycles draws it."""
     said = []
     if _is_linked(owner):
         said.append("light linking counts for light that reaches surfaces straight; bounced light follows none.")
     if kind in _DRAWN:
-        if owner.is_shadow_catcher:
-            said.append("is a shadow catcher, which is drawn as an ordinary surface.")
+        if owner.is_shadow_catcher and not final:
+            said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
         for modifier in owner.modifiers:
             domain = getattr(modifier, "domain_settings", None)
             if domain is not None and modifier.fluid_type == "DOMAIN" and domain.domain_type == "GAS":

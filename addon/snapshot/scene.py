@@ -115,6 +115,7 @@ class Instance:
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
     caustics_caster: bool = False  # set to cast shadow caustics
     links: Links = NO_LINKS
+    shadow_catcher: bool = False
 
 
 @dataclass(frozen=True, eq=False)

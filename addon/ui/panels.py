@@ -52,6 +52,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         settings = context.scene.candela
         column = _columns(self)
         column.prop(settings, "samples", text="Render Samples")
+        column.prop(settings, "noise_threshold")
         column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
@@ -315,6 +316,8 @@ class CANDELA_OBJECT_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
             "shadow",
         ):  # visible_camera and so on
             column.prop(context.object, f"visible_{name}", text=name.replace("_", " ").title())
+        if context.object.type != "LIGHT":
+            column.prop(context.object, "is_shadow_catcher")
 
 
 class CANDELA_WORLD_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):

@@ -76,6 +76,10 @@ PASSES = tuple(
 )
 
 
+# What things change of the light on shadow catchers: 1 where nothing (film/catcher.py).
+CATCHER = RenderPass("cycles.use_pass_shadow_catcher", "Shadow Catcher", "RGB", "COLOR", "film.catcher")
+PASSES = (*PASSES, CATCHER)
+
 # The picture as an eye sees it, beside a Combined that stays as it is; written where glare is on.
 GLARE = RenderPass("", "Glare", "RGBA", "COLOR", "film.lens")
 
@@ -101,7 +105,6 @@ _OTHERS = (
     ("use_pass_cryptomatte_object", "Cryptomatte Object"), ("use_pass_cryptomatte_material", "Cryptomatte Material"),
     ("use_pass_cryptomatte_asset", "Cryptomatte Asset"),
     ("cycles.denoising_store_passes", "Denoising Data"),
-    ("cycles.use_pass_shadow_catcher", "Shadow Catcher"),
 )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from ..frame.settings import (
     AUTO,
     BOUNCES,
     MOTION_STEPS,
+    NOISE_THRESHOLD,
     OFF,
     SAMPLE_COUNT,
     SAMPLE_OFFSET,
@@ -101,6 +102,7 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "noise_threshold": _property(NOISE_THRESHOLD, precision=4),
         "motion_steps": _property(MOTION_STEPS),
     }
     out["pass_tree"] = bpy.props.PointerProperty(
@@ -195,6 +197,7 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
     tree = group.pass_tree
     final = (layer.samples if layer is not None else 0) or group.samples
     samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else final)
+    alone = not (viewport or preview or group.sample_offset or group.sample_count)  # a whole picture, by one machine
     settings = Settings(
         samples=samples,
         whole=not viewport,
@@ -202,7 +205,8 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
         bounces=group.bounces,
         sample_offset=0 if viewport or preview else group.sample_offset,
         sample_count=0 if viewport or preview else group.sample_count,
-        time_limit=0.0 if viewport or preview or group.sample_offset or group.sample_count else group.time_limit,
+        time_limit=group.time_limit if alone else 0.0,
+        noise_threshold=group.noise_threshold if alone else 0.0,
         motion_steps=group.motion_steps,
         passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},

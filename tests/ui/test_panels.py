@@ -174,6 +174,7 @@ READ = {
     "object": (
         *("pass_index", "color", "is_holdout", "shadow_terminator_geometry_offset", "visible_transmission"),
         *("visible_volume_scatter", "visible_camera", "receiver_collection", "blocker_collection"),
+        "is_shadow_catcher",
     ),
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),

@@ -1,0 +1,103 @@
+"""Shadow catchers: surfaces that show only by how things change the light on them, over a plate that is put in later.
+
+As in Cycles three pictures are made of a scene with catchers, with the same samples:
+
+    all       everything as it is
+    plate     the catchers alone, as they would be lit if nothing else were there
+    things    everything, but the camera does not see the catchers
+
+    change = 1 - a + a (all - things) / plate       where a catcher is seen, by what each covers; a: alpha of all
+
+is the pass Shadow Catcher: below 1 in shadows, above where things shine on a catcher, 1 where no catcher is. A view
+layer that asks for it gets `things` alone as Combined. For others, with a transparent film,
+
+    rgb = things,   alpha = a + (1 - a) (1 - mean of change),   a: alpha of things
+
+which cannot say where a catcher is brighter than before; else the world stands for the plate, darkened by the mean.
+
+| cost | |
+|---|---|
+| time | three pictures; other passes are those of `things` |
+| memory | two pictures on the CPU |
+
+Scenes without catchers make one picture, as ever. Not drawn: catchers in the viewport, and slices of such pictures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..snapshot.scene import Snapshot
+
+COMBINED, WORLD = "film.combined", "radiance.environment"
+IMAGES = (COMBINED, WORLD)  # what is read of each of the three
+LEAST = 0.01  # share of a pixel below which nothing is known of what covers it
+
+
+def has_catchers(snapshot: Snapshot) -> bool:
+    return any(one.shadow_catcher for one in snapshot.instances)
+
+
+def catchers_alone(snapshot: Snapshot) -> Snapshot:
+    """The scene of `plate`."""
+    return replace(snapshot, instances=tuple(one for one in snapshot.instances if one.shadow_catcher), volumes=())
+
+
+def catchers_unseen(snapshot: Snapshot) -> Snapshot:
+    """The scene of `things`."""
+    instances = (
+        replace(one, visibility=replace(one.visibility, camera=False)) if one.shadow_catcher else one
+        for one in snapshot.instances
+    )
+    return replace(snapshot, instances=tuple(instances))
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Of one of the three pictures: the light of its objects (H, W, 3), what they cover (H, W, 1), and the world."""
+
+    light: np.ndarray
+    covered: np.ndarray
+    world: np.ndarray
+
+
+def layer(images: dict[str, np.ndarray], snapshot: Snapshot) -> Layer:
+    """From IMAGES of a picture of this scene."""
+    world = snapshot.film.exposure * images[WORLD][..., :3]
+    seen = 0.0 if snapshot.film.transparent else 1.0  # Combined holds the world
+    return Layer(images[COMBINED][..., :3] - seen * world, images[WORLD][..., 3:], world)
+
+
+def change_of(everything: Layer, plate: Layer, things: Layer, transparent: bool) -> np.ndarray:
+    """(H, W, 3) the pass Shadow Catcher: 1 where nothing changes, and where there is no catcher."""
+    shown = _shown(everything, things)
+    known = (shown > LEAST) & (plate.covered > LEAST)
+    now = (everything.light - things.light) / np.where(known, shown, 1.0)
+    alone = plate.light / np.where(known, plate.covered, 1.0)
+    lit = known & (alone > 0.0)
+    ratio = np.where(lit, np.maximum(now, 0.0) / np.where(lit, alone, 1.0), 1.0)
+    alpha = np.clip(everything.covered, 0.0, 1.0) if transparent else 1.0
+    return (1.0 - alpha + alpha * ratio).astype(np.float32)
+
+
+def composed(
+    change: np.ndarray, everything: Layer, things: Layer, combined: np.ndarray, transparent: bool, apart: bool
+) -> np.ndarray:
+    """(H, W, 4) Combined; `combined` is that of `things`. `apart`: the change is a pass of its own."""
+    mean = np.clip(change.mean(axis=-1, keepdims=True), 0.0, 1.0)
+    if transparent:
+        rgb, alpha = combined[..., :3], combined[..., 3:]
+        alpha = alpha if apart else alpha + (1.0 - alpha) * (1.0 - mean)
+    else:
+        shown = _shown(everything, things)
+        share = np.clip(shown / np.clip(1.0 - things.covered, LEAST, 1.0), 0.0, 1.0)  # of what things leave open
+        rgb = things.light + things.world * (1.0 - share + (0.0 if apart else share * mean))
+        alpha = 1.0 - shown if apart else np.ones_like(shown)
+    return np.concatenate([rgb, alpha], axis=-1).astype(np.float32)
+
+
+def _shown(everything: Layer, things: Layer) -> np.ndarray:
+    """(H, W, 1) share of each pixel that shows catchers."""
+    return np.clip(everything.covered - things.covered, 0.0, 1.0)
