@@ -19,6 +19,8 @@ from bench.quick import size_of, table
 
 HEAD = ("scene", "engine", "samples", "seconds", "relMSE", "bias", "volume direct", "bias", "volume indirect", "bias")
 SEED = 5
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "media.md"
+COMMAND = "python -m bench media --page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bounces", type=int, default=4, metavar="N", help="default 4")
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write PNGs of each scene beside Cycles")
-    parser.add_argument("--page", type=Path, metavar="PATH", help="write the table as Markdown, too")
+    parser.add_argument("--page", action="store_true", help="write the tables into docs/media.md, scene by scene")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -51,7 +53,7 @@ def command(options: argparse.Namespace) -> int:
         if profile:
             print(table([PROFILE_HEAD, *profile]), flush=True)
         if options.page:  # after each scene: what is measured stays when the run is ended
-            options.page.write_text(page(rows, profiles, options), encoding="utf-8")
+            markdown.put_between(PAGE, COMMAND, page(rows, profiles, options))
     return 0
 
 
@@ -174,18 +176,15 @@ def _save(path: Path, ours: np.ndarray, theirs: np.ndarray) -> None:
 
 
 def page(rows: list[tuple[str, ...]], profiles: list[tuple[str, ...]], options) -> str:
-    """The tables as a page of the documentation."""
+    """Both tables, and what they are of."""
     width, height = options.size
-    text = f"""# Fog, smoke and volume caustics
-
-Written by `python -m bench media --page docs/media.md`; do not edit. Pictures of {width} x {height} pixels,
-{options.bounces} bounces in all engines but EEVEE, against two renders of {options.reference} samples by Cycles, whose
-noise is taken off the errors (relMSE). Candela and EEVEE draw on a software GPU. EEVEE has no such bounces: its bias
-is partly that.
+    text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two
+renders of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw
+on a software GPU. EEVEE has no such bounces: its bias is partly that.
 
 """
-    text += markdown.table([HEAD, *rows]) + "\n"
+    text += markdown.table([HEAD, *rows])
     if profiles:
-        text += "\n## Volume caustics\n\nProfile of the light in the medium below the caster, 16 samples.\n\n"
-        text += markdown.table([PROFILE_HEAD, *profiles]) + "\n"
+        text += "\n\n**Volume caustics**: profile of the light in the medium below the caster, 16 samples.\n\n"
+        text += markdown.table([PROFILE_HEAD, *profiles])
     return text

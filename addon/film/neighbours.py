@@ -15,7 +15,7 @@ virtual lights and before what reflects was drawn at several points of a pixel,
 
     reflected = albedo * mean over neighbours on the surface of  arriving
 
-Edges and textures need more points than light that is as smooth as this: film_points.py has them.
+Edges and textures need more points than light that is as smooth as this: film/points.py has them.
 
 | cost | per pass |
 |---|---|

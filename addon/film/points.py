@@ -12,7 +12,7 @@ over by their weights times reflectance, of lobes of the same kind. Emission, th
 exact at every point.
 
 K = points / samples, from 1 to MOST. Eight points a picture, as a sample beyond them pays better than a point: since
-points go to all pixels whose filter covers them (film_filter.py), edges need no more. Pictures without indirect light
+points go to all pixels whose filter covers them (film/filter.py), edges need no more. Pictures without indirect light
 have a quarter of that, since there a point costs nearly as much as a sample.
 
 relMSE at 256x192 and seconds, all light, one point a sample, and K as here: one sample, garden .033 1.2, .015 1.5;

@@ -1,4 +1,7 @@
-"""The contract of a technique: data about itself, and the stages in which it works on a picture."""
+"""The contract of a technique: data about itself, and the stages in which it works on a picture.
+
+Techniques are registered in techniques/__init__.py.
+"""
 
 from __future__ import annotations
 

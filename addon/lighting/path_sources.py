@@ -8,7 +8,7 @@ rows and the constants tell.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,9 +67,9 @@ class PathSources:
         """Of all triangles, W/sr: luminance times area. 0 where none emits."""
         return self._triangles.power if self._triangles else 0.0
 
-    def rows(self, frame: Frame) -> list[np.ndarray]:
+    def rows(self, frame: Frame, by_photons: Collection[str] = ()) -> list[np.ndarray]:
         """Points of this sample, for lights.Sources. More lamps than fit are drawn by chance, and count more: both as
-        points and where a ray meets them."""
+        points and where a ray meets them. Light of lamps with the keys `by_photons` passes no glass on its way."""
         rows = []
         count = len(self._emitters)
         chosen = np.arange(count)
@@ -80,7 +80,9 @@ class PathSources:
             emitter = self._emitters[number]
             sample = emitter.sample(*frame.random_volume(f"{self.use}/light"))
             weight = max(count / self.most_lamps, 1.0)
-            rows.append(emitter.row(sample, 0, int(emitter.light.cast_shadow), weight))
+            row = emitter.row(sample, 0, int(emitter.light.cast_shadow), weight)
+            row[0, 1] += lights.GLASS_BLOCKS_FLAG * (emitter.light.key in by_photons)
+            rows.append(row)
         if self._triangles is not None:
             for k in range(self.emissive_points):
                 index = frame.sample * self.emissive_points + k

@@ -1,6 +1,6 @@
 """Repeated light: direct light of a sample once more, where a point of the film shows another surface.
 
-Points of the film that share a sample's light (film_points.py) take it from pixels whose own point lies on the same
+Points of the film that share a sample's light (film/points.py) take it from pixels whose own point lies on the same
 surface. At edges that is a guess: on what is thinner than a pixel, on a leaf half in shadow, on an outline that alone
 shows a highlight. So pixels are marked whose own point lies elsewhere, unless the direct light of two or more
 neighbours on the surface differs by less than 30 %, and the passes of light run again in them alone: the same points

@@ -1,4 +1,6 @@
-"""Whether a point of a light is seen from a surface: what tells it (depth maps or rays), and drawing the maps."""
+"""Whether a point of a light is seen from a surface: what tells it (depth maps, rays, or edges: edge_shadows.py), and
+drawing the maps. Which of maps and rays costs less: ray_costs.py.
+"""
 
 from __future__ import annotations
 

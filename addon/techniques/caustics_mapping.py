@@ -42,22 +42,14 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters, photons
+from ..lighting.caustic_maps import INTO_MAP, LEAST_TEXELS, SEEN, CausticMaps
 from ..lighting.light_views import LightBuffers, widened
 from ..lighting.photons import MAP, Photons
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
+from ..surfaces.draw import SURFACES, surface_bindings
 
-SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
-INTO_MAP = splats.splat_program(
-    "photon into caustic map",
-    "caustics/map.frag.glsl",
-    "map_view.row_x, map_view.row_y, map_view.row_w, map_view.row_q, map_view.backward.w",
-    textures=MAP,
-    blocks=((VIEW, "map_view"),),
-    outputs=(("VEC4", "out_irradiance"),),
-)
 APPLY = passes.fullscreen_program(
     "caustic map applied",
     "caustics/apply.frag.glsl",
@@ -65,7 +57,6 @@ APPLY = passes.fullscreen_program(
     blocks=((VIEW, "map_view"),),
     outputs=(("VEC4", "out_light"),),
 )
-LEAST_TEXELS = 0.9
 LOOKUPS, RAYS = "LOOKUPS", "RAYS"
 
 
@@ -124,6 +115,8 @@ class CausticsMapping(Technique):
         by_rays = settings.get(self, "by") == RAYS
         count = settings.samples if settings.whole else frame.sample + 1
         shift = np.array(frame.random_at(frame.sample, "caustics/map"))
+        maps = frame.kept(CausticMaps)
+        maps.begin(frame)
         for light in self._photons.views(frame, self._casters, side, frame.sample):
             view = widened(light.view, settings.get(self, "extent"), frame.receivers.corners, map_side, shift)
             block, seen = self._receivers.receivers(frame, self, view, self._casters.materials)
@@ -136,7 +129,12 @@ class CausticsMapping(Technique):
                 if by_rays
                 else self._photons.looked_up(frame, self, self._casters, light, block, caught, count)
             )
+            at_hits = maps.wants(frame, light)
+            if at_hits:
+                into_kept = maps.add(frame, self, self._casters, light, count, self._photons)
             for bundle in bundles:
+                if at_hits:
+                    into_kept(bundle)
                 records = self._photons.footprints(frame, self, bundle, block, count, LEAST_TEXELS)
                 splats.draw(INTO_MAP, target, records, textures=caught, blocks={"map_view": block})
                 frame.count(self, "passes")
@@ -149,6 +147,8 @@ class CausticsMapping(Technique):
                 blocks={"map_view": block},
             )
             frame.count(self, "passes")
+            if at_hits:
+                maps.keep(frame, self)
             yield
 
     def _map_of(self, side: int) -> images.Target:

@@ -5,8 +5,8 @@ of the glossy lobe. Light is stored with its colour; engine.py divides, after th
 extent that the camera may see are intersected analytically and land in emission.
 
 Techniques add the light of one sample to the images `radiance.*`, all at one point of each pixel's filter. When all
-have done so it goes into the sums of all pixels whose filter covers that point (film_filter.py), at several such points
-where the picture has few samples (film_points.py).
+have done so it goes into the sums of all pixels whose filter covers that point (film/filter.py), at several such points
+where the picture has few samples (film/points.py).
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ place of a mask's pyramid, and all photons kept with their weight in place of ro
 | bytes | 20 x 16 per photon |
 
 Bias, in diffuse indirect: as photons.py says. Receivers reflect evenly by their albedo; what glossy lobes mirror of
-a caustic, and caustics seen in mirrors or through glass, are left to the light of those paths (grey shadows there).
+a caustic is left out. Caustics seen in mirrors and through glass come from maps (lighting/caustic_maps.py).
 Light of the world and of emissive meshes passes casters straight.
 
 Fails: above 4 million triangles nothing is traced.
@@ -35,13 +35,13 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx.library import Program
 from ..kernels import splats
 from ..lighting import caustic_casters
+from ..lighting.caustic_maps import SEEN, CausticMaps
 from ..lighting.photons import FOOTPRINTS, PHOTONS, Photons
 from ..scene import acceleration
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
-from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
+from ..surfaces.draw import SURFACES, surface_bindings
 
-SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
 SPLAT = splats.splat_program(
     "photon splat",
     "caustics/splat.frag.glsl",
@@ -102,7 +102,12 @@ class ScreenSpacePhotons(Technique):
         side, interfaces = settings.get(self, "grid"), settings.get(self, "interfaces")
         count = settings.samples if settings.whole else frame.sample + 1
         seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
+        maps = frame.kept(CausticMaps)
+        maps.begin(frame)
         for light in self._photons.views(frame, self._casters, side, frame.sample):
+            at_hits = maps.wants(frame, light)
+            if at_hits:
+                into_kept = maps.add(frame, self, self._casters, light, count, self._photons)
             for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, count):
                 records = self._photons.footprints(frame, self, bundle, frame.view_block, count, LEAST_PIXELS)
                 splats.draw(
@@ -113,6 +118,10 @@ class ScreenSpacePhotons(Technique):
                     blocks={"film_view": frame.view_block},
                 )
                 frame.count(self, "passes")
+                if at_hits:
+                    into_kept(bundle)
+            if at_hits:
+                maps.keep(frame, self)
             yield
 
     def release(self) -> None:

@@ -35,6 +35,8 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
+from ..lighting import caustic_maps
+from ..lighting.caustic_maps import CausticMaps
 from ..lighting.interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
@@ -207,7 +209,9 @@ class ShadedReflections(Technique):
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
             return
         hits, transmission = frame.kept(Hits), refracts(frame)
-        rows = self._sources.rows(frame)
+        maps = frame.kept(CausticMaps)
+        caustics = maps.of(frame)
+        rows = self._sources.rows(frame, maps.lights if caustics else ())
         sources = self._sources.block(rows)
         mirrors = min(frame.settings.get(self, "bounces"), frame.settings.bounces)
         glass = next((t for t in frame.plan.techniques if "transmission" in t.fills), None)
@@ -235,6 +239,8 @@ class ShadedReflections(Technique):
                     break
                 self._add_guide(frame, rays, records, closures, round_)
                 self._add_received(frame, rays, records, closures, sources, len(rows), round_, transmission)
+                if caustics:
+                    self._add_caustics(frame, caustics, rays, records, closures, transmission)
                 yield
                 if number + 1 < rounds:
                     before = {
@@ -248,6 +254,7 @@ class ShadedReflections(Technique):
             for image in (*rays.colors, *onward.colors, *closures.colors):
                 images.pool.give(image)
             records.give()
+            maps.end()
         frame.count(self, "light samples", len(rows))
 
     @staticmethod
@@ -337,6 +344,13 @@ class ShadedReflections(Technique):
             constants={**near, **reach, "light_count": count, "offset_size": frame.offset_size, "repeats": repeats},
         )  # fmt: skip
         frame.count(self, "passes")
+
+    def _add_caustics(self, frame, maps, rays, records, closures, transmission) -> None:
+        textures = closure_bindings(closures) | {
+            "met_path": rays.colors[2], "hit_passed": records.images["hit_passed"],
+        }  # fmt: skip
+        target = _target(frame, transmission, ("indirect",), records.target.depth)
+        caustic_maps.add_at_hits(frame, self, maps, target, transmission, MET, textures)
 
     def release(self) -> None:
         self._sources.release()

@@ -21,7 +21,7 @@ diffuse and glossy light) are those of the kinds; lights of one kind share atlas
 Measured with one sample at 128x96 against Cycles, relMSE of the direct diffuse light, by this technique and by points
 with the same 6 maps per sample: Cornell box 0.036 and 0.059, door ajar 0.066 and 0.63, garden 0.19 and 0.24, window
 0.54 and 0.57, instances 0.60 and 0.64, foliage 0.31 and 0.33; colonnade 2.2 and 1.9. All figures include the film's
-filter, and are from before one sample showed several points of it (film_points.py). Round lights, whose points are
+filter, and are from before one sample showed several points of it (film/points.py). Round lights, whose points are
 asked by rays where they are near, are no exception: with rays to them the garden has 0.20.
 """
 

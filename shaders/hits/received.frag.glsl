@@ -83,8 +83,9 @@ vec3 direct_light(Receiver r, uint salt)
   vec3 origin = ray_origin(r.surface.position, behind ? -side : side);
   float reach = light_reach(light, origin, chosen_direction);
   ivec2 hit;
+  bool glass_stops = r.bends || (light.flags & LIGHT_GLASS_BLOCKS) != 0;
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
-                 && trace_layers(origin, chosen_direction, reach, reach, salt, r.bends, true, hit) < reach;
+                 && trace_layers(origin, chosen_direction, reach, reach, salt, glass_stops, true, hit) < reach;
   return blocked ? vec3(0.0) : chosen_light * (total / chosen_share);
 }
 

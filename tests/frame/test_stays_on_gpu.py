@@ -72,6 +72,7 @@ def test_a_turning_viewport_makes_no_framebuffer_after_the_second_frame_of_a_siz
         region.camera = region.moved(1e-3)
         region.draw()
         made.append((region.viewport.scale, images.framebuffer_count))
+    region.viewport.release()
     last = [count for scale, count in made if scale == made[-1][0]]
     assert len(last) > 3 and last[-1] == last[1], made
 

@@ -165,6 +165,131 @@ def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
     assert energy == pytest.approx(expected, rel=0.03)
 
 
+def slab(stage, material, low, high, half=1.5):
+    """A closed box with faces at z = `low` and `high`, whose sides lie outside of what is looked at."""
+    corners = [(x, y, z) for z in (low, high) for x, y in ((-half, -half), (half, -half), (half, half), (-half, half))]
+    sides = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
+    made = stage.mesh(corners, [(3, 2, 1, 0), (4, 5, 6, 7), *sides], material=material)
+    made.visible_camera = False
+    return made
+
+
+def passed(cosine, ior):
+    """Share of light that a face of index `ior` lets in at the cosine, and the tangent behind it."""
+    sine = np.sqrt(1 - cosine * cosine)
+    bent = np.sqrt(1 - (sine / ior) ** 2)
+    s = (cosine - ior * bent) / (cosine + ior * bent)
+    p = (ior * cosine - bent) / (ior * cosine + bent)
+    return 1 - 0.5 * (s * s + p * p), sine / ior / bent
+
+
+def test_slab_shifts_light_sideways_and_takes_what_its_faces_reflect(stage):
+    """Sun at 30 degrees through a hole of .4 m over .4 m of glass: the spot lies h (tan T - tan T') nearer, as bright
+    as two faces leave and what goes to and fro between them gives back."""
+    ior, thick, angle, plate = 1.5, 0.4, np.pi / 6, 1.0
+    stage.floor()
+    slab(stage, glass(stage, ior), 0.5, 0.5 + thick)
+    hole, wide = 0.2, 3.0
+    rim = [
+        (-wide, -wide),
+        (wide, -wide),
+        (wide, wide),
+        (-wide, wide),
+        (-hole, -hole),
+        (hole, -hole),
+        (hole, hole),
+        (-hole, hole),
+    ]
+    faces = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
+    stage.mesh([(x, y, plate) for x, y in rim], faces, material=stage.diffuse()).visible_camera = False
+    stage.light("SUN", turn=(0, angle, 0), angle=0.0)
+    stage.camera_above(2.0)
+    energy = irradiance(stage, PHOTONS, samples=16, size=(96, 96), grid=256)
+    x, y = places((96, 96), 2.0)
+    inside, bent = passed(np.cos(angle), ior)
+    middle = (energy * x).sum() / energy.sum()
+    expected = -((plate - thick) * np.tan(angle) + thick * bent)
+    assert middle == pytest.approx(expected, abs=0.01)
+    assert (energy * y).sum() / energy.sum() == pytest.approx(0.0, abs=0.005)
+    share = inside / (2 - inside)  # (1 - R) / (1 + R)
+    spot = (np.abs(x - expected) < 0.12) & (np.abs(y) < 0.12)
+    assert energy[spot].mean() == pytest.approx(np.cos(angle) * share, rel=0.01)
+    assert energy.sum() * (2.0 / 96) ** 2 == pytest.approx((2 * hole) ** 2 * np.cos(angle) * share, rel=0.02)
+
+
+def test_glass_with_an_absorbing_inside_dims_by_beer_and_lambert(stage, technique_name):
+    """Two slabs of one density, .2 and .5 m thick: the ratio is exp(-density times .3 m), by channel."""
+    stage.floor()
+    material = glass(stage)
+    ball(stage, material, radius=0.1, place=(3, 0, 1))  # flat glass alone is left to shadows
+    tree = material.node_tree
+    absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    absorbing.inputs["Color"].default_value = (0.5, 0.0, 1.0, 1.0)
+    absorbing.inputs["Density"].default_value = 2.0
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    tree.links.new(absorbing.outputs[0], output.inputs["Volume"])
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", technique_name
+    means = []
+    for thick in (0.2, 0.5):
+        made = slab(stage, material, 0.4, 0.4 + thick)
+        light = stage.render(samples=4, size=(32, 32), bounces=2)["diffuse_indirect"][..., :3] * np.pi
+        means.append(light.mean(axis=(0, 1)))
+        bpy.data.objects.remove(made)
+    np.testing.assert_allclose(means[1] / means[0], np.exp(-2.0 * 0.3 * np.array([0.5, 1.0, 0.0])), rtol=0.01)
+
+
+def test_crests_of_water_focus_where_the_paraxial_law_says(stage):
+    """z = A sin(kx): light below a crest comes together at the depth f = ior / ((ior - 1) A k^2), and above it has T /
+    (1 - depth / f) of the sun's light."""
+    ior, amplitude, wave = 1.33, 0.005, 2 * np.pi / 0.8
+    focus = ior / ((ior - 1) * amplitude * wave**2)
+    columns = 512
+    across = np.linspace(-1.2, 1.2, columns + 1)
+    rows = [[(x, y, amplitude * np.cos(wave * x)) for x in across] for y in (-0.6, 0.6)]
+    faces = [(k, k + 1, columns + 2 + k, columns + 1 + k) for k in range(columns)]
+    water = stage.mesh([*rows[0], *rows[1]], faces, material=glass(stage, ior))
+    for polygon in water.data.polygons:
+        polygon.use_smooth = True
+    water.visible_camera = False
+    floor = stage.floor(4.0)
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(0.2, height=3.0)
+    through = passed(1.0, ior)[0]
+    starts = np.linspace(-0.15, 0.15, 30001)
+    lean = np.arctan(amplitude * wave * np.sin(wave * starts))  # of the surface
+    bend = lean - np.arcsin(np.sin(lean) / ior)
+    for part in (0.25, 0.5, 0.75):
+        floor.location.z = -part * focus
+        energy = irradiance(stage, PHOTONS, samples=4, size=(32, 8), grid=512)
+        found = energy[2:6, 14:18].mean()
+        ends = starts - np.tan(bend) * (part * focus + amplitude * np.cos(wave * starts))
+        half = 2 * 0.2 / 32
+        exact = (np.abs(ends) < half).mean() * 0.3 / (2 * half)
+        assert exact == pytest.approx(1 / (1 - part), rel=0.1)  # what aberration leaves of the law
+        assert found == pytest.approx(through * exact, rel=0.02)
+    floor.location.z = -focus
+    assert irradiance(stage, PHOTONS, samples=4, size=(32, 8), grid=512)[2:6, 14:18].mean() > 8.0
+
+
+def test_a_turned_scene_has_the_same_caustic_and_grey_light_stays_grey(stage, technique_name):
+    """Look-ups depend on where texels lie on the far side, by the 5 % of the ball lens."""
+    stage.floor()
+    ball(stage, glass(stage))
+    lamp = stage.light("SPOT", location=(0.8, 0, 3.0), turn=(0, 0.3, 0), shadow_soft_size=0.05, spot_size=1.0)
+    stage.camera_above(3.0)
+    totals = []
+    for turn in (0.0, 1.1):
+        lamp.location = (0.8 * np.cos(turn), 0.8 * np.sin(turn), 3.0)
+        lamp.rotation_euler = (0, 0.3, turn)
+        light = irradiance(stage, technique_name, samples=4, size=(64, 64))
+        totals.append(float(light.sum()))
+    assert totals[1] == pytest.approx(totals[0], rel=0.02 if technique_name == PHOTONS else 0.05)
+    images = stage.render(samples=2, size=(32, 32), bounces=2)["diffuse_indirect"]
+    np.testing.assert_allclose(images[..., 1:3], images[..., :1].repeat(2, axis=-1), rtol=1e-4, atol=1e-6)
+
+
 def test_nothing_bent_puts_light_straight_behind_its_caster(stage, technique_name):
     """Index 1: caustic and shadow together are the light without the ball."""
     stage.floor()
@@ -334,3 +459,43 @@ def test_odd_casters_leave_finite_light(stage, technique_name, build):
         stage.render(samples=1, size=(8, 8), bounces=2)  # so that the next one is drawn anew
     assert (images[0] >= 0).all()
     assert images[0] == pytest.approx(images[1], rel=1e-3, abs=1e-5)  # sums in another order
+
+
+def seen_directly_and_in_a_mirror(stage, technique, ior, samples=4):
+    """What a floor below a glass ball shows from above, and in a mirror above a camera that looks up."""
+    stage.floor(1.5)
+    made = ball(stage, glass(stage, ior), place=(0, 0, 1.0))
+    made.visible_glossy = False
+    mirror = stage.rectangle(
+        (-2, -2), (2, 2), 4.0, material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    )
+    mirror.visible_camera = True
+    stage.light("SPOT", location=(0, 0, 3.5), shadow_soft_size=0.2, spot_size=0.6, spot_blend=0.0)
+    camera = stage.camera_above(1.6, height=2.5)
+    stage.scene.candela.slot_indirect = "OFF"
+    stage.scene.candela.slot_caustics = technique
+    pictures = []
+    for turn in ((0, 0, 0), (np.pi, 0, 0)):
+        camera.rotation_euler = turn
+        found = stage.render(samples=samples, size=(48, 48), bounces=3)
+        pictures.append(found["combined"][..., 0].astype(float))
+    assert stage.ledger.row("shaded_reflections").state == stage.ledger.row(technique).state == RAN
+    return pictures
+
+
+def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
+    seen, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.5)
+    mirrored = mirrored[::-1]
+    middle = slice(16, 32)
+    assert mirrored[middle, middle].sum() == pytest.approx(seen[middle, middle].sum(), rel=0.05)
+    assert mirrored.sum() == pytest.approx(seen.sum(), rel=0.05)
+    spread = [float((one * np.hypot(*places((48, 48), 1.6)) ** 2).sum() / one.sum()) for one in (seen, mirrored)]
+    assert spread[1] == pytest.approx(spread[0], rel=0.1)
+
+
+def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_name):
+    _, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.0)
+    x, y = places((48, 48), 1.6)
+    inside = mirrored[np.hypot(x, y) < 0.3].mean()
+    around = mirrored[(np.hypot(x, y) > 0.75) & (np.hypot(x, y) < 0.8)].mean()
+    assert inside == pytest.approx(around, rel=0.12)  # by the cosine and the distance of the spot

@@ -1,9 +1,12 @@
 """Soft shadows that are looked up at every fourth pixel: as without where nothing varies, alike in penumbrae."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from addon.gfx import context, images
+from addon.lighting import shared_visibility
 from tests.techniques.test_shadows import HEIGHT, irradiance
 from tests.techniques.test_vssm import EDGE, floor  # noqa: F401 - a fixture
 
@@ -50,7 +53,8 @@ def test_penumbra_is_alike_and_all_else_the_same(large, kind, size):
 def test_five_lights_are_the_sum_of_each(large, most, monkeypatch):
     """Four share an image, the fifth has another; two where an image may not be as high."""
     if most:
-        monkeypatch.setattr(images, "most_side", lambda: most)
+        lower = SimpleNamespace(**{**vars(images), "most_side": lambda: most})  # for lookups alone: maps are larger
+        monkeypatch.setattr(shared_visibility, "images", lower)
     large.scene.candela.vssm_refine = False
     for k in range(5):
         large.light("AREA", (0.3 * k - 0.6, 0.2 * k - 0.4, HEIGHT), size=0.6 + 0.2 * k)

@@ -57,6 +57,7 @@ def test_all_of_a_value_arrives(gpu_context, axes):
         blocks={"map_view": Block(VIEW, **view.values)},
     )  # fmt: skip
     drawn = images.read(target.colors[0])
+    images.pool.give(target.colors[0])
     assert drawn[..., :3].sum(axis=(0, 1)) * area == pytest.approx([2.0, 1.0, 0.5], rel=0.01)
 
 

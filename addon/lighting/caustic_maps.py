@@ -1,0 +1,193 @@
+"""Caustic maps for what rays have met: pixels show a caustic by splats, hits in mirrors and behind glass ask a map.
+
+A technique of the slot `caustics` that finds the photons of a view of a light (photons.py) splats them into a map of
+what that view shows past the casters, too, where rays follow lobes (shaded_reflections.py). Of it one image is kept to
+the sample's end: irradiance in W/m2, and the distance along the view's axis of the surface that it is of. A hit adds
+
+    rho / pi * E(x)
+
+of the texels around its place whose surface lies on its plane. Shadow rays of hits take glass as opaque for the lights
+answered for, as those of pixels do.
+
+Cost, per sample and view: a draw of the surfaces, the splats, a pass over the map; per view and round of rays a pass
+over the hits; 4 x 4 bytes a texel of SIDE x SIDE for each view, and of one view 7 x 4 x 4 more.
+
+Bias: the map's texels, and what the light's view does not show. At most MOST views of a sample are kept, those that
+come first; lights beyond them keep their grey shadows there.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..frame.run import Frame
+from ..frame.technique import Technique
+from ..gfx import images, passes
+from ..gfx.library import Program
+from ..gfx.struct import Block
+from ..kernels import splats
+from ..scene.view import VIEW
+from ..surfaces.draw import SURFACE_TEXTURES
+from . import caustic_casters
+from .light_views import LightBuffers, LightView, widened
+from .path_sources import ShadedLobes
+from .photons import MAP, Bundle, LitView, Photons
+
+SIDE, MOST = 384, 8
+EXTENT = 3.0  # of the map, beside the casters as the light sees them
+LEAST_TEXELS = 0.9
+INTO_MAP = splats.splat_program(
+    "photon into caustic map",
+    "caustics/map.frag.glsl",
+    "map_view.row_x, map_view.row_y, map_view.row_w, map_view.row_q, map_view.backward.w",
+    textures=MAP,
+    blocks=((VIEW, "map_view"),),
+    outputs=(("VEC4", "out_irradiance"),),
+)
+KEEP = passes.fullscreen_program(
+    "caustic map kept",
+    "caustics/keep.frag.glsl",
+    textures=(("RGBA32F", "caustic_map"), ("RGBA32F", "receiver_position")),
+    blocks=((VIEW, "map_view"),),
+    outputs=(("VEC4", "out_kept"),),
+)
+SEEN = tuple(one for one in SURFACE_TEXTURES if one[1] in ("surface_position", "surface_normal", "surface_diffuse"))
+
+
+@cache
+def at_hits_program(transmission: bool) -> Program:
+    paths = ("glossy", "transmission") if transmission else ("glossy",)
+    return passes.fullscreen_program(
+        "caustic map at hits",
+        "caustics/at_hits.frag.glsl",
+        textures=(*SEEN, *(("RGBA32F", name) for name in ("met_path", "hit_passed", "kept_map"))),
+        blocks=((VIEW, "map_view"),),
+        defines=(("TRANSMISSION", "1"),) if transmission else (),
+        outputs=tuple(("VEC4", f"out_{path}_indirect") for path in paths),
+    )
+
+
+PROGRAMS = (INTO_MAP, KEEP, *(at_hits_program(transmission) for transmission in (False, True)))
+
+
+@dataclass(frozen=True)
+class KeptMap:
+    """Irradiance (rgb) and distance (w; 0: nothing) of what a light's view shows."""
+
+    image: images.Image
+    block: Block
+
+
+class CausticMaps:
+    """Maps of the sample that is drawn. One for each renderer: `frame.kept(CausticMaps)`."""
+
+    def __init__(self):
+        self.maps: list[KeptMap] = []
+        self.lights: set[str] = set()  # keys of those that the maps are of
+        self._sample: tuple[weakref.ref[Frame], int] | None = None
+        self._pending: tuple[LitView, LightView, images.Image] | None = None
+        self._receivers = LightBuffers()
+        self._map: images.Target | None = None
+        self._blocks: list[Block] = []
+        self._shift = np.zeros(2)
+
+    def begin(self, frame: Frame) -> None:
+        """Drop the maps of the sample before."""
+        self.end()
+        self._sample = weakref.ref(frame), frame.sample
+        self._shift = np.array(frame.random_at(frame.sample, "caustics/map"))
+
+    def end(self) -> None:
+        """Give the maps back: nobody asks for them in this sample any more."""
+        for one in self.maps:
+            images.pool.give(one.image)
+        self.maps, self.lights, self._sample = [], set(), None
+
+    def of(self, frame: Frame) -> list[KeptMap]:
+        """The maps of the sample that `frame` is drawing."""
+        return self.maps if self._sample is not None and self._sample == (weakref.ref(frame), frame.sample) else []
+
+    def wants(self, frame: Frame, light: LitView) -> bool:
+        """Whether rays of lobes meet surfaces that ask for a map of this view, and there is room for it; of a light
+        there are maps of all views or of none."""
+        if frame.service(ShadedLobes) is None:
+            return False
+        return len(self.maps) < MOST or light.emitter.light.key in self.lights
+
+    def add(
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, count: int,
+        photons: Photons,
+    ) -> Callable[[Bundle], None]:  # fmt: skip
+        """Draw what the light's view shows; the function that is returned splats a bundle into its map, and `keep` ends
+        it."""
+        low, high = frame.geometry.bounds_min, frame.geometry.bounds_max
+        corners = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+        view = widened(light.view, EXTENT, corners[None] - frame.geometry.origin, SIDE, self._shift)
+        block, seen = self._receivers.receivers(frame, technique, view, casters.materials)
+        caught = {name: seen[name.replace("receiver", "surface")] for _, name in MAP}
+        if self._map is None:
+            self._map = images.Target((images.pool.take(SIDE, SIDE, "RGBA32F"),))
+        self._map.clear()
+
+        def splat(bundle: Bundle) -> None:
+            records = photons.footprints(frame, technique, bundle, block, count, LEAST_TEXELS)
+            splats.draw(INTO_MAP, self._map, records, textures=caught, blocks={"map_view": block})
+            frame.count(technique, "passes")
+
+        self._pending = (light, view, caught["receiver_position"])
+        return splat
+
+    def keep(self, frame: Frame, technique: Technique) -> None:
+        """Keep the map that was splatted last."""
+        light, view, position = self._pending
+        self._pending = None
+        number = len(self.maps)
+        values = {**view.values, "sample_index": frame.sample, "seed": frame.settings.seed}
+        if number == len(self._blocks):
+            self._blocks.append(Block(VIEW, **values))
+        else:
+            self._blocks[number].update(**values)
+        kept = KeptMap(images.pool.take(SIDE, SIDE, "RGBA32F"), self._blocks[number])
+        passes.fullscreen(
+            KEEP,
+            images.Target((kept.image,)),
+            textures={"caustic_map": self._map.colors[0], "receiver_position": position},
+            blocks={"map_view": kept.block},
+        )
+        frame.count(technique, "passes")
+        self.maps.append(kept)
+        self.lights.add(light.emitter.light.key)
+
+    def release(self) -> None:
+        """Give all images back."""
+        self.end()
+        if self._map is not None:
+            images.pool.give(self._map.colors[0])
+        self._receivers.release()
+        self.__init__()
+
+
+def add_at_hits(
+    frame: Frame, technique: Technique, maps: Iterable[KeptMap], target: images.Target, transmission: bool, where: str,
+    textures: dict[str, images.Image],
+) -> None:  # fmt: skip
+    """Add the caustics of `maps` at hits into images of indirect light. `textures`: closures of the hits (surface_*),
+    and the paths that met them (met_path, hit_passed)."""
+    program = at_hits_program(transmission)
+    wanted = {name for _, name in program.textures}
+    bound = {name: image for name, image in textures.items() if name in wanted}
+    for one in maps:
+        passes.fullscreen(
+            program,
+            target,
+            blend="ADDITIVE_PREMULT",
+            where=where,
+            textures={**bound, "kept_map": one.image},
+            blocks={"map_view": one.block},
+        )
+        frame.count(technique, "passes")
