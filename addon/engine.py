@@ -189,6 +189,7 @@ class CandelaEngine(bpy.types.RenderEngine):
                 plates = self._plates(shared.renderer, snapshot, settings, eye)
                 if plates is None:
                     return
+                transparent = snapshot.film.transparent
                 snapshot, started = catcher.catchers_unseen(snapshot), time.perf_counter()
             seen_as = catcher.catchers_unseen if plates else None
             steps = [] if layer.name in given else self._steps(snapshot, settings, eye, seen_as)
@@ -232,7 +233,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             with context.turn:
                 if taken is not None:
                     taken[layer.name] = slices.taken(frame)
-                pixels = _finished(shared.renderer, frame, wanted, plates)
+                pixels = _finished(shared.renderer, frame, wanted, plates and (*plates, transparent))
             for name, array in pixels.items():
                 render_pass = result.layers[0].passes.find_by_name(name, eye)
                 if render_pass is not None:
@@ -297,8 +298,8 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _plates(self, renderer: Renderer, snapshot: Snapshot, settings, eye: str) -> tuple | None:
         """The pictures with all and with shadow catchers alone (catcher.Layer); None if the render was cancelled."""
         found = []
-        for changed in (None, catcher.catchers_alone):
-            shown = changed(snapshot) if changed else snapshot
+        for changed in (catcher.over_nothing, catcher.catchers_alone):
+            shown = changed(snapshot)
             steps, started = self._steps(shown, settings, eye, changed), time.perf_counter()
             with context.turn:
                 if steps:
@@ -396,7 +397,7 @@ def _finished(
     renderer: Renderer, frame: Frame, wanted: list[RenderPass], plates: tuple | None = None
 ) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32. `plates`: the two other pictures of a scene with shadow
-    catchers."""
+    catchers, and whether its film is transparent."""
     renderer.show(frame)
     names = {"film.combined", *(name for asked in wanted for name in asked.images)} | set(
         catcher.IMAGES if plates else ()
@@ -404,11 +405,10 @@ def _finished(
     arrays = renderer.finish(frame, sorted(names - set(CATCHER.images)))
     arrays[CATCHER.source] = np.ones_like(arrays["film.combined"][..., :3])
     if plates:
-        things, transparent = catcher.layer(arrays, frame.snapshot), frame.snapshot.film.transparent
-        arrays[CATCHER.source] = change = catcher.change_of(*plates, things, transparent)
-        arrays["film.combined"] = catcher.composed(
-            change, plates[0], things, arrays["film.combined"], transparent, CATCHER in wanted
-        )
+        everything, plate, transparent = plates
+        things = catcher.layer(arrays, frame.snapshot)
+        arrays[CATCHER.source] = change = catcher.change_of(everything, plate, things, transparent)
+        arrays["film.combined"] = catcher.composed(change, everything, things, transparent, CATCHER in wanted)
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays["film.combined"]
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}

@@ -33,6 +33,7 @@ from ..snapshot.scene import Snapshot
 
 COMBINED, WORLD = "film.combined", "radiance.environment"
 IMAGES = (COMBINED, WORLD)  # what is read of each of the three
+SURE = 0.5  # share of a pixel from which on its own light is enough to know what has changed
 LEAST = 0.01  # share of a pixel below which nothing is known of what covers it
 
 
@@ -40,9 +41,15 @@ def has_catchers(snapshot: Snapshot) -> bool:
     return any(one.shadow_catcher for one in snapshot.instances)
 
 
+def over_nothing(snapshot: Snapshot) -> Snapshot:
+    """The scene of `all`, on a transparent film: pictures then say what they cover."""
+    return replace(snapshot, film=replace(snapshot.film, transparent=True))
+
+
 def catchers_alone(snapshot: Snapshot) -> Snapshot:
     """The scene of `plate`."""
-    return replace(snapshot, instances=tuple(one for one in snapshot.instances if one.shadow_catcher), volumes=())
+    catchers = tuple(one for one in snapshot.instances if one.shadow_catcher)
+    return replace(over_nothing(snapshot), instances=catchers, volumes=())
 
 
 def catchers_unseen(snapshot: Snapshot) -> Snapshot:
@@ -51,7 +58,7 @@ def catchers_unseen(snapshot: Snapshot) -> Snapshot:
         replace(one, visibility=replace(one.visibility, camera=False)) if one.shadow_catcher else one
         for one in snapshot.instances
     )
-    return replace(snapshot, instances=tuple(instances))
+    return replace(over_nothing(snapshot), instances=tuple(instances))
 
 
 @dataclass(frozen=True)
@@ -64,31 +71,37 @@ class Layer:
 
 
 def layer(images: dict[str, np.ndarray], snapshot: Snapshot) -> Layer:
-    """From IMAGES of a picture of this scene."""
-    world = snapshot.film.exposure * images[WORLD][..., :3]
-    seen = 0.0 if snapshot.film.transparent else 1.0  # Combined holds the world
-    return Layer(images[COMBINED][..., :3] - seen * world, images[WORLD][..., 3:], world)
+    """From IMAGES of a picture of one of these scenes."""
+    return Layer(images[COMBINED][..., :3], images[COMBINED][..., 3:], snapshot.film.exposure * images[WORLD][..., :3])
 
 
 def change_of(everything: Layer, plate: Layer, things: Layer, transparent: bool) -> np.ndarray:
     """(H, W, 3) the pass Shadow Catcher: 1 where nothing changes, and where there is no catcher."""
     shown = _shown(everything, things)
     known = (shown > LEAST) & (plate.covered > LEAST)
-    now = (everything.light - things.light) / np.where(known, shown, 1.0)
+    now = np.concatenate([everything.light - things.light, shown], axis=-1)
+    # At their rims things bring noise of their own, which little of a catcher would enlarge: neighbours tell more.
+    now = np.where(shown < SURE, _around(now), now)
+    now = np.maximum(now[..., :3], 0.0) / np.maximum(now[..., 3:], LEAST)
     alone = plate.light / np.where(known, plate.covered, 1.0)
     lit = known & (alone > 0.0)
-    ratio = np.where(lit, np.maximum(now, 0.0) / np.where(lit, alone, 1.0), 1.0)
+    ratio = np.where(lit, now / np.where(lit, alone, 1.0), 1.0)
     alpha = np.clip(everything.covered, 0.0, 1.0) if transparent else 1.0
     return (1.0 - alpha + alpha * ratio).astype(np.float32)
 
 
-def composed(
-    change: np.ndarray, everything: Layer, things: Layer, combined: np.ndarray, transparent: bool, apart: bool
-) -> np.ndarray:
-    """(H, W, 4) Combined; `combined` is that of `things`. `apart`: the change is a pass of its own."""
+def _around(image: np.ndarray) -> np.ndarray:
+    """Sums over 3x3 pixels, each (H, W, C)."""
+    height, width = image.shape[:2]
+    wide = np.pad(image, ((1, 1), (1, 1), (0, 0)))
+    return sum(wide[y : y + height, x : x + width] for y in range(3) for x in range(3))
+
+
+def composed(change: np.ndarray, everything: Layer, things: Layer, transparent: bool, apart: bool) -> np.ndarray:
+    """(H, W, 4) Combined. `transparent`: the film; `apart`: the change is a pass of its own."""
     mean = np.clip(change.mean(axis=-1, keepdims=True), 0.0, 1.0)
     if transparent:
-        rgb, alpha = combined[..., :3], combined[..., 3:]
+        rgb, alpha = things.light, things.covered
         alpha = alpha if apart else alpha + (1.0 - alpha) * (1.0 - mean)
     else:
         shown = _shown(everything, things)

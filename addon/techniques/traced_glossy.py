@@ -65,6 +65,7 @@ TRACED = passes.fullscreen_program(
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
+LINKED_TRACED = linked.linked(TRACED)
 
 
 class TracedGlossy(Technique):

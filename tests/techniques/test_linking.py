@@ -115,6 +115,12 @@ def test_every_shadow_technique_follows_links(room, shadow):
     assert np.abs(own - auto).mean() < 0.25 * np.abs(own - blocked).mean()
 
 
+def test_the_ledger_says_by_what_blockers_are_found(room):
+    blocked_by_one(room, room.lamp)
+    room.render(1, SIZE)
+    assert "whatever technique" in " ".join(room.ledger.row("direct_light").choices)
+
+
 def test_children_follow_the_mark_of_their_collection(room):
     outer, inner = collection([]), collection([room.boxes[1]])
     outer.children.link(inner)
