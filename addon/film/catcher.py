@@ -79,15 +79,22 @@ def change_of(everything: Layer, plate: Layer, things: Layer, transparent: bool)
     """(H, W, 3) the pass Shadow Catcher: 1 where nothing changes, and where there is no catcher."""
     shown = _shown(everything, things)
     known = (shown > LEAST) & (plate.covered > LEAST)
-    now = np.concatenate([everything.light - things.light, shown], axis=-1)
-    # At their rims things bring noise of their own, which little of a catcher would enlarge: neighbours tell more.
-    now = np.where(shown < SURE, _around(now), now)
-    now = np.maximum(now[..., :3], 0.0) / np.maximum(now[..., 3:], LEAST)
-    alone = plate.light / np.where(known, plate.covered, 1.0)
+    now, alone = (
+        _per_unit(light, covered, shown < SURE)
+        for light, covered in ((everything.light - things.light, shown), (plate.light, plate.covered))
+    )
     lit = known & (alone > 0.0)
     ratio = np.where(lit, now / np.where(lit, alone, 1.0), 1.0)
     alpha = np.clip(everything.covered, 0.0, 1.0) if transparent else 1.0
     return (1.0 - alpha + alpha * ratio).astype(np.float32)
+
+
+def _per_unit(light: np.ndarray, covered: np.ndarray, unsure: np.ndarray) -> np.ndarray:
+    """Light (H, W, 3) per unit of what covers a pixel; of 3x3 pixels where it is `unsure`: at their rims things bring
+    noise of their own, which little of a catcher would enlarge."""
+    both = np.concatenate([light, covered], axis=-1)
+    both = np.where(unsure, _around(both), both)
+    return np.maximum(both[..., :3], 0.0) / np.maximum(both[..., 3:], LEAST)
 
 
 def _around(image: np.ndarray) -> np.ndarray:
