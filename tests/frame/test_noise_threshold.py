@@ -58,12 +58,12 @@ def test_a_picture_that_does_not_change_is_enough():
 
 
 SCENES = {
-    "cornell_box": 0.03,
-    "soft_shadow_garden": 0.03,
-    "door_ajar": 0.1,
-    "window_interior": 0.05,
-    "hdri_product": 0.05,
-}
+    "cornell_box": 0.05,
+    "door_ajar": 0.15,
+    "hdri_product": 0.1,
+    "soft_shadow_garden": 0.05,
+    "window_interior": 0.1,
+}  # asked errors, each that of some ten to a hundred samples
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_five_samples_end_within_half_of_the_asked_error(registered, name):
     found = render_passes(scene, "CANDELA", 4096, 1, size=SIZE).images["combined"]
     taken = ledger.latest().samples
     scene.candela.noise_threshold = 0.0
-    truth = render_passes(scene, "CANDELA", min(12 * taken, 2048), 7, size=SIZE).images["combined"]
+    truth = render_passes(scene, "CANDELA", min(8 * taken, 1024), 7, size=SIZE).images["combined"]
     engine.free_sessions()
     print(f"{name}: asked {asked}, error {error(found, truth):.4f} with {taken} samples")
     assert asked / 1.5 <= error(found, truth) <= asked * 1.5
