@@ -9,6 +9,7 @@ import pytest
 from addon import engine
 from addon.compare.metrics import relative_squared_error
 from addon.frame import slices, time_steps
+from addon.frame.bands import samples_in_parts
 from addon.frame.settings import Settings
 from addon.snapshot import motion
 
@@ -189,6 +190,15 @@ def test_a_merged_picture_is_the_whole(blurred):
         engine.given = {}
     for name in whole:
         np.testing.assert_allclose(merged[name], whole[name], rtol=1e-3, atol=1e-4, err_msg=name)
+
+
+def test_parts_for_a_window_draw_the_same_picture(blurred, monkeypatch):
+    moving_box(blurred)
+    whole = blurred.render(8, (32, 24))
+    monkeypatch.setattr(engine, "_whole_samples", samples_in_parts)
+    in_parts = blurred.render(8, (32, 24))
+    for name in whole:
+        np.testing.assert_allclose(in_parts[name], whole[name], atol=1e-6, err_msg=name)
 
 
 def test_images_are_given_back(blurred):
