@@ -183,26 +183,18 @@ class CandelaEngine(bpy.types.RenderEngine):
             before = shared.renderer.frame
             plates = None
             if catcher.has_catchers(snapshot) and not self.is_preview:
-                if taken is not None or given:
+                if taken is not None or given or settings.is_slice:
                     raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
-                settings = replace(settings, time_limit=settings.time_limit / PICTURES_OF_CATCHERS)
-                plates = self._plates(shared.renderer, snapshot, settings, eye)
-                if plates is None:
+                found = self._plates(shared.renderer, snapshot, settings, eye)
+                if found is None:
                     return
-                transparent = snapshot.film.transparent
+                settings, plates = found
                 snapshot, started = catcher.catchers_unseen(snapshot), time.perf_counter()
             seen_as = catcher.catchers_unseen if plates else None
             steps = [] if layer.name in given else self._steps(snapshot, settings, eye, seen_as)
             with context.turn:
                 _free_old_sessions()
-                if steps:
-                    unlimited = replace(
-                        settings, time_limit=0.0, noise_threshold=0.0
-                    )  # what is kept for one counts samples of one step
-                    begun = (steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
-                    frame = shared.renderer.begin(*begun)
-                else:
-                    frame = shared.renderer.begin(snapshot, settings, self._compiling)
+                frame = self._begun(shared.renderer, snapshot, steps, settings)
                 if before is not None and before.size != frame.size:
                     images.pool.trim()  # nobody asks for images of the old size again
             frame.ledger.times["sync"] = self._sync_seconds
@@ -215,10 +207,7 @@ class CandelaEngine(bpy.types.RenderEngine):
                 frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
             width, height = frame.size
             result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            if steps:
-                drawn = self._drawn_in_steps(shared.renderer, steps, settings, started)
-            else:
-                drawn = self._drawn(shared.renderer, frame, started)
+            drawn = self._drawn(shared.renderer, frame, steps, settings, started)
             for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
                 if self.test_break():
                     self.end_result(result, cancel=True)
@@ -233,7 +222,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             with context.turn:
                 if taken is not None:
                     taken[layer.name] = slices.taken(frame)
-                pixels = _finished(shared.renderer, frame, wanted, plates and (*plates, transparent))
+                pixels = _finished(shared.renderer, frame, wanted, plates)
             for name, array in pixels.items():
                 render_pass = result.layers[0].passes.find_by_name(name, eye)
                 if render_pass is not None:
@@ -265,7 +254,23 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
-    def _drawn(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
+    def _begun(self, renderer: Renderer, snapshot: Snapshot, steps: list[time_steps.Step], settings) -> Frame:
+        """The frame of a picture, or of the first of its time steps."""
+        if not steps:
+            return renderer.begin(snapshot, settings, self._compiling)
+        # What Denoise keeps for a picture that may end early counts the samples of one step.
+        unlimited = replace(settings, time_limit=0.0, noise_threshold=0.0)
+        return renderer.begin(steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
+
+    def _drawn(
+        self, renderer: Renderer, frame: Frame, steps: list[time_steps.Step], settings, started: float
+    ) -> Iterator[None]:
+        """Draw all samples of a frame, or of the time steps of which it is the first."""
+        if steps:
+            return self._drawn_in_steps(renderer, steps, settings, started)
+        return self._drawn_at_once(renderer, frame, started)
+
+    def _drawn_at_once(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
         """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
 
         With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
@@ -296,26 +301,25 @@ class CandelaEngine(bpy.types.RenderEngine):
             yield
 
     def _plates(self, renderer: Renderer, snapshot: Snapshot, settings, eye: str) -> tuple | None:
-        """The pictures with all and with shadow catchers alone (catcher.Layer); None if the render was cancelled."""
+        """The settings with which the last of three pictures is drawn, and what it is composed with: the pictures with
+        all and with shadow catchers alone (catcher.Layer), and whether the film is transparent. None if the render was
+        cancelled. The first picture tells how many samples all have."""
         found = []
+        settings = replace(settings, time_limit=settings.time_limit / PICTURES_OF_CATCHERS)
         for changed in (catcher.over_nothing, catcher.catchers_alone):
             shown = changed(snapshot)
             steps, started = self._steps(shown, settings, eye, changed), time.perf_counter()
             with context.turn:
-                if steps:
-                    unlimited = replace(settings, time_limit=0.0, noise_threshold=0.0)
-                    frame = renderer.begin(steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
-                else:
-                    frame = renderer.begin(shown, settings, self._compiling)
-            drawing = self._drawn_in_steps(renderer, steps, settings, started) if steps else None
-            for _ in drawing or self._drawn(renderer, frame, started):
+                frame = self._begun(renderer, shown, steps, settings)
+            for _ in self._drawn(renderer, frame, steps, settings, started):
                 if self.test_break():
                     return None
             with context.turn:
                 frame = renderer.frame
                 renderer.show(frame)
                 found.append(catcher.layer(renderer.finish(frame, catcher.IMAGES), shown))
-        return tuple(found)
+            settings = replace(settings, samples=frame.samples_done, time_limit=0.0, noise_threshold=0.0)
+        return settings, (*found, snapshot.film.transparent)
 
     def _steps(self, snapshot: Snapshot, settings, eye: str, changed=None) -> list[time_steps.Step]:
         """Time steps of a picture with motion blur; none where nothing moves. All are seen through the camera of an

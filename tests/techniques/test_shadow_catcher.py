@@ -78,6 +78,17 @@ def test_scenes_without_catchers_make_one_picture(caught, monkeypatch):
     np.testing.assert_array_equal(found["shadow_catcher"], 1.0)
 
 
+def test_all_pictures_have_as_many_samples_where_they_end_early(caught):
+    caught.scene.candela.noise_threshold = 0.1
+    found = with_pass(caught, "CANDELA", 256)
+    taken = ledger.latest().samples
+    assert 8 <= taken < 256
+    caught.scene.candela.noise_threshold = 0.0
+    whole = with_pass(caught, "CANDELA", taken)
+    for name in ("combined", "shadow_catcher"):
+        assert np.abs(found[name] - whole[name]).mean() < 0.02
+
+
 def test_slices_are_refused(caught):
     engine.taken = {}
     try:
