@@ -11,30 +11,29 @@ import time
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import bpy
 import numpy as np
 
-from . import viewport
-from .film import catcher
-from .film.noise import NoiseMeter
-from .frame import ledger as ledgers
-from .frame import slices, time_steps
+from . import final, main_loop, viewport
+from .film.catcher import has_catchers
+from .frame import slices
 from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
+from .frame.settings import Settings
 from .gfx import context, images
-from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, motion, take
+from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, shutter, take
 from .snapshot.errors import unforeseen
+from .snapshot.motion import STEPS, Moment, read_moment
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import CATCHER, GLARE, RenderPass, missing_passes, wanted_passes
+from .ui.passes import cryptomatte_metadata, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
-AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
-PICTURES_OF_CATCHERS = 3  # of which a picture with shadow catchers is made: each has a part of the time
 BEHIND_S = 0.5  # what the GPU may be behind in a render in the background
 
 STEREO = ("left", "right")
@@ -72,6 +71,7 @@ def _free_old_sessions() -> None:
 
 def free_sessions() -> None:
     """Free what renders of scenes hold; compiled programs stay."""
+    main_loop.close_all()
     viewport.free_all()
     for shared in _sessions.values():
         shared.renderer.release()
@@ -87,9 +87,11 @@ def _another_file(*_) -> None:
 def register() -> None:
     bpy.utils.register_class(CandelaEngine)
     bpy.app.handlers.load_post.append(_another_file)
+    main_loop.register()
 
 
 def unregister() -> None:
+    main_loop.unregister()
     bpy.app.handlers.load_post.remove(_another_file)
     bpy.utils.unregister_class(CandelaEngine)
     free_sessions()
@@ -102,7 +104,7 @@ class CandelaEngine(bpy.types.RenderEngine):
     bl_idname = ENGINE
     bl_label = "Candela"
     bl_use_preview = True
-    bl_use_gpu_context = True
+    bl_use_gpu_context = bpy.app.background  # in a window every viewport would wait for the render: see main_loop.py
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True
 
@@ -125,9 +127,13 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._snapshot = self._moments = None
         self.update_stats("Candela", "Reading the scene")
         try:
-            self._snapshot = self._take(depsgraph, shared)
-            if motion.is_blurred(scene, depsgraph.view_layer) and not self.is_preview:
-                self._moments = self._take_moments(depsgraph, shared)
+            around = self._frames_around(depsgraph) if depsgraph.view_layer.use_pass_vector else None
+            size = self.resolution_x, self.resolution_y
+            self._snapshot = take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
+            if shutter.is_blurred(scene, depsgraph.view_layer) and not self.is_preview:
+                # What the Vector pass asks for would tell the frame from the moments.
+                central = self._snapshot if around is None else self._take(depsgraph, shared)
+                self._moments = self._take_moments(depsgraph, shared, central)
         except UnsupportedScene as error:
             self._fail(str(error))
         except Exception as error:  # Blender would print it and go on with a black picture
@@ -137,7 +143,7 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _take(self, depsgraph, shared: Session) -> Snapshot:
         return take(depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override)
 
-    def _take_moments(self, depsgraph, shared: Session) -> motion.Moments | None:
+    def _take_moments(self, depsgraph, shared: Session, central: Snapshot) -> shutter.Moments | None:
         """The scene while the shutter is open, where anything moves. It is evaluated now, while Blender keeps it."""
         scene = depsgraph.scene
         settings = settings_of(scene, viewport=False, layer=depsgraph.view_layer, depsgraph=depsgraph)
@@ -147,18 +153,34 @@ class CandelaEngine(bpy.types.RenderEngine):
             frame, subframe = divmod(own + time, 1.0)
             self.frame_set(int(frame), subframe)
 
-        times = motion.shutter_times(scene, min(settings.motion_steps, settings.samples))
-        return motion.take_moments(self._snapshot, times, moved_to, lambda: self._take(depsgraph, shared))
+        times = shutter.shutter_times(scene, min(settings.motion_steps, settings.samples))
+        return shutter.take_moments(central, times, moved_to, lambda: self._take(depsgraph, shared))
+
+    def _frames_around(self, depsgraph) -> tuple[Moment, ...] | None:
+        """The scene in the frames before and after, for the Vector pass. It stands at its own again afterwards."""
+        if self.is_preview:
+            return None
+        scene, camera = depsgraph.scene, self.camera_override or depsgraph.scene_eval.camera
+        camera = camera and camera.original
+        frame, part = scene.frame_current, scene.frame_subframe
+        found = []
+        try:
+            for step in STEPS:
+                self.frame_set(frame + step, part)
+                found.append(read_moment(depsgraph, self.resolution_x, self.resolution_y, camera))
+        finally:
+            self.frame_set(frame, part)
+        return tuple(found)
 
     def render(self, depsgraph):
-        """Draw all samples and hand the passes to Blender. The GPU context is active, and ends afterwards."""
+        """Draw all samples and hand the passes to Blender. In background mode in the engine's own GPU context, which
+        ends afterwards; in a window by its main loop (main_loop.py)."""
         snapshot = getattr(self, "_snapshot", None)
         if snapshot is not None:
-            with images.passing_context():
-                for eye in eyes(depsgraph.scene):
-                    self._render(depsgraph, snapshot, eye)
-                    if self.test_break():
-                        break
+            for eye in eyes(depsgraph.scene):
+                self._render(depsgraph, snapshot, eye)
+                if self.test_break():
+                    break
 
     def _seen(self, depsgraph, snapshot: Snapshot, eye: str) -> Snapshot:
         """The same scene through the camera of a view, where there are several."""
@@ -175,58 +197,31 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph, snapshot: Snapshot, eye: str) -> None:
         started = time.perf_counter()
         scene, layer = depsgraph.scene, depsgraph.view_layer
-        shared = session(scene, "preview" if self.is_preview else "final")
         settings = settings_of(scene, viewport=False, preview=self.is_preview, layer=layer, depsgraph=depsgraph)
+        result = None
         try:
             check_tree(settings.passes)
-            snapshot = self._seen(depsgraph, snapshot, eye)
-            before = shared.renderer.frame
-            plates = None
-            if catcher.has_catchers(snapshot) and not self.is_preview:
-                if taken is not None or given or settings.is_slice:
-                    raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
-                found = self._plates(shared.renderer, snapshot, settings, eye)
-                if found is None:
-                    return
-                settings, plates = found
-                snapshot, started = catcher.catchers_unseen(snapshot), time.perf_counter()
-            seen_as = catcher.catchers_unseen if plates else None
-            steps = [] if layer.name in given else self._steps(snapshot, settings, eye, seen_as)
-            with context.turn:
-                _free_old_sessions()
-                frame = self._begun(shared.renderer, snapshot, steps, settings)
-                if before is not None and before.size != frame.size:
-                    images.pool.trim()  # nobody asks for images of the old size again
-            frame.ledger.times["sync"] = self._sync_seconds
-            if steps and settings.noise_threshold:
-                text = "the noise threshold does not count where something moves: all samples are drawn."
-                frame.ledger.notes += (Note("Motion blur", text),)
-            missing = missing_passes(layer)
-            if missing and not self.is_preview:
-                text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
-                frame.ledger.notes += (Note(f"View layer '{layer.name}'", text),)
-            width, height = frame.size
-            result = self.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-            drawn = self._drawn(shared.renderer, frame, steps, settings, started)
-            for _ in self._merged(shared.renderer, frame, layer.name) or drawn:
+            order = self._order(scene, layer, self._seen(depsgraph, snapshot, eye), settings, started, eye)
+            parts = main_loop.taken(final.steps(order))
+            while True:
+                try:
+                    progress = next(parts)
+                except StopIteration as end:
+                    pixels, ledger = end.value
+                    break
+                if progress is not None:
+                    result = self._tell(progress, result, layer.name, eye)
                 if self.test_break():
-                    self.end_result(result, cancel=True)
-                    with context.turn:
-                        shared.renderer.finish(shared.renderer.frame, ())
+                    parts.close()
+                    if result is not None:
+                        self.end_result(result, cancel=True, do_merge_results=True)  # what is there stays in view
                     return
-            wanted = wanted_passes(layer, scene)
-            if frame is not shared.renderer.frame:  # the last of several, one for each time step
-                ledger, frame = frame.ledger, shared.renderer.frame
-                frame.ledger.times |= ledger.times
-                frame.ledger.notes = ledger.notes
-            with context.turn:
-                if taken is not None:
-                    taken[layer.name] = slices.taken(frame)
-                pixels = _finished(shared.renderer, frame, wanted, plates)
+            if result is None:
+                result = self._begun(pixels["Combined"], layer.name, eye)
             for name, array in pixels.items():
-                render_pass = result.layers[0].passes.find_by_name(name, eye)
-                if render_pass is not None:
-                    render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())
+                _fill(result, name, eye, array)
+            for name, text in cryptomatte_metadata(order.snapshot, layer.name).items():
+                self.get_result().stamp_data_add_field(name, text)
             self.end_result(result)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))
@@ -234,13 +229,55 @@ class CandelaEngine(bpy.types.RenderEngine):
         except Exception as error:
             self._fail_unforeseen(error)
             return
-        ledger = ledgers.latest()
         ledger.times["total"] = time.perf_counter() - started + self._sync_seconds
         if not self.is_preview:
             for note in ledger.notes:
                 self.report({"WARNING"}, str(note))
             if ledger.bad_pixels:
                 self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
+
+    def _order(
+        self, scene, layer, snapshot: Snapshot, settings: Settings, started: float, eye: str = ""
+    ) -> final.Order:
+        """What this render asks for."""
+        shared = session(scene, "preview" if self.is_preview else "final")
+        missing, notes = missing_passes(layer), ()
+        if missing and not self.is_preview:
+            text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
+            notes = (Note(f"View layer '{layer.name}'", text),)
+        keep = None
+        if taken is not None:
+            keep = partial(taken.__setitem__, layer.name)
+        catches, moments = has_catchers(snapshot) and not self.is_preview, self._moments
+        if catches and (taken is not None or given or settings.is_slice):
+            raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
+        if moments is not None and eye:  # seen through the eye's camera at the frame itself
+            seen = (replace(one, camera=snapshot.camera) for one in moments.snapshots)
+            moments = replace(moments, snapshots=tuple(seen))
+        return final.Order(
+            shared.renderer, snapshot, settings, wanted_passes(layer, scene),
+            parts=_whole_samples if bpy.app.background else samples_in_parts, notes=notes,
+            shows=not bpy.app.background and not self.is_preview, started=started, sync_seconds=self._sync_seconds,
+            before=_free_old_sessions, given=given.get(layer.name), take=keep,
+            moments=moments, catches=catches,
+        )  # fmt: skip
+
+    def _begun(self, picture: np.ndarray, layer: str, eye: str):
+        """A result of Blender's for a picture of this size."""
+        height, width = picture.shape[:2]
+        return self.begin_result(0, 0, width, height, layer=layer, view=eye)
+
+    def _tell(self, progress: final.Progress, result, layer: str, eye: str):
+        """Show how far the render is; returns the result that shows its picture, if there is one yet."""
+        self.update_stats("Candela", progress.text)
+        if progress.share is not None:
+            self.update_progress(progress.share)
+        if progress.picture is not None:
+            if result is None:
+                result = self._begun(progress.picture, layer, eye)
+            _fill(result, "Combined", eye, progress.picture)
+            self.update_result(result)
+        return result
 
     # -------------------------------------------------------------------------------------------------- viewport
 
@@ -254,120 +291,7 @@ class CandelaEngine(bpy.types.RenderEngine):
 
     # --------------------------------------------------------------------------------------------------- reports
 
-    def _begun(self, renderer: Renderer, snapshot: Snapshot, steps: list[time_steps.Step], settings) -> Frame:
-        """The frame of a picture, or of the first of its time steps."""
-        if not steps:
-            return renderer.begin(snapshot, settings, self._compiling)
-        # What Denoise keeps for a picture that may end early counts the samples of one step.
-        unlimited = replace(settings, time_limit=0.0, noise_threshold=0.0)
-        return renderer.begin(steps[0].snapshot, unlimited, self._compiling, steps[0].numbers)
-
-    def _drawn(
-        self, renderer: Renderer, frame: Frame, steps: list[time_steps.Step], settings, started: float
-    ) -> Iterator[None]:
-        """Draw all samples of a frame, or of the time steps of which it is the first."""
-        if steps:
-            return self._drawn_in_steps(renderer, steps, settings, started)
-        return self._drawn_at_once(renderer, frame, started)
-
-    def _drawn_at_once(self, renderer: Renderer, frame: Frame, started: float) -> Iterator[None]:
-        """Draw all samples: one after the other, or in parts for a window that has to answer meanwhile.
-
-        With a time limit, counted from `started`, only as many as it allows: room is left for what follows the last.
-        """
-        limit, first, before = frame.settings.time_limit, time.perf_counter(), frame.samples_done
-        meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
-        parts = _whole_samples if bpy.app.background else samples_in_parts
-        shown = -1
-        for _ in parts(renderer, frame):
-            if frame.samples_done != shown:
-                shown = frame.samples_done
-                wanted = frame.settings.samples_to_draw
-                self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
-                self.update_progress(shown / wanted)
-                if meter is not None and shown < wanted:
-                    with context.turn:
-                        if meter.look(frame):
-                            renderer.stop(frame)
-                            return
-                if limit and shown > before:
-                    with context.turn:
-                        images.finish()
-                        now = time.perf_counter()
-                        each = (now - first) / (shown - before)
-                        if shown < wanted and now - started + (1 + AFTER_LAST) * each > limit:
-                            renderer.stop(frame)
-                            return
-            yield
-
-    def _plates(self, renderer: Renderer, snapshot: Snapshot, settings, eye: str) -> tuple | None:
-        """The settings with which the last of three pictures is drawn, and what it is composed with: the pictures with
-        all and with shadow catchers alone (catcher.Layer), and whether the film is transparent. None if the render was
-        cancelled. The first picture tells how many samples all have."""
-        found = []
-        settings = replace(settings, time_limit=settings.time_limit / PICTURES_OF_CATCHERS)
-        for changed in (catcher.over_nothing, catcher.catchers_alone):
-            shown = changed(snapshot)
-            steps, started = self._steps(shown, settings, eye, changed), time.perf_counter()
-            with context.turn:
-                frame = self._begun(renderer, shown, steps, settings)
-            for _ in self._drawn(renderer, frame, steps, settings, started):
-                if self.test_break():
-                    return None
-            with context.turn:
-                frame = renderer.frame
-                renderer.show(frame)
-                found.append(catcher.layer(renderer.finish(frame, catcher.IMAGES), shown))
-            settings = replace(settings, samples=frame.samples_done, time_limit=0.0, noise_threshold=0.0)
-        return settings, (*found, snapshot.film.transparent)
-
-    def _steps(self, snapshot: Snapshot, settings, eye: str, changed=None) -> list[time_steps.Step]:
-        """Time steps of a picture with motion blur; none where nothing moves. All are seen through the camera of an
-        eye, where there are several, which is that of the frame itself."""
-        moments = self._moments
-        if moments is None:
-            return []
-        snapshots = [changed(one) for one in moments.snapshots] if changed else moments.snapshots
-        if eye:
-            snapshots = [replace(one, camera=snapshot.camera) for one in snapshots]
-        return time_steps.shared_out(snapshots, moments.steps, settings)
-
-    def _drawn_in_steps(
-        self, renderer: Renderer, steps: list[time_steps.Step], settings, started: float
-    ) -> Iterator[None]:
-        """The same of a picture with motion blur."""
-        parts = _whole_samples if bpy.app.background else samples_in_parts
-        first, wanted, shown = time.perf_counter(), settings.samples_to_draw, -1
-        unlimited = replace(settings, time_limit=0.0, noise_threshold=0.0)
-        for done, stop in time_steps.drawn(renderer, steps, unlimited, parts, self._compiling):
-            if done != shown:
-                shown = done
-                self.update_stats("Candela", f"Rendering {shown} / {wanted} samples")
-                self.update_progress(shown / wanted)
-                if settings.time_limit and shown:
-                    with context.turn:
-                        images.finish()
-                    now = time.perf_counter()
-                    each = (now - first) / shown
-                    # A step that follows learns in one more sample.
-                    if shown < wanted and now - started + (2 + AFTER_LAST) * each > settings.time_limit:
-                        stop()
-            yield
-
-    def _merged(self, renderer: Renderer, frame: Frame, layer: str) -> list[None]:
-        """Parts in which a picture of samples that were drawn before is finished; none where they are to be drawn."""
-        if layer not in given:
-            return []
-        with context.turn:
-            renderer.merge(frame, given[layer])
-        return [None]
-
-    def _compiling(self, done: int, total: int) -> bool:
-        self.update_stats("Candela", f"Compiling shaders {done} of {total}")
-        return self.test_break()
-
     def _fail(self, sentence: str) -> None:
-        self.error_set(sentence)
         self.report({"ERROR"}, sentence)
 
     def _fail_unforeseen(self, error: Exception) -> None:
@@ -386,34 +310,17 @@ def eyes(scene) -> list[str]:
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
     leash = Leash(frame.profiler, BEHIND_S)
+    yield
     while frame.samples_done < frame.samples_to_draw:
-        yield
         with context.turn:
             renderer.advance(frame)
             if frame.samples_done < frame.samples_to_draw:  # the picture is read next, which waits
                 leash.sample()
+        yield
 
 
-# ------------------------------------------------------------------------------------------------------------- passes
-
-
-def _finished(
-    renderer: Renderer, frame: Frame, wanted: list[RenderPass], plates: tuple | None = None
-) -> dict[str, np.ndarray]:
-    """Pass pixels by Blender's name, (H, W, channels) float32. `plates`: the two other pictures of a scene with shadow
-    catchers, and whether its film is transparent."""
-    renderer.show(frame)
-    names = {"film.combined", *(name for asked in wanted for name in asked.images)} | set(
-        catcher.IMAGES if plates else ()
-    )
-    arrays = renderer.finish(frame, sorted(names - set(CATCHER.images)))
-    arrays[CATCHER.source] = np.ones_like(arrays["film.combined"][..., :3])
-    if plates:
-        everything, plate, transparent = plates
-        things = catcher.layer(arrays, frame.snapshot)
-        arrays[CATCHER.source] = change = catcher.change_of(everything, plate, things, transparent)
-        arrays["film.combined"] = catcher.composed(change, everything, things, transparent, CATCHER in wanted)
-    if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
-        arrays[GLARE.source] = arrays["film.combined"]
-    pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
-    return {"Combined": arrays["film.combined"], **pixels}
+def _fill(result, name: str, eye: str, array: np.ndarray) -> None:
+    """Write the pixels of a pass, if Blender has asked for it."""
+    render_pass = result.layers[0].passes.find_by_name(name, eye)
+    if render_pass is not None:
+        render_pass.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())

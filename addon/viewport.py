@@ -106,6 +106,7 @@ class Viewport:
         self._pauses = (0.0, 0.0)  # between the last redraws
         self._left_at: float | None = None  # when the last redraw ended, if it left something to be done
         self._compiled = -1  # programs made so far, when the sample was begun
+        self.paused = False  # the artist wants no more samples for now
         self.hidden: tuple = ()  # what the region's own settings hide, see _hidden
         self.news = False  # a ledger that the panels do not show yet
         self.reported = ""  # the error that was reported last
@@ -119,7 +120,7 @@ class Viewport:
     @property
     def done(self) -> bool:
         """Nothing is left to be drawn until something changes."""
-        return bool(self.error) or self._finished
+        return bool(self.error) or self._finished or self.paused
 
     def status(self) -> str:
         """How far the picture is, for the text in the region's corner."""
@@ -127,6 +128,8 @@ class Viewport:
             return self.error
         if self.frame is None:
             return "Waiting for the GPU"
+        if self.paused:
+            return f"Paused after sample {self.frame.samples_done} of {self.frame.settings.samples}"
         coarse = f", 1/{self.scale} resolution" if self.scale > 1 else ""
         return f"Sample {self.frame.samples_done} of {self.frame.settings.samples}, {self.seconds:.1f} s{coarse}"
 
@@ -322,9 +325,13 @@ def draw(engine, context, depsgraph) -> None:
         viewport.error = ""
     if not viewport.error:
         viewport.failed_at = place
-        if turn.acquire(timeout=TURN_WAIT_S):
+        paused = viewport.paused = scene.candela.viewport_pause and viewport.picture is not None
+        if paused:
+            pass
+        elif turn.acquire(timeout=TURN_WAIT_S):
             try:
-                _refine(viewport, engine, context, depsgraph, size)
+                with images.lasting_context():
+                    _refine(viewport, engine, context, depsgraph, size)
             finally:
                 turn.release()
         else:

@@ -194,18 +194,23 @@ SCENES = {
 }
 
 
-def make(name: str) -> Scene:
-    """Build a scene in an empty Blender, with its camera."""
+def camera(span: float, centre: tuple[float, float] = (0.0, 0.0)) -> None:
+    """An orthographic camera above, with pixels that are points."""
     import bpy
 
-    clear()
-    made = SCENES[name]
-    made.build()
     data = bpy.data.cameras.new("Camera")
-    data.type, data.ortho_scale = "ORTHO", made.span
+    data.type, data.ortho_scale = "ORTHO", span
     seen = bpy.data.objects.new("Camera", data)
-    seen.location = (*made.centre, 10.0)
+    seen.location = (*centre, 10.0)
     bpy.context.scene.collection.objects.link(seen)
     bpy.context.scene.camera = seen
     bpy.context.scene.render.filter_size = 0.01
+
+
+def make(name: str) -> Scene:
+    """Build a scene in an empty Blender, with its camera."""
+    clear()
+    made = SCENES[name]
+    made.build()
+    camera(made.span, made.centre)
     return made

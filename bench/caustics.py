@@ -9,6 +9,11 @@ Cycles' figure is its diffuse indirect light with one diffuse bounce, which is t
 what light it lets through glass stands in its direct light; so a second error is that of all light of the floor, with
 Cycles' direct light as the rest of the truth. Times are processor seconds of all threads of
 whole renders, which other work on the machine does not change; of Candela the second one, since the first may compile.
+
+With `--motion` ball and lamp move 2 cm a frame over so many frames of 64 x 64 pixels, one sample each, instead. Beside
+the mean square of a frame's error stands what is new in it, as `python -m bench indirect --temporal` has it: half the
+mean square of the error's change from one frame to the next, which is the error's variance where frames err by chance.
+With `--growth`, milliseconds of a picture of one sample with twice and four times the photons, casters and triangles.
 """
 
 from __future__ import annotations
@@ -29,6 +34,8 @@ ROOT = Path(__file__).resolve().parent.parent
 TRUTH = ROOT / "bench" / "results" / "caustics_truth.npz"
 PAGE = ROOT / "docs" / "caustics.md"
 COMMAND = "python -m bench caustics --page"
+MOTION = "python -m bench caustics --motion 24 --page"
+GROWTH = "python -m bench caustics --growth --page"
 SIZE = 128
 PHOTONS = 6_000_000
 BLUR = 2.0  # pixels
@@ -62,12 +69,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--entrants", nargs="*", help="labels to run (default: all)")
     parser.add_argument("--page", action="store_true", help="write the tables into docs/caustics.md")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what each entrant showed as PNG")
+    parser.add_argument("--motion", type=int, default=0, metavar="FRAMES", help="frames of a moving ball instead")
+    parser.add_argument("--growth", action="store_true", help="times by photons, casters and triangles instead")
 
 
 def command(options: argparse.Namespace) -> int:
     from addon import register
 
     register()
+    if options.motion or options.growth:
+        text, mark = (motion(options.motion), MOTION) if options.motion else (growth(), GROWTH)
+        print(text)
+        if options.page:
+            markdown.put_between(PAGE, mark, text)
+        return 0
     if options.truth:
         make_truth(options.scenes, options.truth, options.photons)
     known = dict(np.load(TRUTH)) if TRUTH.exists() else {}
@@ -266,3 +281,82 @@ def lamp_row(placed) -> np.ndarray:
     extent = data.angle / 2 if sun else data.shadow_soft_size
     cone = -1.0 if sun else np.cos(data.spot_size / 2)
     return np.array([0.0 if sun else 1.0, *matrix[:3, 3], *-matrix[:3, 2], *strength, extent, cone])
+
+
+TECHNIQUES = ("screen_space_photons", "caustics_mapping")
+STEP = 0.02  # metres a frame
+TRUTH_SAMPLES = 64
+
+
+def motion(count: int) -> str:
+    """The table of a ball and a lamp that move: error of a frame, and what is new in it."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+
+    rows = [["", "of a frame", "new in it", "of a frame, blurred", "new in it, blurred", "light of a frame, deviation"]]
+    for technique in TECHNIQUES:
+        caustic_scenes.make("sphere")
+        scene = bpy.context.scene
+        moving = [one for one in scene.objects if one.type == "LIGHT" or one.name.startswith("Sphere")]
+        one = Entrant("", "CANDELA", 1, technique)
+        configure(scene, one)
+        errors, sums = [], []
+        for number in range(count):
+            for thing in moving:
+                thing.location.x += STEP * (number > 0)
+            seen = [
+                render_passes(scene, "CANDELA", samples, 1, size=(64, 64), bounces=1).images["diffuse_indirect"][
+                    ..., :3
+                ]
+                * np.pi
+                for samples in (1, TRUTH_SAMPLES)
+            ]
+            errors.append((seen[0] - seen[1]).astype(np.float64))
+            sums.append(seen[0].sum() / seen[1].sum())
+        row = [technique]
+        for found in (np.array(errors), np.array([blurred(error) for error in errors])):
+            row += [f"{np.square(found).mean():.4f}", f"{np.square(np.diff(found, axis=0)).mean() / 2:.4f}"]
+        rows.append([*row, f"{100 * np.std(sums):.2f} %"])
+    return (
+        f"Square of irradiance, (W/m²)²; {count} frames, against {TRUTH_SAMPLES} samples of each; blurred by {BLUR:g}"
+        f" pixels.\n\n{markdown.table(rows)}"
+    )
+
+
+def growth() -> str:
+    """The table of times with more photons, casters and triangles."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+    from addon.frame import ledger
+
+    rows = [["", *(f"{technique}, ms" for technique in TECHNIQUES)]]
+    dials = [(f"{side}² photons", {"side": side}) for side in (64, 128, 256, 512)]
+    dials += [(f"{balls} balls", {"balls": balls}) for balls in (1, 4, 16)]
+    dials += [(f"{triangles:,} triangles of a ball", {"triangles": triangles}) for triangles in (2304, 9216, 36864)]
+    for label, dial in dials:
+        row = [label]
+        for technique in TECHNIQUES:
+            caustic_scenes.clear()
+            caustic_scenes.floor()
+            side = int(np.sqrt(dial.get("balls", 1)))
+            segments = int(np.sqrt(dial.get("triangles", 9216)))
+            for x in range(side):
+                for y in range(side):
+                    place = ((x + 0.5) / side * 2 - 1, (y + 0.5) / side * 2 - 1, 0.75)
+                    caustic_scenes.ball(0.5 / side, place, caustic_scenes.glass(), segments)
+            caustic_scenes.spot((0.9, 0.3, 3.2), (0, 0, 0.75), 10.0, 50.0)
+            caustic_scenes.camera(4.0)
+            scene = bpy.context.scene
+            configure(scene, Entrant("", "CANDELA", 1, technique, values=(("grid", dial.get("side", 128)),)))
+            times = []
+            for seed in range(4):  # the first compiles
+                render_passes(scene, "CANDELA", 4, seed, size=(128, 128), bounces=1)
+                times.append(ledger.latest().row(technique).milliseconds / 4)
+            row.append(f"{np.median(times[1:]):.1f}")
+        rows.append(row)
+    return (
+        "Of one sample, a glass ball above a floor, 128 x 128 pixels, the median of three; one dial at a time, others"
+        f" 128² photons, one ball of 9,216 triangles.\n\n{markdown.table(rows)}"
+    )

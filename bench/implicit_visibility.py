@@ -2,18 +2,16 @@
 
 Diffuse indirect light in six rooms at 1, 16 and 64 samples: relMSE with the reference's noise taken off, bias, and
 seconds of the whole render. Then what the author tabulates: 3,400 surfels with one bounce at as many bins as cube
-maps of 8, 12 and 16, step by step; and what is redone when the camera, a light or an object moves. `--page` writes the
-tables into docs/implicit_visibility.md.
+maps of 8, 12 and 16, step by step. `--page` writes the tables into docs/implicit_visibility.md. What is redone when
+something moves: points_motion.py.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
 
 from bench import indirect, markdown
 
@@ -32,12 +30,11 @@ STEPS = {  # programs by what they are for
     "bounce": ("direct light that surfels send", "light of groups of surfels", "bounce between surfels"),
     "pixels": ("light of surfels at pixels",),
 }
-FRAMES, MOVING_SIZE, MOVING_REFERENCE = 5, (48, 32), 64
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", default=indirect.ROOMS, metavar="NAME", help="rooms to measure")
-    parser.add_argument("--parts", nargs="+", default=("error", "time", "motion"), choices=("error", "time", "motion"))
+    parser.add_argument("--parts", nargs="+", default=("error", "time"), choices=("error", "time"))
     parser.add_argument("--page", action="store_true", help="write the tables into docs/implicit_visibility.md")
 
 
@@ -48,7 +45,6 @@ def command(options: argparse.Namespace) -> int:
     made = {
         "error": lambda: "\n\n".join(f"**{name}**\n\n{errors(name)}" for name in options.scenes),
         "time": times,
-        "motion": motion,
     }
     for part in options.parts:
         text = made[part]()
@@ -164,57 +160,3 @@ class timed_call:
 
     def __exit__(self, *_) -> None:
         setattr(self.owner, self.name, self.kept)
-
-
-def moved_camera(scene, number: int) -> None:
-    from mathutils import Matrix
-
-    if number:
-        scene.camera.matrix_world = scene.camera.matrix_world @ Matrix.Rotation(np.radians(indirect.TURN), 4, "Y")
-
-
-def moved_light(scene, number: int) -> None:
-    light = next(thing for thing in scene.objects if thing.type == "LIGHT")
-    light.location.x += 0.02 * bool(number)
-
-
-def moved_object(scene, number: int) -> None:
-    """The smallest mesh turns."""
-    meshes = [thing for thing in scene.objects if thing.type == "MESH"]
-    min(meshes, key=lambda thing: thing.dimensions.length).rotation_euler.z += 0.05 * bool(number)
-
-
-def motion() -> str:
-    """For each kind of motion what is redone, and error and its change of this technique and of instant radiosity."""
-    rows = [("what moves", "redone", "kept", "error of a frame", "new error", "instant radiosity", "new error")]
-    for label, move in (("camera", moved_camera), ("light", moved_light), ("object", moved_object)):
-        scene = opened("cornell_box")
-        found, own, other, scales = {}, [], [], []
-        for _, counters, first, second, truth in frames_of(scene, move):
-            found = counters
-            own.append(first - truth)
-            other.append(second - truth)
-            luminance = truth.mean(axis=2)
-            scales.append(luminance**2 + (0.1 * luminance.mean()) ** 2)
-        scale = np.mean(scales, axis=0)[..., None]
-        redone = ", ".join(sorted(name for name in found if name.endswith(("made", "shaded")))) or "nothing"
-        kept = ", ".join(sorted(name for name in found if name.endswith("kept")))
-        figures = []
-        for error in (own, other):
-            figures.append(f"{(np.square(error) / scale).mean():.4f}")
-            figures.append(f"{(np.square(np.diff(error, axis=0)).mean(axis=0) / 2 / scale).mean():.4f}")
-        rows.append((label, redone, kept, *figures))
-    return markdown.table(rows)
-
-
-def frames_of(scene, move: Callable) -> Iterator[tuple]:
-    from addon.frame import ledger
-
-    for number in range(FRAMES):
-        move(scene, number)
-        truth, _ = indirect.reference(scene, MOVING_REFERENCE, MOVING_SIZE)
-        scene.candela.slot_indirect = OTHERS[0]
-        second = indirect.render(scene, "CANDELA", 1, 1, MOVING_SIZE)
-        scene.candela.slot_indirect = NAME
-        first = indirect.render(scene, "CANDELA", 1, 1, MOVING_SIZE)
-        yield number, dict(ledger.latest().row(NAME).counters), first, second, truth

@@ -16,6 +16,8 @@ from pathlib import Path
 from bench.indirect import BOUNCES, PATH, ROOMS, SCENES, reference, render
 from bench.quick import size_of, table
 
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "micro_rendering.md"
+COMMAND = "python -m bench micro_rendering --page"
 NAME = "micro_rendering"
 PEERS = ("instant_radiosity", "imperfect_shadow_maps", "clustered_visibility", "ssdo")
 HEAD = ("scene", "technique", "samples", "seconds", "relMSE", "bias")
@@ -30,7 +32,7 @@ DIAL_SCENE = "cornell_box"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="+", default=ROOMS, metavar="NAME", help=f"default: {', '.join(ROOMS)}")
+    parser.add_argument("--scenes", nargs="*", default=ROOMS, metavar="NAME", help=f"default: {', '.join(ROOMS)}")
     parser.add_argument("--techniques", nargs="+", default=(NAME, *PEERS), metavar="NAME")
     parser.add_argument("--samples", nargs="+", type=int, default=(1, 16, 64), metavar="N", help="default: 1 16 64")
     parser.add_argument("--most", type=int, default=64, metavar="N", help="samples of micro-rendering at most")
@@ -38,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reference", type=int, default=256, metavar="N", help="samples of each of two references")
     parser.add_argument("--no-dials", action="store_true", help="leave out what its parameters cost")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write PNGs beside Cycles")
-    parser.add_argument("--page", type=Path, metavar="PATH", help="write the tables as Markdown, too")
+    parser.add_argument("--page", action="store_true", help="write the tables into docs/micro_rendering.md, too")
 
 
 def measured(scene, technique: str, samples: int, size, truth) -> tuple[tuple[str, str, str], object]:
@@ -105,36 +107,16 @@ def write_picture(path: Path, pictures: list) -> None:
     path.write_bytes(png((large * 255 + 0.5).astype(np.uint8)))
 
 
-PAGE = """# Micro-rendering: error and time
-
-Written by `python -m bench micro_rendering --page PATH`; do not edit. Method, bias and where it fails:
-`addon/techniques/micro_rendering.py`.
-
-{size} pixels, {bounces} bounces. Diffuse indirect light against the mean of two renders of {reference} samples by
-Cycles, whose noise is taken off the errors (relMSE). Seconds are of a whole render of which nothing has to be compiled,
-on a GPU drawn in software by two cores that others used, too: they say nothing of a GPU.
-
-{rows}
-"""
-TURNED = """
-## What its parameters cost
-
-One sample, {scene}.
-
-{turned}
-"""
-
-
-def page(rows: list, turned: list, options: argparse.Namespace) -> str:
-    """The tables as Markdown."""
+def page(rows: list, turned: list, options: argparse.Namespace) -> None:
+    """Write the tables into the technique's page."""
     from bench import markdown
 
     size = "x".join(map(str, options.size))
-    table_of_rows = markdown.table([HEAD, *rows])
-    text = PAGE.format(size=size, bounces=BOUNCES, reference=options.reference, rows=table_of_rows)
+    text = f"{size} pixels, {BOUNCES} bounces, references of {options.reference} samples.\n\n"
+    markdown.put_between(PAGE, f"{COMMAND} --no-dials", text + markdown.table([HEAD, *rows]))
     if turned:
-        text += TURNED.format(scene=DIAL_SCENE, turned=markdown.table([DIAL_HEAD, *turned]))
-    return text
+        text = f"One sample, {DIAL_SCENE}.\n\n"
+        markdown.put_between(PAGE, f"{COMMAND} --scenes", text + markdown.table([DIAL_HEAD, *turned]))
 
 
 def command(options: argparse.Namespace) -> int:
@@ -149,7 +131,7 @@ def command(options: argparse.Namespace) -> int:
     for step in steps:
         step()
         if options.page:  # after each scene: what is measured stays when the run is ended
-            options.page.write_text(page(rows, turned, options), encoding="utf-8")
+            page(rows, turned, options)
     print(table([HEAD, *rows]), flush=True)
     if turned:
         print(table([DIAL_HEAD, *turned]), flush=True)

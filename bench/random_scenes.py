@@ -1,4 +1,4 @@
-"""Scenes made by lot, beside Cycles: `python -m bench random`.
+"""Scenes made at random, beside Cycles: `python -m bench random`.
 
 Each number makes one scene: objects of several kinds under modifiers, Principled materials with random values, textures
 and mixes, lamps of all kinds and shapes, a world, a camera; in metres, hundredths or hundreds of them. Both engines

@@ -15,8 +15,13 @@ import sys
 from pathlib import Path
 
 import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
 from scenes import SCENES
 from scenes.construct import begin, finish
+
+import addon
 
 HERE = Path(__file__).resolve().parent
 OLDEST_READER = (4, 5)  # files must open in this Blender
@@ -28,6 +33,7 @@ def make(name: str, folder: Path) -> Path:
     begin(title)
     build()
     finish()
+    bpy.context.scene.render.engine = "CANDELA"  # whoever opens the file wants to see it rendered by Candela
     path = folder / f"{name}.blend"
     bpy.context.preferences.filepaths.save_version = 0  # no .blend1 beside it
     bpy.context.preferences.filepaths.file_preview_type = "NONE"
@@ -49,6 +55,7 @@ def main() -> int:
             "run under 4.5 (`make samples BLENDER=4.5`) or give another folder by --out"
         )
 
+    addon.register()  # Blender keeps the name of an engine only while it knows it
     folder = arguments.out or HERE
     folder.mkdir(parents=True, exist_ok=True)
     for name in arguments.names or SCENES:

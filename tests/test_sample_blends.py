@@ -9,6 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.ui import ENGINE
+
 FOLDER = Path(__file__).resolve().parent.parent / "sample_blends"
 
 LIGHTS = {  # how many of each kind
@@ -41,7 +43,7 @@ SHADERS = {
 
 
 @pytest.fixture(params=list(LIGHTS))
-def sample(request):
+def sample(request, registered):
     """Each committed scene, opened; Blender is left empty."""
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{request.param}.blend"))
     yield request.param
@@ -103,9 +105,9 @@ def test_has_camera_world_and_its_lights(sample):
     assert kinds == LIGHTS[sample]
 
 
-def test_renders_by_cycles_at_a_common_size_with_a_plain_view(sample):
+def test_opens_with_candela_at_a_common_size_with_a_plain_view(sample):
     scene = bpy.context.scene
-    assert scene.render.engine == "CYCLES"
+    assert scene.render.engine == ENGINE
     assert (scene.render.resolution_x, scene.render.resolution_y) == (512, 384)
     assert scene.render.resolution_percentage == 100
     assert scene.view_settings.view_transform == "Standard"

@@ -1,5 +1,7 @@
 """The manual's pictures, cut from what the windowed tests left: `make screenshots`.
 
+    python tools/screenshots.py [SCRIPT ...]     only those of some scripts in tests/window/
+
 The window is 1280 x 800; regions are where the scripts in tests/window/ put them, or as they say in their result.
 """
 
@@ -35,12 +37,22 @@ PICTURES = (
     ("pass_tree_wrong_link", "passes", "passes_wrong_link", LEFT),
     ("compare", "tour", "tour_compared", LEFT),
     ("compare_error", "tour", "tour_error", LEFT),
+    ("render_growing", "growing", "growing_1", LEFT),
+    ("glare_window", "features", "glare_on", LEFT),
+    ("glare_panel", "features", "glare_panel", "properties"),
+    ("subsurface_maps", "features", "painting_maps", LEFT),
+    ("subsurface_painted", "features", "painting_painted", LEFT),
+    ("reflections_picked", "features", "reflections_picked", LEFT),
+    ("reflections_turned", "features", "reflections_turned", LEFT),
 )
 
 
 def main() -> int:
     """Write the pictures; 1 if the tests left none."""
+    wanted = sys.argv[1:]
     for name, script, picture, box in PICTURES:
+        if wanted and script not in wanted:
+            continue
         folder = ROOT / "build" / "window" / f"{script}-{BACKEND}"
         source = folder / f"{picture}.png"
         if not source.exists():

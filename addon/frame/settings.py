@@ -7,23 +7,33 @@ from dataclasses import dataclass, field, replace
 
 from .technique import Param, Technique
 
-SAMPLES = Param("samples", "Samples", 64, "Pictures that are averaged; error falls as the count grows", 1, 65536)
-SEED = Param("seed", "Seed", 0, "Another number gives other noise with the same mean", 0, 2**31 - 1)
+SAMPLES = Param("samples", "Samples", 64, "Number of samples averaged per pixel; error falls as it grows", 1, 65536)
+SEED = Param(
+    "seed", "Seed", 0, "Seed of the random numbers: another value changes the noise, not the mean", 0, 2**31 - 1
+)
 BOUNCES = Param(
     "bounces", "Bounces", 16,
-    "How often light is reflected by surfaces on its way to the surface that is seen; 0: direct light only", 0, 64,
+    "Maximum number of reflections of indirect light before it reaches the visible surface; 0: direct light only",
+    0, 64,
 )  # fmt: skip
 DRAFT_BOUNCES = 4
 SAMPLE_OFFSET = Param(
     "sample_offset", "Sample Offset", 0,
-    "The first of the picture's samples to render, where several machines share them", 0, 65535,
+    "First sample to render, where several machines share the samples of a picture",
+    0, 65535,
 )  # fmt: skip
 SAMPLE_COUNT = Param(
-    "sample_count", "Sample Count", 0, "How many samples to render from there on; 0: all that are left", 0, 65536
+    "sample_count",
+    "Sample Count",
+    0,
+    "Number of samples to render from the sample offset on; 0: all remaining ones",
+    0,
+    65536,
 )
 TIME_LIMIT = Param(
     "time_limit", "Time Limit", 0.0,
-    "Seconds after which a final render ends with the samples that it has by then; 0: none", 0.0, 1e6,
+    "Seconds after which a final render ends with the samples rendered so far; 0: no limit",
+    0.0, 1e6,
 )  # fmt: skip
 NOISE_THRESHOLD = Param(
     "noise_threshold", "Noise Threshold", 0.0,

@@ -28,9 +28,9 @@ POINT, DIRECTION = "POINT", "DIRECTION"
 class Param:
     """One parameter, declared once. Blender property, command-line override, benchmark axis and manual derive from it.
 
-    `default` fixes the type: bool, int, float, str for a choice among `items` (identifier, label, number), or a tuple
-    of three floats. `scope` is the kind of data-block that has it: the scene, the picture's camera or world, or each
-    lamp, material or object (whose values come with the snapshot; see `own_value`).
+    `default` fixes the type: bool, int, float, str for a choice among `items` (identifier, label, number, description),
+    or a tuple of three floats. `scope` is the kind of data-block that has it: the scene, the picture's camera or world,
+    or each lamp, material or object (whose values come with the snapshot; see `own_value`).
 
     With `many` it is a list of groups of those parameters, a tuple of {name: value}. A vector with a `handle` (POINT or
     DIRECTION, in the object's space) can be dragged in the 3D viewport. `image`: a name of an image data-block; `file`:
@@ -44,7 +44,7 @@ class Param:
     minimum: float | None = None
     maximum: float | None = None
     unit: str = ""  # Blender property unit: PIXEL, FACTOR, …
-    items: tuple[tuple[str, str, int], ...] = ()
+    items: tuple[tuple[str, str, int, str], ...] = ()
     scope: str = SCENE
     many: tuple[Param, ...] = ()
     handle: str = ""
@@ -118,6 +118,7 @@ class Write:
     description: str
     accumulates: bool = False
     by_need: bool = False
+    ranked: bool = False  # pairs (id, weight) to which samples add by id (kernels/ranks.py): no sum, but cleared as one
 
 
 class Service:

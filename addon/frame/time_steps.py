@@ -149,7 +149,6 @@ def drawn(
     steps: Sequence[Step],
     settings: Settings,
     parts: Callable[[Renderer, Frame], Iterator[None]],
-    compiling: Callable[[int, int], bool] | None = None,
 ) -> Iterator[tuple[int, Callable[[], None]]]:
     """Draw all samples of all steps; `renderer.frame` is the first one's at the start, and the finished one at the end.
 
@@ -170,7 +169,7 @@ def drawn(
             if place:
                 with turn:
                     renderer.forget()
-                    renderer.begin(step.snapshot, settings, compiling, step.numbers)
+                    renderer.begin(step.snapshot, settings, step.numbers)
             frame = renderer.frame
             first = sum(number < half for number in step.numbers)
             halved = first == 0

@@ -81,6 +81,11 @@ def available() -> bool:
     return True
 
 
+def is_only_one() -> bool:
+    """Whether all GPU work of this process is done in one context, but for final renders: a window has several."""
+    return bpy.app.background
+
+
 def ensure() -> None:
     """Make GPU calls work in this process, or raise RuntimeError with a sentence."""
     if available():

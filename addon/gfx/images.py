@@ -166,19 +166,41 @@ class _Framebuffers:
 
 
 # A framebuffer works in one GPU context only and must end before it. Images, programs and buffers are shared by all
-# contexts, and outlive the one of a final render, which Blender makes for each render anew.
+# contexts, and outlive the one of a final render, which Blender makes for each render anew. Windows have several: all
+# 3D regions are drawn in one that lasts, operators and timers run in that of the window that was drawn last. To bind a
+# framebuffer of another context fails, and leaves a place on Blender's short stack of framebuffers taken for ever.
 _lasting = _Framebuffers()
 _thread = threading.local()
 
 
 @contextmanager
+def lasting_context():
+    """For drawing 3D regions: framebuffers are kept for their next picture."""
+    before = getattr(_thread, "framebuffers", None)
+    _thread.framebuffers = _lasting
+    try:
+        yield
+    finally:
+        _thread.framebuffers = before
+
+
+def _framebuffers() -> _Framebuffers:
+    """Those of the current GPU context; new ones where it is not known which it is."""
+    own = getattr(_thread, "framebuffers", None)
+    if own is not None:
+        return own
+    return _lasting if context.is_only_one() else _Framebuffers()
+
+
+@contextmanager
 def passing_context():
     """For work in a GPU context that may end afterwards: framebuffers made inside are freed at the end."""
+    before = getattr(_thread, "framebuffers", None)
     _thread.framebuffers = _Framebuffers()
     try:
         yield
     finally:
-        del _thread.framebuffers
+        _thread.framebuffers = before
 
 
 @dataclass(eq=False)
@@ -191,7 +213,7 @@ class Target:
     @property
     def framebuffer(self) -> gpu.types.GPUFrameBuffer:
         """The attachments as an object of the current GPU context, made when first asked for by any target."""
-        return getattr(_thread, "framebuffers", _lasting).over(self.colors, self.depth)
+        return _framebuffers().over(self.colors, self.depth)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -213,6 +213,14 @@ def get(program: Program) -> Shader:
     return shader
 
 
+def has(program: Program) -> bool:
+    """Whether an equal declaration is compiled; this picture uses it then."""
+    shader = _shaders.get(program)
+    if shader is not None:
+        shader.used = context.pictures
+    return shader is not None
+
+
 def kept() -> int:
     """Compiled programs that this process holds."""
     return len(_shaders)

@@ -117,7 +117,8 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 def _for_images(program: Program, bindings: dict) -> Shader:
     """The shader of a program, with what the images that it reads define and bring along, if it has room for that."""
     read = bindings.get("textures") or {}
-    beside = {name: image for one in read.values() for name, image in one.beside.items() if name not in read}
+    bound = (*read.values(), *(bindings.get("blocks") or {}).values())
+    beside = {name: image for one in bound for name, image in one.beside.items() if name not in read}
     if len(program.textures) + len(beside) > MOST_TEXTURES:
         beside = {}
     if beside:

@@ -36,6 +36,7 @@ class MapView:
     least_q: float = -np.inf  # of the receivers: what lies farther from the light casts no shadow on any of them
     cell: float = 0.0  # share of the light's extent, along each axis, that the map stands for; 0: a point
     glass_blocks: bool = False  # what passes glass arrives otherwise (caustic_casters.py)
+    channel: int = 0  # of light that coloured casters let pass: 1 to 3; 0: their mean
 
 
 def directional_views(
@@ -329,7 +330,7 @@ def draw_views(
             for call in calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q))):
                 shader, bindings = alpha.programs[call.draw.material]
                 own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point,
-                       "glass_blocks": int(view.glass_blocks)}  # fmt: skip
+                       "glass_blocks": int(view.glass_blocks), "channel_asked": view.channel}  # fmt: skip
                 shader.bind(**bindings, constants={**constants, **own})
                 passes.draw(shader, call.draw.batch, call.count)
                 sent += call.triangles

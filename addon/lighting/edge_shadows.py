@@ -38,7 +38,8 @@ PATTERNS = 16  # of neighbouring pixels, four by four
 SEEN_SHARE = ("R32F", "seen_share")
 MOST_EDGES = Param(
     "most_edges", "Most edges", 20_000,
-    "A light with more silhouette edges has shadow maps or rays in their place", 100, 1_000_000,
+    "Lights with more silhouette edges than this use shadow maps or rays instead",
+    100, 1_000_000,
 )  # fmt: skip
 SHARE_LOOKUP = Lookup("share by edges", "edges/visibility.glsl", textures=(SEEN_SHARE,), maps=False)
 

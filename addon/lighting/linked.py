@@ -1,8 +1,8 @@
 """Light linking: which pixels a light leaves out, by the group of receivers of the object that each shows.
 
-Groups stand in the instance image (snapshot/linking.py) and groups that a light does not light beside its flags
+Groups stand in the instance image (snapshot/linking.py) and groups that a light does not light beside its kind
 (sources/lights.py). Where any light of a pass has such bits, surfaces are drawn once more in the sample, with the
-numbers of their groups in the place of where they lie, and the pass asks for them. Scenes without links compile and
+numbers of their instances in the place of where they lie, and the pass asks for them. Scenes without links compile and
 draw nothing of this.
 
 | cost | per sample with linked lights |
@@ -28,19 +28,20 @@ from ..sources import lights
 from ..surfaces.draw import SURFACES, draw_indices
 from . import repeated_light
 
-GROUPS = "surface.group"
+GROUPS = "surface.object"
 
 
 def has_links(rows: list[np.ndarray]) -> bool:
     """Whether any of these lights, (TEXELS, 4) each, leaves out receivers."""
-    return any(int(row[0, 1]) >= lights.LINK_BIT for row in rows)
+    return any(int(row[0, 0]) >= lights.KIND_STEPS for row in rows)
 
 
 def linked(program: Program) -> Program:
     """The same pass for lights that leave out receivers."""
     return replace(
-        program, name=f"{program.name}, linked", textures=(*program.textures, ("RGBA32F", "surface_group")),
-        defines=(*program.defines, ("LIGHT_LINKS", str(lights.LINK_BIT))),
+        program, name=f"{program.name}, linked",
+        textures=(*program.textures, ("RGBA32F", "surface_object"), ("RGBA32F", "instances")),
+        defines=(*program.defines, ("LIGHT_LINKS", "1")),
     )  # fmt: skip
 
 
@@ -64,4 +65,4 @@ class Groups:
                 passes.copy(drawn[0].colors[0], frame.target(GROUPS))
             frame.count(technique, "passes", 2)
         repeated_light.forbid(frame)
-        return {"surface_group": frame.images[GROUPS]}
+        return {"surface_object": frame.images[GROUPS], "instances": frame.geometry.instances}

@@ -1,45 +1,32 @@
-"""Points on all surfaces with what they reflect and the light that reaches them straight, for who gathers from points.
+"""Lit points: points on surfaces with reflectance and direct light, for techniques that gather from them.
 
-A run is a set of points by area (scene/area_points.py) in the order of a tree (scene/point_tree.py). Each point has
-two sides, entries 2 i and 2 i + 1 of the images here, ROW a row: the one that its triangle faces by its winding, and
-the other one. Nothing asks for the inside of a closed object that is not entered; rooms are closed, too, and entered.
-
-The material's own program is run at every point (surfaces/hits.py), once a picture. Gloss counts as diffuse: what it
-reflects of even light is right, its direction is not.
+Whatever spreads points over surfaces (points by area: point_runs.py; surfels: surfels.py) has them shaded and lit here.
+Points are records of hits, known beforehand or found by rays; the material's own program is run at each
+(surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is kept is the share of even
+light that leaves again: gloss counts as diffuse, what it reflects of even light is right, its direction is not. Light
+of lamps, the world and emissive meshes comes from the light loop with traced shadows (point_light.py).
 
 | cost | |
 |---|---|
-| points and tree | on the CPU, when geometry changes; in a viewport they move along and bounds are refitted |
-| closures | 1 pass, and 1 for each material; 13 x 16 bytes a point and side while it runs |
+| closures | 1 pass, and 1 for each material; 13 x 16 bytes a point while it runs, 3 x 16 are kept |
 | light | as point_light.py: 1 ray for each point and point of a light source in front of it |
 
-Bias: one set of RUNS after the other, so what lies between points is never lit itself; of a mix of closures each point
-has one.
+Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
+from collections.abc import Callable
 
 from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
-from ..materials.compiled import CompiledMaterial
-from ..scene.area_points import AreaPoints, Surfaces, spread
-from ..scene.pieces import octahedral
-from ..scene.point_tree import PointTree, fitted, split
 from ..scene.view import VIEW
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
-from .point_light import PointLight
+from .point_light import LIGHTING, PointLight
 
-ROW = 128  # entries of a row of images of points
-RUNS = 8
-LEAST = 6  # levels of a tree, at least
-LIGHTS, OTHERS = 4, 4  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
-SHARPNESS = 64.0  # see PointLight: a bright spot is one of thousands of points that are gathered
+NAMES = ("position", "normal", "diffuse")  # of the images of shaded points, as surface images are laid out
 REFLECT = passes.fullscreen_program(
     "what points reflect",
     "hits/reflect.frag.glsl",
@@ -47,178 +34,62 @@ REFLECT = passes.fullscreen_program(
     blocks=((VIEW, "film_view"),),
     outputs=(("VEC4", "out_position"), ("VEC4", "out_normal"), ("VEC4", "out_albedo")),
 )
-OWN = ("place", "triangle", "normals", "material")  # see shaders/hits/place.frag.glsl
-
-
-@dataclass
-class Run:
-    """Points of one run on the GPU, and as a tree. `shaded`: place, normals and albedo of both sides of all."""
-
-    points: AreaPoints
-    tree: PointTree
-    nodes: images.Image
-    own: tuple[images.Image, ...]
-    facing: images.Image
-    shaded: images.Target | None = None
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Of images of the points."""
-        return ROW, 2 * self.tree.leaves // ROW
+PROGRAMS = (REFLECT, LIGHTING)
 
 
 class LitPoints:
-    """The points of a renderer's scene for one technique: it calls `begin` in each picture, `run` and `light` in each
-    sample."""
+    """Shades and lights images of points. A technique owns one: `begin` once a picture, `light` in each sample."""
 
-    def __init__(self, use: str):
-        self._light = PointLight(use, LIGHTS, OTHERS, reflected=True, sharpness=SHARPNESS)
-        self._runs: dict[int, Run] = {}
-        self._surfaces: Surfaces | None = None
-        self._key: object = None
-        self._moved = False  # points have followed a motion, and lie elsewhere than they would be spread now
-        self.count = 0
+    def __init__(self, use: str, **light):
+        """`light`: how many points on light sources, as PointLight takes them."""
+        self._light = PointLight(use, reflected=True, **light)
         self._black: images.Image | None = None
 
-    def begin(self, frame: Frame, technique: Technique, count: int) -> None:
-        """Take over the scene as it is in this picture, for about `count` points, a power of two."""
-        self.count = 1 << max(round(np.log2(count)), LEAST)
-        kinds, exact = _keys(frame)
-        key = (self.count, kinds), exact
-        # A picture by itself does not depend on those before it: what has moved along is spread anew for it.
-        if key != self._key or (self._moved and frame.settings.whole):
-            follows = self._key is not None and self._key[0] == key[0] and not frame.settings.whole
-            before = self._runs if follows else {}
-            self._give()
-            self._surfaces, self._key, self._moved = Surfaces.of(frame), key, follows
-            for number, run in before.items():
-                self._runs[number] = self._placed(frame, run.points, run.tree.order)
-            frame.count(technique, "trees refitted", len(before))
-        else:
-            frame.count(technique, "trees kept", len(self._runs))
-        for run in self._runs.values():
-            self._unshade(run)
+    def begin(self, frame: Frame) -> None:
+        """Find what emits."""
         self._light.begin(frame)
 
-    def run(self, frame: Frame, technique: Technique, number: int) -> Run | None:
-        """The points of a run, shaded; None where no surface has any."""
-        number %= RUNS
-        if number not in self._runs:
-            points = spread(self._surfaces, self.count, number)
-            if not len(points):
-                return None
-            self._runs[number] = self._placed(frame, points)
-            frame.count(technique, "trees made")
-        run = self._runs[number]
-        if run.shaded is None:
-            self._shade(frame, technique, run)
-        return run
-
-    def light(self, frame: Frame, technique: Technique, run: Run) -> images.Image:
-        """What both sides of all points reflect of this sample's direct light: an image of the pool, radiance."""
-        direct, unused = (images.pool.take(*run.size, "RGBA32F") for _ in range(2))
-        target = images.Target((direct, unused))
-        target.clear()
-        if self._black is None:
-            self._black = images.pool.take(ROW, run.size[1], "RGBA32F")
-            images.Target((self._black,)).clear()
-        surfaces = dict(zip(("position", "normal", "diffuse"), run.shaded.colors))
-        surfaces |= dict.fromkeys(("tint", "lobe", "emission"), self._black)
-        drawn, rays = self._light.add(frame, surfaces, target)
-        images.pool.give(unused)
-        frame.count(technique, "passes", drawn)
-        frame.count(technique, "light rays", rays * 2 * run.tree.leaves)
-        return direct
-
-    def _placed(self, frame: Frame, points: AreaPoints, order: np.ndarray | None = None) -> Run:
-        """The run of these points, in the order of a tree that is known or made."""
-        surfaces = self._surfaces
-        position, normal, area = points.placed(surfaces)
-        order = split(position, normal) if order is None else order
-        tree = fitted(order, position, normal, area)
-        hits, rows = frame.kept(Hits), {id(one): row for row, one in enumerate(frame.geometry.placed[0])}
-        owner, number = surfaces.owner[points.triangle], surfaces.number[points.triangle]
-        instance, of_material, material = (np.zeros(len(points)) for _ in range(3))
-        shading = normal.copy()
-        meshes = frame.geometry.placed[1]
-        for k in np.unique(owner):
-            one, own = surfaces.shown[k], owner == k
-            mesh = meshes[one.mesh]
-            instance[own] = rows[id(one)]
-            of_material[own] = hits.numbers(frame, one)[number[own]]
-            material[own] = mesh.triangle_materials(one.materials)[number[own]]
-            shading[own] = _shading_normals(mesh, one.matrix[:3, :3], number[own], points.share[own])
-        width = 2.0 * np.sqrt(area / np.pi)
-        columns = (
-            np.concatenate([position, width[:, None]], axis=1),
-            np.concatenate([instance[:, None], of_material[:, None], points.share], axis=1),
-            np.concatenate([octahedral(normal), octahedral(shading)], axis=1),
-            np.stack([material, np.isfinite(position).all(axis=1), *np.zeros((2, len(points)))], axis=1),
-        )
-        own = tuple(images.upload(_both_sides(column[order])) for column in columns)
-        facing = np.zeros((2 * len(points), 4), np.float32)
-        facing[0::2, :3], facing[1::2, :3] = -normal[order], normal[order]  # from in front, from behind
-        return Run(points, tree, tree.upload(), own, images.upload(facing.reshape(-1, ROW, 4)))
-
-    def _shade(self, frame: Frame, technique: Technique, run: Run) -> None:
-        hits, records = frame.kept(Hits), Records.take(run.size)
-        closures = take_closures(run.size, records.target.depth)
-        met = hits.place(frame, technique, run.own, records)
-        hits.shade(frame, technique, run.facing, records, met, closures)
-        run.shaded = images.Target(tuple(images.pool.take(*run.size, "RGBA32F") for _ in range(3)))
+    def shade(
+        self, frame: Frame, technique: Technique, facing: images.Image, find: Callable[[Hits, Records], set[int]]
+    ) -> images.Target:
+        """Place, normals and albedo of points, images of the pool in the order of NAMES; position.w is 0 where there is
+        none. `facing`: the direction in which each is looked at; `find` fills in the records and returns the materials
+        that may be there (Hits.trace, Hits.place)."""
+        hits, records = frame.kept(Hits), Records.take(facing.size)
+        closures = take_closures(facing.size, records.target.depth)
+        hits.shade(frame, technique, facing, records, find(hits, records), closures)
+        shaded = images.Target(tuple(images.pool.take(*facing.size, "RGBA32F") for _ in NAMES))
         passes.fullscreen(
-            REFLECT, run.shaded, blocks={"film_view": frame.view_block},
+            REFLECT, shaded, blocks={"film_view": frame.view_block},
             textures={**closure_bindings(closures), "energy_table": frame.materials.energy_table},
         )  # fmt: skip
         for image in closures.colors:
             images.pool.give(image)
         records.give()
-        frame.count(technique, "points shaded", 2 * run.tree.leaves)
+        frame.count(technique, "passes")
+        return shaded
 
-    def _unshade(self, run: Run) -> None:
-        for image in run.shaded.colors if run.shaded else ():
-            images.pool.give(image)
-        run.shaded = None
+    def light(
+        self, frame: Frame, technique: Technique, points: tuple[images.Image, ...], target: images.Target, count: int,
+        number: int | None = None,
+    ) -> None:  # fmt: skip
+        """Add the direct light of this sample, or of sample `number`, that `count` points (images in the order of
+        NAMES) reflect to the first of the two images of `target`: radiance."""
+        if self._black is None or self._black.size != target.size:
+            self._give()
+            self._black = images.pool.take(*target.size, "RGBA32F")
+            images.Target((self._black,)).clear()
+        surfaces = dict(zip(NAMES, points)) | dict.fromkeys(("tint", "lobe", "emission"), self._black)
+        drawn, rays = self._light.add(frame, surfaces, target, number)
+        frame.count(technique, "passes", drawn)
+        frame.count(technique, "light rays", rays * count)
 
     def _give(self) -> None:
-        for run in self._runs.values():
-            self._unshade(run)
         if self._black is not None:
             images.pool.give(self._black)
-        self._runs, self._black = {}, None
+        self._black = None
 
     def release(self) -> None:
         """Drop GPU resources."""
         self._give()
         self._light.release()
-        self._surfaces = self._key = None
-        self._moved = False
-
-
-def _keys(frame: Frame) -> tuple[tuple, tuple]:
-    """What points must be spread anew for if it differs, and what moves them."""
-    instances, meshes, _ = frame.geometry.placed
-    kinds = tuple((i.mesh, meshes[i.mesh].triangle_count, i.materials, i.visibility.diffuse) for i in instances)
-    opacity = tuple(_opacity(material) for material in frame.measured_materials)
-    exact = tuple((meshes[i.mesh].version, i.matrix.tobytes()) for i in instances)
-    return (kinds, opacity, frame.opacity_maps.changes), (exact, tuple(frame.geometry.origin))
-
-
-def _opacity(material: CompiledMaterial) -> float:
-    return 0.0 if material.glass else material.opacity if material.transparent else 1.0
-
-
-def _shading_normals(mesh, linear: np.ndarray, triangles: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """(N, 3) at places in triangles of a mesh, outwards in the world also where an object is mirrored."""
-    a, b, c = linear.T
-    turn = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    turn = turn * (-1.0 if np.linalg.det(linear) < 0.0 else 1.0)
-    normals = mesh.corner_normals[mesh.triangle_corners[triangles]].astype(np.float64) @ turn.T
-    weights = np.concatenate([1.0 - share.sum(axis=1, keepdims=True), share], axis=1)
-    blended = (weights[:, :, None] * normals).sum(axis=1)
-    return blended / np.maximum(np.linalg.norm(blended, axis=1, keepdims=True), 1e-300)
-
-
-def _both_sides(rows: np.ndarray) -> np.ndarray:
-    """(2 n / ROW, ROW, 4): each row of (n, 4) twice."""
-    return np.repeat(rows, 2, axis=0).astype(np.float32).reshape(-1, ROW, 4)

@@ -3,14 +3,15 @@
 shaders/micro/buffer.glsl fills one, by a thread that goes through the tree; shaders/micro/sum.glsl takes the mean of
 the radiance of what it shows, which is the irradiance over pi, since its pixels are equal shares of cosine-weighted
 solid angle. Here are the radiance of nodes (`NodeRadiance`), from that of the points up, and light that is reflected
-again and again: every one of `groups` groups of points has one of its points gather for all, for both sides, and what
-arrives is reflected by each with its own albedo. What each sees does not change from one reflection to the next, so
-its micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3: Jacobi
-iteration).
+again and again: every one of `groups` groups of points has one of its points gather for all that see it, for both
+sides, and what arrives is reflected by each with its own albedo. What each sees does not change from one reflection to
+the next, so its micro-buffer is drawn once a sample and summed once for each bounce (Ritschel 2009, chapter 6.4.3:
+Jacobi iteration).
 
 | cost | for n points, G groups, K x K pixels |
 |---|---|
 | micro-buffers of groups | 2 G trees walked, 4 K^2 bytes each, of the pool |
+| who takes light from which group | 2 n rays, up to four times as many where walls part groups |
 | each bounce | 2 G K^2 fetches, 2 passes and, for each 7 levels of the tree, one more; 8 fetches a node |
 | radiance | 64 bytes a point, twice |
 """
@@ -25,14 +26,18 @@ from ..frame.run import Frame
 from ..frame.technique import Technique
 from ..gfx import context, images, passes
 from ..gfx.library import Program
-from .lit_points import ROW, LitPoints, Run
+from ..scene import acceleration
+from ..scene.point_tree import COVER
+from ..scene.view import VIEW
+from .point_runs import CLIPS, ROW, PointRuns, Run
 
 PULLED = 7  # levels of a pass
 NODE_ROW = 128  # groups and sides side by side
-SOFTWARE_LEAVES = 2048  # of a part of a tree
+SOFTWARE_LEAVES = 2048  # of a part of a tree, at GROUP_SIDE pixels
 GROUP_SIDE = 8  # pixels of a micro-buffer of a group
 FARTHEST, NEAREST = 2.0, 1e-6  # by the size of the scene: the range of depths that a pixel tells apart
-BUFFER_TEXTURES = (("RGBA32F", "tree_nodes"),)
+BUFFER_TEXTURES = (("RGBA32F", "tree_nodes"), ("RGBA32F", "piece_clips"))
+BUFFER_DEFINES = (("POINT_ROW", str(ROW)),)
 BUFFER_IMAGE = ("micro", "R32UI", "UINT_2D", "READ_WRITE")
 BUFFER_CONSTANTS = (
     ("IVEC2", "part"), ("INT", "micro_side"), ("INT", "leaf_count"), ("INT", "id_bits"), ("FLOAT", "detail"),
@@ -44,7 +49,7 @@ OF_GROUPS = Program(
     textures=(*BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
     images=(BUFFER_IMAGE,),
     constants=(*BUFFER_CONSTANTS, ("INT", "group_count")),
-    defines=(("NODE_ROW", str(NODE_ROW)),),
+    defines=(*BUFFER_DEFINES, ("NODE_ROW", str(NODE_ROW))),
 )
 ARRIVING = passes.fullscreen_program(
     "light arriving at groups",
@@ -56,10 +61,19 @@ ARRIVING = passes.fullscreen_program(
 SENT = passes.fullscreen_program(
     "light sent by points",
     "micro/leaf.frag.glsl",
-    textures=tuple(("RGBA32F", name) for name in ("tree_nodes", "direct", "albedo", "arriving")),
+    textures=(*(("RGBA32F", name) for name in ("tree_nodes", "direct", "albedo", "arriving")), ("R32F", "shares")),
     constants=(("INT", "leaf_count"), ("INT", "group_count")),
-    defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW))),
+    defines=(("NODE_ROW", str(NODE_ROW)), ("POINT_ROW", str(ROW)), ("COVER", str(COVER))),
     outputs=(("VEC4", "out_sent"),),
+)
+SHARES = passes.fullscreen_program(
+    "groups that points take light from",
+    "micro/shares.frag.glsl",
+    textures=(*acceleration.HIERARCHY_TEXTURES, BUFFER_TEXTURES[0]),
+    blocks=((VIEW, "film_view"),),
+    constants=(("INT", "leaf_count"), ("INT", "group_count"), ("VEC4", "buffer_choice"), ("FLOAT", "offset_size")),
+    defines=(("POINT_ROW", str(ROW)),),
+    outputs=(("FLOAT", "out_share"),),
 )
 PULL_POINTS, PULL = (
     passes.fullscreen_program(
@@ -72,13 +86,14 @@ PULL_POINTS, PULL = (
     )
     for below, defines in (("points", (("FIRST", ""),)), ("nodes", ()))
 )
-PROGRAMS = (OF_GROUPS, ARRIVING, SENT, PULL_POINTS, PULL)
+PROGRAMS = (CLIPS, OF_GROUPS, ARRIVING, SENT, SHARES, PULL_POINTS, PULL)
 
 
-def parts(leaves: int) -> list[tuple[int, int]]:
-    """Parts of a tree, one for each dispatch: constant `part`. All of it at once, but in software by pieces: Mesa's
-    rasteriser leaves a shader's loops after 65,536 rounds of all of them together."""
-    count = max(leaves // SOFTWARE_LEAVES, 1) if context.masks_branches() else 1
+def parts(leaves: int, side: int) -> list[tuple[int, int]]:
+    """Parts of a tree, one for each dispatch: constant `part`. All of it at once, but in software by pieces, the more
+    the more pixels a buffer has: Mesa's rasteriser leaves a shader's loops after 65,536 rounds of all together."""
+    most = max(SOFTWARE_LEAVES * GROUP_SIDE**2 // max(side, GROUP_SIDE) ** 2, 1)
+    count = max(leaves >> (most.bit_length() - 1), 1) if context.masks_branches() else 1
     return [(number, count) for number in range(count)]
 
 
@@ -103,7 +118,7 @@ class NodeRadiance:
         self._spare: images.Image | None = None
 
     def update(
-        self, frame: Frame, technique: Technique, points: LitPoints, run: Run, bounces: int, groups: int,
+        self, frame: Frame, technique: Technique, points: PointRuns, run: Run, bounces: int, groups: int,
         threshold: float, centre_test: bool,
     ) -> Iterator[None]:  # fmt: skip
         """Direct light at the points, and what of it has been reflected up to `bounces` times, by `groups` groups."""
@@ -114,37 +129,51 @@ class NodeRadiance:
         sent = held[1]
         try:
             yield
-            self._send(frame, technique, run, direct, direct, 0, sent)
+            self._send(frame, technique, run, direct, direct, direct, 0, sent)
             if bounces > 0:
                 groups = min(groups, leaves // 2)
                 size = (NODE_ROW, max(2 * groups // NODE_ROW, 1))
                 micro = images.pool.take(size[0] * GROUP_SIDE, size[1] * GROUP_SIDE, "R32UI")
                 arriving = images.pool.take(*size, "RGBA32F")
-                held += [micro, arriving]
+                shares = images.pool.take(*run.size, "R32F")
+                held += [micro, arriving, shares]
                 constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
-                for part in parts(leaves):
+                for part in parts(leaves, GROUP_SIDE):
                     passes.compute(
-                        OF_GROUPS, size, textures={"tree_nodes": run.nodes, "node_radiance": self.image},
+                        OF_GROUPS, size,
+                        textures={"tree_nodes": run.nodes, "piece_clips": run.clips, "node_radiance": self.image},
                         images={"micro": micro}, constants={**constants, "group_count": groups, "part": part},
                     )  # fmt: skip
                     yield
+                passes.fullscreen(
+                    SHARES, images.Target((shares,)), blocks={"film_view": frame.view_block},
+                    textures={**frame.hierarchy("diffuse").textures, "tree_nodes": run.nodes},
+                    constants={
+                        "leaf_count": leaves, "group_count": groups, "buffer_choice": constants["buffer_choice"],
+                        "offset_size": frame.offset_size,
+                    },
+                )  # fmt: skip
+                frame.count(technique, "passes")
                 frame.count(technique, "gathers of points", 2 * groups)
                 for _ in range(bounces):
                     passes.fullscreen(
                         ARRIVING, images.Target((arriving,)), textures={"micro": micro, "node_radiance": self.image},
                         constants={name: constants[name] for name in ("micro_side", "id_bits")},
                     )  # fmt: skip
-                    self._send(frame, technique, run, direct, arriving, groups, sent)
+                    self._send(frame, technique, run, direct, arriving, shares, groups, sent)
                 frame.count(technique, "bounces", bounces)
         finally:  # also where a viewport drops the sample
             for image in held:
                 images.pool.give(image)
 
-    def _send(self, frame, technique, run: Run, direct, arriving, groups: int, sent: images.Image) -> None:
+    def _send(self, frame, technique, run: Run, direct, arriving, shares, groups: int, sent: images.Image) -> None:
         leaves = run.tree.leaves
         passes.fullscreen(
             SENT, images.Target((sent,)), constants={"leaf_count": leaves, "group_count": groups},
-            textures={"tree_nodes": run.nodes, "direct": direct, "albedo": run.shaded.colors[2], "arriving": arriving},
+            textures={
+                "tree_nodes": run.nodes, "direct": direct, "albedo": run.shaded.colors[2], "arriving": arriving,
+                "shares": shares,
+            },
         )  # fmt: skip
         level, program, source = leaves.bit_length() - 1, PULL_POINTS, sent
         drawn = 1

@@ -1,4 +1,4 @@
-"""Points on light sources for surfaces that no map is fitted to: those that rays meet, and glass.
+"""Light points for surfaces that no depth map covers: those that rays meet, and glass.
 
 Each sample draws one point on each lamp (where there are many, on some of them by chance), some on emissive
 triangles and some directions of the world, the same ones for all pixels; who lights surfaces by them traces what stands

@@ -34,12 +34,12 @@ from .visibility import (
 
 CUTOFF = Param(
     "cutoff", "Shadow cutoff", 0.001,
-    "Where a light can bring less than this share of the picture's median light, its shadows are left out", 0.0, 0.1,
-    "FACTOR",
+    "Leave a light's shadows out where it contributes less than this share of the picture's median light",
+    0.0, 0.1, "FACTOR",
 )  # fmt: skip
 EDGE_RAYS = Param(
     "edge_rays", "Edge rays", True,
-    "Where the texels of a map do not agree and the penumbra is narrow, a ray tells whether a point is in shadow",
+    "Trace a ray where neighbouring texels of a shadow map disagree and the penumbra is narrow, for exact edges",
     draft=False,
 )  # fmt: skip
 

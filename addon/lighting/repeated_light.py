@@ -43,7 +43,7 @@ from ..surfaces.draw import MARKS, surface_bindings
 
 EDGES = Param(
     "edges", "Light edges", True,
-    "From four samples on, points of the filter that show another surface than the pixel's own are lit by themselves",
+    "From four samples on, light filter points separately where they show another surface than the pixel's centre",
 )  # fmt: skip
 FEWEST = 4  # samples: fewer err by light, not by edges
 PATHS = ("diffuse_direct", "glossy_direct")

@@ -1,25 +1,17 @@
-"""Shared visibility: soft shadows are looked up at every fourth pixel, and in between where they or surfaces vary.
+"""Shared visibility: soft shadows are looked up at every fourth pixel and interpolated where they vary little.
 
-A soft shadow map asks some hundred texels for each pixel and light, for a visibility that mostly varies little from
-one pixel to the next. So up to four lights at a time are looked up at every RATE-th pixel along both axes, a sixteenth
-of the pixels. A cell between four such pixels knows the visibility of a light within it if two or more of them lie on a
-plane (two pixels' width, normals within 25 degrees) and the light is seen alike from those, or varies in proportion.
-Pixels of the cell on that plane interpolate, all others look for themselves:
+A soft shadow lookup reads some hundred texels per pixel and light, for a visibility that is mostly smooth. So up to
+four lights at a time are looked up at every RATE-th pixel along both axes, a sixteenth of the pixels. A cell between
+four such pixels knows the visibility of a light if two or more of its corners lie on one plane (within two pixels'
+width, normals within 25 degrees) and the visibility at those is equal or linear. Pixels of the cell on that plane
+interpolate:
 
     V(p) = bilinear of V at the corners on the plane,
     max V - min V <= ALIKE there, or <= LINEAR where second differences, one corner further too, are at most BEND
 
-What is lit, or in full shadow, is as exact as before; so are outlines, contacts and the bends of penumbrae. The pixels
-that look for themselves lie scattered, and lanes of a GPU beside them would idle: they are listed (kernels/lists.py),
-light by light, and looked up in one dispatch.
-
-Beside looking at every pixel, one variance map of 1024x1024, 640x360 pixels: RMS error of the visibility, and processor
-time of its shadow on a software GPU (as `python -m bench.soft_lights` takes it):
-
-| | thin poles | chain fence | foliage | grid | far background | stacked blockers |
-|---|---|---|---|---|---|---|
-| every pixel | .0208, 230 ms | .0360, 448 ms | .0536, 304 ms | .0340, 276 ms | .0182, 248 ms | .0164, 217 ms |
-| shared | .0212, 104 ms | .0361, 348 ms | .0535, 116 ms | .0347, 158 ms | .0175, 87 ms | .0168, 80 ms |
+All other pixels do their own lookup: outlines, contacts and bends of penumbrae stay as exact as without sharing. Those
+pixels are scattered, so they are compacted into a list per light (kernels/lists.py) and looked up in one dispatch.
+Small pictures (below MANY_PIXELS) are not shared: they cost little, and narrow shadows are much of them.
 
 | cost | per four lights, beside the lookups |
 |---|---|
@@ -27,18 +19,12 @@ time of its shadow on a software GPU (as `python -m bench.soft_lights` takes it)
 | fetches | 28 per cell; per pixel 7, and 1 per light |
 | bytes | per pixel 8 per light, and 2 |
 
-Tried and left: of the pixels that cells do not know, lookups at every second first, and cells between those. As exact
-against many maps, a fifth fewer lookups, but those that are spared are the cheap ones: no time gained.
+Bias (direct light of soft maps in pictures of few samples): shadows narrower than four pixels between corners that do
+not see them are lost; elsewhere at most ALIKE between three corners, or an eighth of BEND between four. None with more
+samples, or with `sparse` off. Errors and times with and without: docs/log/2026-11-26-soft-shadows.md.
 
-Small pictures (MANY_PIXELS) are left alone: they cost little, and shadows narrower than four pixels are much of them.
-
-Bias (direct light of soft maps in pictures of few samples): shadows narrower than four pixels, between corners that do
-not see them; else at most ALIKE between three corners, or an eighth of BEND between four. Beside two corners alone, at
-outlines, nothing tells how visibility goes on; RMS over the families is the same with three. None with more samples, or
-with `sparse` off.
-
-Sources: Ward, Rubinstein, Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, for a quantity
-that is kept where it varies little; on a grid of the screen, with silhouettes told by planes, Nichols & Wyman 2009.
+Sources: Ward, Rubinstein, Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, for keeping a
+quantity where it varies little; on a screen grid with silhouettes found by planes, Nichols & Wyman 2009.
 """
 
 from __future__ import annotations

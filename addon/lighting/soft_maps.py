@@ -1,4 +1,4 @@
-"""What shadow techniques share that see a light as a whole, or a part of it, from one depth map.
+"""Soft shadow maps: what techniques share that see a light, or a part of it, from one depth map.
 
 Which part a map stands for follows from the samples: all of the light with one, a part whose extents shrink by sqrt(n)
 with n (PointMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they
@@ -37,16 +37,18 @@ from .visibility import PART_TEXELS, RAY_CONSTANTS, Lookup, Maps, drawn_by_lot, 
 
 REFINE = Param(
     "refine", "Refine", True,
-    "With more samples, each stands for a smaller part of the light, so that the error goes to zero; else every sample "
-    "shows the whole light from its middle",
+    "Let each sample stand for a smaller part of the light as samples are added, so that the error goes to zero; "
+    "otherwise every sample stands for the entire light, seen from its centre",
 )  # fmt: skip
 CONTACTS = Param(
     "contacts", "Contact rays", True,
-    "Short rays look for blockers close to the receiver, where a depth map cannot tell", draft=False,
+    "Trace short rays for blockers close to the receiver, which a shadow map does not resolve",
+    draft=False,
 )  # fmt: skip
 SPARSE = Param(
     "sparse", "Sparse lookups", True,
-    "In large pictures of few samples look up shadows at every fourth pixel, and between where they or surfaces vary",
+    "In large pictures of few samples, look shadows up at every fourth pixel and in between only where shadows or "
+    "surfaces vary",
 )  # fmt: skip
 FEWEST_POINTS = (
     16  # fewer parts that do not tile the light, at points of a low-discrepancy set, are worse than all of it

@@ -1,19 +1,16 @@
 """Light at surfels: what they reflect, and the light of sources there. In images of receivers (scene/surfels.py), ROW
 wide.
 
-A short ray back to the surface finds each receiver's triangle, and the material's own program is run there, as where
-any ray meets a surface (surfaces/hits.py): textures, procedurals and vertex colours of what no camera sees. What is
-kept is the share of light that leaves again, gloss counted as even. Light of lamps, the world and emissive meshes comes
-from the light loop with traced shadows (lighting/point_light.py), at several points of each surfel's cell, others in
-each solution, over white surfaces: irradiance over pi. A patch of sun is then as large as it is, not as many surfels as
-have their middle in it.
+A short ray back to the surface finds each receiver's triangle, and lit_points.py shades it there and lights it: at
+several points of each surfel's cell, others in each solution, over white surfaces: irradiance over pi. A patch of sun
+is then as large as it is, not as many surfels as have their middle in it.
 
 | cost | |
 |---|---|
 | when materials or surfaces change | 9 rays a receiver, 2 passes and 1 for each material met; 112 bytes a receiver |
 | direct light | LIT POINTS rays to each lamp, the world and emissive meshes, for each receiver and solution |
 
-Bias: as surfaces/hits.py and point_light.py; a mirror sends light to all sides; light through glass does not arrive.
+Bias: as lit_points.py.
 """
 
 from __future__ import annotations
@@ -24,9 +21,8 @@ from ..gfx import images, passes
 from ..scene import acceleration
 from ..scene.surfels import MEMBERS, ROW, Surfels
 from ..scene.view import VIEW
-from ..surfaces.draw import SURFACE_TEXTURES
-from ..surfaces.hits import Hits, Records, closure_bindings, take_closures
-from .point_light import LIGHTING, PointLight
+from . import lit_points
+from .lit_points import LitPoints
 
 LIT = 4  # points in the cell of a surfel that are lit in a solution
 POINTS = 8  # on each source for each of them
@@ -36,12 +32,6 @@ RAYS = passes.fullscreen_program(
     textures=(("RGBA32F", "receivers"),),
     constants=(("INT", "receiver_count"), ("FLOAT", "offset_size")),
     outputs=(("VEC4", "out_origin"), ("VEC4", "out_direction")),
-)
-REFLECTANCE = passes.fullscreen_program(
-    "reflectance of surfels",
-    "implicit_visibility/reflectance.frag.glsl",
-    textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table")),
-    outputs=(("VEC4", "out_reflectance"),),
 )
 FREE = passes.fullscreen_program(
     "free ground around surfels",
@@ -59,7 +49,7 @@ MEMBER = passes.fullscreen_program(
     defines=(("MEMBERS", str(MEMBERS)),),
     outputs=(("VEC4", "out_position"), ("VEC4", "out_normal")),
 )
-PROGRAMS = (RAYS, REFLECTANCE, FREE, MEMBER, LIGHTING)
+PROGRAMS = (RAYS, FREE, MEMBER, *lit_points.PROGRAMS)
 
 
 class SurfelLight:
@@ -68,10 +58,10 @@ class SurfelLight:
     def __init__(self):
         self._key: object = None
         self._held: list[images.Image] = []
-        self._light = PointLight("surfels", each=POINTS, reflected=True)
+        self._lit = LitPoints("surfels", each=POINTS)
         self.reflectance: images.Image | None = None
         self.free: dict[str, images.Image] = {}  # how far surfaces run freely around receivers
-        self._black: images.Image | None = None
+        self._there: images.Image | None = None  # w: whether there is a surface
         self._white: images.Image | None = None
 
     @staticmethod
@@ -87,19 +77,16 @@ class SurfelLight:
         self._give()
         self._key = key
         size = self.size(surfels)
-        self.reflectance, self._black, self._white = (self._take(size) for _ in range(3))
-        images.Target((self._black,)).clear()
+        self._white = self._take(size)
         images.Target((self._white,)).clear((1.0 / LIT, 1.0 / LIT, 1.0 / LIT, 0.0))
         rays = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
-        records = Records.take(size)
-        closures = take_closures(size, records.target.depth)
         passes.fullscreen(
             RAYS, rays, textures={"receivers": surfels.receivers},
             constants={"receiver_count": surfels.receiver_count, "offset_size": frame.offset_size},
         )  # fmt: skip
-        hits = frame.kept(Hits)
-        met = hits.trace(frame, technique, rays.colors, records, path="diffuse")
-        hits.shade(frame, technique, rays.colors[1], records, met, closures)
+        trace = lambda hits, records: hits.trace(frame, technique, rays.colors, records, path="diffuse")  # noqa: E731
+        self._there, unused, self.reflectance = self._lit.shade(frame, technique, rays.colors[1], trace).colors
+        self._held += [self._there, self.reflectance]
         self.free = {name: self._take(size) for name in ("free_a", "free_b")}
         passes.fullscreen(
             FREE, images.Target(tuple(self.free.values())),
@@ -107,19 +94,13 @@ class SurfelLight:
             blocks={"film_view": frame.view_block},
             constants={"receiver_count": surfels.receiver_count, "offset_size": frame.offset_size},
         )  # fmt: skip
-        bound = closure_bindings(closures)
-        passes.fullscreen(
-            REFLECTANCE, images.Target((self.reflectance,)),
-            textures={**bound, "energy_table": frame.materials.energy_table},
-        )  # fmt: skip
-        for image in (*rays.colors, *closures.colors):
+        for image in (*rays.colors, unused):
             images.pool.give(image)
-        records.give()
-        frame.count(technique, "passes", 3)
+        frame.count(technique, "passes", 2)
         return True
 
     def begin(self, frame: Frame) -> None:
-        self._light.begin(frame)
+        self._lit.begin(frame)
 
     def add_direct(
         self, frame: Frame, technique: Technique, surfels: Surfels, target: images.Target, number: int
@@ -128,17 +109,16 @@ class SurfelLight:
         target.clear()
         size = target.size
         placed = images.Target(tuple(images.pool.take(*size, "RGBA32F") for _ in range(2)))
-        black = dict.fromkeys(("tint", "lobe", "emission"), self._black)
         for k in range(number * LIT, (number + 1) * LIT):
             passes.fullscreen(
                 MEMBER, placed,
-                textures={"receivers": surfels.receivers, "members": surfels.members, "shaded": self.reflectance},
+                textures={"receivers": surfels.receivers, "members": surfels.members, "shaded": self._there},
                 constants={"receiver_count": surfels.receiver_count, "member": k % MEMBERS},
             )  # fmt: skip
-            surfaces = {"position": placed.colors[0], "normal": placed.colors[1], "diffuse": self._white, **black}
-            drawn, rays = self._light.add(frame, surfaces, target, k)
-            frame.count(technique, "passes", drawn + 1)
-            frame.count(technique, "light rays", rays * surfels.receiver_count)
+            self._lit.light(
+                frame, technique, (*placed.colors, self._white), target, surfels.receiver_count, number=k
+            )  # fmt: skip
+            frame.count(technique, "passes")
         for image in placed.colors:
             images.pool.give(image)
 
@@ -153,5 +133,5 @@ class SurfelLight:
 
     def release(self) -> None:
         self._give()
-        self._light.release()
+        self._lit.release()
         self.__init__()

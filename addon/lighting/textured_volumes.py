@@ -6,7 +6,7 @@ its plane, and the opacity there decides. The result is a set of points that are
 casters hide (depth_complexity.comp.glsl): where triangles overlap nothing counts twice.
 
 Opacity is that of scene/opacity_maps.py, a tile of cells in the triangle's own axes, 256 levels each: no UVs, and any
-material. What is partly opaque hides a point by lot, so that two sheets of one half let a quarter pass.
+material. What is partly opaque hides a point at random, so that two sheets of one half let a quarter pass.
 
 Which triangles matter to a tile of pixels is told by balls: around the triangle, around the tile's receivers, and
 around the light. This holds for triangles seen edge on, too, where a volume of planes would need a second one.

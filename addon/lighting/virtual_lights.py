@@ -1,53 +1,32 @@
-"""Virtual lights: points of surfaces that light the picture, with the radiance that they reflect. For any gatherer.
+"""Virtual lights: points on surfaces that light the picture with the radiance they reflect, for any gatherer.
 
-Instant radiosity (Keller 1997) starts paths at the lights; in a scene of rooms most of them end where nobody looks. So
-points are found from the picture, as in bidirectional instant radiosity (Segovia et al. 2006): at P pixels of a coarse
-grid, shifted in every sample, R cosine-distributed rays are traced, and where one meets a surface, at y, stands a
-candidate. Its radiance is what light sources send to y straight (all kinds of lights, emissive meshes and the world, as
-points shared by the sample) and what a path on from y finds in up to `bounces` reflections in all:
+Candidates are found from the picture, as in bidirectional instant radiosity (Segovia et al. 2006): at P pixels of a
+coarse grid, shifted in every sample ("probes"), R cosine-distributed rays are traced; where one meets a surface, at y,
+stands a candidate. It has the direct light that y reflects, and what a path on from y finds in up to `bounces`
+reflections in all:
 
     L(y) = rho / pi * (E(y) + sum over further bounces of their albedos x E there)
 
-From its second reflection on a path ends by lot, in proportion to its albedos. The next surfaces z_i that the paths of
-GROUP candidates y_j meet, which lie beside each other and face alike, are shared by them (path reuse, Bekaert et al.
-2002): j takes the part p_j(z_i) / sum over k of p_k(z_i) of what z_i sends, p_k = cos cos V / (pi d^2), the density of
-its own directions there. No candidate's path is lost, and single ones weigh less. Any probe could have found y, so the
-density of candidates there is the sum over all probes x (the balance heuristic)
+From its second reflection on a path ends by Russian roulette. GROUP neighbouring candidates that face alike share the
+next vertices of their paths, weighted by the balance heuristic (path reuse, Bekaert et al. 2002). Any probe could have
+found y, so the density of candidates is the sum over all probes x:
 
     n(y) = sum over x of  R cos_x cos_y V(x, y) / (pi |x - y|^2)      per m2
 
-and a candidate stands for the area 1 / n(y): it has the intensity L / n. `count` of them are kept by systematic
-resampling in proportion to L, which is what they bring to the picture (L / n times the probes that see them), each
-weighted by the inverse of its chance (Georgiev & Slusallek 2010 keep by the same measure, by lot): along a curve
-through space, so that they spread, and cell by cell, so that a candidate more or less changes what is kept nearby, not
-the whole set: a viewport shows the picture of a final render to within 2/255 in .998 of the pixels after eight samples
-when the camera has moved by a micrometre, .991 without cells, at the same error. Only for those that are kept the
-densities are traced.
-
-Colours of a path's surfaces are those of the picture where the camera sees them, else the mean of the material
-(reflectance.py), in both cases with a lobe of microfacets (shaders/indirect/albedo.glsl). L is the radiance towards the
-probe whose ray has found y. A virtual light shines evenly, but its mean over those who find it is what they get of the
-lobe together: the energy that is seen is right, and only among those who see it is its direction blurred.
+A candidate has the intensity L / n. `count` of them are kept by systematic resampling in proportion to L, cell by cell
+along a space-filling curve (after Georgiev & Slusallek 2010), so that one candidate more or less changes only what is
+kept nearby. Densities are traced for those kept alone. Surfaces have the picture's colours where the camera sees them,
+else their material's mean (reflectance.py), and a lobe of microfacets towards the probe that found them.
 
 | cost | per sample, with P = 192 probes and N virtual lights |
 |---|---|
-| candidates | 1152, or 4 N if that is more |
-| rays | 2 per bounce + 19 for each candidate, then 192 for the density of each virtual light |
-| passes | 16 in all, most of them over the candidates alone (lighting/light_choice.py) |
-| readback | none; how many are kept is counted in an image |
+| candidates, rays | max(1152, 4 N); 2 per bounce + 19 for each, then 192 for the density of each virtual light |
+| passes, readbacks | 16, most over the candidates alone (lighting/light_choice.py); none |
 
-Bias, in diffuse and glossy indirect light:
-
-- Points that only pixels see which no probe of a sample came near are missing in that sample. With 192 probes, that is
-  light which reaches less than about half a hundredth of the picture. In the town of the sample with instances, one
-  bounce of the sky has 0.977 of Cycles' mean (0.953 with 96 probes, 0.99 with 384).
-- A virtual light that stands for the area A in one of n samples is no brighter at any distance than at
-  sqrt(A / (pi n)), the radius of a disc of its part: what a wall seen at a grazing angle sends to what lies beside it
-  is otherwise without bound. The loss is a share of a single sample and falls with n.
-- Gloss is shared evenly among the pixels that see it. Its sum is right: in the sample with a window, where low sun
-  falls on varnished boards, the mean of the pass is 1.007 of Cycles' (1.041 while gloss counted as diffuse, since most
-  of that light goes to walls behind the camera; 0.97 with a layer's losses as the camera's view has them).
-- Normals are those of the triangles: a coarse smooth lamp shade about a lamp sends 3 % too much.
+Bias (diffuse and glossy indirect light): light that reaches less than about half a hundredth of the picture is missed
+where no probe comes near. A light for the area A in one of n samples is clamped at the distance sqrt(A / (pi n)); the
+loss falls with n. Gloss is spread evenly over the pixels that see it. Normals are the triangles'. Figures:
+docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations

@@ -25,7 +25,8 @@ from .ray_costs import Compared, compared, maps_ns, rays_ns
 
 RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,
-    "Texels of a depth map per pixel of the picture's longer side", 0.125, 16.0,
+    "Shadow map resolution, in texels per pixel of the picture's longer side",
+    0.125, 16.0,
 )  # fmt: skip
 # Texels decide alone where casters let some light pass, and their error does not fall with samples: where leaves touch
 # it outweighs noise from so many on. alpha_foliage, direct light, 64 samples: relMSE .0008 to .0006 (gloss .0097 to
@@ -36,8 +37,12 @@ MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights 
 BY_COST, BY_MAPS, BY_RAYS = "COST", "MAPS", "RAYS"
 SHADOWS_BY = Param(
     "by", "Shadows by", BY_COST,
-    "What tells whether a point of a light is seen. Rays need opaque casters, and a hierarchy of all triangles",
-    items=((BY_COST, "What costs less", 0), (BY_MAPS, "Depth maps", 1), (BY_RAYS, "Rays", 2)),
+    "How visibility of a point on a light is tested. Rays need opaque casters and a hierarchy of all triangles",
+    items=(
+        (BY_COST, "What Costs Less", 0, "As measured on this device, for each light"),
+        (BY_MAPS, "Depth Maps", 1, "Pictures of the scene as seen from points of the light"),
+        (BY_RAYS, "Rays", 2, "A ray to a point of the light from each pixel"),
+    ),
 )  # fmt: skip
 PIXEL_SHARE = 0.1  # of a pixel's side on the nearest surfaces, by which rays may begin off them
 ATLAS_TEXELS = 2**24  # maps of more views than this are drawn and used in several rounds

@@ -18,7 +18,9 @@ half vector h drawn from the distribution of visible normals (so that the expect
 with G2' for the refracted direction, which must lie below the surface.
 Directions that leave below the surface count as zero in all of them. The axis z = sqrt(|ior - 1| / (ior + 1)) is
 the fourth root of F0, which spaces the usual indices of refraction evenly. These are the quantities that Cycles
-tabulates (its closures estimate albedos this way), with the same node positions, so that interpolation errors agree.
+tabulates (its closures estimate albedos this way), with the same node positions, so that interpolation errors agree;
+from 5.3 on its table of dielectric layers has 32 nodes along each axis, those of mu closer at grazing angles (at their
+number's square), and so has ours there.
 
 Sources: Heitz, "Understanding the masking-shadowing function", JCGT 2014; Dupuy & Benyoub, "Sampling visible GGX
 normals with spherical caps", HPG 2023; Turquin, "Practical multiple scattering compensation for microfacet models",
@@ -36,11 +38,14 @@ import numpy as np
 
 ENERGY_SIZE = 32  # nodes along roughness and along mu
 LAYER_SIZE = 16  # nodes along roughness, mu and z
+FINE_SIZE = 32  # and of the dielectric layer in Cycles 5.3 and later
 TEXTURE_SIZE = 64  # texels along each side of a third of the packed texture: 4 x 4 tiles of LAYER_SIZE
 
 SMALLEST_COSINE = 1e-4  # the node at mu = 0 stands just above the horizon, where the lobe is still defined
 SMALLEST_Z, LARGEST_Z = 1e-4, 0.99  # z = 0 has no reflection, z = 1 an infinite index of refraction
 GRID = 384  # quadrature points along each of the two dimensions of the half vector
+
+BINS = 1 << 15  # of the square root of the cosine between view and half vector
 
 PATH = Path(__file__).with_name("energy.npz")
 SHEEN_SIZE = 32  # nodes along roughness and along mu of the sheen tables
@@ -121,10 +126,33 @@ def glass_energy(mu: float, roughness: float, ior: float, grid: int = GRID // 2)
     return float(np.mean(reflected + (1.0 - fresnel) * masking(below))), float(np.mean(reflected))
 
 
+def dielectric_layer(size: int, power: int = 1) -> np.ndarray:
+    """The table `dielectric` with `size` nodes along each axis: [roughness, mu, z]; mu is the axis to that power.
+
+    Fresnel's term depends on view . half alone, so a histogram of that stands for the half vectors.
+    """
+    axis = np.linspace(0.0, 1.0, size)
+    cosines = np.square((np.arange(BINS) + 0.5) / BINS)  # finer where the term is steep
+    shapes = np.zeros((BINS, size))
+    for k, z in enumerate(np.clip(axis, SMALLEST_Z, LARGEST_Z)):
+        ior = ior_from_f0(z**4)
+        f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
+        shapes[:, k] = np.clip((fresnel_dielectric(cosines, ior) - f0) / (1.0 - f0), 0.0, 1.0)
+    table = np.zeros((size,) * 3)
+    for i, roughness in enumerate(axis):
+        for j, mu in enumerate(axis**power):
+            cos_half, cos_out = visible_half_vectors(max(mu, SMALLEST_COSINE), roughness)
+            lit = cos_half[cos_out > 0.0]
+            counts = np.bincount(np.minimum((np.sqrt(lit) * BINS).astype(int), BINS - 1), minlength=BINS)
+            table[i, j] = counts @ shapes / len(cos_half)
+    return table
+
+
 def make_tables() -> dict[str, np.ndarray]:
-    """All tables: energy (32, 32) [roughness, mu], energy_average (32,), dielectric (16, 16, 16) [roughness, mu, z],
-    schlick (16, 16) [roughness, mu], glass and glass_reflection like dielectric, glass_average (16, 16) [roughness, z],
-    and these three as leaving… for rays from inside; float32."""
+    """All tables: energy (32, 32) [roughness, mu], energy_average (32,), dielectric (16, 16, 16) [roughness, mu, z] and
+    the same as dielectric_fine (32, 32, 32) [roughness, sqrt(mu), z], schlick (16, 16) [roughness, mu], glass and
+    glass_reflection like dielectric, glass_average (16, 16) [roughness, z], and these three as leaving… for rays from
+    inside; float32."""
     axis = np.linspace(0.0, 1.0, ENERGY_SIZE)
     energy = np.array([[ggx_energy(max(mu, SMALLEST_COSINE), r) for mu in axis] for r in axis])
     nodes, weights = np.polynomial.legendre.leggauss(24)
@@ -132,7 +160,6 @@ def make_tables() -> dict[str, np.ndarray]:
     average = np.array([sum(2.0 * w * m * ggx_energy(m, r) for m, w in zip(nodes, weights)) for r in axis])
 
     layer_axis = np.linspace(0.0, 1.0, LAYER_SIZE)
-    dielectric = np.zeros((LAYER_SIZE,) * 3)
     schlick = np.zeros((LAYER_SIZE,) * 2)
     glass, glass_reflection, leaving, leaving_reflection = np.zeros((4, *(LAYER_SIZE,) * 3))
     glass_average, leaving_average = np.zeros((2, *(LAYER_SIZE,) * 2))
@@ -143,9 +170,6 @@ def make_tables() -> dict[str, np.ndarray]:
             schlick[i, j] = np.mean(np.where(lit, (1.0 - cos_half) ** 5, 0.0))
             for k, z in enumerate(np.clip(layer_axis, SMALLEST_Z, LARGEST_Z)):
                 ior = ior_from_f0(z**4)
-                f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
-                shape = np.clip((fresnel_dielectric(cos_half, ior) - f0) / (1.0 - f0), 0.0, 1.0)
-                dielectric[i, j, k] = np.mean(np.where(lit, shape, 0.0))
                 cosine = max(mu, SMALLEST_COSINE)
                 glass[i, j, k], glass_reflection[i, j, k] = glass_energy(cosine, roughness, ior)
                 leaving[i, j, k], leaving_reflection[i, j, k] = glass_energy(cosine, roughness, 1.0 / ior)
@@ -155,7 +179,8 @@ def make_tables() -> dict[str, np.ndarray]:
                 means = (2.0 * w * m * glass_energy(m, roughness, inside, 96)[0] for m, w in zip(nodes, weights))
                 filled[i, k] = sum(means)
     tables = {
-        "energy": energy, "energy_average": average, "dielectric": dielectric, "schlick": schlick,
+        "energy": energy, "energy_average": average, "schlick": schlick,
+        "dielectric": dielectric_layer(LAYER_SIZE), "dielectric_fine": dielectric_layer(FINE_SIZE, 2),
         "glass": glass, "glass_reflection": glass_reflection, "glass_average": glass_average,
         "leaving": leaving, "leaving_reflection": leaving_reflection, "leaving_average": leaving_average,
     }  # fmt: skip
@@ -176,18 +201,21 @@ def sheen_tables() -> dict[str, np.ndarray]:
         return {name: stored[name] for name in stored.files}
 
 
-def energy_texture() -> np.ndarray:
-    """The tables packed for the GPU: (64, 192, 4) float32, row first, to be bound as `energy_table`.
+def energy_texture(fine: bool) -> np.ndarray:
+    """The tables packed for the GPU: (64, 192, 4) float32, row first, to be bound as `energy_table`; if `fine`,
+    (160, 192, 4), which tells shaders to do as Cycles 5.3.
 
     R: dielectric[i, j, k] at column i + 16 (k mod 4), row j + 16 (k div 4); G: the same for k + 1, so that one fetch
     gives both ends of the interpolation along z. From column 64 on the same way, R and G: glass; B and A:
     glass_reflection; from column 128 on, leaving and leaving_reflection. Up to column 63, B: energy[i, j] at column i,
     row j; energy_average[i] at column i, row 32; schlick[i, j] at column 32 + i, row j; glass_average[i, k] at column
     32 + i, row 32 + k, leaving_average beside it from column 48 on. A: the sheen's a[i, j] at column i, row j; its b at
-    column 32 + i, row j; its albedo at column i, row 32 + j. `shaders/lib/energy.glsl` reads exactly this.
+    column 32 + i, row j; its albedo at column i, row 32 + j. From row 64 on, for k < 16, R and G: the table
+    dielectric_fine[i, j, k] and that of k + 1 at column i + 32 (k mod 6), row 64 + j + 32 (k div 6); B and A: the same
+    of k + 16. `shaders/lib/energy.glsl` reads exactly this.
     """
     stored = tables()
-    texture = np.zeros((TEXTURE_SIZE, 3 * TEXTURE_SIZE, 4), np.float32)
+    texture = np.zeros((TEXTURE_SIZE + (3 * FINE_SIZE if fine else 0), 3 * TEXTURE_SIZE, 4), np.float32)
     for name, first, channel in (
         ("dielectric", 0, 0), ("glass", TEXTURE_SIZE, 0), ("glass_reflection", TEXTURE_SIZE, 2),
         ("leaving", 2 * TEXTURE_SIZE, 0), ("leaving_reflection", 2 * TEXTURE_SIZE, 2),
@@ -204,6 +232,11 @@ def energy_texture() -> np.ndarray:
         "glass_average"
     ].T
     texture[ENERGY_SIZE : ENERGY_SIZE + LAYER_SIZE, 48 : 48 + LAYER_SIZE, 2] = stored["leaving_average"].T
+    for k in range(FINE_SIZE if fine else 0):
+        column, row = FINE_SIZE * (k % 16 % 6), TEXTURE_SIZE + FINE_SIZE * (k % 16 // 6)
+        tile = texture[row : row + FINE_SIZE, column : column + FINE_SIZE]
+        tile[..., 2 * (k // 16)] = stored["dielectric_fine"][:, :, k].T
+        tile[..., 2 * (k // 16) + 1] = stored["dielectric_fine"][:, :, min(k + 1, FINE_SIZE - 1)].T
     sheen = sheen_tables()
     texture[:SHEEN_SIZE, :SHEEN_SIZE, 3] = sheen["a"].T
     texture[:SHEEN_SIZE, SHEEN_SIZE : 2 * SHEEN_SIZE, 3] = sheen["b"].T

@@ -2,13 +2,13 @@
 
 Sobol' points, Owen-scrambled by hashing. Two scrambles of one dimension are functions of each other: what is integrated
 together needs dimensions of its own. Every use but these three takes dimensions 1 to 3 with a scramble of its own: the
-lens takes 4 and 5, since each point of it sees all lights, and lots that choose one of many things (`lot`) take 8. The
-first two are the perfect pair: every prefix of 2^k points has one in each cell of any shape. The film takes this pair,
-too, but with its index turned by a matrix over the bits (FILM_ORDER): each prefix of 2^k points is then the same set,
-perfect at edges, in another order, chosen so that the film and any one use form a net together as well. At an edge,
-where only some of the samples see a surface, those still cover the light evenly. (Pairs shuffled independently leave a
-random subset there, and the error at edges falls only like 1 / sqrt(n).) With dimensions 4 and 5 for the film, 16
-points err 1.8 times as much (mean square) in how far an edge covers a pixel. Shaders get dimensions 1, 2, 5 and 6
+lens takes 4 and 5, since each point of it sees all lights, and numbers that choose one of many things (`lot`) take 8.
+The first two are the perfect pair: every prefix of 2^k points has one in each cell of any shape. The film takes this
+pair, too, but with its index turned by a matrix over the bits (FILM_ORDER): each prefix of 2^k points is then the same
+set, perfect at edges, in another order, chosen so that the film and any one use form a net together as well. At an
+edge, where only some of the samples see a surface, those still cover the light evenly. (Pairs shuffled independently
+leave a random subset there, and the error at edges falls only like 1 / sqrt(n).) With dimensions 4 and 5 for the film,
+16 points err 1.8 times as much (mean square) in how far an edge covers a pixel. Shaders get dimensions 1, 2, 5 and 6
 unscrambled and scramble them per pixel.
 
 The first point of the film is its filter's middle, and that of the lens the aperture's: the set is shifted bit by bit

@@ -1,17 +1,20 @@
 """Points on all surfaces, spread by area, wherever the camera looks: where light is stored that others gather.
 
-Triangles are laid end to end, each as long as its area times its opacity, and points stand at equal steps along that
-line; those of one triangle are a stretch of the R2 sequence (Roberts 2018), which spreads 2 points as it does 2000. Of
-discs of 1.5 times the area's radius about them, 0.4 % of a square is free; about points of a three-dimensional Sobol'
-sequence 3.7 %, about random ones 11 %. On meshes whose triangles have one to ten points each it is 1 to 4 %: a stretch
-knows nothing of those beside it. A run takes other stretches.
+The largest triangles, up to half as many as there are points, are cut into pieces: one each, and what points are left
+by area; always the longest edge of a piece and in proportion to the points on both sides. Each point stands for its
+piece, anywhere in it. So light neither leaks between points nor overhangs where a thing ends. For the other triangles,
+and those that let light through, points stand for discs (point_tree.py), as many as their area's share: laid end to
+end, each as long as its area times its opacity, they have points at equal steps along that line; those of one triangle
+are a stretch of the R2 sequence (Roberts 2018), which spreads 2 points as it does 2000. Of discs of 1.5 times the
+area's radius about them, 0.4 % of a square is free. On meshes whose triangles have about one point each it is 1 to 4 %:
+a stretch knows nothing of those beside it. A run takes other cuts, places and stretches.
 
-A point knows its triangle and place in it: where a mesh has been deformed or moved,
-it moves along, and what it stands for grows with its triangle.
+A point knows its triangle and place in it: where a mesh has been deformed or moved, it moves along, and what it stands
+for grows with its triangle.
 
 What rays of the diffuse path cannot meet has no points, and neither has clear glass, which lets light pass.
 
-Made on the CPU: about 1 us a point and 0.3 us a triangle. Points that follow a motion cost the same without the search.
+Made on the CPU: about 2 us a point and 0.3 us a triangle. Points that follow a motion cost the same without the search.
 
 Fails: a ground of a kilometre takes all the points of the room that stands on it.
 """
@@ -29,18 +32,20 @@ from . import acceleration
 PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
 ALONE = 0.7  # how much nearer to the middle of its triangle a point lies that is the only one
 CYCLE = 1 << 20  # where stretches of the sequence begin
+OPAQUE = 0.999  # opacity of what is cut into pieces
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Triangles of the instances `shown`: corners (T, 3, 3) relative to the render origin, what of their area counts
-    (T,), which of `shown` each belongs to and its number in the mesh."""
+    """Triangles of the instances `shown`: corners (T, 3, 3) relative to the render origin, opacity (T,), which of
+    `shown` each belongs to and its number in the mesh; how many points they have for their area beside others (T,)."""
 
     shown: tuple[Instance, ...]
     corners: np.ndarray
     opacity: np.ndarray
     owner: np.ndarray
     number: np.ndarray
+    rate: np.ndarray | float = 1.0
 
     @classmethod
     def of(cls, frame) -> Surfaces:
@@ -73,15 +78,20 @@ class Surfaces:
 @dataclass(frozen=True)
 class AreaPoints:
     """Points by triangle (of Surfaces) and barycentric coordinates (N, 2) of its second and third corner; `density`:
-    the points that fall on a square metre of the triangle (N,), when they were spread."""
+    of discs, the points that fall on a square metre of the triangle (N,), when they were spread; `piece` (N, 3, 2): the
+    corners of what each stands for, by the same coordinates, NaN: a disc."""
 
     triangle: np.ndarray
     share: np.ndarray
     density: np.ndarray
     areas: np.ndarray  # (N,) of the triangle then
+    piece: np.ndarray
 
     def __len__(self) -> int:
         return len(self.triangle)
+
+    def joined(self, other: AreaPoints) -> AreaPoints:
+        return AreaPoints(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values())))
 
     def placed(self, surfaces: Surfaces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions (N, 3), unit normals by the triangles' winding (N, 3) and the area, m2, that each stands for."""
@@ -91,17 +101,62 @@ class AreaPoints:
         double = np.linalg.norm(across, axis=1)
         position = corners[:, 0] + self.share[:, :1] * e1 + self.share[:, 1:] * e2
         area = double / 2 / np.maximum(self.areas, 1e-300) / np.maximum(self.density, 1e-300)
+        own = np.isfinite(self.piece[:, 0, 0])
+        area[own] = double[own] * _share_of(self.piece[own])
         return position, across / np.maximum(double, 1e-300)[:, None], area
+
+    def pieces(self, surfaces: Surfaces) -> np.ndarray:
+        """Corners (N, 3, 3) of what points stand for, NaN where that is a disc."""
+        corners = surfaces.corners[self.triangle][:, None]
+        e1, e2 = corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
+        return corners[:, :, 0] + self.piece[..., :1] * e1 + self.piece[..., 1:] * e2
+
+    def sides(self, surfaces: Surfaces) -> np.ndarray:
+        """(N, 3) the second longest edge of each point's triangle, which of half a rectangle is a side of it."""
+        corners = surfaces.corners[self.triangle]
+        edges = np.roll(corners, -1, axis=1) - corners
+        return edges[np.arange(len(edges)), np.argsort(np.linalg.norm(edges, axis=2), axis=1)[:, 1]]
 
 
 def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     """`count` points of this run; none where there is no area."""
     areas = surfaces.areas()
-    edges = np.concatenate([[0.0], np.cumsum(areas * surfaces.opacity)])
-    if not edges[-1] > 0:
-        return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
-    marks = (np.arange(count) + bits(run, 0) / 2.0**32) / count
-    triangle = np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, len(areas) - 1)
+    rate = np.broadcast_to(surfaces.rate, areas.shape)
+    weights = areas * surfaces.opacity * rate
+    total = float(weights.sum())
+    if not total > 0:
+        return AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3, 2)))
+    whole = np.flatnonzero((surfaces.opacity > OPAQUE) & (areas > 0.0))
+    if len(whole) > count // 2:
+        whole = np.sort(whole[np.argsort(-weights[whole], kind="stable")[: count // 2]])
+    rest = np.ones(len(areas), bool)
+    rest[whole] = False
+    left = np.where(rest, weights, 0.0)
+    discs = min(max(round(count * left.sum() / total), int(left.any())), count - len(whole)) if len(whole) else count
+    first = _pieces(surfaces, areas, weights, whole, count - discs, run)
+    return first.joined(_discs(areas, left, rate, discs, run))
+
+
+def _pieces(
+    surfaces: Surfaces, areas: np.ndarray, weights: np.ndarray, whole: np.ndarray, count: int, run: int
+) -> AreaPoints:
+    """`count` points for pieces of the triangles `whole`, one each at least."""
+    # Beyond the first, by what a triangle has more than a point's share.
+    more = np.maximum(weights[whole] - weights[whole].sum() / max(count, 1), 0.0)
+    more = more if more.any() else weights[whole]
+    extra = _marked(more, count - len(whole), run)
+    triangle = np.repeat(whole, 1 + np.bincount(extra, minlength=len(whole)))
+    piece = _cut(surfaces.corners, triangle, run)
+    a, b, c = piece.transpose(1, 0, 2)
+    v, w = (bits(np.arange(count) + run * count, dimension)[:, None] / 2.0**32 for dimension in (0, 1))
+    root = np.sqrt(v)
+    share = (1 - root) * a + root * (1 - w) * b + root * w * c
+    return AreaPoints(triangle, share, np.ones(count), areas[triangle], piece)
+
+
+def _discs(areas: np.ndarray, weights: np.ndarray, rate: np.ndarray, count: int, run: int) -> AreaPoints:
+    """`count` points for discs on triangles by weight."""
+    triangle = _marked(weights, count, run)
     within = np.arange(count) - np.searchsorted(triangle, triangle)  # number of a point among those of its triangle
     number = within + (triangle * 7919 + run * count) % CYCLE
     v, w = np.mod(0.5 + number / PLASTIC, 1.0), np.mod(0.5 + number / PLASTIC**2, 1.0)
@@ -111,5 +166,45 @@ def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     few = np.bincount(triangle, minlength=len(areas))[triangle]
     share = 1 / 3 + (share - 1 / 3) * (1.0 - ALONE / few**1.5)[:, None]
     # Where half the light passes, half as many points stand for their own discs.
-    density = np.full(count, count / edges[-1])
-    return AreaPoints(triangle, share, density, areas[triangle])
+    density = count / max(float(weights.sum()), 1e-300) * rate[triangle]
+    return AreaPoints(triangle, share, density, areas[triangle], np.full((count, 3, 2), np.nan))
+
+
+def _marked(weights: np.ndarray, count: int, run: int) -> np.ndarray:
+    """(count,) numbers in order: where equal steps fall along weights laid end to end."""
+    edges = np.concatenate([[0.0], np.cumsum(weights)])
+    marks = (np.arange(count) + bits(run, 0) / 2.0**32) / max(count, 1)
+    return np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, max(len(weights) - 1, 0))
+
+
+def _cut(corners: np.ndarray, triangle: np.ndarray, run: int) -> np.ndarray:
+    """(N, 3, 2) pieces of triangles: as many of each as its number stands in `triangle` (N,), in order."""
+    number, first, count = np.unique(triangle, return_index=True, return_counts=True)
+    place = np.zeros((len(number), 3, 2))
+    place[:] = (0, 0), (1, 0), (0, 1)
+    found = np.zeros((len(triangle), 3, 2))
+    while len(number):
+        done = count == 1
+        found[first[done]] = place[done]
+        number, first, count, place = number[~done], first[~done], count[~done], place[~done]
+        world = corners[number]
+        at = (
+            world[:, :1]
+            + place[..., :1] * (world[:, 1:2] - world[:, :1])
+            + place[..., 1:] * (world[:, 2:] - world[:, :1])
+        )
+        longest = np.linalg.norm(at - np.roll(at, -1, axis=1), axis=2).argmax(axis=1)
+        a, b, c = (place[np.arange(len(place)), (longest + k) % 3] for k in range(3))
+        # Of an odd number, the larger half lies here or there in turn.
+        half = (count + (first + run) % 2) // 2
+        middle = a + (b - a) * (half / np.maximum(count, 1))[:, None]
+        place = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        number, first = np.concatenate([number, number]), np.concatenate([first, first + half])
+        count = np.concatenate([half, count - half])
+    return found
+
+
+def _share_of(piece: np.ndarray) -> np.ndarray:
+    """Of the triangle's area that pieces have, halved: their areas in barycentric coordinates."""
+    e1, e2 = piece[:, 1] - piece[:, 0], piece[:, 2] - piece[:, 0]
+    return np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]) / 2

@@ -153,7 +153,7 @@ class SceneGeometry:
         matrices = _stacked([i.matrix for i in instances], (4, 4))
         if kinds != self._kinds or (matrices != self._matrices).any(axis=(1, 2)).sum() > MOST_MOVED:
             place = _neighbourhood(instances)
-            # Not by the mesh's name, which holds a number of this session: what is drawn by lot depends on the order.
+            # Not by the mesh's name, which holds a number of this session: random choices depend on the order.
             first = {mesh: k for k, mesh in enumerate(dict.fromkeys(mesh for mesh, _ in kinds))}
             of_kind = {kind: (first[kind[0]], kind[1]) for kind in set(kinds)}
             rank = {kind: k for k, kind in enumerate(sorted(of_kind, key=of_kind.__getitem__))}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import wraps
 
@@ -17,6 +17,8 @@ from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
+from ..materials.reader import FINE_LAYERS
+from ..materials.working_space import current
 from ..snapshot.scene import Image, Note, Snapshot
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
@@ -59,14 +61,15 @@ class MaterialSet:
     def update(self, snapshot: Snapshot) -> None:
         """Compile and upload what changed."""
         if self.energy_table is None:
-            self.energy_table = images.upload(energy_texture())
+            self.energy_table = images.upload(energy_texture(FINE_LAYERS))
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
-            if cached is None or cached[0] != (material.graph, versions):
+            key = material.graph, versions, current().name
+            if cached is None or cached[0] != key:
                 cached = (
-                    (material.graph, versions),
+                    key,
                     compile_material(material.name, material.graph, snapshot.images, lean=to_hold(True, False)),
                 )
             cache[material.key] = cached
@@ -111,6 +114,16 @@ class MaterialSet:
             self._scene.update(**values)
 
     @property
+    def scene_block(self) -> Block:
+        """From where the scene is seen, for node trees; once `set_view` was called."""
+        return self._scene
+
+    @property
+    def view_key(self) -> tuple:
+        """Equal in two frames if they are seen alike."""
+        return self._view
+
+    @property
     def soft(self) -> bool:
         """Some material has a lobe of shaders/lib/soft_lobe.glsl, so that programs which light surfaces need it."""
         return any(compiled.soft for compiled in self.compiled)
@@ -150,6 +163,10 @@ class MaterialSet:
     def scatter_program(self, index: int) -> Program:
         """Draws what of material `index` light enters elsewhere, where the surface images show it."""
         return _scatter_program(self.compiled[index])
+
+    def aov_program(self, index: int, layout: AovLayout) -> Program:
+        """Draws what AOV Output nodes of material `index` give."""
+        return _aov_program(self.compiled[index], layout)
 
     def glow_program(self, index: int) -> Program:
         """Adds what layers of material `index` emit that this sample passes."""
@@ -366,6 +383,66 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+AOV_GROUP = 6  # images that Blender lets a pass draw into
+AovLayout = tuple[tuple[tuple[str, str], ...], ...]  # by image, what its channels hold: name and kind
+_aov_programs: dict[tuple[int, AovLayout], tuple[CompiledMaterial, Program]] = {}
+
+
+def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
+    known = _aov_programs.get((id(compiled), layout))
+    if known is None or known[0] is not compiled:
+        if len(_aov_programs) >= MOST_DECLARED:
+            _aov_programs.clear()
+        layered = (("LAYERED", "1"),) * compiled.transparent
+        shared = _shared(compiled)
+        moving = any(kind == "VECTOR" for held in layout for _, kind in held)
+        program = Program(
+            name=f"AOVs {compiled.program_key[:8]}",
+            fragment="surface/aov.frag.glsl",
+            outputs=tuple(("VEC4", f"out_{k}") for k in range(len(layout))),
+            blocks=(
+                (VIEW, "film_view"),
+                (_struct(len(compiled.values)), "material_values"),
+                (MATERIAL_SCENE, "material_scene"),
+            ),
+            constants=(("INT", "first_instance"), ("INT", "layers"), ("FLOAT", "alpha_threshold")),
+            defines=(*CAMERA_DEFINES, *layered, *((("MOTION", "1"),) if moving else ()), *_own_defines(compiled)),
+            **{
+                **shared,
+                "textures": (
+                    *shared["textures"],
+                    ("RGBA32F", "surface_position"),
+                    *((("RGBA32F", "motion_table"),) if moving else ()),
+                ),
+                "snippets": (*shared["snippets"], ("generated/aovs", _aov_texts(compiled.aovs, layout))),
+            },
+        )
+        known = _aov_programs[id(compiled), layout] = (compiled, program)
+    return known[1]
+
+
+def _aov_texts(given: tuple[tuple[str, str], ...], layout: AovLayout) -> str:
+    """GLSL that sets the images of a layout from the AOVs that a material gives."""
+    none = " ".join(f"out_{k} = vec4(0.0);" for k in range(len(layout)))
+    written = []
+    for k, held in enumerate(layout):
+        for channel, aov in enumerate(held):
+            if aov not in given:
+                continue
+            value, to = f"material_aov{given.index(aov)}", f"out_{k}.{'xyzw'[channel]}"
+            written.append(
+                {
+                    "VALUE": f"{to} = {value}(point);",
+                    "HIT": f"{to} = surface;",
+                    "DISTANCE": f"{to} = surface * aov_distance(point.position);",
+                    "UV": f"out_{k} = surface * vec4({value}(point), 1.0);",
+                    "VECTOR": f"out_{k} = surface * motion_vector(point.position, instance_flat.x, {value}(point), "
+                    f"{value}_after(point));",
+                }.get(aov[1], f"out_{k} = vec4({value}(point), 1.0);")
+            )
+    return f"#define AOV_NONE {none}\n#define AOV_WRITE {' '.join(written)}\n"
+
+
 @_once
 def _glow_program(compiled: CompiledMaterial) -> Program:
     return replace(
@@ -384,7 +461,13 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
+        constants=(
+            *PROJECTION_CONSTANTS,
+            ("INT", "sample_index"),
+            ("VEC4", "light_point"),
+            ("INT", "glass_blocks"),
+            ("INT", "channel_asked"),
+        ),
         defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
         **_shared(compiled),
     )
@@ -406,7 +489,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
-        constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
+        constants=tuple(one for one in like.constants if one[1] not in ("glass_blocks", "channel_asked")),
         defines=(*EVERY_DEFINES, *_own_defines(compiled, "light_point")),
     )
 
@@ -453,9 +536,9 @@ def _material_may_be_glossy(material) -> bool:
 _NEVER_GLOSSY = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeBsdfTranslucent"}
 
 
-def compile_programs(programs: list[Program], progress=None) -> None:
-    """Compile what is not compiled yet. `progress(done, total)` returns True to stop."""
-    for done, program in enumerate(programs):
+def compiling(programs: list[Program]) -> Iterator[tuple[int, int]]:
+    """Compile what is not compiled yet; yields (done, total) of those after each."""
+    fresh = [program for program in programs if not library.has(program)]
+    for done, program in enumerate(fresh, 1):
         library.get(program)
-        if progress is not None and progress(done + 1, len(programs)):
-            return
+        yield done, len(fresh)

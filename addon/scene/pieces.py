@@ -1,4 +1,4 @@
-"""Triangles in pieces, and directions in two numbers: what every spreading of points over surfaces needs."""
+"""Triangles in pieces, well-spaced points and octahedral directions, for spreading points over surfaces."""
 
 from __future__ import annotations
 
@@ -38,3 +38,23 @@ def octahedral(normal: np.ndarray) -> np.ndarray:
     flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)
     folded = (1.0 - np.abs(flat[:, 1::-1])) * np.where(flat[:, :2] >= 0.0, 1.0, -1.0)
     return np.where(flat[:, 2:] >= 0.0, flat[:, :2], folded)
+
+
+def farthest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(count,) numbers of points (N, D), each the farthest from those before, and (N,) the nearest centre of each, by
+    its place among them. In the precision of `points`; Eldar et al. 1997."""
+    squares = (points * points).sum(axis=1)
+    distance = np.full(len(points), np.inf, points.dtype)
+    owner = np.zeros(len(points), np.int64)
+    centres = np.zeros(count, np.int64)
+    chosen = 0
+    for k in range(count):
+        centres[k] = chosen
+        to_chosen = squares - 2.0 * (points @ points[chosen]) + squares[chosen]
+        nearer = to_chosen < distance
+        distance[nearer] = to_chosen[nearer]
+        owner[nearer] = k
+        distance[chosen] = -1.0
+        owner[chosen] = k
+        chosen = int(distance.argmax())
+    return centres, owner

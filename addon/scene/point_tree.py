@@ -7,13 +7,16 @@ sheet that are wound the other way, part early and what is left is flat. Ties go
 too.
 
     node    bounding ball, mean normal, cosine of the half angle of the cone of normals
-    point   radius of a disc that has COVER^2 times the area that it stands for
-    group   flat: a rectangle that holds its points' discs; else a ball, of a radius that goes by the area
+    point   a piece of a triangle, or the radius of a disc that has COVER^2 times the area that it stands for
+    group   flat: a rectangle that holds its pieces and discs; else a ball, of a radius that goes by the area
 
-Points that have moved keep their places in the tree: bounds are made anew from the leaves up (refit), at a fifth of the
-cost. `numpy` for 2^14 points: 12 ms, 3 ms refitted; 2^18: 0.4 s and 0.08.
+A rectangle lies along an edge of a piece's triangle, so that none of a rectangular wall reaches over its rim, however
+it is turned; one that is more than EXACT times as large as its pieces stands for nothing.
 
-Source: Ritschel 2009, chapter 6.2. Ours: splits by normal, discs by area.
+Points that have moved keep their places in the tree: bounds are made anew from the leaves up (refit). `numpy` for 2^14
+points: 0.09 s, 0.05 refitted; 2^18: 2 s and 1.
+
+Source: Ritschel 2009, chapter 6.2. Ours: splits by normal, discs by area, pieces.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ COVER = 1.5  # radius of a disc beside that of the area which it stands for (hol
 NORMAL_WEIGHT = 1.2  # more than one: faces at right angles part before what is longest is cut
 FLAT = 0.7  # cosine of the half angle of a cone of normals, up to which a group is drawn as a disc
 LOOSE = 3.0  # area of a rectangle beside that of the group that it stands for
+EXACT = 1.5  # the same of a group of pieces
 NODE_TEXELS = 3
 
 
@@ -36,7 +40,10 @@ NODE_TEXELS = 3
 class PointTree:
     """`order` (n,): the points in the order of leaves. By node (2 n; 0 is unused): `centre` (2 n, 3), `radius` of the
     bounding ball, `axis` (2 n, 3), `cone` (cosine), `disc` (radius), `area`, m2, `along` (2 n, 3), a side of a flat
-    group's rectangle, and `half` (2 n, 2) of its lengths along and across."""
+    group's rectangle, and `half` (2 n, 2) of its lengths along and across; `exact` (2 n,): no discs are below.
+
+    Of a leaf that is a piece, `centre` is the middle of its longest edge, which runs along `along`, `disc` half of its
+    length, and `half` where the third corner is, across from 0 up. `half` of a disc is 0."""
 
     order: np.ndarray
     centre: np.ndarray
@@ -47,11 +54,13 @@ class PointTree:
     area: np.ndarray
     along: np.ndarray
     half: np.ndarray
+    exact: np.ndarray
 
     @property
     def flat(self) -> np.ndarray:
         """(2 n,) groups that a rectangle stands for: those whose rectangle is not much larger than they are."""
-        return (self.cone >= FLAT) & (4.0 * self.half.prod(axis=1) <= LOOSE * self.area)
+        loose = np.where(self.exact, EXACT, LOOSE)
+        return (self.cone >= FLAT) & (4.0 * self.half.prod(axis=1) <= loose * self.area)
 
     @property
     def leaves(self) -> int:
@@ -72,63 +81,120 @@ class PointTree:
         return images.upload_list(self.packed())
 
 
-def split(positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The order (n,) of leaves of n = 2^L points (n, 3) with unit normals."""
+def split(positions: np.ndarray, normals: np.ndarray, sides: np.ndarray | None = None) -> np.ndarray:
+    """The order (n,) of leaves of n = 2^L points (n, 3) with unit normals. A group is cut along the direction `sides`
+    (n, 3) of one of its points and across it; along the axes of space where that is 0."""
     count = len(positions)
-    keys = np.concatenate([positions, normals], axis=1)
     order = np.arange(count)
     parts = 1
     while parts < count:
-        grouped = keys[order].reshape(parts, count // parts, 6)
+        place, normal = positions[order].reshape(parts, -1, 3), normals[order].reshape(parts, -1, 3)
+        if sides is not None:
+            first = order.reshape(parts, -1)[:, 0]
+            place = place @ _frames(normals[first], sides[first])
+        grouped = np.concatenate([place, normal], axis=2)
         extent = grouped.max(axis=1) - grouped.min(axis=1)
         extent[:, 3:] *= NORMAL_WEIGHT * extent[:, :3].max(axis=1, keepdims=True)
         axis = extent.argmax(axis=1)
         along = np.take_along_axis(grouped, axis[:, None, None], axis=2)[:, :, 0]
+        along = along - along.min(axis=1, keepdims=True)
+        # What stands in a row stays so where it is turned.
+        along = np.round(along / np.maximum(along.max(axis=1, keepdims=True), 1e-300), 9)
         within = np.argsort(along, axis=1, kind="stable")
         order = np.take_along_axis(order.reshape(parts, -1), within, axis=1).reshape(-1)
         parts *= 2
     return order
 
 
-def fitted(order: np.ndarray, positions: np.ndarray, normals: np.ndarray, areas: np.ndarray) -> PointTree:
-    """The tree over points (n, 3) with unit normals and the areas (n,) that they stand for, in a known order."""
+def _frames(normal: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """(N, 3, 3) along, across and up as columns; the axes of space where `side` is 0."""
+    length = np.linalg.norm(side, axis=1, keepdims=True)
+    along = side / np.maximum(length, 1e-300)
+    frame = np.stack([along, np.cross(normal, along), normal], axis=2)
+    return np.where((length > 0.0)[:, :, None], frame, np.eye(3))
+
+
+def fitted(
+    order: np.ndarray, positions: np.ndarray, normals: np.ndarray, areas: np.ndarray, pieces: np.ndarray | None = None,
+    sides: np.ndarray | None = None,
+) -> PointTree:  # fmt: skip
+    """The tree over points (n, 3) with unit normals and the areas (n,) that they stand for, in a known order. `pieces`
+    (n, 3, 3): corners of what they stand for, NaN: discs; with directions (n, 3) along which their groups lie."""
     n = len(order)
     place, normal, area = positions[order], normals[order], areas[order]
     disc = COVER * np.sqrt(area / np.pi)
+    corners = np.repeat(place[:, None], 3, axis=1)
     centre, axis = np.zeros((2 * n, 3)), np.zeros((2 * n, 3))
-    radius, cone, whole = np.zeros(2 * n), np.ones(2 * n), np.zeros(2 * n)
-    centre[n:], axis[n:], radius[n:], whole[n:] = place, normal, disc, area
+    radius, cone, whole, exact = np.zeros(2 * n), np.ones(2 * n), np.zeros(2 * n), np.zeros(2 * n, bool)
     along, half = np.zeros((2 * n, 3)), np.zeros((2 * n, 2))
     along[:] = (1.0, 0.0, 0.0)
+    if pieces is not None:
+        own = exact[n:] = np.isfinite(pieces[order]).all(axis=(1, 2))
+        corners[own] = pieces[order][own]
+    centre[n:], axis[n:], radius[n:], whole[n:] = place, normal, disc, area
+    own = np.flatnonzero(exact[n:])
+    _set_pieces(centre, along, half, radius, disc, corners, normal, n, own)
+    overhang = np.where(exact[n:], 0.0, disc)  # of corners
+    wanted = np.zeros((n, 3)) if sides is None else sides[order] * exact[n:, None]
+    whole_pieces = not overhang.any()
+    low, high = corners.min(axis=1), corners.max(axis=1)
     parts = n // 2
     while parts:
-        own = slice(parts, 2 * parts)
-        of_node, of_normal = place.reshape(parts, -1, 3), normal.reshape(parts, -1, 3)
-        low, high = of_node.min(axis=1), of_node.max(axis=1)
-        whole[own] = area.reshape(parts, -1).sum(axis=1)
+        level = slice(parts, 2 * parts)
+        of_node, of_normal = corners.reshape(parts, -1, 3), normal.reshape(parts, -1, 3)
+        low, high = low.reshape(parts, 2, 3).min(axis=1), high.reshape(parts, 2, 3).max(axis=1)
+        whole[level] = area.reshape(parts, -1).sum(axis=1)
+        exact[level] = exact[n:].reshape(parts, -1).all(axis=1)
         sums = (normal * area[:, None]).reshape(parts, -1, 3).sum(axis=1)
         length = np.linalg.norm(sums, axis=1, keepdims=True)
-        axis[own] = np.where(length > 1e-6 * whole[own][:, None], sums / np.maximum(length, 1e-300), (0.0, 0.0, 1.0))
-        cone[own] = (of_normal @ axis[own][:, :, None])[..., 0].min(axis=1)
-        along[own], across = _sides(axis[own], high - low)
+        axis[level] = np.where(
+            length > 1e-6 * whole[level][:, None], sums / np.maximum(length, 1e-300), (0.0, 0.0, 1.0)
+        )
+        cone[level] = np.einsum("nki,ni->nk", of_normal, axis[level]).min(axis=1)
+        largest = area.reshape(parts, -1).argmax(axis=1) + np.arange(parts) * (n // parts)
+        along[level], across = _sides(axis[level], high - low, wanted[largest])
         middle = (low + high) / 2
-        margin = COVER * np.sqrt(whole[own] / of_node.shape[1] / np.pi)
-        for number, side in enumerate((along[own], across)):
-            reach = ((of_node - middle[:, None]) @ side[:, :, None])[..., 0]
+        margin = np.where(exact[level], 0.0, COVER * np.sqrt(whole[level] / (n // parts) / np.pi))
+        for number, side in enumerate((along[level], across)):
+            reach = np.einsum("nki,ni->nk", of_node, side)
             first, last = reach.min(axis=1), reach.max(axis=1)
-            half[own, number] = (last - first) / 2 + margin
-            middle = middle + side * ((first + last) / 2)[:, None]
-        centre[own] = middle
-        away = np.linalg.norm(of_node - middle[:, None], axis=2) + disc.reshape(parts, -1)
-        radius[own] = np.maximum(away.max(axis=1), np.linalg.norm(half[own], axis=1) * (cone[own] >= FLAT))
+            half[level, number] = (last - first) / 2 + margin
+            middle = middle + side * ((first + last) / 2 - (middle * side).sum(axis=1))[:, None]
+        centre[level] = middle
+        off = of_node - middle[:, None]
+        away = np.sqrt(np.einsum("nki,nki->nk", off, off))
+        away = (away if whole_pieces else away + np.repeat(overhang, 3).reshape(parts, -1)).max(axis=1)
+        radius[level] = np.maximum(away, np.linalg.norm(half[level], axis=1) * (cone[level] >= FLAT))
         parts //= 2
-    return PointTree(order, centre, radius, axis, cone, COVER * np.sqrt(whole / np.pi), whole, along, half)
+    disc_of_node = COVER * np.sqrt(whole / np.pi)
+    disc_of_node[n:] = disc
+    return PointTree(order, centre, radius, axis, cone, disc_of_node, whole, along, half, exact)
 
 
-def _sides(axis: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) twice: sides of rectangles with these normals, the first one nearest to that axis of space along which the
-    group is longest, as medians cut it."""
+def _set_pieces(centre, along, half, radius, disc, corners, normal, n: int, own: np.ndarray) -> None:
+    """Fill in what leaves `own` say about their pieces, see PointTree."""
+    piece = corners[own]
+    longest = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2).argmax(axis=1)
+    a, b, c = (piece[np.arange(len(own)), (longest + k) % 3] for k in range(3))
+    edge = b - a
+    length = np.linalg.norm(edge, axis=1)
+    side = edge / np.maximum(length, 1e-300)[:, None]
+    middle = (a + b) / 2
+    across = np.cross(normal[own], side)
+    apex = c - middle
+    up = (apex * across).sum(axis=1)
+    side = side * np.where(up < 0.0, -1.0, 1.0)[:, None]
+    centre[n + own], along[n + own], disc[own] = middle, side, length / 2
+    half[n + own, 0], half[n + own, 1] = (apex * side).sum(axis=1), np.maximum(np.abs(up), 1e-30)
+    radius[n + own] = np.maximum(length / 2, np.linalg.norm(apex, axis=1))
+
+
+def _sides(axis: np.ndarray, extent: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) twice: sides of rectangles with these normals, the first one nearest to the direction `wanted` or, where
+    that is 0, to that axis of space along which the group is longest, as medians cut it."""
     longest = np.eye(3)[(extent * (1.0 - np.abs(axis)) + 1e-30 * (1.0 - np.abs(axis))).argmax(axis=1)]
+    size = np.linalg.norm(wanted, axis=1, keepdims=True)
+    longest = np.where(size > 0.0, wanted / np.maximum(size, 1e-300), longest)
     along = longest - axis * (longest * axis).sum(axis=1, keepdims=True)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     return along, np.cross(axis, along)

@@ -24,10 +24,10 @@ from ..gfx import images
 from ..kernels.morton import morton_codes
 from ..materials import translucency
 from ..materials.translucency import maps_of
-from ..materials.values import LUMINANCE
+from ..materials.working_space import current
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance, Mesh, Snapshot
-from .pieces import octahedral
+from .pieces import farthest, octahedral
 
 ROW = 64  # cells
 RUNS = 8  # points of the cloud for each cell
@@ -207,7 +207,7 @@ class _Surface:
         triangles (count, RUNS) and texture coordinates (count, RUNS, 2)."""
         place, normal, face, triangle, uv = self._cloud(count * RUNS)
         size = np.sqrt(self.area / count)
-        centre, owner = _farthest(np.concatenate([place, TURN / 2 * size * face], axis=1).astype(np.float32), count)
+        centre, owner = farthest(np.concatenate([place, TURN / 2 * size * face], axis=1).astype(np.float32), count)
         sums = np.bincount(owner, minlength=count)
         order = np.argsort(owner, kind="stable")
         first = np.concatenate([[0], np.cumsum(sums)[:-1]])
@@ -246,27 +246,8 @@ def _painted(material: np.ndarray, uv: np.ndarray, maps: list, pictures: dict) -
                 out[own, :3] = translucency.sampled(pictures[image], uv[own])
             elif name == translucency.TRANSLUCENCY:
                 color = translucency.sampled(pictures[image], uv[own])
-                out[own, 3] = np.clip(color @ LUMINANCE, 0.0, 1.0)
+                out[own, 3] = np.clip(color @ current().luminance, 0.0, 1.0)
     return out
-
-
-def _farthest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """(count,) numbers of points (N, D), each the farthest from those before, and (N,) the nearest centre of each."""
-    squares = (points * points).sum(axis=1)
-    distance = np.full(len(points), np.inf, np.float32)
-    owner = np.zeros(len(points), np.int64)
-    centres = np.zeros(count, np.int64)
-    chosen = 0
-    for k in range(count):
-        centres[k] = chosen
-        to_chosen = squares - 2.0 * (points @ points[chosen]) + squares[chosen]
-        nearer = to_chosen < distance
-        distance[nearer] = to_chosen[nearer]
-        owner[nearer] = k
-        distance[chosen] = -1.0
-        owner[chosen] = k
-        chosen = int(distance.argmax())
-    return centres, owner
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

@@ -9,7 +9,9 @@ whatever the tessellation: a mesh of two triangles has as many surfels as one of
 Meshes are sampled in their own space after stretching (M = rotation * stretch): what moves rigidly keeps its surfels,
 instances share them, and the result does not depend on what was there before. Objects that would have fewer than FEWEST
 surfels are sampled together. Area farther than `reach` from `eye` counts by (reach / distance)^4, as in
-surface_points.py but steeper, so that a kilometre of ground does not take all.
+surface_points.py but steeper, so that a kilometre of ground does not take all. Triangles of which neither side sees
+another surface (seen.py), such as outer faces of walls, count as UNSEEN of their area; where one side of a sheet sees
+nothing, the other alone gathers light.
 
 The tree is binary and lies depth first: a node's first child follows it, `skip` is where to go on beside it. Nodes of
 up to PURE leaves are split by normal first, so that most small nodes are flat and may stand for their leaves.
@@ -25,14 +27,16 @@ tessellation, which the thesis names as future work); Eldar et al. 1997 (farthes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..gfx import images
 from ..sampling.sequence import bits
 from . import acceleration
-from .pieces import halved, octahedral
+from .pieces import farthest, halved, octahedral
+from .seen import UNSEEN, seen_sides
 
 MEMBERS = 8  # points of its cell at which a surfel is lit, in turn
 CLOUD = 16  # points of the cloud for each surfel
@@ -56,7 +60,8 @@ MOST_PIECES, ROUNDS = 100_000, 64  # of triangles that are halved, and how often
 class Cells:
     """Surfels of some surface: places (N, 3), unit normals (N, 3), radii (N,), areas (N,) m2, opacities (N,), MEMBERS
     places in the cell of each and normals there (N, MEMBERS, 3), CLIPS edges (N, CLIPS, 4) as unit direction and
-    distance at which its disc ends, and whether only the front is seen (N,) bool."""
+    distance at which its disc ends, whether only the front is seen (N,) bool, and whether that is so since the back
+    of a sheet sees nothing (N,) bool."""
 
     place: np.ndarray
     normal: np.ndarray
@@ -67,6 +72,7 @@ class Cells:
     members: np.ndarray
     member_normals: np.ndarray
     closed: np.ndarray
+    sheet: np.ndarray
 
     def __len__(self) -> int:
         return len(self.place)
@@ -83,7 +89,7 @@ class Cells:
 NOTHING = Cells(
     np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, CLIPS, 4)),
     np.zeros((0, MEMBERS, 3)),
-    np.zeros((0, MEMBERS, 3)), np.zeros(0, bool),
+    np.zeros((0, MEMBERS, 3)), np.zeros(0, bool), np.zeros(0, bool),
 )  # fmt: skip
 
 
@@ -120,7 +126,8 @@ class Surfels:
             return False
         self._key = key
         shown = [one for one in shown if np.isfinite(one.matrix).all()]
-        surfaces = [_Surface.of(frame, one, materials) for one in shown]
+        seen = seen_sides(frame)
+        surfaces = [part for one in shown for part in _Surface.of(frame, one, materials).parted(seen.get(id(one)))]
         self._upload(self._sample(surfaces, budget, reach, eye))
         self.changes += 1
         return True
@@ -148,7 +155,8 @@ class Surfels:
 
     def _own(self, one: _Surface, count: int, reach: float, eye: np.ndarray, known: dict) -> Cells:
         if one.far(reach, eye):
-            return sampled(*one.world(), count, one.closed, reach, eye)
+            cells = sampled(*one.world(), count, one.closed, reach, eye)
+            return replace(cells, sheet=np.full(len(cells), one.sheet))
         key = (*one.key, count)
         cells = known.get(key) or self._known.get(key)
         if cells is None:
@@ -159,13 +167,14 @@ class Surfels:
         return Cells(
             cells.place @ one.turn.T + one.moved, cells.normal @ one.turn.T, cells.radius, cells.area, cells.opacity,
             clips, cells.members @ one.turn.T + one.moved, cells.member_normals @ one.turn.T, cells.closed,
+            np.full(len(cells), one.sheet),
         )  # fmt: skip
 
     def _upload(self, cells: Cells) -> None:
         cells, nodes = tree(cells)
         self.cells, self.node_count = cells, len(nodes)
         count = len(cells)
-        back = np.where(cells.closed, -1, count + np.cumsum(~cells.closed) - 1)
+        back = np.where(cells.closed, np.where(cells.sheet, -2, -1), count + np.cumsum(~cells.closed) - 1)
         leaves = np.zeros((count, 4))
         leaves[:, 0], leaves[:, 1], leaves[:, 2], leaves[:, 3] = cells.area, np.arange(count), back, cells.radius
         other = np.flatnonzero(~cells.closed)
@@ -196,6 +205,8 @@ class _Surface:
     closed: bool
     turn: np.ndarray
     moved: np.ndarray
+    sheet: bool = False
+    share: float = 1.0  # of its area that counts
 
     @classmethod
     def of(cls, frame, instance, materials) -> _Surface:
@@ -217,6 +228,28 @@ class _Surface:
         key = (*key, opacity.astype(np.float32).tobytes() if opacity.min(initial=1.0) < 1.0 else b"")
         return cls(key, corners, opacity, closed, turn, instance.matrix[:3, 3] - frame.geometry.origin)
 
+    def parted(self, seen: np.ndarray | None) -> Iterator[_Surface]:
+        """Triangles by what their sides see, (T, 2) for front and back."""
+        if seen is None or len(seen) != len(self.corners):
+            yield self
+            return
+        front, back = seen.T
+        if self.closed:
+            kinds = (front, False, True, False, 1.0), (~front, False, True, False, UNSEEN)
+        else:
+            kinds = (
+                (front & back, False, False, False, 1.0), (front & ~back, False, True, True, 1.0),
+                (~front & back, True, True, True, 1.0), (~front & ~back, False, False, False, UNSEEN),
+            )  # fmt: skip
+        for number, (own, turned, closed, sheet, share) in enumerate(kinds):
+            if own.any():
+                corners = self.corners[own][:, ::-1] if turned else self.corners[own]
+                key = self.key if own.all() else (*self.key, own.tobytes())
+                yield replace(
+                    self, key=(*key, number), corners=corners, opacity=self.opacity[own], closed=closed, sheet=sheet,
+                    share=share,
+                )  # fmt: skip
+
     def world(self) -> tuple[np.ndarray, np.ndarray]:
         return self.corners @ self.turn.T + self.moved, self.opacity
 
@@ -233,7 +266,7 @@ class _Surface:
         if self.far(reach, eye):
             pieces, _ = halved(corners, eye, reach, ROUNDS, MOST_PIECES)
             areas = _areas(pieces)[0] * _share(pieces, reach, eye)
-        return float(areas.sum())
+        return self.share * float(areas.sum())
 
 
 def _reach(frame, distance: float) -> tuple[float, np.ndarray]:
@@ -268,12 +301,13 @@ def _share(pieces: np.ndarray, reach: float, eye: np.ndarray) -> np.ndarray:
 def _together(surfaces: list[_Surface], count: int, reach: float, eye: np.ndarray) -> Cells:
     """Small objects sampled as one; some of them may have no surfel."""
     parts = []
-    for closed in (True, False):
-        some = [one.world() for one in surfaces if one.closed is closed]
+    for closed, sheet in ((True, False), (True, True), (False, False)):
+        some = [one.world() for one in surfaces if one.closed is closed and one.sheet is sheet]
         if some:
             number = max(round(count * len(some) / len(surfaces)), 1)
             corners, opacity = (np.concatenate(values) for values in zip(*some))
-            parts.append(sampled(corners, opacity, number, closed, reach, eye))
+            cells = sampled(corners, opacity, number, closed, reach, eye)
+            parts.append(replace(cells, sheet=np.full(len(cells), sheet)))
     return Cells.joined([part for part in parts if len(part)])
 
 
@@ -303,7 +337,8 @@ def sampled(
         for block in _blocks(place, number)
     ]
     *out, members, turned = (np.concatenate(values) for values in zip(*parts))
-    return Cells(*out, _clips(*out[:3], *edges_of_mesh), members, turned, np.full(len(members), closed))
+    kinds = np.full(len(members), closed), np.zeros(len(members), bool)
+    return Cells(*out, _clips(*out[:3], *edges_of_mesh), members, turned, *kinds)
 
 
 def borders(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -385,7 +420,9 @@ def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...
     """Places, normals, radii, areas, opacities and members of the surfels of a block of the cloud."""
     count = max(len(block) // CLOUD, 1)
     place, normal, area, opacity = place[block], normal[block], area[block], opacity[block]
-    owner = _nearest_of_farthest(np.concatenate([place, turned[block]], axis=1), count)
+    keys = np.concatenate([place, turned[block]], axis=1)
+    _, owner = farthest(keys - keys.mean(axis=0), count)
+    owner = np.unique(owner, return_inverse=True)[1].reshape(-1)
     count = int(owner.max()) + 1
     members = np.maximum(np.bincount(owner, minlength=count), 1)
     middle = np.stack([np.bincount(owner, place[:, k], minlength=count) for k in range(3)], axis=1) / members[:, None]
@@ -404,31 +441,13 @@ def _cells(block, place, normal, area, opacity, turned) -> tuple[np.ndarray, ...
     return place[stands], normal[stands], radius, sums, cover, place[some], normal[some]
 
 
-def _nearest_of_farthest(points: np.ndarray, count: int) -> np.ndarray:
-    """(N,) which of `count` points (N, D), each the farthest from those before, is the nearest to each."""
-    points = points - points.mean(axis=0)
-    squares = (points * points).sum(axis=1)
-    distance = np.full(len(points), np.inf)
-    owner = np.zeros(len(points), np.int64)
-    chosen = 0
-    for k in range(count):
-        to_chosen = squares - 2.0 * (points @ points[chosen]) + squares[chosen]
-        nearer = to_chosen < distance
-        distance[nearer] = to_chosen[nearer]
-        owner[nearer] = k
-        distance[chosen] = -1.0
-        owner[chosen] = k
-        chosen = int(distance.argmax())
-    return np.unique(owner, return_inverse=True)[1].reshape(-1)
-
-
 def tree(cells: Cells) -> tuple[Cells, np.ndarray]:
     """The surfels in the order of a tree's leaves, and its nodes (M, NODE_TEXELS, 4), depth first:
 
     - middle, radius of a ball that holds the discs of all its leaves
     - mean normal (octahedral), how far its discs lie off the plane through its middle, negative where no disc may stand
       for it; node to go on with
-    - first leaf, number of leaves, 0 for both sides or 1 where only fronts are seen, opacity
+    - first leaf, number of leaves, 0 for both sides or 1 where only fronts are seen, 2 of sheets, opacity
     - two edges at which the disc ends: direction in its plane, distance from its middle
     """
     count = len(cells)
@@ -510,7 +529,8 @@ def _describe(cells: Cells, first: np.ndarray, last: np.ndarray, skip: np.ndarra
     nodes[:, 0, :3], nodes[:, 0, 3] = middle, radius * (1 + 1e-5)
     slab = np.maximum(thickness * (1 + 1e-3), 1e-6 * radius)
     nodes[:, 1, :2], nodes[:, 1, 2], nodes[:, 1, 3] = octahedral(normal), np.where(stands | leaf, slab, -slab), skip
-    nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, closed == leaves
+    sheets = sums(cells.sheet.astype(float)) == leaves
+    nodes[:, 2, 0], nodes[:, 2, 1], nodes[:, 2, 2] = first, leaves, (closed == leaves) * 1.0 + sheets
     nodes[:, 2, 3] = sums(cells.opacity * cells.area) / area
     nodes[:, 3:, 3] = NONE
     nodes[leaf, 3:] = cells.clips[first[leaf]]

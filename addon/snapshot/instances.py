@@ -69,6 +69,8 @@ class ObjectFacts:
     caustics_caster: bool
     shadow_catcher: bool
     linked: bool  # it, or its instancer, has collections of light linking
+    asset: str
+    group: str
     notes: tuple[Note, ...]
 
 
@@ -134,6 +136,8 @@ def walk(
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
+                        asset=_topmost(owner),
+                        group=owner.lightgroup,
                         notes=_object_notes(owner, kind, original.name, final),
                     )
                     if made != facts:
@@ -176,6 +180,14 @@ def _collections_say(top) -> tuple[bool, bool]:
         holdout |= one.holdout
         waiting += one.children
     return indirect_only, holdout
+
+
+def _topmost(owner) -> str:
+    """Name of the topmost parent of an object, empty without one."""
+    parent = owner.parent
+    while parent is not None and parent.parent is not None:
+        parent = parent.parent
+    return "" if parent is None else parent.name
 
 
 def _is_holdout(owner, parent, view_layer) -> bool:

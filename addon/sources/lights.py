@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..gfx import images
 from ..gfx.context import to_hold
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Light, Links, Snapshot
+from .lamp_maps import LampMaps
 
 TEXELS = 8
 VIEW_TEXELS = 5
@@ -32,8 +34,11 @@ NEAR_FLAG = 128  # rays are traced where the light is near; no shader asks for i
 TRANSMISSION_FLAG = 256
 SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
 EVEN_FLAG = 1024  # of a world of one colour
-LINK_BIT = 4096  # bits from here on, 12 of them: groups of receivers that a light does not light (snapshot/linking.py)
 GLASS_BLOCKS_FLAG = 2048  # what passes glass arrives as photons of caustics
+KIND_STEPS = (
+    16  # a row's kind stands in the bits below; above, groups of receivers that a light does not light, 12 bits
+)
+MAPPED_FLAG, MAP_SHIFT = 4096, 13  # its node tree varies; the bits above are the number of its map (lamp_maps.py)
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,7 @@ class Emitter:
     u: np.ndarray  # (3,) half width vector, or (4,) rows for spots
     v: np.ndarray
     w: np.ndarray
+    maps: images.Image | None = None  # of lamp_maps.py, where MAPPED_FLAG is set
 
     @property
     def has_span(self) -> bool:
@@ -119,7 +125,8 @@ class Emitter:
         points of this light a sample of the picture has on average, and `points` how many the whole picture has."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
         rows = np.zeros((TEXELS, 4))
-        rows[0] = self.kind, flags, first_view, view_count
+        kind = self.kind + (unlit_bits(self.light.links) if self.light is not None else 0)
+        rows[0] = kind, flags, first_view, view_count
         rows[1] = *self.centre, self.radius
         rows[2] = *sample, rate
         rows[3] = *(self.radiance * weight / rate), self.area
@@ -127,14 +134,40 @@ class Emitter:
         for k, row in enumerate((self.u, self.v, self.w)):
             rows[5 + k, : len(row)] = row
         rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
-        return rows
+        return rows if self.maps is None else MappedRow.of(rows, self.maps)
 
 
-def emitters(snapshot: Snapshot, origin: np.ndarray) -> list[Emitter]:
-    """The scene's lights that give something, in an order of their own: choices by lot then do not depend on names and
-    on the order in the scene."""
-    found = (emitter(light, origin) for light in snapshot.lights)
+class MappedRow(np.ndarray):
+    """A row for the light list, with the image that holds the map of its lamp."""
+
+    maps: images.Image | None = None
+
+    @classmethod
+    def of(cls, rows: np.ndarray, maps: images.Image) -> MappedRow:
+        made = rows.view(cls)
+        made.maps = maps
+        return made
+
+    def __array_finalize__(self, source) -> None:
+        self.maps = getattr(source, "maps", None)
+
+
+def emitters(snapshot: Snapshot, origin: np.ndarray, maps: LampMaps | None = None) -> list[Emitter]:
+    """The scene's lights that give something, in an order of their own, so that random choices do not depend on names
+    and on the order in the scene. `maps`: what their node trees make of their light."""
+    found = (
+        emitter(light, origin) if light.graph is None else _mapped(light, origin, maps) for light in snapshot.lights
+    )
     return sorted((one for one in found if one is not None), key=_order)
+
+
+def _mapped(light: Light, origin: np.ndarray, maps: LampMaps | None) -> Emitter | None:
+    """A lamp with a node tree."""
+    scale, number = (1.0, -1) if maps is None else maps.of(light)
+    made = emitter(replace(light, strength=np.asarray(light.strength) * scale), origin)
+    if made is None or number < 0:
+        return made
+    return replace(made, flags=made.flags | MAPPED_FLAG | number << MAP_SHIFT, maps=maps.image)
 
 
 def _order(one: Emitter) -> tuple:
@@ -151,7 +184,7 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
     flags = (
         DIFFUSE_FLAG * light.visibility.diffuse + GLOSSY_FLAG * light.visibility.glossy
         + SHADOW_FLAG * light.cast_shadow + CAMERA_FLAG * light.visibility.camera
-        + TRANSMISSION_FLAG * light.visibility.transmission + unlit_bits(light.links)
+        + TRANSMISSION_FLAG * light.visibility.transmission
     )  # fmt: skip
     power = float(np.abs(strength).max())
     smallest = max(SMALLEST, np.sqrt(power / BRIGHTEST) if light.normalize else 0.0)
@@ -204,8 +237,8 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
 
 
 def unlit_bits(links: Links) -> int:
-    """Flags for the groups of receivers that are not lit."""
-    return sum(LINK_BIT << group for group in links.unlit)
+    """What is added to a row's kind for the groups of receivers that are not lit (snapshot/linking.py)."""
+    return sum(KIND_STEPS << group for group in links.unlit)
 
 
 def footprint(area: float, points: float) -> float:
@@ -240,6 +273,8 @@ class Sources:
             self._block = Block(SOURCES, light=light, view=view)
         else:
             self._block.update(light=light, view=view)
+        maps = next((row.maps for row in rows if isinstance(row, MappedRow)), None)
+        self._block.beside = {} if maps is None else {"lamp_maps": maps}
         return self._block
 
     def release(self) -> None:

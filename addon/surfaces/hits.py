@@ -1,35 +1,32 @@
 """Shading of hits: what rays meet, as closures of the materials there, laid out like the surface images.
 
-A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record of
-some numbers per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates,
-normals. For each material among them one pass over the screen runs *its own* program at its records (textures,
-procedurals, bumps, vertex colours, emission, alpha) into six images as those of surfaces/draw.py, masked by depth: the
-trace writes the material as depth, the pass tests for EQUAL, and a driver leaves out blocks of pixels that fail. What
-reads surface images (lighting, indirect light) then reads hits.
+A draw of meshes evaluates materials where the camera sees them; a ray meets what no view shows. So a hit is a record
+per pixel (shaders/hits/trace.frag.glsl): place, footprint, instance, triangle, barycentric coordinates, normals. For
+each material met, one pass over the screen runs *its own* program at its records (textures, procedurals, bumps, vertex
+colours, emission, alpha) into six images like those of surfaces/draw.py. The trace writes the material as depth and the
+pass tests for EQUAL, so a driver skips blocks of other pixels. Whatever reads surface images then reads hits.
 
-The first picture asks which materials were met, by a flag for each, and compiles their programs alone. Asking stops the
-queue, so where rays can meet no more than MOST_UNASKED, later pictures compile the rest (in a viewport one each) and
-then draw all of them without asking; the vertices of one that was not met leave the screen, by the same flags. Scenes
-of more materials ask in each round.
+The first picture flags the materials that were met and compiles those programs alone. Reading flags stops the queue, so
+where rays can meet no more than MOST_UNASKED materials, later pictures compile the rest (in a viewport one each) and
+draw all of them without asking: vertices of a material that was not met leave the screen by the same flags. Scenes of
+more materials read the flags in each round.
 
-Programs of meshes get attributes of corners by interpolation. Here they are fetched: `owners` tells for each triangle
-of the hierarchy its instance and its number among the triangles of its material, and each material has a list of corner
-attributes by that number, made when it is first met. Derivatives are those of the ray's footprint, for bumps.
+`owners` gives for each triangle of the hierarchy its instance and its number within its material, and each material has
+a list of corner attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
 
     rays (origin, direction)  --trace-->  Records  --shade-->  closures
 
 | cost | per round of rays |
 |---|---|
-| passes | 1 trace, 1 that flags the materials met, 1 for each of those |
-| draws that end at their vertices | 1 for each other material that rays can meet; with many materials none |
+| passes | 1 trace, 1 that flags the materials met, 1 for each of those; 1 that ends at its vertices for others |
 | readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
 
-One with more than MOST_IMAGES images is its mean reflectance instead.
-
 Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
-Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits.
+Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits. Relief goes on over
+the edges of its mesh (shaders/hits/relief.glsl); grass is its ground. A material with more than MOST_IMAGES images is
+its mean reflectance instead.
 """
 
 from __future__ import annotations
@@ -112,27 +109,37 @@ def depth_of(material: int) -> float:
 
 
 def _program_key(compiled: CompiledMaterial) -> str:
-    return MEAN.name if len(compiled.images) > MOST_IMAGES else compiled.program_key
+    if len(compiled.images) > MOST_IMAGES:
+        return MEAN.name
+    return f"{compiled.program_key} relief" if _has_relief(compiled) else compiled.program_key
+
+
+def _has_relief(compiled: CompiledMaterial) -> bool:
+    """Whether its heights are looked for at hits (shaders/hits/relief.glsl)."""
+    own = compiled.own_surface
+    return own is not None and own.shell and len(compiled.images) + bool(compiled.attributes) <= MOST_IMAGES
 
 
 def hit_program(compiled: CompiledMaterial) -> Program:
     """Evaluates a material where rays met it."""
-    if compiled.program_key not in _programs:
+    key = _program_key(compiled)
+    if key not in _programs:
         if len(_programs) >= MOST_PROGRAMS:
             del _programs[next(iter(_programs))]
-        _programs[compiled.program_key] = _hit_program(compiled)
-    return _programs[compiled.program_key]
+        _programs[key] = _hit_program(compiled)
+    return _programs[key]
 
 
 def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
-    room = len(compiled.images) + len(listed) < MOST_IMAGES + 1
+    relief = (("RGBA32F", "shell_corners"),) if _has_relief(compiled) else ()
+    room = len(compiled.images) + len(listed) + len(relief) < MOST_IMAGES + 1
     return Program(
-        name=f"hits {compiled.program_key[:8]}",
+        name=f"hits {compiled.program_key[:8]}{' relief' * len(relief)}",
         fragment="hits/surface.frag.glsl",
         textures=(
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
-            *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *relief, *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
         ),
         blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
@@ -140,7 +147,13 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             ("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth"), ("INT", "material_number"),
         ),
         snippets=(("generated/material", f"{compiled.glsl}\n{_fill(len(compiled.attributes))}"),),
-        **{**MASKED, "defines": (*MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()))},
+        **{
+            **MASKED,
+            "defines": (
+                *MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()),
+                *((("OWN_SURFACE", ""),) if relief else ()),
+            ),
+        },
     )  # fmt: skip
 
 
@@ -309,6 +322,8 @@ class Hits:
             return MEAN, {"textures": textures, "blocks": {}, "constants": constants}
         bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
         textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
+        if _has_relief(compiled):
+            textures |= frame.materials.own_images[material]
         if compiled.attributes:
             textures["hit_attributes"] = self._attributes_of(material, compiled)
         constants |= {"ray_number": number, "glass_bends": int(refracts(frame))}

@@ -1,4 +1,4 @@
-"""Airlight: light of every lamp, the world and shining meshes that media scatter once towards the eye, with shadows.
+"""Airlight: light of lamps, the world and emissive meshes that media scatter towards the camera, with shadows.
 
     L(v) = integral over the view ray of  T(eye, x) sum over lights of  sigma_s(x) p(x, w, v) T(x, y) V(x, y) L(y) dw
 
@@ -133,13 +133,14 @@ class Airlight(Technique):
     params = (
         Param(
             "rays", "Rays", 4,
-            "Places on each pixel's ray that are asked what light reaches them, in a sample, shared by all lights",
+            "Points on each pixel's ray at which in-scattered light is evaluated in a sample, shared by all lights",
             1, 64, draft=2,
         ),
         Param(
             "bounces", "Volume bounces", 8,
-            "How often light is scattered or reflected before a medium sends it to the eye, at most; 0: none but "
-            "that of lamps and world", 0, MOST_BOUNCES, draft=2,
+            "Maximum number of times light is scattered or reflected before a medium scatters it to the camera; 0: "
+            "light of lamps and world only",
+            0, MOST_BOUNCES, draft=2,
         ),
     )  # fmt: skip
     reads = SURFACES
@@ -170,7 +171,7 @@ class Airlight(Technique):
             return
         rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
         kinds = lights.kinds_of(emitters) | sum(
-            1 << kind for kind in {int(row[0, 0]) for row in rows} if kind >= lights.DIRECTION
+            1 << kind for kind in {int(row[0, 0]) % lights.KIND_STEPS for row in rows} if kind >= lights.DIRECTION
         )
         coarse = frame.settings.samples < FEW
         stride = COARSE if coarse else 1

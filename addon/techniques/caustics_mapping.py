@@ -68,17 +68,22 @@ class CausticsMapping(Technique):
     params = (
         Param(
             "grid", "Photon grid", 128,
-            "Photons along each side of a light's view of what throws caustics; the fewer, the softer at few samples",
+            "Photons along each side of the grid that a light sends towards casters of caustics; fewer are softer at "
+            "few samples",
             16, 1024, draft=96,
         ),
         Param("map_size", "Map size", 512, "Texels along each side of a caustic map", 64, 4096, draft=256),
         Param(
             "extent", "Map extent", 3.0,
-            "How many times as wide as what throws caustics, seen from the light, the map of receivers is", 1.0, 16.0,
+            "Width of the map of receivers, relative to that of the casters of caustics as seen from the light",
+            1.0, 16.0,
         ),
         Param(
-            "by", "Photons by", LOOKUPS, "What tells where bent light goes",
-            items=((LOOKUPS, "Look-ups in the light's images", 0), (RAYS, "Rays", 1)),
+            "by", "Photons by", LOOKUPS, "How the end of a photon's path is found",
+            items=(
+                (LOOKUPS, "Look-Ups", 0, "Steps in images of what the light sees: fast, and blind behind it"),
+                (RAYS, "Rays", 1, "Rays through all triangles"),
+            ),
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -1,82 +1,33 @@
-"""Clustered visibility: all virtual lights shine, some tens of clusters of them cast soft shadows, rays correct those.
+"""Clustered visibility: virtual lights shine one by one, clusters of them cast soft shadows, and rays correct those.
 
     irradiance = sum over clusters m of  V_m U_m   +   sum over groups of them of  (D / D_m) (v_i u_i / p_i - V_m U_m)
     U_m = sum of u_i,  u_i = L_i G_i s(d_i),  over members i of m
 
-Members are virtual lights (virtual_lights.py); their kernels G, their bound s near surfaces, the short rays that give
-back what the bound takes, and gathering by regions are those of multires_radiosity.py. What differs is visibility. Each
-cluster (addon/sources/clusters.py: k-means over place and normal) has one map of what it sees from its middle, and is
-an area light with its members' extent in it: V_m. That alone is the source's method: smooth, but what only some members
-of a cluster see, through the gap of a door, all of them light or none.
+Virtual lights, kernels G, the bound s near surfaces with its short rays, and regions are those of
+multires_radiosity.py. Each cluster (addon/sources/clusters.py: k-means over place and normal) has one map seen from its
+middle and is an area light of its members' extent: V_m, the source's method. V_m is used as a control variate: clusters
+form `rays` groups; in each, one cluster is drawn in proportion to D_m = |U_m| sqrt(V_m (1 - V_m)), at least a tenth of
+|U_m| (D: the group's sum), one member by p_i = |u_i| / |U_m|, and a ray finds its visibility v_i. The mean is that of
+tracing every virtual light; the noise is that of what the maps do not know.
 
-So the clusters are a guess, a control variate. They are split into `rays` groups; in each, one cluster m is drawn in
-proportion to its doubt D_m = |U_m| sqrt(V_m (1 - V_m)), at least a tenth of |U_m| (D: the group's sum), one member i by
-the chance p_i = |u_i| / |U_m|, and a ray finds v_i, whether that is seen. In the mean the guess cancels: the estimate
-is that of tracing every virtual light, whatever the maps show, and its noise is that of what the maps do not know. An
-eighth of the rays that multires_radiosity traces gives its error (below).
-
-The map is a paraboloid's, in the stereographic projection: conformal, one map per half space and a little more. It is
-traced, not rasterised: rays hit walls of two triangles exactly, whose straight edges a paraboloid bends, and the cost
-does not grow with M draws of the scene. A receiver at distance d sees a cluster with half sides e past blockers at
-distance z through the kernel e' (1/z - 1/d), e' being e across the line of sight, taken into the map by the
-projection's derivative. First the mean z of blockers in the kernel of those half-way, then the share that is blocked in
-the kernel of that z:
-
-- texels: 4 x 4 texels of the kernel, each compared with the receiver's plane and, the other way, the caster's plane
-  with the receiver, so that no bias in metres is needed and walls close;
-- convolution: the series of cssm.py over 2 x 2 boxes of the prefiltered map, as in the source. It leaks where blockers
-  stand nearer to the receiver than 6 % of the map's range, and costs twice as much.
-
-With more samples each stands for smaller parts of the clusters: a map is drawn from a member, chosen by its strength,
-and the extent shrinks by sqrt(n). Without `refine`, clusters and maps of the first sample stand, and later virtual
-lights join the nearest cluster. Maps are kept, too, over frames in which neither clusters nor geometry change.
-
-Source: Dong, Grosch, Ritschel, Kautz, Seidel, "Real-time indirect illumination with clustered visibility", VMV 2009.
-Ours: traced maps, exact comparison of planes, the kernel's shape, correction by rays, bounces, refinement, regions.
+Maps are traced stereographic half spaces. Blockers at distance z from a cluster with half extents e shadow a receiver
+at distance d by the kernel e (1/z - 1/d): first the mean z, then the share blocked, by 4 x 4 texels compared by planes,
+or by the Fourier series of cssm.py, as in the source. With n samples the extent shrinks by sqrt(n), where `refine` is
+on.
 
 | cost | per sample, N virtual lights, M clusters, maps of S x S |
 |---|---|
 | maps | M S^2 rays, 16 bytes per texel; convolution: + 4 (order + 1) bytes per texel, log2 S dispatches |
 | per region | N kernels, M lookups of 16 to 32 texels (convolution: 4 boxes of 200 fetches with order 8), `rays` rays |
-| rays per pixel, virtual lights | as multires_radiosity.py |
+| else | as multires_radiosity.py |
 
-Fails: the guess is poor, and so rays leave grain, where the members of a cluster see different things, and for blockers
-narrower than a texel of the map (3 degrees with 64 texels).
+Bias (diffuse indirect light): that of multires_radiosity.py; sums that rays take below zero are cut there (up to + 2
+%). Without rays, light and visibility are taken as independent within a cluster, so gaps of doors leak.
 
-Bias, in diffuse indirect light: that of multires_radiosity.py. Sums that rays take below zero are cut there, unless a
-lamp has negative power: + 0.8 % in the hall, + 1.9 % beyond the door. Without rays, besides: within a cluster light and
-visibility are taken as independent. Against tracing the same virtual lights, one sample, RMS over the mean: in the
-Cornell box 7 % with 64 clusters (11 % with 8, 24 % with 2; unshadowed 25 %), mean + 0.7 %, with 8 rays - 0.8 %; beyond
-a door ajar, mean + 16 % without rays, - 0.1 % with 8.
+Fails: grain where members of a cluster see different things and for blockers narrower than a texel (3 degrees with 64).
 
-Measured at 96x72 against Cycles' diffuse indirect pass, 16 bounces: relMSE over the reference's noise of one sample
-(mean of six seeds, filtered) and of 64 (denoised); processor time over that of instant radiosity with 128 virtual
-lights and 4 rays; -: not measured in this way.
-
-| | Cornell box | courtyard | lamp | hall | door | window |
-|---|---|---|---|---|---|---|
-| instant radiosity, 1 sample | 0.071 | 0.037 | 0.025 | 0.063 | 0.115 | 0.095 |
-| multires radiosity, 1 sample | 0.049 | 0.037 | 0.016 | 0.050 | 0.071 | 0.079 |
-| this, 1 sample | 0.050 | 0.037 | 0.017 | 0.050 | 0.067 | 0.079 |
-| its bias | 0.995 | 1.056 | 0.987 | 0.925 | 0.955 | 0.915 |
-| instant radiosity with 4 rays, 64 samples | 0.0027 | - | - | 0.0113 | 0.0149 | 0.0149 |
-| instant radiosity, 64 samples | - | - | - | 0.0103 | 0.0120 | 0.0197 |
-| multires radiosity, 64 samples | - | - | - | 0.0060 | 0.0081 | 0.0086 |
-| this, 64 samples | 0.0016 | - | - | 0.0083 | 0.0217 | - |
-| time at 256x192, 4 samples | 1.3 | - | - | 1.8 | - | - |
-| multires radiosity's | 2.2 | - | - | 3.6 | - | - |
-
-The biases of one sample are those of its set of virtual lights: light that few probes meet. Beyond the door the cut of
-negative sums shows at 64 samples (bias 1.012). While camera and light move slowly in the Cornell box, 0.073 of a
-frame's error of 0.152 is new (instant radiosity: 0.132 of 0.230; both before what reflects was drawn at several points
-of a pixel).
-
-At 160x120 the time is 1.7 to 2.4 times that of instant radiosity, since the maps cost the same, and at 640x360 0.9
-(Cornell box) and 1.2 (hall). Auto takes this technique for pictures of one sample from 60 000 pixels on, where the
-error falls by more than the time rises in all scenes but the window (smaller ones: multires_radiosity.py, which has the
-same error in less time there). With more samples it takes instant radiosity: the
-same time spent on more of its samples leaves less error than multires radiosity in the hall and than this beyond the
-door and in the hall; multires radiosity is the one that has less per sample.
+Auto takes it for pictures of one sample from 60 000 pixels on. Figures: docs/log/2026-11-26-indirect-light.md. Source:
+Dong, Grosch, Ritschel, Kautz, Seidel, "Real-time indirect illumination with clustered visibility", VMV 2009.
 """
 
 from __future__ import annotations
@@ -102,7 +53,10 @@ from .cssm import ORDERS, SEARCH_OFFSET
 from .multires_radiosity import LEVELS, MANY_PIXELS, NEAR_BOUNCES, MultiresRadiosity, pixels_shown_alone, regions
 
 TEXELS, CONVOLUTION = "TEXELS", "CONVOLUTION"
-FILTERS = ((TEXELS, "Texels", 0), (CONVOLUTION, "Convolution", 1))
+FILTERS = (
+    (TEXELS, "Texels", 0, "Compare the depths of some texels of the kernel one by one"),
+    (CONVOLUTION, "Convolution", 1, "Look up a filtered map, whose cost does not depend on the kernel's size"),
+)
 TAPS, CELLS = 4, 2  # along each side of a kernel: texels that are looked at; boxes of the filtered map
 AREA_ROWS = 5  # texels of a cluster, see shaders/cluster/lights.glsl
 MAPS = passes.fullscreen_program(
@@ -154,17 +108,24 @@ class ClusteredVisibility(MultiresRadiosity):
     name = "clustered_visibility"
     label = "Clustered visibility"
     params = (
+        Param("virtual_lights", "Virtual lights", 1024, "Virtual lights in each sample", 1, 2048, draft=128),
         Param(
-            "virtual_lights", "Virtual lights", 1024, "Points of surfaces that light the picture in a sample", 1, 2048,
-            draft=128,
-        ),
-        Param(
-            "clusters", "Clusters", 64, "Groups of virtual lights that share a shadow map, at most", 1, 256, draft=16
+            "clusters", "Clusters", 64,
+            "Maximum number of clusters of virtual lights; each has one shadow map",
+            1, 256, draft=16,
         ),
         Param("map_size", "Map size", 64, "Texels along each side of a shadow map", 8, 256, draft=32),
-        Param("shadows", "Shadows", TEXELS, "How the share of a kernel that is blocked is found", items=FILTERS),
-        Param("order", "Order", "8", "Terms of the series that compares depths, for convolution", items=ORDERS),
-        Param("rays", "Rays", 8, "Rays of a region that correct the clusters in a sample; 0: none", 0, 64, draft=4),
+        Param("shadows", "Shadows", TEXELS, "How the blocked share of a filter kernel is found", items=FILTERS),
+        Param(
+            "order", "Order", "8",
+            "Terms of the Fourier series that approximates the depth comparison, for convolution",
+            items=ORDERS,
+        ),
+        Param(
+            "rays", "Rays", 8,
+            "Rays per region and sample that correct the clusters' shadows; 0: none",
+            0, 64, draft=4,
+        ),
         REFINE,
         LEVELS,
         NEAR_BOUNCES,
@@ -206,7 +167,7 @@ class ClusteredVisibility(MultiresRadiosity):
         """Trace the maps, unless they hold these clusters among this geometry."""
         count, hierarchy = len(areas), frame.hierarchy("diffuse")
         key = areas.tobytes(), side
-        varies = any(compiled.transparent for compiled in frame.materials.compiled)  # alpha is met by lot
+        varies = any(compiled.transparent for compiled in frame.materials.compiled)  # alpha is met at random
         if not varies and self._drawn is not None and self._drawn[0]() is hierarchy and self._drawn[1] == key:
             frame.count(self, "maps kept", count)
             return

@@ -9,10 +9,9 @@ the second step for the share of blockers in the kernel that this depth gives. B
 the kernel: for pictures with many lights. A single important light is better served by vssm, whose comparison has no
 least distance.
 
-Ours: the kernel is cut into `cells` squared boxes, each compared with the receiver's plane at its place, so that tilted
-receivers do not shadow themselves, and blockers are asked for only above the receiver's point; kernels of a few texels
-look at texels, so contacts are closed without the source's sharpening, a power of the visibility; the part of the
-light below the receiver's horizon does not count; a min-max pyramid settles most pixels.
+Beyond the source, the kernel is cut into `cells` squared boxes, each compared with the receiver's plane at its place,
+so that tilted receivers do not shadow themselves; kernels of a few texels read texels, so contacts close without the
+source's sharpening; a min-max pyramid settles most pixels. All lights of a round share atlas and basis images.
 
 | cost | per map of N x N texels, order M |
 |---|---|
@@ -20,15 +19,10 @@ light below the receiver's horizon does not count; a min-max pyramid settles mos
 | basis, by pyramid | log2 N dispatches, 4 (M + 1) bytes per texel |
 | lookup | cells^2 boxes, each (M + 1) + M / 2 means: 4 fetches by table, 8 by pyramid |
 
-All lights of a round share atlas and basis images.
-
-Bias (direct diffuse and glossy light): as vssm. In addition blockers nearer to the receiver than twice the series'
-offset (6.4 % of the depth range with order 4, 1.6 % with 16) block in part only where the kernel is wider than a few
-texels. It goes to zero with order and samples. A box whose part of a steep receiver rises above a roof does not see the
-roof: up to 11 % of the light passes it.
-
-Errors and times on six families of blockers, with every parameter, stand in docs/soft_shadows.md. The order shows where
-something lies far behind.
+Bias (direct diffuse and glossy light): that of vssm. Blockers nearer to the receiver than twice the series' offset (6.4
+% of the depth range with order 4, 1.6 % with 16) block in part only where the kernel is wider than a few texels; this
+goes to zero with order and samples. A box whose part of a steep receiver rises above a roof does not see the roof: up
+to 11 % of the light passes it. Errors and times with every parameter: docs/soft_shadows.md.
 
 Source: Annen, Dong, Mertens, Bekaert, Seidel, Kautz, "Real-time, all-frequency shadows in dynamic scenes", SIGGRAPH
 2008.
@@ -57,8 +51,15 @@ from ..lighting.soft_maps import (
 )
 from ..lighting.visibility import RESOLUTION, Lookup, Maps
 
-ORDERS = (("4", "4", 0), ("8", "8", 1), ("16", "16", 2))
-PREFILTERS = ((PYRAMID, "Pyramid", 0), (TABLE, "Summed-area table", 1))
+ORDERS = (
+    ("4", "4 Terms", 0, "Fast; shadows begin gradually behind what casts them"),
+    ("8", "8 Terms", 1, "Shadows begin close behind what casts them"),
+    ("16", "16 Terms", 2, "The sharpest contacts, for twice the memory of 8"),
+)
+PREFILTERS = (
+    (PYRAMID, "Pyramid", 0, "Mip levels: fast, and a little blocky"),
+    (TABLE, "Summed-Area Table", 1, "Exact means over boxes of any size; needs more memory"),
+)
 BASIS = {
     PYRAMID: ("RGBA16F", "basis_means"),
     TABLE: ("RGBA32UI", "basis_table"),
@@ -93,7 +94,7 @@ def _lookup(order: int, prefilter: str, cells: int) -> Lookup:
     )  # fmt: skip
 
 
-DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, _, _ in PREFILTERS)
+DEFAULTS = tuple(_lookup(8, prefilter, 4) for prefilter, *_ in PREFILTERS)
 LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 SHARED = tuple(program for lookup in DEFAULTS for program in programs_of(with_contacts(lookup)))
 BASIS_MEANS = tables.level_program(_basis(8, PYRAMID).source)
@@ -107,9 +108,13 @@ class ConvolutionSoftShadows(SoftMaps):
     params = (
         RESOLUTION,
         CUTOFF,
-        Param("order", "Order", "8", "Terms of the series that compares depths", items=ORDERS),
-        Param("prefilter", "Prefilter", PYRAMID, "How means over boxes of texels are made", items=PREFILTERS),
-        Param("cells", "Cells", 4, "Boxes along each side of a kernel", 1, 6),
+        Param(
+            "order", "Order", "8",
+            "Terms of the Fourier series that approximates the depth comparison",
+            items=ORDERS,
+        ),
+        Param("prefilter", "Prefilter", PYRAMID, "How averages over boxes of texels are precomputed", items=PREFILTERS),
+        Param("cells", "Cells", 4, "Boxes along each side of the filter kernel", 1, 6),
         REFINE,
         CONTACTS,
         SPARSE,

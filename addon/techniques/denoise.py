@@ -1,62 +1,32 @@
-"""Denoise: what is left of noise in light after the last sample, taken out where it can be told from shade.
+"""Denoise: noise that is left in light after the last sample is filtered where variance tells it from shading.
 
-    light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each for itself
+    light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each by itself
     out   = light(p) + sum over pixels q  w(p, q) (light(q) - light(p))
     w     = binomial * same surface * exp(-(light(p) - light(q))^2 / s^2)
     s^2   = k^2 (var(p) + var(q)) / 2 + light(p) light(q) / 100^2
 
 An edge-avoiding wavelet of three or five levels (Dammertz, Sewtz, Hanika and Lensch 2010), steered by variance as in
-Schied et al. 2017 (SVGF), but by the variance of the picture itself: the sums are copied in the middle of the samples,
-and half the squared difference of the two halves' means estimates it, noise that pixels share included (one set of
-virtual lights or points on a lamp for all pixels). Two numbers are a poor estimate; their mean over 3x3 pixels of the
-same surface does as well as that over 7x7. k is 3 for direct light, 5.5 for diffuse indirect light, whose edges are
-softer, and 5 for glossy, which has fireflies: highlights of metal that metal shows, in one sample of many. Pixels
-exchange indirect light though their normals differ more, as on columns a few pixels wide. Its last level is one of
-neighbours again: where weights fall short, no wider level mixes odd pixels with even ones.
+Schied et al. 2017 (SVGF). The variance comes from the picture itself: the sums are copied half-way through the samples,
+and half the squared difference of the two halves' means, averaged over 3x3 pixels of the same surface, estimates it.
+That includes noise shared by all pixels (one set of virtual lights or light points). k is 3 for direct light, 5.5 for
+diffuse indirect light, whose edges are softer, and 5 for glossy light.
 
-w is the same from p to q as from q to p, and what weights lack to one stays where it is: pixels exchange light and none
-is lost, however skewed the noise. Dividing by the weights instead filters a little more and moves means by up to 0.4 %.
-
-Reflections have edges where no surface has any: pixels exchange glossy light only if what their lobes show reflects
-alike (shaded_reflections.py), as far as the samples tell.
-
-Where both halves agree nothing is changed, so the result still converges, and textures, which are divided out, stay.
-relMSE over the reference's noise, 16 samples at 128x96, as summed up and denoised:
-
-| | Cornell box | window | hall | door | lamp |
-|---|---|---|---|---|---|
-| diffuse indirect | .0200 .0098 | .1017 .0825 | .0493 .0311 | .2570 .1321 | .0142 .0088 |
-| diffuse direct | .0075 .0060 | .4694 .4041 | .1880 .1270 | .1705 .1357 | .0393 .0391 |
+w is symmetric and the centre keeps what the weights lack to one: pixels exchange light and none is lost, however skewed
+the noise. Pixels exchange glossy light only if what their lobes show reflects alike (shaded_reflections.py). Where both
+halves agree nothing changes, so the result still converges; textures are divided out before and stay.
 
 | cost | after the last sample |
 |---|---|
 | passes | 5 for direct and 7 for indirect light, over the screen |
 | fetches per noisy pixel and path | 9 x 5 + 3 or 5 x 25 x 3; 54 or 60 where there is no noise |
 
-Glossy indirect light, 16 samples at 256x192: garden .27 .10, product .54 .35, instances 1.09 .46.
+Bias: light is spread by at most 14 pixels over a surface, indirect light by 32, by an amount that the standard error
+hides; means stay.
 
-With k = 8 rooms full of indirect light have up to 1 % less error, and sunlit scenes, in which it comes from creases and
-fades within some pixels, more: relMSE of the path in four files of other people as summed up, with 8 and with 5.5:
-50.8 38.8 26.8, .062 .28 .20, 45 120 93, .108 .117 .081. The second and third are still better left alone (they hardly
-have such light: 1 % of the picture).
+Fails: creases in sunlit scenes whose indirect light fades within some pixels are blurred. Not filtered: direct gloss,
+glass, emission, pixels without the path's colour, pictures of one sample, drafts.
 
-What does not help:
-
-- To keep only that share of the change which the halves' difference explains in 9x9 pixels. Those files then have 18,
-  .086 and 44, but rooms 3 to 4 % more error, and in small pictures noise stays: the halves have errors in common, since
-  the numbers of a pixel are one sequence.
-- Open Image Denoise in place of all this: ten sample scenes have .94 to 2 times the error, geometric mean 1.1. What is
-  left is shared by pixels, or lies in edges.
-- At edges, whose pixels hardly any other is like and which have half of the error that is left, the mean over 5x5
-  pixels of the same surface in each sample (3 to 10 % more error, since light changes there); weights by light that was
-  filtered before.
-
-- To filter direct gloss as diffuse light: pictures of product, garden, window and instances have .97 to 1.01 times the
-  error at 16 samples, the path itself .94 to twice as much.
-
-Bias: light is spread by at most 14 pixels over a surface, indirect light by 32, by what the standard error hides; means
-stay.
-Not filtered: direct gloss, glass, emission, pixels without the path's colour, pictures of one sample, drafts.
+Errors with and without it, and what was tried and left: docs/log/2026-11-26-denoise.md.
 """
 
 from __future__ import annotations
@@ -140,7 +110,8 @@ class Denoise(Technique):
     params = (
         Param(
             "strength", "Strength", 1.0,
-            "How much of what may be noise is taken out of light after the last sample; 0: none", 0.0, 2.0,
+            "Strength of the noise filter that runs after the last sample; 0: off",
+            0.0, 2.0,
         ),
     )  # fmt: skip
     reads = ("surface.position", "surface.normal_sum", "color.diffuse", "color.glossy")

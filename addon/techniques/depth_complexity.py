@@ -58,9 +58,16 @@ from ..scene.view import VIEW
 from ..sources.rates import Rate
 from .accumulated_maps import AccumulatedMaps
 
-COUNTS = (("16", "16", 0), ("64", "64", 1))
+COUNTS = (
+    ("16", "16", 0, "Four by four points: fast, with visible steps in wide penumbrae"),
+    ("64", "64", 1, "Eight by eight points"),
+)
 AUTO, SHARE, POINTS = "AUTO", "SHARE", "POINTS"
-MODES = ((AUTO, "By samples", 0), (SHARE, "Share of the light", 1), (POINTS, "Point by point", 2))
+MODES = (
+    (AUTO, "By Samples", 0, "The share of the light in pictures of few samples, else point by point"),
+    (SHARE, "Share of the Light", 1, "The whole light, as much of it as is seen: smooth at once"),
+    (POINTS, "Point by Point", 2, "The light of each point that is seen: exact over many samples"),
+)
 FEW_SAMPLES = 4  # pictures of fewer take the light as a whole
 NORMAL = ("RGBA32F", "surface_normal")
 
@@ -111,14 +118,22 @@ class DepthComplexity(EdgeShadows):
     label = "Depth complexity sampling"
     requests = (LightRates,)
     params = (
-        Param("points", "Points", "64", "Points of each light to which layers are counted from a pixel", items=COUNTS),
-        Param("mode", "Light", AUTO, "How the points that are seen become light", items=MODES),
+        Param(
+            "points", "Points", "64",
+            "Points on each light for which the layers towards a pixel are counted",
+            items=COUNTS,
+        ),
+        Param(
+            "mode", "Light", AUTO,
+            "How visible light points become light: as a share of the unshadowed light, or shaded point by point",
+            items=MODES,
+        ),
         Param(
             "accurate", "Accurate edges", True,
-            "Edges are silhouettes from any point of a light, not from its centre alone",
+            "Use silhouette edges seen from any point of a light, not only from its centre",
         ),
-        Param("interleaved", "Interleaved", True, "Neighbouring pixels ask different points of the light"),
-        Param("smooth", "Smooth", True, "Take the mean over neighbouring pixels with different points, on one plane"),
+        Param("interleaved", "Interleaved", True, "Neighbouring pixels use different points of the light"),
+        Param("smooth", "Smooth", True, "Average over neighbouring pixels with different points on the same plane"),
         MOST_EDGES,
         CUTOFF,
     )  # fmt: skip

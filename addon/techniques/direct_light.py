@@ -9,7 +9,7 @@ the technique in the shadow slot. All pixels share y, so there is no noise, only
 low-discrepancy set; where a narrow lobe would see dots, traced rays take over part of the light (see traced_glossy).
 
 Where the picture is only shown whole, light_probes shares out points among the lights by the error that each leaves.
-More lights than `lights_per_sample` are drawn by lot, in proportion to power, each weighted by the inverse of its
+More lights than `lights_per_sample` are drawn at random, in proportion to power, each weighted by the inverse of its
 chance (systematic sampling); every light keeps a minimum chance.
 
 | cost | per sample |
@@ -58,7 +58,8 @@ class DirectLight(Technique):
     params = (
         Param(
             "lights_per_sample", "Lights per sample", 16,
-            "With more lights than this, each sample draws so many of them by lot", 1, 256,
+            "If the scene has more lights, each sample picks this many of them at random",
+            1, 256,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES
@@ -113,7 +114,7 @@ class DirectLight(Technique):
                 part = provider.part(frame, emitter, number, points)
                 shown, share = (part, part.area / emitter.area) if part else (emitter, 1.0)
                 cell = 1.0 if part else provider.cell(frame, number, points)
-                whole = cell >= 1.0 and emitter.extended
+                whole = cell >= 1.0 and emitter.extended and emitter.maps is None
                 # The same numbers for all lights: then two half lights are one, and names and order change nothing.
                 sample = shown.middle() if whole else shown.sample(*frame.random_volume_at(number, "light"))
                 near = bool(service) and provider.asks_views and cell == 0.0 and emitter.light.key in self._near

@@ -1,13 +1,15 @@
-"""Directional occlusion: light of the world where nothing stands before it: first on the screen, then along a ray.
+"""Directional occlusion: light of the world where nothing blocks it, tested on the screen first, then by a ray.
 
     L(x) = albedo * mean over fans of  V * sum over groups of sectors  L_world(w) (sectors that nothing hides) / 32
 
-Half planes through x and the viewer are searched on the screen as in ssdo.py; of their 32 sectors, equal shares of the
-cosine-weighted solid angle, the hidden ones are marked, and groups of eight read the world in a direction of their own.
-So shadows have the colour, direction and softness of the light that is missing there (Ritschel, Grosch and Seidel 2009;
-sectors after Therrien, Levesque and Gilet 2023). An open plane has all its light at every tilt: no sector is lost to
-the surface itself, and the fans' weights are equal. V: what the screen leaves of a fan's light is asked for by one ray
-(`rays`), in a direction drawn in proportion to it; so what the picture does not show hides light as well.
+Half planes through x and the viewer ("fans") are searched on the screen as in ssdo.py. Of their 32 sectors, equal
+shares of the cosine-weighted solid angle, the hidden ones are marked, and groups of eight read the world in a direction
+of their own. So shadows have the colour, direction and softness of the light that is missing there. An open plane has
+all its light at every tilt: no sector is lost to the surface itself, and the fans' weights are equal. V: one ray
+(`rays`), in a direction drawn in proportion to the light that the screen leaves of a fan, finds casters that the
+picture does not show.
+
+Sources: Ritschel, Grosch and Seidel 2009 (SSDO); sectors after Therrien, Levesque and Gilet 2023.
 
 | cost | per sample |
 |---|---|
@@ -15,27 +17,17 @@ the surface itself, and the fans' weights are equal. V: what the screen leaves o
 | fetches per pixel | `fans` x (2 x `steps` + 16) |
 | rays per pixel | `fans` |
 
-For pictures of one sample, where it replaces a few hard shadows of environment_light by smooth shade. relMSE of direct
-diffuse light at 96x72, before a sample was seen at several points of the film, in one to three times the time of
-environment_light and a third to a tenth of that of environment_area_lights:
+For pictures of one sample, where it replaces a few hard shadows of environment_light by smooth shading. Auto does not
+take it: the others light every closure, this one diffuse closures only, and the error of environment_light falls to
+zero with the samples. Errors beside both: docs/log/2026-11-26-environment.md.
 
-| | courtyard | product | garden | foliage | window |
-|---|---|---|---|---|---|
-| environment_light, 1 sample | 20 | 0.134 | 0.224 | 0.249 | 0.57 |
-| environment_area_lights, 1 | 6.9 | 0.082 | 0.224 | 0.235 | 7.6 |
-| this, 1 | 1.1 | 0.093 | 0.221 | 0.195 | 0.37 |
-| this without rays, 1 | 93 | 0.25 | 0.225 | 0.194 | 98 |
-| environment_light, 16 samples | 0.26 | 0.013 | 0.030 | 0.022 | 0.49 |
-| this, 16 | 0.20 | 0.084 | 0.026 | 0.026 | 0.50 |
+Bias (diffuse direct light), by design: surfaces hide up to a step more than they are (0.94 to 0.99 of the light is
+left), hidden sides are as thick as `thickness`, and the world is blurred to cells of 5.6 degrees; small suns in it are
+noise.
 
-Auto does not take it: the others light every closure, this one diffuse ones only, and the error of environment_light
-falls to zero with the samples.
-
-Bias, in diffuse direct light, by design: patches hide up to a step more than they are (0.94 to 0.99 of the light is
-left on these scenes), hidden sides are as thick as `thickness`, and the world is blurred to cells of 5.6 degrees; small
-suns in it are noise. Without rays, or with more than 4 million triangles, what is off the screen, hidden, or farther
-than `radius` hides nothing, so light gets into rooms through walls that the camera does not see. Glossy lobes get the
-world by rays (traced_glossy), not from here; translucent and velvet ones get none.
+Fails: without rays, or with more than 4 million triangles, what is off the screen, hidden, or farther than `radius`
+blocks nothing, so light enters rooms through walls that the camera does not see. Glossy lobes get the world by rays
+(traced_glossy); translucent and sheen lobes get none.
 """
 
 from __future__ import annotations
@@ -91,7 +83,7 @@ class DirectionalOcclusion(Technique):
     fills = ("environment",)
     params = (
         *fan_params(radius=1.0, thickness=0.02),
-        Param("rays", "Rays", True, "One ray per fan for what the screen does not show"),
+        Param("rays", "Rays", True, "Trace one ray for each screen direction, for what the screen does not show"),
     )
     reads = SURFACES
     writes = DIRECT_WRITES

@@ -54,7 +54,7 @@ class EmissiveLight(Technique):
     name = "emissive_light"
     label = "Emissive surfaces"
     params = (
-        Param("points", "Points", 4, "Points on emissive surfaces that are drawn per sample", 1, 64),
+        Param("points", "Points", 4, "Points on emissive surfaces in each sample", 1, 64),
         replace(RESOLUTION, default=1.0),
     )
     reads = LIT_SURFACES

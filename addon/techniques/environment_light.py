@@ -1,33 +1,20 @@
-"""Environment light: the world as directional lights, drawn in proportion to its radiance, each with a depth map.
-
-The light probes guide the drawing (light_probes.py): a room lit through a window spends its directions on the window,
-and no scene spends them on the ground below it.
+"""Environment light: the world as directional lights, sampled in proportion to its radiance, each with a depth map.
 
     L(x, v) = mean over samples of  f(x, v, w) cos(w) L_world(w) V(x, w) / p(w)
 
-Directions w come from a low-discrepancy set warped by the world's luminance (addon/sources/environment.py); V is an
-orthographic depth map along w over what the camera sees, so it converges to the truth with any occluder.
+Directions w come from a low-discrepancy set warped by the world's luminance (addon/sources/environment.py) and by what
+light probes found open (light_probes.py): a room lit through a window spends its directions on the window. V is an
+orthographic depth map along w over what the camera sees, so it converges to the truth with any caster.
 
-What shared directions bring where nothing is in the way has a known mean, the irradiance of a normal
-(addon/sources/irradiance.py), and differs from it by noise that all pixels share. Diffuse surfaces have that noise
-taken off, as much of it as light arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl):
-an open floor has its exact light in every sample. Directions count there by how open the probes found the scene towards
-them; with what is hardly seen, and hardly drawn, counted in full, there would be more noise than before. relMSE of the
-picture, 256x192, 1, 4 and 16 samples, without and with: product .0558 .0134 .00199 and .0455 .0106 .00181, and its mean
-1.029 1.016 .997 and .993 1.000 .999 of Cycles'; instances .113 .0367 and .112 .0357; garden, foliage 0 to 3 % less.
+All pixels share a sample's directions, and with them their noise. What they bring unoccluded has a known mean, the
+irradiance of a normal (addon/sources/irradiance.py). Diffuse surfaces subtract the difference, as much of it as light
+arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl): an open floor has its exact light
+in every sample. Directions count there by how open the probes found the scene.
 
-Where many pixels see little of the world (a gallery behind columns), most of the shared directions bring them nothing.
-There each pixel of a final picture traces a ray instead of each two directions, drawn from a table of its tile
-(addon/sources/world_tiles.py). The probes tell beforehand which of the two leaves less: an open sky and a sun in a
-picture of the sky are shared. The noise of rays differs from pixel to pixel, so Denoise takes out more of it.
-relMSE of 256x192 pixels, denoised, by shared directions and by rays:
-
-| | hall, 16 samples | hall, 64 | courtyard, 16 | courtyard, 64 |
-|---|---|---|---|---|
-| shared | .0884 | .0217 | .0684 | .0110 |
-| rays | .0522 | .0081 | .0106 | .0020 |
-
-Where a ray of each pixel costs less than a map (accumulated_maps.py), rays answer for shared directions, too.
+Where many pixels see little of the world (a gallery behind columns), each pixel of a final picture traces a ray instead
+of each two directions, drawn from a table of its tile (addon/sources/world_tiles.py); the probes tell beforehand which
+of the two leaves less error. Where a ray of each pixel costs less than a map, rays answer for shared directions, too.
+Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
 
 | cost | per sample |
 |---|---|
@@ -35,14 +22,11 @@ Where a ray of each pixel costs less than a map (accumulated_maps.py), rays answ
 | passes | 2 over the screen |
 | rays | 1 per pixel instead of each 2 maps |
 
-Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
+Bias: the first sample takes its own share of the known light, an error that falls with directions and samples; the
+irradiance is known to within 0.3 %.
 
-Bias: the first sample takes its own share of the known light, an error that falls with its directions and with the
-samples; the irradiance is known to within 0.3 % (irradiance.py). Rough diffuse surfaces have it as Lambert's do, which
-costs noise, not truth.
-
-Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (see traced_glossy).
-Few samples under an even sky show faint overlapping hard shadows.
+Fails: a mirror-like lobe sees single directions as dots; traced rays take its light instead (traced_glossy). Few
+samples under an even sky show faint overlapping hard shadows. Figures: docs/log/2026-11-26-environment.md.
 """
 
 from __future__ import annotations
@@ -156,7 +140,7 @@ class EnvironmentLight(Technique):
             "directions",
             "Directions",
             0,
-            "Directions of the world that are drawn per sample, as a power of two; 0: by the error they leave",
+            "Directions of the world in each sample, rounded to a power of two; 0: chosen by the expected error",
             0,
             64,
         ),

@@ -1,4 +1,4 @@
-"""Eye: what the observer's eye does to a point of light, at the scene's time.
+"""Eye: how the observer's eye scatters a point of light, at the scene's time.
 
 Provides the point spread function of a living eye (addon/eye): the pupil with its restlessness, particles and fibres of
 the lens, which the ciliary muscle moves, the vitreous body, which swings after each jump of the eye, lids and lashes;
@@ -32,12 +32,20 @@ from ..snapshot.scene import Snapshot
 GLARE = "glare"  # the technique that asks for the point spread, and its choice of how
 OFF, CONVOLUTION, BILLBOARDS = "OFF", "CONVOLUTION", "BILLBOARDS"
 MODE = Param(
-    "mode", "Glare", OFF, "Show the picture as an eye sees it",
-    items=((OFF, "Off", 0), (CONVOLUTION, "Convolution", 1), (BILLBOARDS, "Billboards", 2)), scope=CAMERA,
+    "mode", "Glare", OFF, "Show glare as a human eye sees it",
+    items=(
+        (OFF, "Off", 0, "The picture as a camera takes it"),
+        (CONVOLUTION, "Convolution", 1, "The light of every pixel is spread, by Fourier transform"),
+        (BILLBOARDS, "Billboards", 2, "Only the brightest spots are spread, each as a picture of its own"),
+    ),
+    scope=CAMERA,
 )  # fmt: skip
 LUMINANCE_STEP = 0.02  # decades; as much as noise of the first samples changes the mean, and 0.02 mm of a pupil
 DRAFT_SIDE = 256
-SIDES = tuple((str(side), f"{side} x {side}", side) for side in (128, 256, 512, 1024, 2048))
+SIDES = tuple(
+    (str(side), f"{side} x {side}", side, f"The pattern has {side} texels along each side")
+    for side in (128, 256, 512, 1024, 2048)
+)
 
 
 class PointSpread(Service):
@@ -105,36 +113,58 @@ class EyeModel(Technique):
     name = "eye"
     label = "Eye"
     params = (
-        Param("age", "Age", 30.0, "Years of the observer: old lenses scatter more, old pupils are smaller", 1.0, 110.0),
+        Param(
+            "age", "Age", 30.0,
+            "Age of the observer in years: older lenses scatter more, older pupils are smaller",
+            1.0, 110.0,
+        ),
         Param(
             "pupil", "Pupil", 0.0,
             "Mean diameter of the pupil in mm; 0: by the luminance of the picture (Scene Luminance)", 0.0, 8.5,
         ),
-        Param("restlessness", "Hippus", 1.0, "How much the pupil changes by itself; 1: as measured", 0.0, 5.0),
-        Param("tremor", "Lens Tremor", 1.0, "How much the ciliary muscle moves the lens", 0.0, 10.0),
-        Param("movement", "Eye Movement", 1.0, "How much the vitreous body swings after the eye's jumps", 0.0, 10.0),
-        Param("speed", "Speed", 1.0, "Seconds of the eye in a second of the scene; 0: it stands still", 0.0, 10.0),
-        Param("scatter", "Scatter", 0.1, "Share of the pupil that particles cover, at 25 years", 0.0, 0.5, "FACTOR"),
+        Param(
+            "restlessness", "Hippus", 1.0,
+            "Amplitude of the pupil's spontaneous fluctuations (hippus); 1: as measured",
+            0.0, 5.0,
+        ),
+        Param("tremor", "Lens Tremor", 1.0, "Amplitude of the lens' movement by the ciliary muscle", 0.0, 10.0),
+        Param("movement", "Eye Movement", 1.0, "Amplitude of the vitreous body's swing after eye movements", 0.0, 10.0),
+        Param("speed", "Speed", 1.0, "Speed of the eye's motion relative to scene time; 0: no motion", 0.0, 10.0),
+        Param(
+            "scatter", "Scatter", 0.1,
+            "Share of the pupil covered by scattering particles, at 25 years of age",
+            0.0, 0.5, "FACTOR",
+        ),
         Param(
             "fibres", "Lens Fibres", 0.3,
             "Opacity of the lens' radial fibres, which make a coloured ring where the pupil is wide",
             0.0, 1.0, "FACTOR",
         ),
         Param("lashes", "Eyelashes", 1.0, "Opacity of the eyelashes", 0.0, 1.0, "FACTOR"),
-        Param("squint", "Squint", 0.0, "How far the lids are lastingly closed", 0.0, 1.0, "FACTOR"),
-        Param("blink", "Blink", 0.0, "For keyframes: 0 open, 1 shut; it darkens the picture", 0.0, 1.0, "FACTOR"),
+        Param("squint", "Squint", 0.0, "How far the lids are closed permanently", 0.0, 1.0, "FACTOR"),
+        Param("blink", "Blink", 0.0, "Eyelid, for keyframes: 0 open, 1 shut; darkens the picture", 0.0, 1.0, "FACTOR"),
         Param(
-            "blinks_per_minute", "Blinks per Minute", 0.0, "Blinks that come by themselves; people have 10 to 20",
+            "blinks_per_minute", "Blinks per Minute", 0.0,
+            "Spontaneous blinks per minute; people have 10 to 20",
             0.0, 60.0,
         ),
-        Param("defocus", "Defocus", 0.25, "Residual defocus of the eye in dioptres: widens the core", 0.0, 1.0),
+        Param(
+            "defocus", "Defocus", 0.25,
+            "Residual defocus of the eye in dioptres; widens the core of the glare",
+            0.0, 1.0,
+        ),
         Param(
             "side", "Pattern Size", "512",
-            "Texels of the diffraction pattern: with twice as many it reaches twice as far; drafts take 256 at most",
+            "Texels along each side of the diffraction pattern; twice as many reach twice as far. Drafts use at most "
+            "256",
             items=SIDES,
         ),
-        Param("wavelengths", "Wavelengths", 32, "At least summed for each texel; further out more are taken", 8, 256),
-        Param("person", "Person", 0, "Another number gives another observer's eye", 0, 2**20),
+        Param(
+            "wavelengths", "Wavelengths", 32,
+            "Minimum number of wavelengths summed for each texel; more are used further out",
+            8, 256,
+        ),
+        Param("person", "Person", 0, "Seed of the observer's eye", 0, 2**20),
     )  # fmt: skip
     params = tuple(replace(param, scope=CAMERA) for param in params)
     provides = (PointSpread,)

@@ -63,16 +63,29 @@ class Grass(Technique):
     label = "Grass"
     params = (
         Param(
-            "patch", "Patch", NONE, "What the material's surface is covered with", scope=MATERIAL,
-            items=((NONE, "None", 0), (MEADOW, "Meadow", 1), (FILE, "File", 2)),
+            "patch", "Patch", NONE, "Grass patch that covers the material's surface", scope=MATERIAL,
+            items=(
+                (NONE, "None", 0, "No grass"),
+                (MEADOW, "Meadow", 1, "The meadow that comes with Candela"),
+                (FILE, "File", 2, "A patch from a file"),
+            ),
         ),
-        Param("file", "File", "", "A patch that Render > Candela Grass Patch has made", scope=MATERIAL, file=True),
-        Param("size", "Tile", 0.0, "Side of a tile; 0: as it was made", 0.0, 1000.0, "DISTANCE", scope=MATERIAL),
+        Param("file", "File", "", "Grass patch file, made by Render > Candela Grass Patch", scope=MATERIAL, file=True),
         Param(
-            "height", "Height", 0.0, "Of the longest blades; 0: as they were made, for this tile", 0.0, 1000.0,
-            "DISTANCE", scope=MATERIAL,
+            "size", "Tile", 0.0,
+            "Side length of a tile; 0: the patch's own",
+            0.0, 1000.0, "DISTANCE", scope=MATERIAL,
         ),
-        Param("density", "Density", 1.0, "Share of the ground that is covered", 0.0, 1.0, "FACTOR", scope=MATERIAL),
+        Param(
+            "height", "Height", 0.0,
+            "Height of the longest blades; 0: the patch's own, scaled with the tile",
+            0.0, 1000.0, "DISTANCE", scope=MATERIAL,
+        ),
+        Param(
+            "density", "Density", 1.0,
+            "Share of the ground that is covered by grass",
+            0.0, 1.0, "FACTOR", scope=MATERIAL,
+        ),
     )  # fmt: skip
     provides = (GrassTable,)
 

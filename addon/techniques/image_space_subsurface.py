@@ -3,33 +3,30 @@
     L(x) = albedo / pi * integral over the object's surface of  R(|x - y|) E(y) dA(y)
 
 R is the profile of the material's own method, per channel (kernels/diffusion.py): Christensen-Burley's, or that of the
-random walk. E is found where Shah, Konttinen and Pattanaik (2009) find it, at points seen by rasterisation, and at
-points of the mesh, which also know what the camera does not see. A smooth window of a few point distances divides R:
+random walk. E is known where Shah, Konttinen and Pattanaik (2009) find it, at points seen by rasterisation, and at
+points of the mesh, which also cover what the camera does not see. A smooth window of a few point distances divides R:
 
 - **near**: pixels of the object around, at taps on a spiral, with all the light that the picture's techniques have
   brought there. The mean over taps is divided by that of the profile, so that it is smooth in one sample. Where the
   profile lies within a pixel, this is the local limit, albedo * E / pi.
 - **far**: points of the mesh (scene/scatter_points.py), another of each cell in every sample, lit by every lamp, the
-  world and emissive meshes by rays, and by indirect light (the virtual lights of the technique in that slot). Pixels
-  gather them row by row, leaving out rows beyond the profile's reach.
+  world and emissive meshes by rays, and by indirect light (the virtual lights of the technique in that slot).
 
 Objects do not exchange light. Albedo and radius are those of the place where light leaves, as in Cycles. Burley's
-profile is summed over the surface as it is, thin or bent, in Cycles' measure. The walk's mean over points is divided by
-the profile's, what faces away counts as often as walks through slabs and spheres find it, and the total follows from
-the mean length of lines through the object. What the walk returns depends on the angle of view (Chandrasekhar).
+profile is summed over the surface as it is. The walk's mean over points is divided by the profile's, surfaces that face
+away count as often as walks through slabs and spheres find them, the total follows from the mean chord length of the
+object, and the exit depends on the angle of view (Chandrasekhar).
 
 | cost | per sample |
 |---|---|
 | passes | 1 of the draws that scatter, 1 to 4 over the points, 2 over the picture |
 | rays | a point: one per lamp point, `world directions` and `emissive points`; 4 for indirect light |
-| fetches per pixel | 5 per tap, 3 per point within reach, 1 per row |
-| bytes | 32 per pixel and 64 more while it runs; 384 a point |
+| fetches, bytes per pixel | 5 per tap, 3 per point within reach, 1 per row; 32, and 64 while it runs; 384 a point |
 
-Bias: distances are straight lines through what may be air; the mean over taps is a ratio, and knows what is on screen
-only; the walk's profile is that of a plane; indirect light comes from pixels alone where its technique offers no
-virtual lights. Diffuse roughness and bumps act where light leaves. In mirrors and in indirect light it is diffuse.
-
-Fails: a range of many pixels on an object with more detail than points (`points`) smooths that detail away.
+Bias: distances are straight lines through what may be air; the mean over taps is a ratio of what is on screen; the
+walk's profile is that of a plane; without virtual lights indirect light comes from pixels alone. Bumps and diffuse
+roughness act where light leaves. In mirrors and in indirect light it is diffuse. Fails: a range of many pixels on an
+object with more detail than `points` smooths that detail away.
 """
 
 from __future__ import annotations
@@ -113,21 +110,29 @@ class ImageSpaceSubsurface(Technique):
     params = (
         Param(
             "points", "Points", 4096,
-            "Most points on the surfaces of objects below which light scatters, that are lit in a sample", 64, 65536,
-            draft=512,
-        ),
-        Param("taps", "Taps", 24, "Pixels around each that light below its surface is taken from in a sample", 1, 256),
-        Param(
-            translucency.BLUR, "Blur Map", "", "Painted: how far light spreads below the surface; 0.5 as the material "
-            "says, 1 eight times as far, 0 an eighth", scope=MATERIAL, image=True,
+            "Maximum number of points that are lit in each sample, on all objects with subsurface scattering",
+            64, 65536, draft=512,
         ),
         Param(
-            translucency.TINT, "Tint Map", "", "Painted: colour of light that enters here, below the skin",
+            "taps", "Taps", 24,
+            "Neighbouring pixels from which each pixel gathers scattered light in a sample",
+            1, 256,
+        ),
+        Param(
+            translucency.BLUR, "Blur Map", "",
+            "Painted image: how far light spreads below the surface. 0.5: the material's radius, 1: eight times as "
+            "far, 0: an eighth",
             scope=MATERIAL, image=True,
         ),
         Param(
-            translucency.TRANSLUCENCY, "Translucency Map", "", "Painted: where light scatters below the surface; black "
-            "is plain diffuse", scope=MATERIAL, image=True,
+            translucency.TINT, "Tint Map", "",
+            "Painted image: colour of the light that enters the surface here",
+            scope=MATERIAL, image=True,
+        ),
+        Param(
+            translucency.TRANSLUCENCY, "Translucency Map", "",
+            "Painted image: where light scatters below the surface; black: plain diffuse",
+            scope=MATERIAL, image=True,
         ),
     )  # fmt: skip
     reads = SURFACES

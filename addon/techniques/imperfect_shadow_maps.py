@@ -3,65 +3,31 @@
     irradiance = sum over groups of virtual lights of  (A v_a + B v_b)
     A = sum over the group of  V_i L_i G_i s(d_i),    B = sum of  (1 - V_i) L_i G_i s(d_i)
 
-Virtual lights (virtual_lights.py), their kernels G, their bound s near surfaces, the short rays that give back what the
-bound takes, and gathering by regions are those of multires_radiosity.py. What differs is visibility: V_i is what the
-map of light i says, bilinear between four texels. In each of `rays` groups, a is drawn in proportion to its term of A
-and b to its term of B; rays find v_a and v_b, whether those are seen. In the mean the maps cancel, and the estimate is
-that of tracing every virtual light; its noise is that of what the maps show wrong. Each channel draws by itself, with
-the same numbers, mostly the same light: so no channel loses more than it has, and light stays positive.
+Virtual lights, kernels G, the bound s with its short rays, and regions are those of multires_radiosity.py. V_i is what
+the map of light i says, bilinear between four texels. In each of `rays` groups, light a is drawn in proportion to its
+term of A and b to its term of B; rays find their visibilities v_a and v_b. In the mean the maps cancel: the estimate is
+that of tracing every virtual light, and its noise is that of what the maps show wrong. Light stays positive.
 
-All maps are drawn at once, from a coarse stand-in for the scene (scene/surface_points.py): triangles that are large
-beside the spacing of points as themselves, the rest as discs about `points` points, 1.2 times as wide as the area that
-a point stands for, cut off at the bounds of their object. Each map takes other points. A map is the half ball over its
-light's surface as a disc, (x, y) / (1 + z), in which circles stay circles, so that a square holds each disc's picture.
-A texel stores the plane of what it meets first, not a depth: plane n . p = h hides a place p of a surface with normal
-m, seen from the light, if
+All maps are drawn at once from a coarse stand-in for the scene (scene/surface_points.py): large triangles as
+themselves, the rest as discs at `points` points, others for each map. A map is the half ball over its light's surface,
+(x, y) / (1 + z). A texel stores the plane of the nearest thing; plane n . p = h hides a place p of a surface with
+normal m if
 
     n . p - h > slack |p|,     and, where -n . m > 1/2:     n . p - h > 3/4 |p - hit| |n x m| + slack |p|
 
-By the second, smooth surfaces that are bent either way are the same surface as the disc beside them: on an arc the left
-side is half of |p - hit| |n x m|. No bias is in metres. Then holes between discs are filled by pulling planes up to two
-maps of half the side each and pushing them down again. A coarse texel has a plane if three of its four have the nearest
-one, to 5 % of the distance (10 % on the next level), and fills what is empty or farther behind than that.
+(the second keeps curved surfaces from shadowing themselves). Pull and push fills holes between discs.
 
 Sources: Ritschel, Grosch, Kim, Seidel, Dachsbacher & Kautz 2008; Ritschel 2009, chapter 5; pull and push: Marroquim et
-al. 2007. Ours: planes, triangles for themselves, bounds, evenly spread points, correction by rays, that a coarse texel
-needs three of four. With one of four, as theirs, every edge grows by a texel or two: of the light in a corner under a
-shelf, all drawn from discs, that took 8 % instead of 1 %.
+al. 2007, here where three of four texels agree. Ours: planes, triangles, evenly spread points, correction by rays.
 
-| cost | per sample, with N virtual lights |
+| cost | per sample, with N virtual lights; else as multires_radiosity.py |
 |---|---|
-| surface points | once per geometry; objects that move redo all |
-| splats | N x (`points` + at most as many large triangles) squares |
-| texels | N x `map_size`^2 of 12 bytes, 1.3 passes more where there are points; 256 x 32^2: 3 MB |
+| splats, texels | N x (`points` + large triangles) squares; N x `map_size`^2 of 12 bytes, 1.3 passes more for points |
 | gathering | 1 kernel and 4 texels per region and virtual light, 2 to 6 rays per region and group |
-| else | as multires_radiosity.py |
 
-Fails: what is smaller than a texel (4 / `map_size` of the distance) or than the spacing of points is wrong in the maps,
-and so grain: grass, and towns of thousands of houses. No hierarchy for more than 4 million triangles: no indirect light
-then.
-
-Bias, in diffuse indirect light: that of multires_radiosity.py. Without rays, besides, what the maps show wrong. Against
-tracing the same 256 virtual lights, two samples, all pixels, RMS over the mean and mean:
-
-| | maps alone | 4 pairs of rays | 16 pairs |
-|---|---|---|---|
-| Cornell box | 3.7 %, - 0.4 % | 6.1 %, 0.0 % | 3.2 %, 0.0 % |
-| door ajar | 49 %, + 9.9 % | 22 %, + 0.2 % | 13 %, + 0.1 % |
-| colonnade | 31 %, - 0.1 % | 21 %, - 0.2 % | 10 %, - 0.2 % |
-| town of instances | 45 %, + 23 % | 15 %, + 0.2 % | 9 %, - 0.2 % |
-
-Beside Cycles' diffuse indirect pass (`python -m bench indirect`; relMSE, and bias at 64 samples), on a software GPU, on
-which the squares of splats are what costs most:
-
-| | 1 sample | 64 samples | instant radiosity: 1, 64 | time by instant radiosity's |
-|---|---|---|---|---|
-| Cornell box | 0.227 | 0.0024, 1.001 | 0.182, 0.0044 | 1.3 |
-| emissive lamp, denoised | 0.048 | 0.0045, 1.002 | 0.045, 0.0048 | 2.3 |
-| sky courtyard, denoised | 0.064 | 0.0029, 1.012 | 0.063, 0.0032 | 3.3 |
-| window interior | 0.43 | 0.105, 1.057 | 0.54, 0.097, 1.057 | 4.4 |
-
-The window's bias and error are those of the virtual lights.
+Bias (diffuse indirect light): that of multires_radiosity.py; without rays also what the maps show wrong. Fails: what is
+smaller than a texel or the spacing of points is grain (grass, towns of thousands of houses). Figures:
+docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
@@ -217,16 +183,23 @@ class ImperfectShadowMaps(MultiresRadiosity):
     label = "Imperfect shadow maps"
     params = (
         Param(
-            "virtual_lights", "Virtual lights", 256, "Points of surfaces that light the picture, each with a map", 1,
-            2048, draft=64,
+            "virtual_lights", "Virtual lights", 256,
+            "Virtual lights in each sample, each with a shadow map",
+            1, 2048, draft=64,
         ),
         Param(
-            "points", "Points", 512, "Points in each map for what is small; rounded to a power of two", 16, 16384,
-            draft=128,
+            "points", "Points", 512,
+            "Points that stand for small geometry in each map; rounded to a power of two",
+            16, 16384, draft=128,
         ),
-        Param("map_size", "Map size", 32, "Texels along a side of a map; rounded to a power of two", 8, 128, draft=16),
         Param(
-            "rays", "Rays", 4, "Pairs of rays of each region in a sample that correct what the maps show; 0: none",
+            "map_size", "Map size", 32,
+            "Texels along each side of a map; rounded to a power of two",
+            8, 128, draft=16,
+        ),
+        Param(
+            "rays", "Rays", 4,
+            "Pairs of rays per region and sample that correct the maps; 0: none",
             0, 128, draft=1,
         ),
         LEVELS,

@@ -5,39 +5,30 @@ that making links is testing depth: no shadow map, no rays through triangles. Li
 
     E_k(x) / pi = mean over bins of  L_k-1(link),      L_k = rho (E_direct + E_k) / pi,        k = 1 .. bounces
 
-and what arrives at surfels is shown at pixels by a linear fit over those around (shaders/implicit_visibility/). The
-solution belongs to the surfaces, not to the picture: a camera that moves costs the fit alone, changed lights or
-materials keep the links, and what moves makes links anew.
+and pixels show a linear fit over the surfels around (shaders/implicit_visibility/). The solution belongs to the
+surfaces, not to the picture: a camera that moves costs the fit alone, changed lights or materials keep the links, and
+what moves makes links anew.
 
-Bins are not the cube maps of the thesis but a square of bins folded onto the half ball over the surfel so that all have
-the same projected solid angle: weights are equal, the sum over a closed room is exactly pi, none lie below the horizon.
-21 x 21 are as many over a half ball as 6 x 12 x 12 are over a ball. `bins` x `bins` of them are turned and shifted
-differently for every surfel and in each of `orientations` solutions, one for each sample of a picture until they begin
-anew: what a bin hides is drawn evenly out of it, and blocks average out among neighbours and over samples.
-
-Links are found bin by bin instead of pair by pair: down the tree of surfels, opening nodes until they look no larger
-than the bin, keeping the nearest disc that the bin's direction meets. That is the thesis's refinement (a link goes to a
-group that fits a bin), its pushing down (links of a leaf and of its parents: the shortest wins) and its weight E2 with
-the footprint rule in one pass, in no order and without atomics.
+Bins are a square folded onto the half ball so that all have the same projected solid angle (Shirley and Chiu 1997):
+weights are equal, and 21 x 21 are as many as a cube map of 6 x 12 x 12 has. They are turned and shifted differently for
+every surfel and in each of `orientations` solutions, one for each sample of a picture, so that errors average out.
+Links are found bin by bin down the tree of surfels: nodes are opened until they look no larger than the bin, and the
+nearest disc in the bin's direction is kept (the source's refinement, push-down and weight E2 in one pass).
 
 Source: Dong, Kautz, Theobalt and Seidel, "Interactive Global Illumination Using Implicit Visibility", Pacific Graphics
-2007; Dong, PhD thesis, Saarland University 2011, chapter 4. Bins by Shirley and Chiu 1997.
+2007; Dong, PhD thesis, Saarland University 2011, chapter 4.
 
 | cost, R receivers | |
 |---|---|
-| surfels, when surfaces change | CPU, scene/surfels.py |
+| surfels, when surfaces change | CPU, scene/surfels.py; 200,000 rays and a readback, scene/seen.py |
 | links, for each solution, when surfaces change | R bins^2 walks down the tree; 4 R bins^2 bytes are kept |
 | light, for each solution, when it changes | lighting/surfels.py; a bounce fetches 2 R bins^2 texels |
 | each sample | 1 pass, about 150 nodes per pixel of 2 fetches |
 
-Bias, all in diffuse indirect light: surfaces are discs, so that silhouettes, contacts and slits narrower than a surfel
-are blurred; light of neighbouring surfels is one linear function. Rough diffuse surfaces count as Lambertian, gloss
-that surfels send as even, glass and alpha as what they cover; participating media between surfels are left out.
-Directions of the world are those that the first picture preferred. Averages over all `orientations` are the floor of
-the error.
-
-Fails: light through gaps, and on things, smaller than a surfel: `surfels` says how many there are. Gloss is one ray per
-pixel, as of ssdo.py."""
+Bias (diffuse indirect light): silhouettes, contacts and slits narrower than a surfel are blurred. Rough diffuse and
+gloss that surfels send count as even, glass and alpha as what they cover; media are left out. Fails: light through
+gaps, and on things, smaller than a surfel (`surfels` sets the number). Gloss is one ray per pixel, as in ssdo.py.
+"""
 
 from __future__ import annotations
 
@@ -53,6 +44,7 @@ from ..lighting import surfels as surfel_light
 from ..lighting.surfels import SurfelLight
 from ..lighting.virtual_lights import VirtualLights
 from ..scene import acceleration
+from ..scene.seen import SEES
 from ..scene.surfels import Surfels
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import ANY_SURFACE, LIT_SURFACES, MARKS, SURFACE_TEXTURES, surface_bindings
@@ -130,13 +122,16 @@ class ImplicitVisibility(Technique):
     label = "Implicit visibility"
     fills = ("indirect",)
     params = (
-        Param("surfels", "Surfels", 4096, "Discs that stand for all surfaces, both sides counted", 64, 65536),
+        Param("surfels", "Surfels", 4096, "Number of discs that represent all surfaces, both sides counted", 64, 65536),
         Param(
-            "bins", "Bins", 21, "Directions along a side of the square that is a surfel's half ball; 21 are as fine as "
-            "cube maps of 12", 4, 32,
+            "bins", "Bins", 21,
+            "Directions along each side of the square that is mapped to a surfel's hemisphere; 21 are as fine as "
+            "cube maps of 12 texels",
+            4, 32,
         ),
         Param(
-            "orientations", "Orientations", 8, "Solutions with bins turned differently, of which each sample shows one",
+            "orientations", "Orientations", 8,
+            "Number of solutions with differently rotated bins; each sample shows one of them",
             1, 64,
         ),
     )  # fmt: skip
@@ -152,7 +147,7 @@ class ImplicitVisibility(Technique):
         return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return (*PROGRAMS, *surfel_light.PROGRAMS)
+        return (SEES, *PROGRAMS, *surfel_light.PROGRAMS)
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is None or not len(frame.receivers.distance):

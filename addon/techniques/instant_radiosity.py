@@ -1,36 +1,21 @@
 """Instant radiosity: indirect light by virtual lights and traced visibility. Converges to the truth.
 
 Indirect light at x is the integral over surfaces y of f(x) L(y) G(x, y) V(x, y), G = cos_x cos_y / d^2. Virtual lights
-(virtual_lights.py) are points of this integral, shared by all pixels; alone they leave bright blots in corners, where G
-has no bound. So the integral is split by a share s(d) = min(1, d^2 / r^2):
+(virtual_lights.py; Keller 1997) are points of this integral, shared by all pixels; alone they leave bright blots in
+corners, where G has no bound. So the integral is split by a share s(d) = min(1, d^2 / r^2):
 
     L_ind(x) = sum over virtual lights of  f L/n G s V   +   mean over rays of  f pi / cos * (1 - s) L(y)
 
-The first kernel is bounded by cos_x cos_y / r^2. The second needs rays of length r only (Kollig & Keller 2004: bias
-compensation), and both shares add to one at every distance: nothing is doubled, nothing is lost. L at the end of a ray
-is estimated on the spot: sources by one traced point, the virtual lights by one of them, and what is nearer than r to
-*that* point by another short ray, and so on. In pictures of several samples r is a fifth of the median distance of what
-is seen (not behind rays of glossy lobes); in drafts and pictures of few it shrinks with the spacing of the virtual
-lights. What rays find is grain, each pixel's own, which Denoise takes out; what a set of virtual lights lacks in
-places, all pixels there share. relMSE at 16 samples, 256x192, with r of .06, .12, .16, .23 and .4 times that distance:
-hall .0131, .0118, .0112, .0110 and .0108 (of which .0064 is the reference's noise), Cornell box .00173, .00164, .00160,
-.00159 and .00178 (.0008).
+The first kernel is bounded by cos_x cos_y / r^2. The second needs rays of length r only (bias compensation, Kollig &
+Keller 2004). Both shares add to one at every distance: nothing is counted twice, nothing is lost. L at the end of a ray
+is estimated on the spot: light sources by one traced point, the virtual lights by one of them, and what is nearer than
+r to that point by another short ray. r is a fifth of the median distance of what is seen; in drafts and pictures of few
+samples it shrinks with the spacing of the virtual lights.
 
-Every pixel looks at every other one of the virtual lights, as on a chess board that turns colours with each sample.
-Twice as many for the same arithmetic: a mean over neighbours is one over all of them.
-
-Per pixel and sample, `rays` virtual lights are traced out of all, drawn in proportion to what they would bring: noise
-comes from visibility alone. Glossy surfaces trace a ray of their lobe, whose end is shaded in the same way; where the
-lobe is most of what is seen, as on metal, LOBE_RAYS of them: the noise of one is then the noise of the picture. relMSE
-of the picture, 256x192, 16 samples, with one, two and four: product .00181, .00160, .00151, garden .0037, .0034, .0033,
-instances .0127, .0124, .0122, in 1, 1.0 to 1.04 and 1.03 to 1.08 times the time.
-
-Sheen, velvet, toon and translucent lobes get light of other surfaces by one ray of each pixel, of the cosine's density;
-a translucent surface that a ray meets is lit from behind or from before, by lot.
-
-More than two of them do not pay from four samples on: what is left is noise of the virtual lights, which all pixels
-share. Eight have .5 to 5 % less error than two (seven sample scenes, 256x192, 16 samples), in 1.15 to 1.5 times the
-time.
+Each pixel evaluates every second virtual light, in a chequered pattern that changes with each sample, and traces `rays`
+of them, drawn in proportion to what they would bring: noise comes from visibility alone. Pixels choose all lights
+before they trace, so that neighbouring rays run together. Glossy surfaces trace a ray of their lobe, metals LOBE_RAYS
+of them; sheen, toon and translucent lobes one of the cosine's density.
 
 | cost | per sample |
 |---|---|
@@ -39,19 +24,10 @@ time.
 | of glossy surfaces | + 1 to 3, on metal + 4 to 12 |
 | arithmetic per pixel | 1 kernel for every other virtual light, and one 32nd of that again for each ray |
 
-A pixel first chooses all virtual lights that it traces, then traces them: where every pixel traced as soon as its light
-had passed, the rays of neighbours ran one by one. At 128x96 that divides the time of the gather by 3.8 in the Cornell
-box and by 2.5 beyond a door ajar, at the same error. Squared error of diffuse indirect light after 64 samples, net of
-the reference's (2 x 2048 or 4096 samples, 96x72, two seeds), with 96 probes and 256 virtual lights: hall 0.051 (of one
-seed 0.011), door ajar 0.0053; with 192 and 256: hall 0.0068, door 0.0058, window 0.0116; with 192 and 384: window
-0.0082. More probes find what few would, and then stood for much: the spread between seeds falls with them.
-
-Fails: with few samples, grain where virtual lights are partly hidden; a sample that is shown alone is filtered
-(neighbours.py). Light that reached a diffuse surface over mirrors (caustics) is spread as by roughness 0.5 and more.
-No hierarchy for more than 4 million triangles: no indirect light then.
-
-Bias, all in the diffuse and glossy indirect paths: what virtual_lights.py names; of light that is reflected near a
-corner several times, the last bounces before the limit may be counted once more than allowed.
+Bias (diffuse and glossy indirect light): that of virtual_lights.py; near corners the last bounces before the limit may
+be counted once more than allowed. Fails: grain in few samples where virtual lights are partly hidden; caustics are
+spread as by roughness 0.5 and more; no indirect light above 4 million triangles. Figures:
+docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
@@ -206,12 +182,13 @@ class InstantRadiosity(Technique):
     params = (
         Param(
             "virtual_lights", "Virtual lights", 512,
-            "Points of surfaces that light the picture in a sample; pixels look at every other one", 1, 1024, draft=64,
+            "Virtual lights in each sample; a pixel evaluates every second one",
+            1, 1024, draft=64,
         ),
         Param(
             "rays", "Rays", 2,
-            "How many of the virtual lights each pixel traces in a sample; pictures of few samples trace up to four "
-            "times as many", 1, 64, draft=1,
+            "Shadow rays to virtual lights per pixel and sample; pictures of few samples use up to four times as many",
+            1, 64, draft=1,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES

@@ -46,7 +46,7 @@ POINTS, FEWEST_POINTS, RAYS_OF_PROBE = 32, 8, 128  # of each light at most, at l
 # relMSE that one lit sample leaves at edges, by four points of the film: of the sample scenes at 256x192, 16 samples.
 EDGES = 0.04
 ROUNDING = 1e-5  # of sums of POINTS equal numbers and their squares
-MOST_LIGHTS = 16  # more are drawn by lot, and then each sample has a point on each that was drawn
+MOST_LIGHTS = 16  # more are drawn at random, and then each sample has a point on each that was drawn
 RAYS = (*acceleration.HIERARCHY_TEXTURES, *SURFACE_TEXTURES)
 GUIDE = passes.fullscreen_program(
     "environment guide",
@@ -73,14 +73,15 @@ class LightProbes(Technique):
     label = "Light probes"
     params = (
         Param(
-            "guiding", "Guiding", True, "Draw more directions of the world from where light reaches the picture",
+            "guiding", "Guiding", True,
+            "Sample more directions of the world from where its light reaches the picture",
             draft=False,
         ),
         Param(
             "maps", "Maps per sample", 8.0,
-            "Depth maps that a sample of a final picture shares out among lights and world, by the error of each, "
-            "and more of them where many samples, or few directions of the world, would leave too much of it; "
-            "0: one for every light", 0.0, 64.0,
+            "Number of depth maps in each sample of a final render, distributed among lights and world in proportion "
+            "to their error; more are used where that leaves too much noise. 0: one for every light",
+            0.0, 64.0,
         ),
     )  # fmt: skip
     reads = SURFACES
@@ -197,7 +198,7 @@ class LightProbes(Technique):
         if lit:
             rates[WORLD] = directions_for(joint[-1], samples, rates[WORLD], asked, alone)
         if any(material.transparent or material.soft for material in frame.materials.compiled):
-            # Layers and soft lobes are drawn by lot in each sample: a light that misses samples would see few of them.
+            # Layers and soft lobes are drawn at random in each sample: a light that misses samples would see few.
             rates = {place: Rate(max(rate.exponent, 0)) for place, rate in rates.items()}
         frame.count(self, "probing rays", (len(moments) - (seen is not None)) * moments.shape[1] * asked_points)
         keys = [emitter.light.key for emitter in emitters] + [WORLD] * lit

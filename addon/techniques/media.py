@@ -1,4 +1,4 @@
-"""Media: what fog, smoke and coloured solids take away from light, along the view and on its way from lights.
+"""Media: the light that fog, smoke and coloured solids absorb and scatter away, along the view and towards lights.
 
     T(a, b) = exp(-integral of the extinction of all media from a to b)
 
@@ -37,7 +37,9 @@ class MediaAttenuation(Technique):
     params = (
         Param(
             "resolution", "Resolution", 96,
-            "Cells along the longest side of a volume that varies; OpenVDB objects keep their voxels", 4, 256, draft=48,
+            "Grid cells along the longest side of a volume whose density varies; OpenVDB objects keep their own "
+            "voxels",
+            4, 256, draft=48,
         ),
     )  # fmt: skip
     provides = (MediaService,)

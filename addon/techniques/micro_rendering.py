@@ -1,44 +1,33 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
-Points are spread over all surfaces by area, wherever the camera looks, shaded with their own materials and lit straight
-by all lamps, the world and emissive meshes (lighting/lit_points.py). A tree over them has rectangles in place of flat
-groups of points (scene/point_tree.py). Every place that gathers goes through the tree and draws what it sees of it into
-a micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Its pixels
-are equal shares of what the surface reflects, so light is a plain mean:
+Points are spread over all surfaces by area, each for its own piece of a triangle, shaded with their own materials and
+lit by all lamps, the world and emissive meshes (lighting/point_runs.py). A tree over them has rectangles in place of
+flat groups of points (scene/point_tree.py). Every place that gathers walks the tree and draws what it sees of it into a
+micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Pixels of the
+buffer are equal shares of what the surface reflects, so light is a plain mean:
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
 Diffuse light is gathered by regions of the picture and interpolated as in multires_radiosity.py; lobes of microfacets
-by each pixel, whose micro-buffer has rays of the lobe. What is reflected more than once, groups of points gather for
-themselves. In each sample other points, other turns and shifts of the pixels: what is not bias averages out.
+by each pixel, whose micro-buffer has rays of the lobe. Groups of points gather further bounces for themselves. Each
+sample has other points and pixels turned and shifted differently.
 
-Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours: groups
-are rectangles, drawn by rays through the middles of pixels (there a group fills the one pixel that its own middle falls
-into, which makes silhouettes grow); no list of what is left for rays; both sides of points; medians of normals, too;
-the concentric map.
+Source: Ritschel, Engelhardt, Grosch, Seidel, Kautz, Dachsbacher 2009; Ritschel's thesis 2009, chapter 6. Ours:
+rectangles drawn by rays through the middles of pixels (there a group fills one pixel); both sides of points; medians of
+normals.
 
 | cost | with n points, a region or pixel that gathers, K x K pixels |
 |---|---|
-| fetches | 2 for each node that is visited, some 10 to 30 K^2 log n; K^2 for the sum |
+| fetches, rays | 2 per visited node, some 10 to 30 K^2 log n; 2 n rays for each point of a light source, else none |
 | bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
-| rays | 2 n for each point of a light source, and none besides |
-| passes | 4 x `levels` + 2, and for each bounce 4 |
+| passes | 4 x `levels` + 2, and for each bounce 4; the tree in parts on Mesa (docs/micro_rendering.md) |
 
-A dispatch is one thread for each place. Mesa's software rasteriser ends a shader's loops after 65,536 rounds, so there
-the tree is walked by parts; eight lanes that walk different ways make it slow: docs/micro_rendering.md.
+Fails: lobes narrower than the points' spacing show pieces (mirrors need rays). A kilometre of ground takes all points.
 
-Fails: beside a bright room behind a thin wall (the door ajar): what stands for lit surfaces there reaches through at
-the room's edges, by up to the points' spacing, and lights a dark room many times too much. A mirror needs rays: lobes
-narrower than the points' spacing show discs. A ground of a kilometre takes all points. Where columns or slats are as
-narrow as the points' spacing, discs that overhang shut the gaps: the colonnade has .64 of its light of one reflection
-with 8192 points, .79 with 65536.
-
-Bias, in diffuse and glossy indirect light: discs of points, 1.5 times their area's radius, reach over edges by half of
-that, which darkens beside them; between them are 0.4 to 4 % of holes; leaves, grass and hair below the points' spacing
-are wrong.
-Points reflect gloss as if it were diffuse, and translucent leaves what they let through. Clear glass is not there.
-Sheen, velvet and translucent lobes of what is seen get no indirect light, rough diffuse counts as Lambertian, and fog
-between surfaces dims nothing.
+Bias (diffuse and glossy indirect light): a piece sends the light of one place on it as far as nothing stands between
+(shaders/micro/clips.frag.glsl); of meshes with more triangles than half of the points the smallest have discs, which
+reach over edges: leaves, grass and hair below the points' spacing are wrong. Points reflect gloss as diffuse; sheen and
+translucent lobes get none, clear glass is not there, rough diffuse counts as Lambertian, fog between dims nothing.
 """
 
 from __future__ import annotations
@@ -52,8 +41,16 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import lists
 from ..lighting import micro_buffers
-from ..lighting.lit_points import LitPoints, Run
-from ..lighting.micro_buffers import BUFFER_CONSTANTS, BUFFER_IMAGE, BUFFER_TEXTURES, NodeRadiance, buffer_bindings
+from ..lighting.micro_buffers import (
+    BUFFER_CONSTANTS,
+    BUFFER_DEFINES,
+    BUFFER_IMAGE,
+    BUFFER_TEXTURES,
+    NodeRadiance,
+    buffer_bindings,
+)
+from ..lighting.point_runs import PointRuns, Run
+from ..scene.seen import SEES
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..surfaces.draw import SURFACE_TEXTURES, surface_bindings
@@ -78,7 +75,7 @@ def _regions(listed: bool) -> Program:
         constants=(
             *BUFFER_CONSTANTS, *GRID, ("INT", "first_row"), ("INT", "row_count"), ("INT", "columns"), *constants,
         ),
-        defines=(*RUNS, *(() if listed else (("BY_LEVEL", ""),))),
+        defines=(*RUNS, *BUFFER_DEFINES, *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
     )  # fmt: skip
 
@@ -91,6 +88,7 @@ GLOSSY = Program(
     images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
     blocks=((VIEW, "film_view"),),
     constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
+    defines=BUFFER_DEFINES,
 )
 REFLECTED = passes.fullscreen_program(
     "light of micro-buffers reflected",
@@ -106,45 +104,53 @@ class MicroRendering(MultiresRadiosity):
     label = "Micro-rendering"
     params = (
         Param(
-            "points", "Points", 8192, "Points on all surfaces that light is stored at; rounded to a power of two", 64,
-            1 << 20,
+            "points", "Points", 8192,
+            "Points on all surfaces at which light is stored; rounded to a power of two",
+            64, 1 << 20,
         ),
         Param(
-            "side", "Micro-buffer side", 8, "Pixels along a side of the hemisphere that a place gathers", 4, 32,
-            draft=8,
+            "side", "Micro-buffer side", 8,
+            "Pixels along each side of the micro-buffer, the picture of a hemisphere from which light is gathered",
+            4, 32, draft=8,
         ),
         Param(
-            "lobe_side", "Reflections' side", 5, "The same of what a glossy pixel reflects", 1, 32, draft=3,
+            "lobe_side", "Reflections' side", 5,
+            "Pixels along each side of the micro-buffer of a glossy reflection",
+            1, 32, draft=3,
         ),
         Param(
-            "threshold", "Threshold", 1.0, "Pixels of a micro-buffer that a group of points may cover and still be "
-            "drawn as one disc", 0.05, 16.0,
+            "threshold", "Threshold", 1.0,
+            "Largest group of points that is drawn as one disc, in pixels of the micro-buffer",
+            0.05, 16.0,
         ),
         Param(
-            "centre_test", "Centre test", True, "Draw a disc where the middles of pixels see it; else into the pixel "
-            "that its own middle falls into, which makes silhouettes grow",
+            "centre_test", "Centre test", True,
+            "Draw a disc into the pixels whose centres see it; otherwise into the pixel that holds the disc's own "
+            "centre, which enlarges silhouettes",
         ),
         Param(
-            "groups", "Groups", 1024, "Groups of points that gather light to be reflected again", 16, 1 << 14,
-            draft=256,
+            "groups", "Groups", 1024,
+            "Groups of points that gather light for further bounces",
+            16, 1 << 14, draft=256,
         ),
         Param(
-            "levels", "Levels", 2, "Regions that gather have up to 2^levels pixels a side; 0: every pixel gathers", 0,
-            5,
+            "levels", "Levels", 2,
+            "Largest regions have 2^levels pixels a side; 0: gather light at every pixel",
+            0, 5,
         ),
     )  # fmt: skip
     provides = ()
 
     def __init__(self):
         super().__init__()
-        self._points = LitPoints("micro")
+        self._points = PointRuns("micro")
         self._radiance = NodeRadiance()
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return False
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
-        return (*micro_buffers.PROGRAMS, REFLECTED)
+        return (SEES, *micro_buffers.PROGRAMS, REFLECTED)
 
     def begin(self, frame: Frame) -> None:
         if frame.receivers is not None and len(frame.receivers.distance):
@@ -165,7 +171,12 @@ class MicroRendering(MultiresRadiosity):
         levels = fitting_levels(frame.size, frame.settings.get(self, "levels"))
         offset = tuple(int(u * (1 << levels)) for u in frame.random("regions"))
         bindings = {
-            "textures": {**surface_bindings(frame), "tree_nodes": run.nodes, "node_radiance": self._radiance.image},
+            "textures": {
+                **surface_bindings(frame),
+                "tree_nodes": run.nodes,
+                "piece_clips": run.clips,
+                "node_radiance": self._radiance.image,
+            },
             "blocks": {"film_view": frame.view_block},
             "constants": buffer_bindings(frame, run, frame.settings.get(self, "side"), **settings, use="micro regions"),
         }
@@ -233,7 +244,7 @@ class MicroRendering(MultiresRadiosity):
         try:
             for first in range(0, height, rows):
                 count = min(rows, height - first)
-                for part in micro_buffers.parts(leaves):
+                for part in micro_buffers.parts(leaves, side):
                     passes.compute(
                         program, (columns, count), textures=textures, images={"gathered": atlas, "micro": micro},
                         blocks=bindings["blocks"],

@@ -1,4 +1,4 @@
-"""Multi-resolution instant radiosity: hundreds of virtual lights per picture, gathered by regions instead of pixels.
+"""Multi-resolution instant radiosity: hundreds of virtual lights, gathered by regions of the picture instead of pixels.
 
 Irradiance varies slowly over a surface, so that it is gathered once for each region of 1 x 1 to 2^L x 2^L pixels and
 interpolated in between. A region may not hold a silhouette, a range of depths above 5 % or of normals above 0.4 per
@@ -7,19 +7,13 @@ axis (by min-max pyramids), nor the border of the picture, and neighbours differ
     S(q, l) = range(q, l) too large, or S of any of the 4 x 4 regions around q's quarter at level l - 1
     gathered: not S(q, l) and S(parent, l + 1)            (every pixel lies in exactly one such region)
 
-The regions that gather are listed first, so that a processor that runs many side by side finds no gaps between them.
-From the coarsest level down, a region that a larger one covers interpolates bilinearly between its four coarser
-neighbours, those without data left out, the others weighted by exp(-(distance off the plane / 2 % of the depth)^2) and
-(n . n')^8. A region that is split has what its quarters have, so that interpolation does not end one region before
-every edge; and weights are those between the pixels that stand for regions, which of two pixels is the second one: half
-a pixel beside, light that falls off along a wall lost 1.6 % in 32 x 32 pixels. Both halved the difference from the
-gather of every pixel (Cornell box 1.5 %, window 1.1 %, hall 1.1 %).
+From the coarsest level down, a region that a larger one covers interpolates its four coarser neighbours, weighted
+bilinearly, by exp(-(distance off the plane / 2 % of the depth)^2) and (n . n')^8.
 
-Virtual lights, their bound near surfaces, and the short rays that give back what the bound takes are those of
-instant_radiosity.py, as is glossy light; nothing is doubled and nothing is lost. As a region is gathered for many
-pixels, it can look at many more virtual lights and trace more of them: at one sample the error of a picture is that of
-the set of virtual lights, which falls with their number. In every sample the grid of regions is shifted. A sample that
-is shown alone is filtered over neighbouring pixels (neighbours.py), which takes the grain of the short rays.
+Virtual lights, their bound near surfaces, the short rays that give back what the bound takes, and glossy light are
+those of instant_radiosity.py. A region serves many pixels, so it can evaluate and trace many more virtual lights: at
+one sample the error is that of the set of virtual lights, which falls with their number. The grid shifts in every
+sample.
 
 Sources: Nichols & Wyman 2009 (multi-resolution splatting); Nichols, Shopf & Wyman 2009; Le Hoang Quyen 2014.
 
@@ -30,25 +24,10 @@ Sources: Nichols & Wyman 2009 (multi-resolution splatting); Nichols, Shopf & Wym
 | virtual lights | see virtual_lights.py: 4 candidates each, 192 rays each for the density |
 | passes | 4 x `levels` + 2 |
 
-Measured at 640x360 with 256 virtual lights on a software GPU, all that finds regions and interpolates included: Cornell
-box 52 ms beside 108 for every pixel, hall 65 beside 154, window 81 beside 150; 58, 108 and 104 when it was drawn level
-by level instead of from a list, and each edge split the regions on both of its sides. Some 25 ms do not depend on the
-virtual lights. With 64 of the lights traced: 0.25 s beside 1.1, 1.4 beside 5.3, 2.6 beside 6.2.
-
-Auto takes it for pictures of one sample, up to 60 000 pixels. At 96x72 their diffuse indirect light has relMSE 0.049,
-0.050, 0.071, 0.079, 0.016 and 0.037 (Cornell box, hall, door, window, lamp, courtyard; mean of six seeds), instant
-radiosity 0.071, 0.063, 0.115, 0.095, 0.025 and 0.037, clustered visibility the same as this within 6 % in more time. At
-256x192 the error is 1.5 to 2.2 times smaller than instant radiosity's in 1.2 to 2.1 times the processor time.
-
-Fails: grass and hair split every region, and then it costs as much as gathering for every pixel. Alpha that is drawn by
-lot does the same.
-
-Bias, all in diffuse indirect light: that of instant_radiosity.py; shadows of indirect light that are narrower than a
-region are blurred over it (the shift of the grid averages the blocks, not the blur); rough diffuse reflection counts as
-Lambertian. Without `near_bounces` what is reflected more than once between surfaces closer than the bound is missing,
-for less time and no more error of a picture that is noisy anyway: by the Fast preset, 256x192, three seeds, seconds,
-relMSE and mean with it and without: instances 1.6 .0869 .988 and 1.2 .0817 .964, foliage .96 .0225 1.001 and .77 .0224
-.999, window .74 .146 .955 and .61 .141 .946, garden .69 .0360 1.002 and .61 .0344 .999.
+Bias (diffuse indirect light): that of instant_radiosity.py; indirect shadows narrower than a region are blurred over
+it; rough diffuse counts as Lambertian; without `near_bounces` light reflected more than once between surfaces closer
+than the bound is missing. Fails: grass, hair and stochastic alpha split every region: the cost is then that of every
+pixel. Auto takes it for pictures of one sample, up to 60 000 pixels. Figures: docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
@@ -79,10 +58,13 @@ from .instant_radiosity import (
 # From here on maps of clusters, which do not grow with the picture, cost less than rays of regions.
 MANY_PIXELS = 60_000
 DEPTH_STEP, NORMAL_STEP = 0.05, 0.4  # ranges within a region: share of its depth, and of each axis of unit normals
-LEVELS = Param("levels", "Levels", 3, "Regions have up to 2^levels pixels a side; 0: every pixel gathers", 0, 5)
+LEVELS = Param(
+    "levels", "Levels", 3, "Largest regions have 2^levels pixels a side; 0: gather light at every pixel", 0, 5
+)
 NEAR_BOUNCES = Param(
     "near_bounces", "Near bounces", True,
-    "Follow light that close surfaces reflect to each other more than once, as long as it goes", draft=False,
+    "Follow light that close surfaces reflect to each other more than once; slower, brighter corners",
+    draft=False,
 )  # fmt: skip
 BOUNDS_CONSTANTS = (
     ("IVEC2", "grid_offset"), ("FLOAT", "depth_scale"), ("FLOAT", "depth_step"), ("FLOAT", "normal_step"),
@@ -191,12 +173,10 @@ class MultiresRadiosity(InstantRadiosity):
     name = "multires_radiosity"
     label = "Multi-resolution radiosity"
     params = (
+        Param("virtual_lights", "Virtual lights", 1024, "Virtual lights in each sample", 1, 2048, draft=128),
         Param(
-            "virtual_lights", "Virtual lights", 1024, "Points of surfaces that light the picture in a sample", 1, 2048,
-            draft=128,
-        ),
-        Param(
-            "rays", "Rays", 64, "How many of the virtual lights each region traces in a sample; 0: light passes walls",
+            "rays", "Rays", 64,
+            "Shadow rays to virtual lights per region and sample; 0: no shadows of indirect light",
             0, 1024, draft=8,
         ),
         LEVELS,

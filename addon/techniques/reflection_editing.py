@@ -1,4 +1,4 @@
-"""Reflection editing: mirrors, gloss, highlights and glass show what an artist wants them to, where they want it.
+"""Reflection editing: mirrors, gloss, highlights and glass show what an artist wants, where the artist wants it.
 
 Constraints of an object say that a place of it is to show another target than it would; regions say where that acts.
 In every pixel of the object the rotation of reflected directions is solved from them (surfaces/reflection_edits.py),
@@ -45,25 +45,34 @@ KINDS = {
 EDIT, EDIT_AT_POINT = "surface.edit", "surface.edit_at_point"
 CONSTRAINT = (
     Param("enabled", "Enabled", True, "Whether the constraint acts"),
-    Param("point", "Point", (0.0, 0.0, 0.0), "Place of the surface that shows the target", handle=POINT),
-    Param("target", "Target", (0.0, 0.0, 1.0), "What is to be seen there, in the object's space", handle=POINT),
-    Param("viewer", "Viewer", (0.0, -5.0, 0.0), "Where the constraint was seen from when it was made"),
+    Param("point", "Point", (0.0, 0.0, 0.0), "Point of the surface that shows the target", handle=POINT),
+    Param("target", "Target", (0.0, 0.0, 1.0), "Point that is seen there, in object space", handle=POINT),
     Param(
-        "of", "Of", REFLECTION, "Which light is turned",
-        items=((REFLECTION, "Reflection", 0), (REFRACTION, "Refraction", 1)),
+        "viewer", "Viewer", (0.0, -5.0, 0.0), "Viewpoint from which the constraint was made", unit="TRANSLATION"
     ),
-    Param("triangle", "Triangle", -1, "Triangle that carries the point through deformation; -1: none", -1, 2**31 - 1),
-    Param("weights", "Weights", (1.0, 0.0, 0.0), "Where on that triangle the point is"),
+    Param(
+        "of", "Of", REFLECTION, "Which light the edit redirects",
+        items=(
+            (REFLECTION, "Reflection", 0, "What the surface mirrors, and highlights of lamps"),
+            (REFRACTION, "Refraction", 1, "What is seen through the surface"),
+        ),
+    ),
+    Param("triangle", "Triangle", -1, "Triangle that the point follows under deformation; -1: none", -1, 2**31 - 1),
+    Param("weights", "Weights", (1.0, 0.0, 0.0), "Barycentric coordinates of the point on that triangle"),
 )  # fmt: skip
 REGION = (
     Param("enabled", "Enabled", True, "Whether constraints act in the region"),
     Param(
-        "kind", "Kind", "EUCLIDEAN", "How far a place is from the centre",
-        items=(("EUCLIDEAN", "Ball", 0), ("GEODESIC", "Along Surface", 1), ("PAINTED", "Painted", 2)),
+        "kind", "Kind", "EUCLIDEAN", "How distance from the centre is measured",
+        items=(
+            ("EUCLIDEAN", "Ball", 0, "All of the object within a radius"),
+            ("GEODESIC", "Along Surface", 1, "As far as the radius, measured along the surface"),
+            ("PAINTED", "Painted", 2, "Where the active color attribute is bright"),
+        ),
     ),
-    Param("centre", "Centre", (0.0, 0.0, 0.0), "Middle of the region", handle=POINT),
-    Param("radius", "Radius", 1.0, "How far the region reaches", 0.0, 1e6, "DISTANCE"),
-    Param("border", "Border", 0.25, "Over which width inside the radius edits fade", 0.0, 1e6, "DISTANCE"),
+    Param("centre", "Centre", (0.0, 0.0, 0.0), "Centre of the region", handle=POINT),
+    Param("radius", "Radius", 1.0, "Radius of the region", 0.0, 1e6, "DISTANCE"),
+    Param("border", "Border", 0.25, "Width inside the radius over which edits fade out", 0.0, 1e6, "DISTANCE"),
 )  # fmt: skip
 
 
@@ -111,10 +120,12 @@ class ReflectionEditing(Technique):
     params = (
         Param(
             "freeze", "Freeze Reflections", False,
-            "Reflections are those of the view in which an object's first constraint was made", scope=OBJECT,
+            "Keep the reflections of the view in which the object's first constraint was made",
+            scope=OBJECT,
         ),
-        Param("constraints", "Constraints", (), "What places are to show", scope=OBJECT, many=CONSTRAINT),
-        Param("regions", "Regions", (), "Where constraints act", scope=OBJECT, many=REGION),
+        Param("constraints", "Constraints", (),
+            "Which target each constrained point of the surface should show", scope=OBJECT, many=CONSTRAINT),
+        Param("regions", "Regions", (), "Regions of the surface in which constraints act", scope=OBJECT, many=REGION),
     )  # fmt: skip
     reads = ("surface.position",)
     writes = (

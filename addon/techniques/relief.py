@@ -16,9 +16,10 @@ and has its own outline. Where the whole of it is less than a pixel high it fade
 | draws | 8 triangles for each of the mesh; early depth tests are lost |
 | bytes | 240 for a triangle's prism, 96 and 48 an attribute in its list |
 
-Bias: what is thinner than a step may be missed (`safe` does not, where the steepest slope was found). Rays that run
-no shader (mirrors, indirect light) meet the mesh at the lowest level of the relief, with its bumped normals. Soft
-shadows that need opaque meshes treat it as alpha.
+Bias: what is thinner than a step may be missed (`safe` does not, where the steepest slope was found). Rays meet the
+mesh at the lowest level of the relief; where they are shaded (mirrors, glass, points that send light on) the relief is
+looked for from there (shaders/hits/relief.glsl), where they only ask what is hidden it is flat. Soft shadows that need
+opaque meshes treat it as alpha.
 
 Fails: heights above an edge of a mesh that is not smooth part from those of the next face; overhangs need a mesh.
 """
@@ -34,15 +35,15 @@ from ..scene import displacement
 from ..snapshot.scene import Snapshot
 
 MODES = (
-    (displacement.AUTO, "Auto", 0),
-    (displacement.RELIEF, "Relief", 1),
-    (displacement.MESH, "Mesh", 2),
-    (displacement.BUMP, "Bump", 3),
+    (displacement.AUTO, "Auto", 0, "As the material's Displacement setting says; on coarse meshes by relief"),
+    (displacement.RELIEF, "Relief", 1, "Rays search the surface within a shell around the mesh"),
+    (displacement.MESH, "Mesh", 2, "The mesh's vertices are moved"),
+    (displacement.BUMP, "Bump", 3, "Only shading changes"),
 )
 SEARCHES = (
-    (displacement.FALSE_POSITION, "False Position", 0),
-    (displacement.INTERVAL, "Interval Mapping", 1),
-    (displacement.BISECTION, "Bisection", 2),
+    (displacement.FALSE_POSITION, "False Position", 0, "By the slope between two steps: few refinements are enough"),
+    (displacement.INTERVAL, "Interval Mapping", 1, "By where the ray and the slope meet, again and again"),
+    (displacement.BISECTION, "Bisection", 2, "In the middle of each step: slow and sure"),
 )
 DEFAULTS = displacement.DEFAULTS
 
@@ -63,22 +64,27 @@ class Relief(Technique):
     params = (
         Param(
             "mode", "Displacement", DEFAULTS["mode"],
-            "What draws the displacement; Auto: as Cycles' setting says, on coarse meshes by relief",
+            "How displacement is drawn; Auto: as the material's Cycles setting says, with relief on coarse meshes",
             items=MODES, scope=MATERIAL,
         ),
         Param(
-            "search", "Search", DEFAULTS["search"], "How a crossing is narrowed down", items=SEARCHES, scope=MATERIAL
+            "search", "Search", DEFAULTS["search"],
+            "Root-finding method that refines where a ray meets the surface",
+            items=SEARCHES, scope=MATERIAL,
         ),
         Param(
-            "steps", "Steps", DEFAULTS["steps"], "Most steps of a ray through one prism of the shell", 3, 512,
-            scope=MATERIAL,
+            "steps", "Steps", DEFAULTS["steps"],
+            "Maximum number of steps of a ray through one prism of the shell",
+            3, 512, scope=MATERIAL,
         ),
         Param(
-            "refinements", "Refinements", DEFAULTS["refinements"], "Steps that narrow a crossing down", 1, 16,
-            scope=MATERIAL,
+            "refinements", "Refinements", DEFAULTS["refinements"],
+            "Root-finding steps after a ray has crossed the surface",
+            1, 16, scope=MATERIAL,
         ),
         Param(
-            "safe", "Thin Features", DEFAULTS["safe"], "Steps as short as the steepest slope needs; slower",
+            "safe", "Thin Features", DEFAULTS["safe"],
+            "Shorten steps to what the steepest slope needs, so that thin features are not missed; slower",
             scope=MATERIAL,
         ),
     )  # fmt: skip

@@ -53,7 +53,8 @@ SPLAT = splats.splat_program(
 LEAST_PIXELS = 0.8
 INTERFACES = Param(
     "interfaces", "Interfaces", 8,
-    "How many more surfaces of glass or mirrors a photon may meet on its way to a diffuse surface", 0, 32,
+    "Number of glass or mirror surfaces after the first that a photon may meet before a diffuse surface",
+    0, 32,
 )  # fmt: skip
 
 
@@ -65,7 +66,8 @@ class ScreenSpacePhotons(Technique):
     params = (
         Param(
             "grid", "Photon grid", 160,
-            "Photons along each side of a light's view of what throws caustics; the fewer, the softer at few samples",
+            "Photons along each side of the grid that a light sends towards casters of caustics; fewer are softer at "
+            "few samples",
             16, 1024, draft=96,
         ),
         INTERFACES,

@@ -156,12 +156,13 @@ class ShadedReflections(Technique):
     params = (
         Param(
             "bounces", "Mirror bounces", 8,
-            "How many mirrors in a row show what they reflect; 0: reflections show mean colours", 0, 16, draft=0,
+            "Number of consecutive mirror reflections that are shaded; 0: reflections show mean colours",
+            0, 16, draft=0,
         ),
         Param(
             "roughness", "Roughness", 0.6,
-            "Lobes up to this roughness show surfaces with their own materials; rougher ones their mean colours", 0.0,
-            1.0,
+            "Reflections up to this roughness show surfaces with their own materials; rougher ones show mean colours",
+            0.0, 1.0,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES

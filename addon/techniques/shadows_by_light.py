@@ -1,4 +1,4 @@
-"""Shadow maps by light: each light gets the kind of map that its penumbrae ask for, in pictures of one sample.
+"""Shadow maps by light: each light gets the kind of map that suits its penumbrae, in pictures of one sample.
 
 | light | kind | why |
 |---|---|---|
@@ -65,11 +65,12 @@ class ShadowsByLight(PointMaps):
     params = (
         Param(
             "important", "Important lights", 8,
-            "So many lights with wide penumbrae have variance soft shadow maps, the others convolution maps", 0, 64,
+            "Number of lights with wide penumbrae that use variance soft shadow maps; the others use convolution maps",
+            0, 64,
         ),
         Param(
             "soft_maps", "Soft maps", True,
-            "Filter the maps of soft lights in pictures of one sample; else each such light has several points",
+            "In pictures of one sample, use filtered maps for soft lights; otherwise several hard maps for each",
         ),
     )  # fmt: skip
 

@@ -3,25 +3,17 @@
     L_ind(x) = albedo / pi * integral over the hemisphere of  L(y(w)) cos(w) dw
 
 y(w) is sought on the screen first. Half planes through x and the viewer ("fans") are lines there: a walk along one
-meets the surfaces in the order of their distance from x. Each step stands for the piece of the tangent plane that it
-finds between its two ends, takes those of the fan's 32 sectors that nothing before it took, and sends its radiance
-through them. Sectors are equal shares of the cosine-weighted solid angle (shaders/ssdo/fan.glsl), so a step's weight is
-the form factor of what is seen of its patch: bounded by the sectors, where A cos cos / d^2 of the thesis needs a clamp.
-Patches that face away take their sectors and send nothing. What is seen from the viewer is `thickness` thick, so that
-light passes behind posts.
+meets the surfaces in the order of their distance from x. Each step stands for the piece of the tangent plane between
+its two ends, takes those of the fan's 32 sectors that nothing before it took, and sends its radiance through them.
+Sectors are equal shares of the cosine-weighted solid angle (shaders/ssdo/fan.glsl), so that a step's weight is the
+bounded form factor of what is seen of its patch. Patches that face away take their sectors and send nothing; what is
+seen is `thickness` thick.
 
-Sectors that brought no light are not lost: one of them all is drawn, evenly, and traced (`rays`); the path on from
-there takes the light of its further reflections at once. Glossy surfaces trace one ray of their lobe in the same way.
-What the screen shows is estimated by the screen, and the rest by rays: each direction of x by one of both, so nothing
-is doubled.
+Of the sectors that brought no light one is drawn and traced (`rays`), with the light of its further reflections; glossy
+surfaces trace one ray of their lobe. So each direction is estimated once, by the screen or by a ray. L is the direct
+diffuse light of this very sample, gloss counted as diffuse, and each bounce sends what the one before brought.
 
-L is the direct diffuse light of this very sample (`radiance.diffuse_direct`, before the Film takes it), with glossy
-reflection counted as diffuse; the next bounce sends what the one before brought, rays included. The mean over the
-samples has no lag.
-
-`visibility` POINTS is the thesis's own way for comparison: as many points as bits have steps, in a half ball of the
-radius; those below what is seen are solid, and each sends as a patch of pi r^2 / N, bounded by the directions that it
-stands for. A blocker at distance t is met with the chance 1 - t / r, so it fits small radii only.
+`visibility` POINTS is the thesis's own way, for comparison: points in a half ball, solid where below what is seen.
 
 Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque and Gilet 2023 (bits for sectors).
 
@@ -31,27 +23,11 @@ Sources: Ritschel, Grosch and Seidel 2009 (SSDO, the bounce); Therrien, Levesque
 | fetches per pixel and bounce | `fans` x `steps` x 3; later bounces have half the fans of the one before |
 | rays per pixel | 1 or 2 per vertex of one path, of 1 / (1 - albedo) vertices in the mean |
 
-Instead of instant_radiosity, never beside it: both estimate the whole integral, and one slot holds one of them. relMSE
-over the reference's noise at 96x72, of single samples (filtered, mean of four seeds), and of 16:
-
-| | Cornell box | window | hall | door | courtyard | lamp |
-|---|---|---|---|---|---|---|
-| instant radiosity, 1 | 0.20 | 0.35 | 0.24 | 0.44 | 0.09 | 0.09 |
-| this, 1, in 0.5 to 1.2 of its time | 0.09 | 0.39 | 0.17 | 0.80 | 0.09 | 0.16 |
-| this without rays, 1, in 0.1 to 0.3 | 0.27 | 0.67 | 0.78 | 0.76 | 0.78 | 0.92 |
-| instant radiosity, 16 | 0.03 | 0.15 | 0.06 | 0.48 | 0.02 | 0.01 |
-| this, 16 | 0.05 | 1.0 | 0.32 | 2.6 | 0.20 | 0.12 |
-
-Auto takes instant radiosity: its virtual lights find the light that single paths seldom meet, and its error falls to
-zero. This one is for single samples of rooms that are seen whole, and steadier there: over 24 pictures of one sample of
-the Cornell box, with camera and lamp moving, half the squared change of the error from one to the next is 0.019 of the
-squared mean, beside an error of 0.185; with instant radiosity 0.070 and 0.191.
-
-Bias, in diffuse indirect light, by design. Patches reach up to a step beyond their edges, and hidden sides are as
-thick as `thickness`: up to a tenth of the light where posts stand close (hall: 0.90). Without rays, surfaces off the
-screen, behind others or turned away send nothing: 0.51 of the light is left in the Cornell box, 0.04 to 0.4 in rooms
-that are lit from behind the camera. Metals send nothing on the screen; without rays nothing is reflected on
-glossy surfaces. The last bounces before the limit may be counted once more than allowed.
+Bias (diffuse indirect light), by design: surfaces reach up to a step beyond their edges and hidden sides are
+`thickness` thick: up to a tenth of the light where posts stand close. Metals send nothing on the screen. The last
+bounces before the limit may be counted once more than allowed. Fails: without rays, what is off the screen or hidden
+sends nothing (half of the light in the Cornell box, most of it in rooms lit from behind the camera). Auto takes instant
+radiosity, whose error goes to zero. Figures: docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
@@ -119,15 +95,24 @@ def fan_params(radius: float, thickness: float) -> tuple[Param, ...]:
     return (
         Param(
             "visibility", "Visibility", BITS,
-            "How surfaces hide each other: bits for sectors of half planes, or points in a half ball of a small radius",
-            items=((BITS, "Bits", 0), (POINTS, "Points", 1)),
+            "How occlusion is found: by a bit mask of sectors in half planes, or by points in a hemisphere of a "
+            "small radius",
+            items=(
+                (BITS, "Bits", 0, "One bit for each sector of a half plane: surfaces near and far"),
+                (POINTS, "Points", 1, "Points in a half ball of the radius"),
+            ),
         ),
-        Param("fans", "Fans", 4, "Directions on the screen that each pixel searches in a sample", 1, 64, draft=2),
-        Param("steps", "Steps", 16, "Places that are looked at along each", 2, 64, draft=12),
-        Param("radius", "Radius", radius, "How far surfaces matter, in median distances of what is seen", 0.01, 100.0),
+        Param("fans", "Fans", 4, "Screen directions that each pixel searches in a sample", 1, 64, draft=2),
+        Param("steps", "Steps", 16, "Steps along each screen direction", 2, 64, draft=12),
+        Param(
+            "radius", "Radius", radius,
+            "Search radius, as a multiple of the median distance of visible surfaces",
+            0.01, 100.0,
+        ),
         Param(
             "thickness", "Thickness", thickness,
-            "How far surfaces reach behind what is seen of them, in median distances of what is seen", 0.0, 10.0,
+            "Assumed thickness of visible surfaces, as a multiple of their median distance",
+            0.0, 10.0,
         ),
     )  # fmt: skip
 
@@ -138,8 +123,8 @@ class ScreenSpaceBounce(Technique):
     fills = ("indirect",)
     params = (
         *fan_params(radius=4.0, thickness=0.1),
-        Param("rays", "Rays", True, "One ray per pixel and sample for what the screen does not show"),
-        Param("bounces", "Bounces", 4, "At most so many of the scene's bounces are gathered", 1, 8, draft=2),
+        Param("rays", "Rays", True, "Trace one ray per pixel and sample for what the screen does not show"),
+        Param("bounces", "Bounces", 4, "Maximum number of bounces, up to that of the scene", 1, 8, draft=2),
     )
     reads = (*SURFACES, "radiance.diffuse_direct")
     writes = (

@@ -1,4 +1,4 @@
-"""Temporal glare: the picture as a living eye sees it, with needles, halo and veil around what is bright.
+"""Temporal glare: the picture as a human eye sees it, with needles, halo and veil around bright pixels.
 
     lens = I - s w H + s (H * kernel)     H what exceeds white, kernel the eye's tail (addon/techniques/eye.py)
 
@@ -45,7 +45,11 @@ from ..snapshot.scene import Camera, Snapshot
 from .eye import BILLBOARDS, GLARE, MODE, OFF, PointSpread
 
 LENS = "film.lens"
-RESOLUTIONS = (("FULL", "Full", 1), ("HALF", "Half", 2), ("QUARTER", "Quarter", 4))
+RESOLUTIONS = (
+    ("FULL", "Full", 1, "Every pixel of the picture"),
+    ("HALF", "Half", 2, "Pixels of twice the side: about a quarter of the time"),
+    ("QUARTER", "Quarter", 4, "Pixels of four times the side: about a sixteenth of the time"),
+)
 LEAST_CONTRAST = 10.0  # of the brightest pixel to white, below which nobody sees glare
 LEAST_VEIL = 0.5 / 255.0  # of white
 ORTHOGRAPHIC_DEGREES = 39.6  # of a lens of 50 mm before a sensor of 36 mm
@@ -56,20 +60,22 @@ class TemporalGlare(Technique):
     label = "Temporal Glare"
     params = (
         MODE,
-        Param("strength", "Strength", 1.0, "How much of what the eye scatters is shown; 1: as it is", 0.0, 10.0),
-        Param("white", "White", 1.0, "Light that displays show as white; what exceeds it glares", 0.0, 1e4),
+        Param("strength", "Strength", 1.0, "Strength of the glare; 1: physically correct", 0.0, 10.0),
+        Param("white", "White", 1.0, "Radiance that the display shows as white; brighter pixels cause glare", 0.0, 1e4),
         Param(
             "luminance", "Scene Luminance", 100.0,
-            "Luminance of the picture's value 1 in cd/m², by which the pupil adapts", 1e-4, 1e8,
+            "Luminance of the pixel value 1, in cd/m²; the pupil adapts to it",
+            1e-4, 1e8,
         ),
         Param(
             "magnification", "Size", 10.0,
-            "Angular magnification of the glare; 10 puts the ring of the eye's 2000 fibres, of which 200 are drawn, at"
-            " its 3 degrees", 0.1, 100.0,
+            "Angular magnification of the glare; 10 puts the ring of the lens fibres at its natural 3 degrees",
+            0.1, 100.0,
         ),
         Param("sharp", "Keep Sharp", True, "Leave out the core of the glare, which only blurs bright pixels"),
         Param(
-            "resolution", "Resolution", "FULL", "Pixels in which light is convolved; in larger ones needles are softer",
+            "resolution", "Resolution", "FULL",
+            "Resolution of the convolution; lower ones have softer needles",
             items=RESOLUTIONS,
         ),
     )  # fmt: skip
@@ -118,7 +124,7 @@ class TemporalGlare(Technique):
         white, strength, magnification, luminance, sharp = (
             frame.settings.get(self, name) for name in ("white", "strength", "magnification", "luminance", "sharp")
         )
-        factor = {name: number for name, _, number in RESOLUTIONS}[frame.settings.get(self, "resolution")]
+        factor = {name: number for name, _, number, _ in RESOLUTIONS}[frame.settings.get(self, "resolution")]
         billboards = frame.settings.get(self, "mode") == BILLBOARDS
         factor = 1 if billboards else factor
         measured = scatter.measure(picture, white)

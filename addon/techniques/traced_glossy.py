@@ -75,7 +75,8 @@ class TracedGlossy(Technique):
     params = (
         Param(
             "roughness", "Roughness", 0.6,
-            "Lobes up to this roughness trace a ray per sample; rougher ones are lit by light samples alone", 0.0, 1.0,
+            "Glossy lobes up to this roughness trace a ray in each sample; rougher ones use light samples only",
+            0.0, 1.0,
         ),
     )  # fmt: skip
     reads = LIT_SURFACES
@@ -101,8 +102,8 @@ class TracedGlossy(Technique):
     def begin(self, frame: Frame) -> None:
         """Tell the techniques that draw points of lights, which run before this one, what share the rays take over."""
         frame.provide(TracedLobes(frame.settings.get(self, "roughness")))
-        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-        shown = lights.traceable([emitter for emitter in found if emitter is not None])
+        found = {emitter.light.key: emitter for emitter in frame.emitters}
+        shown = lights.traceable([found[light.key] for light in frame.snapshot.lights if light.key in found])
         points = frame.service(PointsDrawn)  # whole lights have one point, whatever their rate
         drawn = points.per_sample if points else {}
         rates = [drawn.get(e.light.key, rate_of(frame, e.light.key).per_sample) for e in shown]

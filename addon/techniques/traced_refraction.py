@@ -2,7 +2,7 @@
 
 Each walk starts with the transmission lobe of the surface that the camera sees (shaders/lib/refraction.glsl, Walter et
 al. 2007, energy of multiple scattering restored as in Cycles), and goes on through what it meets: at interfaces it is
-mirrored or bent by lot, in proportion to Fresnel's reflectance; a light, the world or an opaque surface ends it.
+mirrored or bent at random, in proportion to Fresnel's reflectance; a light, the world or an opaque surface ends it.
 
     L_t(v) = sum over interfaces k of  T_k (light of this sample's points through k  +  what the walk finds behind k)
 
@@ -12,26 +12,22 @@ at smooth ones, only the walk finds what has an extent. What the first interface
 Cycles' passes, the rest Transmission Indirect. Here, glass does not count as a bounce: it is followed through
 `interfaces` of them however few bounces the scene allows.
 
+Surfaces behind glass reflect lights and world by this sample's points, and other surfaces by the virtual lights of the
+indirect slot's technique, where it has any, and by short rays, as pixels do (instant_radiosity.py).
+
 | cost | per sample |
 |---|---|
 | draws | the surface pass once more, without what is transparent |
 | rays | per pixel of glass and interface 1 for the walk, 1 for lights; where it ends 2 to 4 |
 | fetches per ray | about 6 per node and 10 per leaf visited; 15 per interface |
 
-Surfaces behind glass reflect lights and world by this sample's points, and other surfaces by virtual lights of the
-technique of the indirect slot, where it has any, and by short rays, as pixels do (instant_radiosity.py), whose probes
-look through glass for that. Squared error relative to Cycles' of what passes a pane before a room lit through its
-window, 16 samples: .39 and 29 % too dark with direct light only, .69 with paths instead of virtual lights, .11 with
-them.
+Bias (indirect path): interfaces behind the first have their material's mean colour, index and roughness, and no bumps.
+Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo in the picture
+or their material's mean, have straight grey shadows, and no caustics. Against Cycles: within 2 % for a rough ball below
+a world of which Cycles draws no light samples.
 
-Fails: above 4 million triangles nothing is traced, and glass lets light pass straight on (surfaces.py).
-
-Bias, in the indirect path: interfaces behind the first have their material's mean colour, index and roughness, none of
-its bumps. Insides do not scatter or shine, and absorb evenly. Surfaces behind glass reflect evenly, by their albedo
-where they stand behind glass in the picture, too, and else by their material's mean (the boards of that room shine: 5 %
-too dark). Surfaces behind glass have straight grey shadows, and no caustics. Against Cycles:
-within 2 % for a rough ball below a world of which Cycles draws no light samples; where it does, its own result for
-rough glass rises by up to 11 % (a world symmetric in x shows it).
+Fails: above 4 million triangles nothing is traced, and glass lets light pass straight on (surfaces.py). Figures:
+docs/log/2026-11-26-indirect-light.md.
 """
 
 from __future__ import annotations
@@ -102,7 +98,8 @@ class TracedRefraction(Technique):
     params = (
         Param(
             "interfaces", "Interfaces", 8,
-            "How many more surfaces of glass light may cross or be mirrored at on its way to the first one", 0, 32,
+            "Number of glass surfaces behind the first that a ray may cross or be reflected by",
+            0, 32,
         ),
     )  # fmt: skip
     reads = SURFACES

@@ -87,7 +87,7 @@ class VolumeCaustics(Technique):
     params = (
         Param(
             "rays", "Rays", 192,
-            "Side of the square of light rays that each lamp sends towards glass and mirrors in a sample",
+            "Light rays along each side of the grid that each lamp sends towards glass and mirrors in a sample",
             8, 1024, draft=64,
         ),
     )  # fmt: skip

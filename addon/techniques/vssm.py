@@ -1,51 +1,33 @@
 """Variance soft shadow maps: one depth map serves all of a light, or the part of it that a sample stands for.
 
 A blocker at height h (in the map's depth measure q) above a receiver hides those points of the light that lie in a box
-(a disc) of half extents e h around the receiver in the map (shaders/lib/soft_kernel.glsl). First the mean height of
-the blockers in the largest kernel that matters is found, then the share of blockers in the kernel of that height:
+(a disc) of half extents e h around the receiver in the map (shaders/lib/soft_kernel.glsl). First the mean height of the
+blockers in the largest kernel that matters is found, then the share f of blockers in the kernel of that height:
 
     f = mean(h)^2 / mean(h^2),   h = mean(h^2) / mean(h)
 
-for a cell of the kernel that holds the receiver's plane and one height. Both means come from a summed-area table of
-q, q^2, q x and q y: with the last two, heights above a tilted plane are as exact as above a parallel one.
+Both means come from a summed-area table of q, q^2, q x and q y, so that heights above a tilted plane are exact. A
+min-max pyramid classifies cells (`rule` BOUNDS): all above the receiver, all lit, or nothing far behind it, where the
+moments hold; in other cells some texels are read. `rule` MEAN is the source's: moments wherever the mean is above.
 
-Cells are classified by a min-max pyramid (`rule` BOUNDS): all above the receiver, all lit, nothing far behind the
-receiver (the moments hold), else a few texels are looked at, staggered so that edges along rows are told as finely. The
-source's own rule (`rule` MEAN) takes the moments wherever the mean lies above the receiver, and leaks where a far
-background lies behind near blockers. Kernels of a few texels look at every texel and see the caster's plane too, so
-contacts stay closed.
-
-With n samples of the light, the map of each stands for 1 / n of it: the kernel's extents shrink by sqrt(n), steps
-between the points are filled, and the error goes to that of accumulated maps and to zero. Rectangles are cut into 2^k
-parts that tile them. With one sample, and for each such part, the point is the middle, and the unblocked light has a
-closed form (shaders/light/whole.glsl). Blockers much lower than the mean are looked for by short rays, or, without
-them, in smaller windows.
-
-Source: Yang, Dong, Feng, Seidel, Kautz, "Variance soft shadow mapping", Computer Graphics Forum 29(7), 2010; the
-classification by bounds and the plane-relative moments are ours.
+With n samples each map stands for 1 / n of the light: the kernel's extents shrink by sqrt(n), and the error goes to
+zero as that of accumulated maps. With one sample the map's point is the middle of the light or of each of 2^k parts,
+and the unblocked light has a closed form (shaders/light/whole.glsl).
 
 | cost | per map of N x N texels |
 |---|---|
 | pyramid | a pass and log2 N - 1 dispatches; 4 bytes per texel |
 | table | 4 log8 N - 1 passes (log8 N rounded up) over blocks of 2 x 2 texels, from 16 samples on over texels |
-| lookup, lit or all blocked pixels | up to 27 loads |
-| lookup, penumbra | grids of 3 x 3 and 4 x 4 cells: 64 loads of 16 bytes, 225 of 8; up to 8 more per mixed cell |
-| contact rays | 4, or 8 where those disagree, per pixel that is not settled and map; from 16 samples on 1 |
+| lookup | lit or all blocked: up to 27 loads; penumbra: 64 loads of 16 bytes, 225 of 8, 8 more per mixed cell |
+| contact rays | 4 or 8 per unsettled pixel and map; from 16 samples on 1 |
 | bytes | 8 per texel and 4 borrowed, beside the map's 20; from 16 samples on 20 and 16 |
 
-Bias (direct diffuse and glossy light): blockers at several heights are flattened to their mean height; what the light's
-middle does not see, beyond the reach of contact rays, blocks nothing; visibility multiplies the unblocked light, as if
-every part of the light counted the same for the receiver; parts of a refined light reach beyond its edge by half their
-width. All of it goes to zero with the samples, where they refine. Parts of the light below a receiver's horizon count
-neither as lit nor as blocked, also where the map's own point is among them. Fails: blockers so close to a wide light
-that the kernel is larger than the view (a lamp right behind muntins: half of the light is lost at one sample); kernels
-wider than 512 texels are cut to that.
+Bias (direct diffuse and glossy light; to zero with samples): several heights are flattened to their mean; blockers that
+the light's middle does not see, beyond the reach of contact rays, are missed; all parts of the light count the same,
+and parts below the receiver's horizon not at all. Fails: blockers so close to a wide light that the kernel exceeds the
+view (half of the light is lost at one sample). Errors and times: docs/soft_shadows.md.
 
-Measured, RMS of the visibility behind an edge half way to the light, one map: square 0.012, rectangle 5:1 0.029, disc
-0.021, sphere 0.003, sun 0.005. Refined, 16 and 64 points: square 0.0024 and 0.0007, where points alone leave 0.014 and
-0.0031.
-
-Errors and times on six families of blockers, with every parameter, stand in docs/soft_shadows.md.
+Source: Yang, Dong, Feng, Seidel, Kautz, "Variance soft shadow mapping", Computer Graphics Forum 29(7), 2010.
 """
 
 from __future__ import annotations
@@ -71,7 +53,10 @@ from ..lighting.soft_maps import (
 )
 from ..lighting.visibility import RESOLUTION, Lookup, Maps
 
-RULES = (("BOUNDS", "Bounds", 0), ("MEAN", "Mean", 1))
+RULES = (
+    ("BOUNDS", "Bounds", 0, "The nearest and farthest depths of a cell tell whether its moments hold"),
+    ("MEAN", "Mean", 1, "The mean depth of a cell alone tells: faster, with light at some contacts"),
+)
 FINE, COARSE = 1, 2  # texels along each side of the blocks that a table has entries for
 MOMENTS = {
     block: tables.TableSource(
@@ -97,7 +82,7 @@ def _lookup(rule: str, cells: int, block: int) -> Lookup:
     )  # fmt: skip
 
 
-DEFAULTS = tuple(_lookup(rule, 3, block) for rule, _, _ in RULES for block in MOMENTS)
+DEFAULTS = tuple(_lookup(rule, 3, block) for rule, *_ in RULES for block in MOMENTS)
 LOOKUPS = tuple(lighting(one, False) for lookup in DEFAULTS for one in (lookup, with_contacts(lookup)))
 SHARED = programs_of(with_contacts(_lookup("BOUNDS", 3, COARSE)))
 MOMENT_VALUES = tuple(tables.values_program(source) for source in MOMENTS.values())
@@ -110,9 +95,12 @@ class VarianceSoftShadows(SoftMaps):
     params = (
         RESOLUTION,
         CUTOFF,
-        Param("cells", "Cells", 3, "Cells along each side of the kernel in which blockers are looked for", 2, 8),
+        Param("cells", "Cells", 3, "Cells along each side of the blocker search kernel", 2, 8),
         Param(
-            "rule", "Rule", "BOUNDS", "What tells whether the moments of a cell can be trusted", items=RULES,
+            "rule", "Rule", "BOUNDS",
+            "How to decide whether the depth moments of a cell are reliable: by its depth bounds, or by its mean as "
+            "in the source",
+            items=RULES,
         ),
         REFINE,
         CONTACTS,

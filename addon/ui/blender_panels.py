@@ -24,7 +24,14 @@ _TAKEN = {
     "VIEWLAYER_PT_override",
 }
 # Panels for every engine whose settings Candela does not read, or that have a better one in _TAKEN.
-_LEFT = {"DATA_PT_light", "NODE_DATA_PT_light"}
+_LEFT = {
+    "DATA_PT_light",
+    "NODE_DATA_PT_light",
+    "RENDER_PT_simplify",
+    "RENDER_PT_simplify_greasepencil",
+    "RENDER_PT_simplify_render",
+    "RENDER_PT_simplify_viewport",
+}
 _LEFT_FAMILIES = ("lightprobe", "freestyle")
 
 

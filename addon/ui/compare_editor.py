@@ -19,7 +19,8 @@ from ..compare.report import shown_pixels
 from . import shown_images, shown_otherwise
 from .jobs import Job, draw_progress, part
 from .pass_run import render_steps
-from .properties import settings_of
+from .properties import settings_of, titled
+from .texts import wrapped
 
 IMAGE = "Candela Comparison"
 NAMES_SHARE = 0.46  # of the table's width
@@ -39,8 +40,19 @@ def latest() -> tuple[Picture, ...]:
     return _rows
 
 
-def picture_of(row: Picture, view: str) -> np.ndarray:
-    """What the image shows of a row, (H, W, 3) linear."""
+def table_of(rows: tuple[Picture, ...]) -> list[tuple[int, Picture]]:
+    """(number, row) of those that the panel lists: light as Blender's passes have it, divided by colour, is left to the
+    command line where the same light stands there as it is seen."""
+    names = {picture.row.label for picture in rows}
+    return [
+        (number, picture)
+        for number, picture in enumerate(rows)
+        if picture.row.label.removesuffix(" pass") not in names - {picture.row.label}
+    ]
+
+
+def picture_of(row: Picture, view: str, gain: float = 1.0) -> np.ndarray:
+    """What the image shows of a row, (H, W, 3) linear; a difference is multiplied by the gain."""
     if row.x is None or row.reference is None:
         return np.zeros((1, 1, 3), np.float32)
     if row.row.name in ("depth", "normal"):
@@ -50,7 +62,7 @@ def picture_of(row: Picture, view: str) -> np.ndarray:
     made = {
         "CANDELA": lambda: x,
         "CYCLES": lambda: reference,
-        "DIFFERENCE": lambda: pictures.difference(x, reference),
+        "DIFFERENCE": lambda: gain * pictures.difference(x, reference),
         "ERROR": lambda: pictures.error_map(x, reference),
     }
     return np.nan_to_num(made[view]()[..., :3]).astype(np.float32)
@@ -59,7 +71,7 @@ def picture_of(row: Picture, view: str) -> np.ndarray:
 def _show(self, context) -> None:
     rows = latest()
     if rows:
-        shown_images.show(context, IMAGE, picture_of(rows[min(self.row, len(rows) - 1)], self.view))
+        shown_images.show(context, IMAGE, picture_of(rows[min(self.row, len(rows) - 1)], self.view, self.gain))
 
 
 class CandelaComparison(bpy.types.PropertyGroup):
@@ -73,11 +85,16 @@ class CandelaComparison(bpy.types.PropertyGroup):
         max=65536,
     )  # fmt: skip
     percentage: bpy.props.IntProperty(
-        name="Resolution", description="Size of the comparison, of the render's resolution", default=50, min=1, max=100,
+        name="Resolution", description="Size of the compared pictures, in percent of the render resolution",
+        default=50, min=1, max=100,
         subtype="PERCENTAGE",
     )  # fmt: skip
     view: bpy.props.EnumProperty(name="View", description="What the image shows", items=VIEWS, update=_show)
-    row: bpy.props.IntProperty(name="Light Path", description="Which light path it shows", min=0, update=_show)
+    gain: bpy.props.FloatProperty(
+        name="Gain", description="Factor by which differences are brightened", default=8.0, min=0.01,
+        soft_max=64.0, update=_show,
+    )  # fmt: skip
+    row: bpy.props.IntProperty(name="Light Path", description="Light path that the image shows", min=0, update=_show)
 
 
 class CANDELA_OT_compare(Job, bpy.types.Operator):
@@ -117,7 +134,7 @@ class CANDELA_OT_compare_show(bpy.types.Operator):
 
 
 class CANDELA_OT_compare_swap(bpy.types.Operator):
-    """Swap the picture by Candela and the one by Cycles in place"""
+    """Switch between Candela's and Cycles' picture in place"""
 
     bl_idname = "candela.compare_swap"
     bl_label = "Swap Candela and Cycles"
@@ -154,6 +171,8 @@ class IMAGE_PT_candela_compare(bpy.types.Panel):
             row = column.row(align=True)
             for view in pair:
                 row.prop_enum(options, "view", view)
+        if options.view == "DIFFERENCE":
+            column.prop(options, "gain")
         layout.operator("candela.compare_swap", icon="ARROW_LEFTRIGHT")
         table = layout.column(align=True)
         head = table.split(factor=NAMES_SHARE)
@@ -161,16 +180,21 @@ class IMAGE_PT_candela_compare(bpy.types.Panel):
         row = head.row()
         row.label(text="relMSE")
         row.label(text="Bias")
-        for number, made in enumerate(latest()):
+        for number, made in table_of(latest()):
             line = table.split(factor=NAMES_SHARE, align=True)
-            line.operator("candela.compare_show", text=made.row.label, depress=number == options.row).row = number
+            line.operator(
+                "candela.compare_show", text=titled(made.row.label), depress=number == options.row
+            ).row = number
             row = line.row()
             if metrics.is_surface(made.error):
-                row.label(text=made.error.remark or f"{made.error.median:.1e}")
+                row.label(text="see below" if made.error.remark else f"{made.error.median:.1e}")
             else:
                 relmse, _, _, bias, _ = metrics.figures(made.error)
                 row.label(text=relmse)
                 row.label(text=bias)
+        for _, made in table_of(latest()):
+            if made.error.remark:
+                wrapped(layout, context, f"{titled(made.row.label)}: {made.error.remark}.", dim=True)
 
 
 _CLASSES = (

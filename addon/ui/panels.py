@@ -5,21 +5,37 @@ The panels of the techniques are made from the parameters that they declare.
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
 from ..frame import ledger as ledgers
 from ..frame.settings import AUTO
 from ..frame.technique import SCENE, identifier
 from ..techniques import REGISTRY
-from . import ENGINE, blender_panels, notes
+from . import ENGINE, blender_panels, notes, pass_panels
 from .passes import PASSES
-from .properties import slots
+from .properties import slots, titled
 from .quality import CANDELA_PT_quality_presets
+from .texts import wrapped
 
+TAB_S, TAB_TRIES = 0.05, 40  # between tries to show a tab that the editor may not have yet, and how many
 MOST_NOTES = 12  # more than these are counted only
 _PARENTS = {"denoise": "CANDELA_RENDER_PT_sampling"}  # where artists look for it; else they stand in Parameters
+# Bounces by kind of light, as far as techniques limit them themselves.
+_BOUNCES = (
+    ("shaded_reflections", "bounces", "Glossy"),
+    ("traced_refraction", "interfaces", "Transmission"),
+    ("airlight", "bounces", "Volume"),
+)
+_SIMPLIFY = (
+    ("simplify_subdivision", "Max Subdivision"),
+    ("simplify_child_particles", "Max Child Particles"),
+    ("simplify_volumes", "Volume Resolution"),
+    ("use_simplify_normals", "Normals"),
+)
+_SIMPLIFY_RENDER = (
+    ("simplify_subdivision_render", "Max Subdivision"),
+    ("simplify_child_particles_render", "Max Child Particles"),
+)
 _WITH_OTHERS = {"film"}  # techniques whose parameters stand in a panel of Blender's settings
 _STATE_ICONS = {ledgers.RAN: "CHECKMARK", ledgers.REUSED: "LOOP_BACK", ledgers.SKIPPED: "REMOVE"}
 
@@ -56,7 +72,37 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
-        column.prop(settings, "bounces")
+
+
+class CANDELA_RENDER_PT_light_paths(_CandelaPanel, bpy.types.Panel):
+    """How often light is reflected, by kind; those of the techniques stand among their parameters, too"""
+
+    bl_label = "Light Paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column, settings = _columns(self), context.scene.candela
+        column.prop(settings, "bounces", text="Max Bounces")
+        for technique, param, text in _BOUNCES:
+            column.prop(settings, identifier(technique, param), text=text)
+
+
+class CANDELA_RENDER_PT_simplify(_CandelaPanel, bpy.types.Panel):
+    """Blender's own settings, behind Candela's: its panel would come before them"""
+
+    bl_label = "Simplify"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context):
+        column, render = _columns(self), context.scene.render
+        column.active = render.use_simplify
+        for heading, names in (("Viewport", _SIMPLIFY), ("Render", _SIMPLIFY_RENDER)):
+            part = column.column(align=True, heading=heading)
+            for name, text in names:
+                part.prop(render, name, text=text)
 
 
 class CANDELA_RENDER_PT_techniques(_CandelaPanel, bpy.types.Panel):
@@ -92,13 +138,17 @@ def _technique_panel(technique) -> type:
 
     def draw(self, context):
         column = _columns(self)
+        if technique.name == "denoise":
+            switches = column.column(align=True, heading="Denoise")
+            switches.prop(context.scene.candela, "use_denoise", text="Render")
+            switches.prop(context.scene.candela, "use_viewport_denoise", text="Viewport")
         for param in technique.params_of(SCENE):
             column.prop(context.scene.candela, identifier(technique.name, param.name))
 
     body = {
         "__doc__": f"Parameters of {technique.label}",
         "__module__": __name__,
-        "bl_label": technique.label,
+        "bl_label": titled(technique.label),
         "bl_parent_id": _PARENTS.get(technique.name, "CANDELA_RENDER_PT_parameters"),
         "bl_options": set() if technique.name in _PARENTS else {"DEFAULT_CLOSED"},
         "poll": poll,
@@ -167,7 +217,7 @@ class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
             return
         column = self.layout.column(align=True)
         times = ", ".join(f"{name} {_seconds(seconds)}" for name, seconds in ledger.times.items() if seconds >= 0.0005)
-        _text(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
+        wrapped(column, context, f"{ledger.samples} samples" + (f": {times}" if times else ""))
         column.separator()
         for row in ledger.rows:
             if row.state != ledgers.SKIPPED:
@@ -205,9 +255,9 @@ def _ledger_row(column, context, row) -> None:
     value.alignment = "RIGHT"
     value.label(text=_seconds(row.milliseconds / 1000) if row.state == ledgers.RAN else row.state)
     if row.reason:
-        _text(column, context, row.reason, dim=True, indent=True)
+        wrapped(column, context, row.reason, dim=True, indent=True)
     for choice in ledgers.some_of(row.choices):
-        _text(column, context, choice, dim=True, indent=True)
+        wrapped(column, context, choice, dim=True, indent=True)
 
 
 class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
@@ -224,10 +274,10 @@ class CANDELA_RENDER_PT_frame_notes(_CandelaPanel, bpy.types.Panel):
 
     def draw(self, context):
         if _bad_pixels():
-            _text(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
+            wrapped(self.layout, context, f"{_bad_pixels()} values were not finite and were set to 0.", icon="ERROR")
         for note in notes.by_weight(_notes())[:MOST_NOTES]:
             row = self.layout.row()
-            _text(row.column(align=True), context, str(note), icon="ERROR", room=2)
+            wrapped(row.column(align=True), context, str(note), icon="ERROR", room=2)
             kind, name = notes.target(note)
             if kind:
                 button = row.operator("candela.select_culprit", text="", icon="RESTRICT_SELECT_OFF")
@@ -411,17 +461,26 @@ def _show_tab(context, tab: str) -> None:
     space = context.space_data
     if space is None or space.type != "PROPERTIES":
         return
-    if not _shows_tab(space, tab):
-        # The editor learns of another active object, and of its tabs, only when it is drawn again.
-        bpy.app.timers.register(lambda: _shows_tab(space, tab) and None, first_interval=0.05)
+    if _shows_tab(space, tab):
+        return
+    # The editor learns of another active object, and of its tabs, only when it is drawn again. Until then it has no
+    # such tab; where none comes, it is hidden, or of no use for the kind of object.
+    left = iter(range(TAB_TRIES))
+
+    def again() -> float | None:
+        return None if _shows_tab(space, tab) or next(left, None) is None else TAB_S
+
+    bpy.app.timers.register(again, first_interval=TAB_S)
 
 
 def _shows_tab(space, tab: str) -> bool:
-    """Whether a Properties editor shows this tab now; it may be hidden, or of no use for the kind of object."""
+    """Whether a Properties editor shows this tab now, or is gone."""
     try:
         space.context = tab
-    except (TypeError, ReferenceError):
+    except TypeError:
         return False
+    except ReferenceError:
+        pass
     return True
 
 
@@ -441,22 +500,19 @@ def _seconds(seconds: float) -> str:
     return f"{seconds * 1000:.1f} ms" if seconds < 0.1 else f"{seconds * 1000:.0f} ms"
 
 
-def _text(layout, context, text: str, dim=False, indent=False, icon="NONE", room: int = 0) -> None:
-    """A sentence over as many lines as the panel's width asks for; `room` widgets of a line's height are left free."""
-    widget = 20 * context.preferences.system.ui_scale
-    letters = (context.region.width - (3 + room + (icon != "NONE") + indent) * widget) / (0.29 * widget)
-    blank = "BLANK1" if indent or icon != "NONE" else "NONE"
-    for number, line in enumerate(textwrap.wrap(text, max(int(letters), 16))):
-        row = layout.row()
-        row.active = not dim
-        row.scale_y = 0.8
-        row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
+def _draw_pause(self, context):
+    """The button in the header of a rendered viewport, as Cycles has one."""
+    space = context.space_data
+    if context.engine == ENGINE and space is not None and space.shading.type == "RENDERED":
+        paused = context.scene.candela.viewport_pause
+        self.layout.prop(context.scene.candela, "viewport_pause", icon="PLAY" if paused else "PAUSE", text="")
 
 
 _CLASSES = (
     CANDELA_OT_select_culprit,
     CANDELA_RENDER_PT_frame_notes,  # first: panels stand in this order
     CANDELA_RENDER_PT_sampling,
+    CANDELA_RENDER_PT_light_paths,
     CANDELA_RENDER_PT_techniques,
     CANDELA_RENDER_PT_parameters,
     *(
@@ -467,9 +523,11 @@ _CLASSES = (
     CANDELA_RENDER_PT_film,
     CANDELA_RENDER_PT_motion_blur,
     CANDELA_RENDER_PT_motion_blur_curve,
+    CANDELA_RENDER_PT_simplify,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,
     CANDELA_VIEWLAYER_PT_passes,
+    *pass_panels.CLASSES,
     CANDELA_VIEWLAYER_PT_override,
     CANDELA_LIGHT_PT_beam_shape,
     CANDELA_LIGHT_PT_shadow,
@@ -483,10 +541,12 @@ _CLASSES = (
 def register() -> None:
     for made in _CLASSES:
         bpy.utils.register_class(made)
+    bpy.types.VIEW3D_HT_header.append(_draw_pause)
     blender_panels.show(ENGINE)
 
 
 def unregister() -> None:
     blender_panels.withdraw(ENGINE)
+    bpy.types.VIEW3D_HT_header.remove(_draw_pause)
     for made in reversed(_CLASSES):
         bpy.utils.unregister_class(made)

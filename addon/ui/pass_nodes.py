@@ -12,8 +12,8 @@ from ..compare import pictures
 from ..frame.pass_graph import FAMILY, RESULT, SERVICE, SUM, in_words, sockets
 from ..frame.technique import OF_A_PICTURE, identifier
 from ..techniques import REGISTRY
-from .pass_tree import TREE, checked, forget_result, graph_of, origin, preview, result
-from .properties import block_of
+from .pass_tree import SHOWN, TREE, checked, forget_result, graph_of, origin, preview, result
+from .properties import block_of, titled
 
 IMAGE = "image"  # the kind of socket that takes or gives any picture
 _COLORS = {
@@ -24,7 +24,15 @@ _COLORS = {
     IMAGE: (0.78, 0.78, 0.16, 1.0),
 }
 _KINDS = {SUM: "Light", FAMILY: "Images", SERVICE: "Service", RESULT: "Result", IMAGE: "Image"}
-PREVIEW_SCALE = 6.0
+# Of nodes, by what they are for: dark enough for white text.
+_NODE_COLORS = {
+    "SURFACE": (0.20, 0.34, 0.25),
+    "LIGHT": (0.40, 0.32, 0.16),
+    "SERVICE": (0.28, 0.28, 0.30),
+    "FILM": (0.22, 0.28, 0.42),
+    "SHOW": (0.36, 0.22, 0.38),
+}
+PREVIEW_SCALE = 9.0
 
 
 class _Socket:
@@ -90,6 +98,18 @@ def _lines(sentence: str, width: int = 36) -> list[str]:
     return textwrap.wrap(sentence, width)
 
 
+def category_of(technique) -> str:
+    """What a technique is for, as colours of nodes tell it."""
+    if technique().only_shows:
+        return "SHOW"
+    written = {write.name for write in technique.writes}
+    if technique.name in ("film", "denoise") or any(name.startswith("film.") for name in written):
+        return "FILM"
+    if any(name.startswith("surface.") for name in written):
+        return "SURFACE"
+    return "LIGHT" if any(name.startswith("radiance.") for name in written) else "SERVICE"
+
+
 def _technique_node(technique) -> type:
     """The node class of a technique, with its sockets and parameters."""
     inputs, outputs = sockets(technique, REGISTRY)
@@ -100,6 +120,7 @@ def _technique_node(technique) -> type:
             for socket in wanted:
                 new = made.new(f"CandelaSocket{socket.kind.capitalize()}", socket.label, identifier=socket.name)
                 new.description = socket.description
+        self.use_custom_color, self.color = True, _NODE_COLORS[category_of(technique)]
 
     def draw_settings(self, context, layout):
         column = layout.column()
@@ -115,7 +136,7 @@ def _technique_node(technique) -> type:
         "__module__": __name__,
         "__annotations__": {},
         "bl_idname": f"CandelaPass_{technique.name}",
-        "bl_label": technique.label,
+        "bl_label": titled(technique.label),
         "bl_width_default": 260.0,
         "technique": technique.name,
         "init": init,
@@ -239,10 +260,21 @@ def pictures_of(tree, images: dict[str, np.ndarray], truth: dict[str, np.ndarray
             made[node.name] = node.picture([picture for picture, _ in found], found[0][1])
         return made[node.name]
 
+    # The fourth channel of light, normals and so on is no opacity: as one it would hide the picture.
+    images, truth = (
+        {name: image if name in SHOWN else opaque(image) for name, image in found.items()} for found in (images, truth)
+    )
     for node in tree.nodes:
         if node.bl_idname.startswith("CandelaPass"):
             of_node(node)
     return {name: picture for name, picture in made.items() if picture is not None}
+
+
+def opaque(image: np.ndarray) -> np.ndarray:
+    """The image with an alpha of 1, if it has four channels."""
+    if image.shape[-1] != 4:
+        return image
+    return np.concatenate([image[..., :3], np.ones_like(image[..., :1])], axis=-1)
 
 
 def _technique(node):

@@ -53,11 +53,16 @@ class _OnTree:
 
 
 class CANDELA_OT_passes_from_auto(_OnTree, bpy.types.Operator):
-    """Make a pass tree of what Auto would run for this scene now"""
+    """Make a pass tree of the techniques that Auto chooses for this scene now"""
 
     bl_idname = "candela.passes_from_auto"
     bl_label = "New from Auto"
     bl_options = {"REGISTER", "UNDO"}
+
+    use: bpy.props.BoolProperty(
+        name="Render With It", default=False,
+        description="Render the scene and its viewports by the new tree instead of what Auto chooses",
+    )  # fmt: skip
 
     def execute(self, context):
         scene = context.scene
@@ -70,7 +75,8 @@ class CANDELA_OT_passes_from_auto(_OnTree, bpy.types.Operator):
         tree = bpy.data.node_groups.new(self.tree or "Passes", TREE)
         graph = pass_graph.from_plan(plan)
         fill(tree, graph, pass_graph.depths(graph))
-        scene.candela.pass_tree = tree
+        if self.use:
+            scene.candela.pass_tree = tree
         space = context.space_data
         if space is not None and space.type == "NODE_EDITOR" and space.tree_type == TREE:
             space.node_tree = tree
@@ -156,7 +162,7 @@ def _ended(called: set[str]) -> set[str]:
 
 
 class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
-    """Run only what the active node needs, and show what it gives"""
+    """Run only what the active node needs, and show its picture"""
 
     bl_idname = "candela.passes_run_to_node"
     bl_label = "Run to Node"
@@ -186,7 +192,7 @@ class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
 
 
 class CANDELA_OT_passes_bake(_OnTree, bpy.types.Operator):
-    """Keep a node's picture of the last run as an image in this file, in scene-linear floats"""
+    """Store a node's picture of the last run as an image in this file, in scene-linear floats"""
 
     bl_idname = "candela.passes_bake"
     bl_label = "Bake to Image"
@@ -244,6 +250,20 @@ class NODE_PT_candela_passes(bpy.types.Panel):
         row.use_property_split, row.use_property_decorate = True, False
         if context.scene.render.engine == ENGINE:
             row.prop(context.scene.candela, "pass_tree", text="Render With")
+            if context.scene.candela.pass_tree != tree:
+                row.label(text="Renders do not use this tree.", icon="INFO")
+
+
+def _draw_header(self, context):
+    """The tree's buttons where a node editor has those of other trees."""
+    if context.space_data.tree_type != TREE:
+        return
+    row = self.layout.row(align=True)
+    row.operator("candela.passes_from_auto", icon="ADD", text="" if context.space_data.edit_tree else "New from Auto")
+    if context.space_data.edit_tree is not None:
+        row.operator("candela.passes_run", icon="PLAY")
+        row.operator("candela.passes_run_to_node", icon="NODE", text="")
+        row.operator("candela.passes_compare", icon="SPLIT_HORIZONTAL", text="")
 
 
 _CLASSES = (
@@ -259,8 +279,10 @@ _CLASSES = (
 def register() -> None:
     for made in _CLASSES:
         bpy.utils.register_class(made)
+    bpy.types.NODE_HT_header.append(_draw_header)
 
 
 def unregister() -> None:
+    bpy.types.NODE_HT_header.remove(_draw_header)
     for made in reversed(_CLASSES):
         bpy.utils.unregister_class(made)

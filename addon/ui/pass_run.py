@@ -19,7 +19,7 @@ from ..frame.ledger import Ledger
 from ..frame.run import Renderer
 from ..frame.settings import Settings
 from ..gfx import context as gpu_context
-from ..gfx import images
+from ..gfx import images, library
 from ..gfx.context import turn
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import make_registry
@@ -77,7 +77,16 @@ def render_steps(
     with turn:
         for other in list(_kept)[:-MOST_KEPT]:
             _kept.pop(other).renderer.release()
-        frame = kept.renderer.begin(snapshot, replace(settings, profile=profile))
+    compiled = library.compile_count
+    frame = yield from _begun(kept.renderer, snapshot, replace(settings, profile=profile))
+    if profile and compiled != library.compile_count:
+        # Drivers make the rest of a program at its first draw. Drawn again, each technique's time is its own.
+        for _ in samples_in_parts(kept.renderer, frame):
+            yield 0.0, "preparing shaders"
+            if frame.samples_done:
+                break
+        kept.renderer.forget()
+        frame = yield from _begun(kept.renderer, snapshot, replace(settings, profile=profile))
     for _ in samples_in_parts(kept.renderer, frame):
         drawing = min(frame.samples_done + 1, settings.samples)
         yield frame.samples_done / settings.samples, f"sample {drawing} of {settings.samples}"
@@ -88,6 +97,18 @@ def render_steps(
     ledger = frame.ledger
     ledger.times["total"] = sum(ledger.times.values())
     return Rendered(arrays, ledger, settings.samples, settings.seed, snapshot.film.exposure, snapshot.film.transparent)
+
+
+def _begun(renderer: Renderer, snapshot, settings: Settings) -> Iterator[tuple[float, str]]:
+    """Begin a frame in parts, and return it."""
+    parts = renderer.beginning(snapshot, settings)
+    while True:
+        with turn:
+            try:
+                done, total = next(parts)
+            except StopIteration as end:
+                return end.value
+        yield 0.0, f"compiling shaders, {done} of {total}"
 
 
 def reference_images(reference: Reference) -> dict[str, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from math import floor, log10
 
 import bpy
 
@@ -33,6 +34,7 @@ from ..frame.technique import (
     identifier,
 )
 from ..techniques import REGISTRY
+from ..techniques.denoise import Denoise
 from .pass_tree import TREE, order_of
 
 _VECTOR_OF_HANDLE = {POINT: "TRANSLATION", DIRECTION: "DIRECTION"}
@@ -49,9 +51,33 @@ def _redraw(group, context) -> None:
     group.id_data.update_tag()
 
 
+_SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the", "to", "with", "x"}
+
+
+def titled(label: str) -> str:
+    """A label as Blender writes its own: Title Case but for small words in its middle."""
+    words = [
+        word if number and word in _SMALL else "-".join(part[:1].upper() + part[1:] for part in word.split("-"))
+        for number, word in enumerate(label.split(" "))
+    ]
+    return " ".join(words)
+
+
+def precision_of(default: float) -> int:
+    """Digits behind the point with which a value like the default is not shown as zero."""
+    if default >= 10.0:
+        return 1
+    return 3 if default == 0.0 or default >= 0.01 else min(2 - floor(log10(default)), 6)
+
+
 def _property(param: Param, **changes):
     """A bpy property for a declared parameter."""
-    common = {"name": param.label, "description": param.description, "default": param.default, "update": _redraw}
+    common = {
+        "name": titled(param.label),
+        "description": param.description,
+        "default": param.default,
+        "update": _redraw,
+    }
     common |= changes
     if param.many:
         del common["default"], common["update"]
@@ -67,7 +93,7 @@ def _property(param: Param, **changes):
     if isinstance(param.default, bool):
         return bpy.props.BoolProperty(**common)
     if isinstance(param.default, str):
-        items = [(identifier, label, "", number) for identifier, label, number in param.items]
+        items = [(identifier, titled(label), about, number) for identifier, label, number, about in param.items]
         return bpy.props.EnumProperty(items=items, **common)
     limits = {}
     if param.minimum is not None:
@@ -77,6 +103,9 @@ def _property(param: Param, **changes):
     make = bpy.props.IntProperty if isinstance(param.default, int) else bpy.props.FloatProperty
     if param.unit:
         limits["subtype"] = param.unit
+    # Lengths are shown in the scene's units.
+    if isinstance(param.default, float) and param.unit != "DISTANCE" and "precision" not in common:
+        limits["precision"] = precision_of(param.default)
     return make(**common, **limits)
 
 
@@ -84,7 +113,7 @@ def _slot_items(slot: str) -> list[tuple[str, str, str, int]]:
     items = [(AUTO, "Auto", "Let Candela choose by what the scene holds", 0)]
     for number, technique in enumerate((t for t in REGISTRY if slot in t.fills), 1):
         summary = (technique.__module__ and __import__(technique.__module__, fromlist=["_"]).__doc__) or ""
-        items.append((technique.name, technique.label, summary.strip().splitlines()[0], number))
+        items.append((technique.name, titled(technique.label), summary.strip().splitlines()[0], number))
     return [*items, (OFF, "Off", "Leave this light out", OFF_NUMBER)]
 
 
@@ -102,9 +131,26 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
-        "noise_threshold": _property(NOISE_THRESHOLD, precision=4),
+        "noise_threshold": _property(NOISE_THRESHOLD, precision=3),
         "motion_steps": _property(MOTION_STEPS),
-    }
+        "split_light_groups": bpy.props.BoolProperty(
+            name="Direct and Indirect", update=_redraw,
+            description="Write two more passes for each light group: its direct light with what is seen of it, and its "
+            "indirect light",
+        ),
+        "use_denoise": bpy.props.BoolProperty(
+            name="Denoise Render", default=True, update=_redraw,
+            description="Filter the remaining noise of final renders after the last sample",
+        ),
+        "use_viewport_denoise": bpy.props.BoolProperty(
+            name="Denoise Viewport", default=True, update=_redraw,
+            description="Filter the remaining noise of the viewport after its last sample",
+        ),
+        "viewport_pause": bpy.props.BoolProperty(
+            name="Pause Viewport", default=False, update=_redraw,
+            description="Stop updating rendered viewports, so that the GPU is free for other work",
+        ),
+    }  # fmt: skip
     out["pass_tree"] = bpy.props.PointerProperty(
         type=bpy.types.NodeTree, name="Pass Tree", poll=lambda _, tree: tree.bl_idname == TREE, update=_redraw,
         description="Render the passes of this tree; without one, Candela chooses them by slot and scene",
@@ -129,7 +175,9 @@ def _declared(scope: str) -> dict:
                 name = identifier(technique.name, param.name)
                 out[name] = _property(param)
                 if param.many:
-                    out[f"{name}_active"] = bpy.props.IntProperty(name=f"Active of {param.label}", options={"HIDDEN"})
+                    out[f"{name}_active"] = bpy.props.IntProperty(
+                        name=f"Active of {titled(param.label)}", options={"HIDDEN"}
+                    )
     return out
 
 
@@ -195,6 +243,9 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
     with its number of samples where it has one of its own. With a dependency graph, as they are evaluated."""
     group = block_of(SCENE, scene, depsgraph).candela
     tree = group.pass_tree
+    values = _values(scene, depsgraph)
+    if not (group.use_viewport_denoise if viewport else group.use_denoise):
+        values[Denoise.name, "strength"] = 0.0
     final = (layer.samples if layer is not None else 0) or group.samples
     samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else final)
     alone = not (viewport or preview or group.sample_offset or group.sample_count)  # a whole picture, by one machine
@@ -210,7 +261,7 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
         motion_steps=group.motion_steps,
         passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
-        values=_values(scene, depsgraph),
+        values=values,
     )
     return settings.as_draft() if preview else settings
 

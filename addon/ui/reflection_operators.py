@@ -91,34 +91,62 @@ class CANDELA_OT_pick_reflection(_OfAnObject, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def invoke(self, context, event):
-        if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, "Pick in a 3D viewport.")
+        if not any(area.type == "VIEW_3D" for area in context.screen.areas):
+            self.report({"ERROR"}, "There is no 3D viewport in this window to click in.")
             return {"CANCELLED"}
         context.window_manager.modal_handler_add(self)
+        context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set("Click on the surface that is to show something else. Escape: cancel.")
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
         if event.type in {"RIGHTMOUSE", "ESC"}:
-            context.workspace.status_text_set(None)
+            self._end(context)
             return {"CANCELLED"}
         if event.type != "LEFTMOUSE" or event.value != "PRESS":
             return {"PASS_THROUGH"}
-        context.workspace.status_text_set(None)
-        place_on_window = (event.mouse_region_x, event.mouse_region_y)
-        region, view = context.region, context.region_data
-        start = view3d_utils.region_2d_to_origin_3d(region, view, place_on_window)
-        direction = view3d_utils.region_2d_to_vector_3d(region, view, place_on_window)
+        region, view = _viewport_at(context.screen, event.mouse_x, event.mouse_y)
+        if region is None:
+            return {"PASS_THROUGH"}  # a click on another editor is that editor's
+        self._end(context)
+        place_on_region = (event.mouse_x - region.x, event.mouse_y - region.y)
+        start = view3d_utils.region_2d_to_origin_3d(region, view, place_on_region)
+        direction = view3d_utils.region_2d_to_vector_3d(region, view, place_on_region)
         graph = context.evaluated_depsgraph_get()
         hit, point, normal, _, met, _ = context.scene.ray_cast(graph, start, direction)
-        if not hit:
-            self.report({"WARNING"}, "There is no surface.")
+        edited = (met.original or met) if hit else None
+        if edited is None or edited.type != "MESH":
+            missing = f"'{edited.name}' is no mesh." if hit else "There is no surface where you clicked."
+            self.report({"WARNING"}, missing)
             return {"CANCELLED"}
-        edited = met.original if met.original else met
+        for other in context.view_layer.objects.selected:
+            other.select_set(False)
+        edited.select_set(True)
         context.view_layer.objects.active = edited
         normal = normal if normal.dot(direction) < 0 else -normal
         place(context, edited, point, normal, start)
         return {"FINISHED"}
+
+    def cancel(self, context):
+        self._end(context)
+
+    def _end(self, context) -> None:
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+
+
+def _viewport_at(screen, x: int, y: int):
+    """Region and view of the 3D viewport under a point of the window; (None, None) where another editor is."""
+    for area in screen.areas:
+        if area.type != "VIEW_3D":
+            continue
+        under = [r for r in area.regions if r.x <= x < r.x + r.width and r.y <= y < r.y + r.height]
+        if any(region.type in {"UI", "HEADER", "TOOL_HEADER"} for region in under):
+            continue
+        main = next((region for region in under if region.type == "WINDOW"), None)
+        if main is not None:
+            return main, main.data
+    return None, None
 
 
 class CANDELA_OT_return_to_view(_OfAnObject, bpy.types.Operator):
@@ -129,9 +157,10 @@ class CANDELA_OT_return_to_view(_OfAnObject, bpy.types.Operator):
 
     def execute(self, context):
         entry = active_entry(context.object.candela, CONSTRAINTS)
-        view = getattr(context.space_data, "region_3d", None)
+        view = getattr(context.space_data, "region_3d", None) or _largest_view(context.screen)
         if entry is None or view is None:
-            self.report({"ERROR"}, "There is no constraint, or no 3D viewport.")
+            missing = "The object has no constraint." if entry is None else "There is no 3D viewport in this window."
+            self.report({"ERROR"}, missing)
             return {"CANCELLED"}
         matrix = context.object.matrix_world
         point, viewer = matrix @ Vector(entry.point), matrix @ Vector(entry.viewer)
@@ -140,6 +169,14 @@ class CANDELA_OT_return_to_view(_OfAnObject, bpy.types.Operator):
         view.view_distance = (viewer - point).length
         view.view_rotation = (viewer - point).to_track_quat("Z", "Y")
         return {"FINISHED"}
+
+
+def _largest_view(screen):
+    """View of the largest 3D viewport; None without one."""
+    areas = [area for area in screen.areas if area.type == "VIEW_3D"] if screen is not None else []
+    if not areas:
+        return None
+    return max(areas, key=lambda area: area.width * area.height).spaces.active.region_3d
 
 
 def _draw(self, context):

@@ -7,12 +7,15 @@ of the active entry.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 from mathutils import Matrix, Quaternion, Vector
 
 from ..frame.technique import CAMERA, LIGHT, MATERIAL, OBJECT, POINT, SCENE, WORLD, Param, identifier
 from ..techniques import REGISTRY
 from . import ENGINE
+from .properties import titled
 
 # Tab of the Properties editor, and the context's name for the data-block that it shows.
 _TABS = {
@@ -22,6 +25,8 @@ _TABS = {
     MATERIAL: ("material", "material"),
     OBJECT: ("object", "object"),
 }
+
+_WITH_SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "VOLUME"}  # kinds of object
 
 
 def scoped(technique) -> dict[str, list[Param]]:
@@ -38,7 +43,8 @@ def _panel(technique, scope: str, params: list[Param]) -> type:
 
     @classmethod
     def poll(cls, context):
-        return context.engine == ENGINE and getattr(context, name, None) is not None
+        block = getattr(context, name, None)
+        return context.engine == ENGINE and block is not None and (scope != OBJECT or block.type in _WITH_SURFACES)
 
     def draw(self, context):
         group = getattr(context, name).candela
@@ -55,7 +61,7 @@ def _panel(technique, scope: str, params: list[Param]) -> type:
         "bl_space_type": "PROPERTIES",
         "bl_region_type": "WINDOW",
         "bl_context": tab,
-        "bl_label": technique.label,
+        "bl_label": titled(technique.label),
         "bl_options": {"DEFAULT_CLOSED"},
         "COMPAT_ENGINES": {ENGINE},
         "poll": poll,
@@ -73,7 +79,7 @@ class CANDELA_UL_entries(bpy.types.UIList):
 
 def _draw_list(layout, group, technique, scope: str, param: Param) -> None:
     name = identifier(technique.name, param.name)
-    layout.label(text=param.label)
+    layout.label(text=titled(param.label))
     row = layout.row()
     row.template_list("CANDELA_UL_entries", name, group, name, group, f"{name}_active", rows=3)
     buttons = row.column(align=True)
@@ -146,17 +152,35 @@ class CANDELA_OT_edit_list(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _handles(block_object) -> list[tuple[object, Param, str]]:
-    """(settings, parameter, property) of all vectors with a handle: the object's, and of active entries of lists."""
+@dataclass(frozen=True)
+class Place:
+    """Where a vector with a handle is found on an object. Found anew whenever it is asked for: undo and edits of lists
+    free what a handle would hold on to."""
+
+    name: str
+    param: Param
+    entries: str = ""  # the list whose entry has it; else it is the object's own
+    index: int = 0
+
+    def settings(self, shown):
+        """What holds the vector; None where it is gone."""
+        if shown is None or not self.entries:
+            return shown.candela if shown is not None else None
+        entries = getattr(shown.candela, self.entries)
+        return entries[self.index] if self.index < len(entries) else None
+
+
+def _handles(shown) -> list[Place]:
+    """All vectors of an object that have a handle: its own, and those of the active entries of lists."""
     found = []
     for technique in REGISTRY:
         for param in scoped(technique).get(OBJECT, ()):
             name = identifier(technique.name, param.name)
-            if param.many:
-                entry = active_entry(block_object.candela, name)
-                found += [(entry, own, own.name) for own in param.many if own.handle and entry is not None]
+            if param.many and active_entry(shown.candela, name) is not None:
+                index = getattr(shown.candela, f"{name}_active")
+                found += [Place(own.name, own, name, index) for own in param.many if own.handle]
             elif param.handle:
-                found.append((block_object.candela, param, name))
+                found.append(Place(name, param))
     return found
 
 
@@ -174,34 +198,80 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
         return context.engine == ENGINE and context.object is not None and bool(_handles(context.object))
 
     def setup(self, context):
+        self.shown = None
         self.refresh(context)
 
     def refresh(self, context):
+        """Make the handles that there should be. Those that are there stay: one of them may be the one that is being
+        dragged, which Blender goes on using."""
+        shown, places = context.object, tuple(_handles(context.object))
+        wanted = shown.session_uid, places
+        if wanted == self.shown or any(gizmo.is_modal for gizmo in self.gizmos):
+            return
+        self.shown = wanted
         self.gizmos.clear()
-        shown = context.object
-        for settings, param, name in _handles(shown):
-            if param.handle == POINT:
+        for place in places:
+            if place.param.handle == POINT:
                 gizmo = self.gizmos.new("GIZMO_GT_move_3d")
-                gizmo.target_set_handler(
-                    "offset", get=_reader(settings, name, shown), set=_writer(settings, name, shown)
-                )
+                gizmo.draw_options = {"FILL_SELECT", "ALIGN_VIEW"}  # a ring is hardly seen from its side
+                gizmo.target_set_handler("offset", get=_reader(place), set=_writer(place, gizmo))
             else:
                 gizmo = self.gizmos.new("GIZMO_GT_dial_3d")
-                gizmo.matrix_basis = _turned(shown, Vector(getattr(settings, name)))
-                gizmo.target_set_handler(
-                    "offset", get=lambda: 0.0, set=_turner(settings, name, Vector(getattr(settings, name)))
-                )
+                gizmo.target_set_handler("offset", get=lambda: 0.0, set=_turner(place, gizmo, _vector(place)))
             gizmo.color, gizmo.alpha = (1.0, 0.7, 0.2), 0.8
+            gizmo.color_highlight, gizmo.alpha_highlight = (1.0, 0.9, 0.6), 1.0
             gizmo.scale_basis = 0.3
 
+    def draw_prepare(self, context):
+        """Dials stand where their object is."""
+        for gizmo, place in zip(self.gizmos, self.shown[1] if self.shown else ()):
+            if place.param.handle != POINT and not gizmo.is_modal:
+                gizmo.matrix_basis = _turned(context.object, _vector(place))
 
-def _reader(settings, name: str, shown):
-    return lambda: shown.matrix_world @ Vector(getattr(settings, name))
+
+DRAG_S = 0.05  # between two looks whether a drag goes on
 
 
-def _writer(settings, name: str, shown):
+class _Drag:
+    """Makes a step for undo when a drag of a handle has ended, as Blender does for its own handles alone."""
+
+    def __init__(self, gizmo):
+        self._gizmo, self._goes_on = gizmo, False
+
+    def moved(self) -> None:
+        if not self._goes_on:
+            self._goes_on = True
+            bpy.app.timers.register(self._look, first_interval=DRAG_S)
+
+    def _look(self) -> float | None:
+        try:
+            if self._gizmo.is_modal:
+                return DRAG_S
+        except ReferenceError:
+            pass  # it has gone since
+        self._goes_on = False
+        bpy.ops.ed.undo_push(message="Drag Handle")
+        return None
+
+
+def _vector(place: Place) -> Vector:
+    settings = place.settings(bpy.context.object)
+    return Vector(getattr(settings, place.name)) if settings is not None else Vector((0.0, 0.0, 1.0))
+
+
+def _reader(place: Place):
+    return lambda: bpy.context.object.matrix_world @ _vector(place)
+
+
+def _writer(place: Place, gizmo):
+    drag = _Drag(gizmo)
+
     def write(value):
-        setattr(settings, name, shown.matrix_world.inverted_safe() @ Vector(value))
+        shown = bpy.context.object
+        settings = place.settings(shown)
+        if settings is not None:
+            setattr(settings, place.name, shown.matrix_world.inverted_safe() @ Vector(value))
+            drag.moved()
 
     return write
 
@@ -212,9 +282,14 @@ def _turned(shown, direction: Vector) -> Matrix:
     return Matrix.Translation(shown.matrix_world.translation) @ axis.to_track_quat("Z", "Y").to_matrix().to_4x4()
 
 
-def _turner(settings, name: str, began: Vector):
+def _turner(place: Place, gizmo, began: Vector):
+    drag = _Drag(gizmo)
+
     def write(angle):
-        setattr(settings, name, Quaternion(began.orthogonal().normalized(), angle) @ began)
+        settings = place.settings(bpy.context.object)
+        if settings is not None:
+            setattr(settings, place.name, Quaternion(began.orthogonal().normalized(), angle) @ began)
+            drag.moved()
 
     return write
 

@@ -14,6 +14,7 @@ from ..materials import translucency
 from ..techniques.image_space_subsurface import ImageSpaceSubsurface
 
 LABELS = {translucency.BLUR: "blur", translucency.TINT: "tint", translucency.TRANSLUCENCY: "translucency"}
+SOFT_BRUSH = "brushes/essentials_brushes-mesh_texture.blend/Brush/Paint Soft"
 OVERLAP_GRID = 64  # cells along each side of the unit square, for the check of texture coordinates
 MOST_FACES = 2000  # of a mesh whose faces are looked at one by one
 
@@ -91,7 +92,7 @@ class CANDELA_OT_new_translucency_maps(bpy.types.Operator):
 
 
 class CANDELA_OT_paint_translucency_map(bpy.types.Operator):
-    """Paint this map in Texture Paint, with a soft brush"""
+    """Paint this map in Texture Paint, with a soft brush where Blender has one"""
 
     bl_idname = "candela.paint_translucency_map"
     bl_label = "Paint"
@@ -113,7 +114,28 @@ class CANDELA_OT_paint_translucency_map(bpy.types.Operator):
         settings.mode, settings.canvas = "IMAGE", image
         if context.object.mode != "TEXTURE_PAINT":
             bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
+            _take_soft_brush()
         return {"FINISHED"}
+
+
+def _take_soft_brush() -> None:
+    """Blender's own brush with a soft edge, an asset since 4.3; where there is none the brush stays as it is."""
+    try:
+        bpy.ops.brush.asset_activate(asset_library_type="ESSENTIALS", relative_asset_identifier=SOFT_BRUSH)
+    except (AttributeError, RuntimeError):
+        return
+
+
+@bpy.app.handlers.persistent
+def _before_save(*_) -> None:
+    """Put what was painted into the file: Blender saves an image that was made in it as it was before painting."""
+    for material in bpy.data.materials:
+        if material.library is not None:
+            continue
+        for name in translucency.MAPS:
+            image = getattr(material.candela, property_of(name))
+            if image is not None and image.is_dirty and (image.source == "GENERATED" or image.packed_file is not None):
+                image.pack()
 
 
 def _draw_maps(self, context):
@@ -121,7 +143,7 @@ def _draw_maps(self, context):
     column.operator("candela.new_translucency_maps", icon="IMAGE_DATA")
     row = column.row(align=True)
     for name, label in LABELS.items():
-        row.operator("candela.paint_translucency_map", text=label.title(), icon="TPAINT_HLT").name = name
+        row.operator("candela.paint_translucency_map", text=f"Paint {label.title()}", icon="TPAINT_HLT").name = name
 
 
 _CLASSES = (CANDELA_OT_new_translucency_maps, CANDELA_OT_paint_translucency_map)
@@ -132,9 +154,11 @@ def register() -> None:
     for made in _CLASSES:
         bpy.utils.register_class(made)
     getattr(bpy.types, _PANEL).append(_draw_maps)
+    bpy.app.handlers.save_pre.append(_before_save)
 
 
 def unregister() -> None:
+    bpy.app.handlers.save_pre.remove(_before_save)
     getattr(bpy.types, _PANEL).remove(_draw_maps)
     for made in reversed(_CLASSES):
         bpy.utils.unregister_class(made)

@@ -3,7 +3,7 @@
 //
 // A projection from the receiver onto the card's plane, J, takes directions to (x, y, z) with x / z and y / z along the
 // card's edges and 1 / z the distance of the card as a share of the way. A place's opacity stands in the card's tile of
-// addon/scene/opacity_maps.py; what is half opaque hides a point by lot.
+// addon/scene/opacity_maps.py; what is half opaque hides a point at random.
 //
 // Source: Forest, Barthe, Paulin, "Soft textured shadow volume", CGF 28(4), 2009; its projection corrected in three places
 // (J acts on s - p; the last row of W is (0, 0, 1 / e); z > 1, as the card lies before the light).

@@ -38,6 +38,12 @@ float grass_clumps(vec2 place)
   return smoothstep(0.15, 0.85, mix(below, above, f.y));
 }
 
+// How far along its ray a point lies that is `below` the plane on top, where that bends upwards by `bend` per metre.
+float grass_length(float below, float rise, float bend)
+{
+  return 2.0 * below / (rise + sqrt(rise * rise + 2.0 * bend * below));
+}
+
 bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
 {
   hit.bare = true;
@@ -103,9 +109,11 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
     return false;
   }
 
-  vec2 root = uv - (below / rise) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
+  // In a hollow the ground rises ahead, and the ray meets what stands there sooner than on flat ground.
+  float bend_down = max(-curvature, 0.0) * level;
+  vec2 root = uv - grass_length(below, rise, bend_down) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
   hit.bare = g.density < 1.0 && grass_clumps(root * 6.0) >= g.density;
-  float depth = (hit.bare ? g.height : below) / rise;
+  float depth = grass_length(hit.bare ? g.height : below, rise, bend_down);
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;

@@ -8,6 +8,9 @@
 #include "lib/instance.glsl"
 #include "generated/material"
 #include "hits/point.glsl"
+#ifdef OWN_SURFACE
+#include "hits/relief.glsl"
+#endif
 #include "surface/store.glsl"
 
 #define FIRST_EVEN 16  // as in surface/surface.frag.glsl
@@ -19,6 +22,9 @@ void main()
   int id = int(hit_triangle_fetch(pixel).x);
   SurfacePoint point = hit_point(pixel, instance_read(id), id);
   point.refracts = glass_bends != 0;
+#ifdef OWN_SURFACE
+  relief_at_hit(point);
+#endif
   // Evenly over the samples: a pane's two sides are each one lobe of two.
   uvec3 salt = roll_of(pixel, 0, film_view.seed, 81 + ray_number);
   float even_share = (film_view.sample_index < FIRST_EVEN) ? 0.0 : EVEN_SHARE;

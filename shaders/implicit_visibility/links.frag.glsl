@@ -106,7 +106,8 @@ void main()
     bool bends = !front && t < TOUCHING * ball.w && dot(disc_normal, normal) > ALIKE;
     bool bends_back = front && t < TOUCHING * ball.w && dot(disc_normal, normal) < -ALIKE && leaves.z < 0.5;
     bends = bends || (bends_back && dot(off, normal) < 0.0);
-    if (own_surface || bends) {
+    // Nothing sees the back of a sheet that sees nothing: what meets it has slipped between two discs.
+    if (own_surface || bends || (!front && leaves.z > 1.5)) {
       continue;
     }
     if (leaves.w < 1.0) {

@@ -40,15 +40,16 @@ vec3 arriving_at(vec3 place, vec3 normal, vec3 face)
     vec4 own = surfel_leaves_fetch(ivec2(int(leaves.x) & 2047, int(leaves.x) >> 11));
     int receiver = int(front ? own.y : own.z);
     float alike = max(front ? cosine : -cosine, 0.0);
+    bool dark = receiver < -1;  // the back of a sheet that sees nothing
     if (receiver < 0) {
       receiver = int(own.y);
-      alike = 0.0;
+      alike = dark ? alike : 0.0;
     }
     ivec2 stored = receiver_pixel(receiver);
-    vec4 known = arriving_fetch(stored);
+    vec4 known = dark ? vec4(0.0) : arriving_fetch(stored);
     int facing = receiver * RECEIVER_TEXELS + 1;
     vec3 own_normal = receivers_fetch(ivec2(facing & 2047, facing >> 11)).xyz;
-    float seen = seen_around(free_a_fetch(stored), free_b_fetch(stored), own_normal, -off, ball.w);
+    float seen = dark ? 1.0 : seen_around(free_a_fetch(stored), free_b_fetch(stored), own_normal, -off, ball.w);
     float near = 1.0 - square / (reach * reach);
     float beside = dot(off, face) / (OFF_PLANE * ball.w);
     alike *= alike;

@@ -50,7 +50,7 @@ void main()
       out_albedo.rgb = min(reflected, met.reflection.diffuse);
     }
     else {
-      // From here on paths end by lot: what they bring is a mean over many, shared by many.
+      // From here on paths end at random: what they bring is a mean over many, shared by many.
       throughput *= reflected;
       float chance = min(max_component(throughput), 1.0);
       if (to_unit(roll.z) >= chance) {

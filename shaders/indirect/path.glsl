@@ -113,7 +113,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   met.lit = met.normal;
   float through = met.reflection.through;
   if (through > 0.0) {
-    // Leaves, paper: one of both sides is looked at, by lot.
+    // Leaves, paper: one of both sides is looked at, at random.
     bool passes = to_unit(hash3(uvec3(salt, uint(hit.x), uint(hit.y))).x) < through;
     met.lit = passes ? -met.normal : met.normal;
     float shine = passes ? 0.0 : 1.0 / max(1.0 - through, 1e-6);

@@ -4,7 +4,7 @@
 // The four texels around the receiver say together whether it lies at the edge of a shadow or where surfaces meet. The
 // nearest of them decides, so that means over jittered maps stay right,
 // - where the penumbra is wide: such an edge is one of many that make it, and no texel shows in the picture;
-// - where a caster with alpha was drawn by lot; rays pass such casters.
+// - where a caster with alpha was drawn at random; rays pass such casters.
 // A caster of f < 1/2 texels is seen by one of the four in 2 f of the maps, and keeps 2 f^2 of its shadow in place of f.
 // To leave casters of one texel to the map would take a quarter of a texel off those of one to two, and most of the gain.
 #define OPAQUE_ONLY

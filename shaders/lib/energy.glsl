@@ -1,7 +1,7 @@
 // Albedos of microfacet lobes from the table `energy_table`, and what follows from them: how much a layer leaves for
 // the layer below, and how much light a lobe must gain because it scatters more than once.
 //
-// The host binds `energy_table` (sampler2D, 192 x 64 RGBA32F, filled by addon/materials/energy.py, where the layout and
+// The host binds `energy_table` (sampler2D, 192 x 64 or 192 x 160 RGBA32F, filled by addon/materials/energy.py, where the layout and
 // the sources are described) in every program that includes this file. `mu` is the cosine between the lobe's normal
 // and the viewer, `roughness` the artist's roughness (alpha = roughness^2; for anisotropic lobes (ax ay)^(1/4), which
 // is the same value).
@@ -14,6 +14,13 @@
 
 #define ENERGY_NODES 32.0
 #define LAYER_NODES 16.0
+#define FINE_NODES 32.0
+
+// Whether the tables are those of Cycles 5.3 and later: the dielectric layer has more nodes there, at sqrt(mu).
+bool energy_is_fine()
+{
+  return energy_table_size().y > 64;
+}
 
 // Column and row of a fractional node position: xy the lower node, zw the weight of the next one.
 vec4 energy_cell(float roughness, float mu, float nodes)
@@ -46,17 +53,29 @@ float ggx_energy_average(float roughness)
   return mix(energy_table_fetch(texel).z, energy_table_fetch(texel + ivec2(1, 0)).z, cell.z);
 }
 
-// Place of an index of refraction between the tables' slices: lower slice and weight of the next one.
+// Place of an index of refraction between the slices of a table: lower slice and weight of the next one.
+vec2 ior_slice_of(float ior, float nodes)
+{
+  float z = clamp(sqrt(abs((ior - 1.0) / (ior + 1.0))), 0.0, 1.0) * (nodes - 1.0);
+  float slice = min(floor(z), nodes - 2.0);
+  return vec2(slice, z - slice);
+}
+
 vec2 ior_slice(float ior)
 {
-  float z = clamp(sqrt(abs((ior - 1.0) / (ior + 1.0))), 0.0, 1.0) * (LAYER_NODES - 1.0);
-  float slice = min(floor(z), LAYER_NODES - 2.0);
-  return vec2(slice, z - slice);
+  return ior_slice_of(ior, LAYER_NODES);
 }
 
 // Where between reflectance at normal incidence (0) and total reflection (1) the mean of a dielectric lobe lies.
 float dielectric_layer_shape(float mu, float roughness, float ior)
 {
+  if (energy_is_fine()) {
+    vec2 fine = ior_slice_of(ior, FINE_NODES);
+    int pair = int(fine.x) % 16;
+    vec4 cell = energy_cell(roughness, sqrt(max(mu, 0.0)), FINE_NODES);
+    vec4 four = energy_bilinear(ivec2(32 * (pair % 6), 64 + 32 * (pair / 6)), cell);
+    return (fine.x < 16.0) ? mix(four.x, four.y, fine.y) : mix(four.z, four.w, fine.y);
+  }
   vec2 slice = ior_slice(ior);
   int k = int(slice.x);
   vec4 ends = energy_bilinear(ivec2(16 * (k % 4), 16 * (k / 4)), energy_cell(roughness, mu, LAYER_NODES));

@@ -86,7 +86,7 @@ void main()
   }
   bool traced = s.glossy_roughness <= traced_roughness;
 #ifdef LIGHT_LINKS
-  int group = int(surface_group_fetch(pixel).z + 0.5);
+  int group = receiver_group(pixel);
 #endif
   vec3 diffuse = vec3(0.0);
   vec3 glossy = vec3(0.0);
@@ -98,7 +98,7 @@ void main()
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
 #ifdef LIGHT_LINKS
-    if ((light.flags & (LIGHT_LINKS << group)) != 0) {
+    if (((light.unlit >> group) & 1) != 0) {
       continue;
     }
 #endif

@@ -38,7 +38,7 @@ vec3 arriving(ivec2 pixel, vec3 origin, vec3 direction, float lobe_density, bool
       continue;
     }
 #ifdef LIGHT_LINKS
-    if ((light.flags & (LIGHT_LINKS << int(surface_group_fetch(pixel).z + 0.5))) != 0) {
+    if (((light.unlit >> receiver_group(pixel)) & 1) != 0) {
       continue;
     }
 #endif

@@ -371,11 +371,16 @@ vec3 principled_coat(inout Closures closures, SurfacePoint point, vec3 weight, f
   vec3 albedo = add_glossy(closures, point, weight * coat_weight, DISTRIBUTION_MULTI_GGX, FRESNEL_DIELECTRIC,
                            vec3(dielectric_f0(ior)), vec3(1.0), ior, clamp(coat_roughness, 0.0, 1.0), 0.0,
                            default_tangent(n), n);
-  vec3 below = below_layer(weight, albedo);
   float mu = view_cosine(point, n);
   float cos_inside = sqrt(max(1.0 - (1.0 - mu * mu) / (ior * ior), 1e-6));
   vec3 absorption = pow(max(coat_tint, vec3(0.0)), vec3(1.0 / cos_inside));
-  return below * mix(vec3(1.0), absorption, clamp(coat_weight, 0.0, 1.0));
+  float covered = clamp(coat_weight, 0.0, 1.0);
+  if (energy_is_fine()) {
+    // As Cycles 5.3: the coat covers a share of the surface and reflects there as if its facets did not hide each other.
+    float reflected = clamp(dielectric_layer_albedo(mu, clamp(coat_roughness, 0.0, 1.0), ior), 0.0, 1.0);
+    return weight * mix(vec3(1.0), (1.0 - reflected) * absorption, covered);
+  }
+  return below_layer(weight, albedo) * mix(vec3(1.0), absorption, covered);
 }
 
 // Principled BSDF, from the top layer down: alpha, sheen, coat, emission, metal, transmission, specular, diffuse.

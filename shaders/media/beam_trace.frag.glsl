@@ -1,7 +1,7 @@
 // Light rays through specular objects, one per texel: the stretches of each that lie in media after an interface.
 //
 // Rays of a lamp fill the cone around its casters evenly (a sun's, a disc across its direction). At smooth interfaces a ray
-// is mirrored or bent by lot, by Fresnel's reflectance; what is diffuse ends it. Two stretches are kept, each as its ends,
+// is mirrored or bent at random, by Fresnel's reflectance; what is diffuse ends it. Two stretches are kept, each as its ends,
 // its flux in watts, and half the distance to the ray of the next texel as it would be had nothing bent them.
 #include "media/media.glsl"
 #include "light/sources.glsl"
@@ -83,6 +83,7 @@ void main()
     if ((light.flags & LIGHT_SPOT) != 0) {
       flux *= spot_attenuation(light, direction);
     }
+    flux *= light_tree(light, direction, position, length(to_casters));
     spread = 0.5 * sqrt(solid_angle);
   }
   uint seed = salt;

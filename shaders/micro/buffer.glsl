@@ -7,13 +7,15 @@
 // larger leaves cover cast rays afterwards. Here every node is drawn by rays through the middles of pixels (`centre_test`):
 // what a node's ball holds between the middles is left out with all that is below it, and silhouettes do not grow.
 //
-// Binds `tree_nodes`, `node_radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
+// Binds `tree_nodes`, `piece_clips`, `node_radiance`, the image `micro`; constants part, micro_side, leaf_count, id_bits, detail, centre_test, log_depths.
 //
 // With GLOSSY the pixels are equal shares of what microfacets reflect to the viewer instead: each has a ray of the lobe, and
 // nodes beside the cone about all rays are left out.
 #include "micro/warp.glsl"
 #define NOTHING 0xffffffffu
 #define ROUND 0.2  // of the size of a flat group that is drawn as one disc: up to there a bent one is drawn as a ball
+#define ITSELF 1e-3  // half lengths of a piece within which what is seen of it is where one looks from
+#define SEAM 1e-4    // half lengths by which pieces overlap, so that rounding leaves no gap
 #define SAME_SURFACE 0.7  // cosine between normals, from which on a disc whose radius reaches here is this surface
 
 vec4 node_texel(int index)
@@ -73,19 +75,29 @@ void micro_store(ivec2 texel, float depth, int node, bool behind)
   }
 }
 
-// A point's disc, a flat group's rectangle or a bent one's ball, into the pixels `low` to `high` whose middles see it.
+// Whether something stands between a place on a piece and the point where it was lit (micro/clips.frag.glsl).
+bool beyond_clips(int node, bool behind, vec2 at)
+{
+  int entry = 2 * (node - leaf_count) + (behind ? 1 : 0);
+  vec4 clips = piece_clips_fetch(ivec2(entry % POINT_ROW, entry / POINT_ROW));
+  return dot(at, vec2(cos(clips.x), sin(clips.x))) > clips.y || dot(at, vec2(cos(clips.z), sin(clips.z))) > clips.w;
+}
+
+// A point's piece of a triangle or disc, a flat group's rectangle or a bent one's ball, into the pixels `low` to `high` whose
+// middles see it.
 void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node, vec4 shape, int node)
 {
   vec3 axis = octahedral_decode(shape.xy);
   float squared = shape.w * shape.w;
   float off_plane = dot(to_node, axis);
   bool flat_group = node < leaf_count && shape.w > 0.0;
-  vec4 sides = flat_group ? node_texel(3 * node + 2) : vec4(0.0);
+  vec4 sides = (flat_group || node >= leaf_count) ? node_texel(3 * node + 2) : vec4(0.0);
+  bool piece = node >= leaf_count && sides.w > 0.0;
   vec3 along = octahedral_decode(sides.xy);
   vec3 across = cross(axis, along);
   // A smooth surface bends away below the disc beside it.
   bool same = node >= leaf_count && abs(dot(axis, f.normal)) > SAME_SURFACE;
-  float nearest = same ? shape.w : 0.0;
+  float nearest = piece ? ITSELF * shape.w : (same ? shape.w : 0.0);
   int width = high.x - low.x + 1;
   int count = width * (high.y - low.y + 1);
   for (int i = 0; i < count; i++) {
@@ -95,10 +107,19 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
     float cosine = dot(ray, axis);
     float depth = (shape.w < 0.0) ? dot(to_node, ray) : off_plane / ((cosine == 0.0) ? 1e-30 : cosine);
     vec3 off = depth * ray - to_node;
-    bool inside = flat_group ? (abs(dot(off, along)) <= sides.z && abs(dot(off, across)) <= sides.w)
-                             : dot(off, off) <= squared;
+    bool inside = dot(off, off) <= squared;
+    if (flat_group || piece) {
+      vec2 at = vec2(dot(off, along), dot(off, across));
+      // Between the two edges that meet above the longest one.
+      float up = at.y / sides.w;
+      vec2 edges = vec2(-shape.w, shape.w) + (sides.z - vec2(-shape.w, shape.w)) * up;
+      inside = flat_group ? abs(at.x) <= sides.z && abs(at.y) <= sides.w
+                          : up >= -SEAM && up <= 1.0 + SEAM && at.x >= edges.x - SEAM * shape.w && at.x <= edges.y + SEAM * shape.w;
+    }
     if (depth > nearest && inside && dot(ray, f.plane) > 0.0) {
-      micro_store(corner + pixel, depth, node, cosine > 0.0);
+      bool behind = cosine > 0.0;
+      bool dark = piece && beyond_clips(node, behind, vec2(dot(off, along), dot(off, across)));
+      micro_store(corner + pixel, depth, dark ? 0 : node, behind);
     }
   }
 }

@@ -1,4 +1,4 @@
-// Radiance that each side of each point sends: of direct light, and of what its group gathered. w: what it weighs.
+// Radiance that each side of each point sends: of direct light, and of what its group gathered. w: its area.
 #include "lib/math.glsl"
 
 void main()
@@ -7,13 +7,17 @@ void main()
   int entry = pixel.y * POINT_ROW + pixel.x;
   int leaf = entry >> 1;
   int index = 3 * (leaf_count + leaf) + 1;
-  float radius = tree_nodes_fetch(ivec2(index & 2047, index >> 11)).w;
+  float size = tree_nodes_fetch(ivec2(index & 2047, index >> 11)).w;
+  float apex = tree_nodes_fetch(ivec2((index + 1) & 2047, (index + 1) >> 11)).w;
+  float area = (apex > 0.0) ? size * apex : (PI / (COVER * COVER)) * size * size;
   vec3 sent = direct_fetch(pixel).rgb;
   if (group_count > 0) {
-    int group = 2 * (leaf / (leaf_count / group_count)) + (entry & 1);
-    sent += albedo_fetch(pixel).rgb * (1.0 / PI) * arriving_fetch(ivec2(group % NODE_ROW, group / NODE_ROW)).rgb;
+    int group = int(shares_fetch(pixel).x);
+    if (group >= 0) {
+      sent += albedo_fetch(pixel).rgb * (1.0 / PI) * arriving_fetch(ivec2(group % NODE_ROW, group / NODE_ROW)).rgb;
+    }
   }
   // A point that is not there (its material has no surface) sends nothing, but what lies behind it is hidden.
   bool finite = is_finite(sent.r + sent.g + sent.b);
-  out_sent = vec4(finite ? max(sent, vec3(0.0)) : vec3(0.0), radius * radius);
+  out_sent = vec4(finite ? max(sent, vec3(0.0)) : vec3(0.0), area);
 }

@@ -2,7 +2,7 @@
 #include "ssdo/fan.glsl"
 #include "indirect/path.glsl"
 
-// Radiance along a ray, with all that reaches its end in further reflections; paths go on by lot.
+// Radiance along a ray, with all that reaches its end in further reflections; paths go on at random.
 vec3 path_radiance(vec3 origin, vec3 direction, uvec3 roll)
 {
   vec3 sum = vec3(0.0);

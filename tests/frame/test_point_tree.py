@@ -1,5 +1,7 @@
 """Points by area and the tree over them: laws that hold for every cloud of points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,12 +60,83 @@ def test_triangles_have_points_by_their_area_and_opacity():
 
 @pytest.mark.parametrize("run", [0, 5])
 def test_their_discs_leave_few_holes_and_lie_where_they_say(run):
-    shown = surfaces(square())
+    shown = surfaces(square(), opacity=0.99)
     position, normal, areas = spread(shown, 1024, run).placed(shown)
     assert (position[:, 2] == 0).all() and (normal == (0, 0, 1)).all()
     asked = np.random.default_rng(1).random((4000, 2)) * 0.9 + 0.05
     nearest = ((asked[:, None] - position[None, :, :2]) ** 2).sum(axis=2).min(axis=1)
     assert (nearest > COVER**2 * areas[0] / np.pi).mean() < 0.012
+
+
+@pytest.mark.parametrize("run", [0, 3])
+def test_pieces_cover_their_triangles_once(run):
+    """As many as there are points; each place of two triangles lies in one piece, and each point in its own."""
+    shown = surfaces(np.array(square()) * (3, 1, 1))
+    points = spread(shown, 500, run)
+    pieces, (position, _, areas) = points.pieces(shown), points.placed(shown)
+    assert areas.sum() == pytest.approx(3.0) and areas.max() < 4.1 * areas.mean()
+    asked = np.random.default_rng(run).random((500, 2)) * (3, 1)
+    assert (inside(pieces, asked).sum(axis=1) == 1).all()
+    assert inside(pieces, position[:, :2]).diagonal().all()
+
+
+def inside(pieces, asked):
+    """(asked, pieces): whether places lie in triangles of the plane."""
+    e1, e2 = (pieces[:, k, :2] - pieces[:, 0, :2] for k in (1, 2))
+    off = asked[:, None] - pieces[None, :, 0, :2]
+    across = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+    u = (off[..., 0] * e2[:, 1] - off[..., 1] * e2[:, 0]) / across
+    v = (e1[:, 0] * off[..., 1] - e1[:, 1] * off[..., 0]) / across
+    return (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+
+
+def test_the_smallest_of_many_triangles_and_what_lets_light_pass_have_discs():
+    small = np.array(square()) * 1e-2 + (5, 0, 0)
+    shown = surfaces(np.concatenate([square(), *(small + (k, 0, 0) for k in range(40))]))
+    points = spread(shown, 64, 0)
+    assert len(points) == 64
+    whole = np.isfinite(points.piece[:, 0, 0])
+    assert len(np.unique(points.triangle[whole])) == 32 and {0, 1} <= set(points.triangle[whole])
+    assert whole.sum() == 63  # all others have a thousandth of the area
+    assert np.isnan(spread(surfaces(square(), opacity=0.5), 64, 0).piece).all()
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_what_nothing_sees_has_few_points_that_stand_for_all_of_it(opacity):
+    both = np.concatenate([square(), square(1.0)])
+    shown = replace(surfaces(both, opacity), rate=np.array([1, 1, 1 / 16, 1 / 16]))
+    points = spread(shown, 1024, 0)
+    assert (points.triangle >= 2).sum() == pytest.approx(1024 / 17, abs=2)
+    _, _, area = points.placed(shown)
+    own = points.triangle >= 2
+    assert area[own].sum() == pytest.approx(opacity, rel=0.05) and area[~own].sum() == pytest.approx(opacity, rel=0.05)
+
+
+def test_every_triangle_of_few_has_a_piece():
+    small = np.array(square()) * 1e-2 + (5, 0, 0)
+    shown = surfaces(np.concatenate([square(), *(small + (k, 0, 0) for k in range(10))]))
+    points = spread(shown, 64, 0)
+    assert set(points.triangle) == set(range(22))
+    assert points.placed(shown)[2].sum() == pytest.approx(shown.areas().sum())
+
+
+def test_rectangles_of_groups_end_where_a_turned_wall_does():
+    """No group of pieces reaches over the rim of a turned rectangle, and most of them are drawn as rectangles."""
+    turn = np.array([[np.cos(0.6), np.sin(0.6), 0], [-np.sin(0.6), np.cos(0.6), 0], [0, 0, 1.0]])
+    shown = surfaces((np.array(square()) * (2, 1, 1)) @ turn)
+    points = spread(shown, 512, 0)
+    pieces, (position, normal, areas) = points.pieces(shown), points.placed(shown)
+    order = split(pieces.mean(axis=1), normal, points.sides(shown))
+    tree = fitted(order, position, normal, areas, pieces, points.sides(shown))
+    groups = np.arange(1, 512)
+    assert tree.flat[1:16].all()  # those of 32 points and more, rags at their rims
+    across = np.cross(tree.axis, tree.along)
+    for a in (-1, 1):
+        for b in (-1, 1):
+            corner = tree.centre + a * tree.half[:, :1] * tree.along + b * tree.half[:, 1:] * across
+            back = corner[groups] @ turn.T
+            over = np.maximum(np.maximum(-back, back - (2, 1, 0)), 0)
+            assert over.max() < 1e-9
 
 
 def test_runs_do_not_repeat_each_other():
@@ -130,7 +203,7 @@ def test_points_in_one_place_make_a_tree(places):
 
 
 def test_points_of_nothing_are_none():
-    points = AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    points = AreaPoints(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3, 2)))
     assert len(points.placed(surfaces(np.zeros((0, 3, 3))))[0]) == 0
 
 

@@ -31,6 +31,25 @@ def test_a_mirror_loses_nothing_and_reflects_by_fresnel():
         assert stored["dielectric"][0, 1:, k] == pytest.approx(expected[1:], abs=2e-3)
 
 
+def test_the_fine_table_of_a_mirror_is_fresnel_at_its_own_nodes():
+    stored, axis = energy.tables()["dielectric_fine"], np.linspace(0.0, 1.0, energy.FINE_SIZE)
+    for k in (8, 18, 28):
+        ior = energy.ior_from_f0(axis[k] ** 4)
+        f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
+        fresnel = energy.fresnel_dielectric(np.maximum(axis**2, 1e-4), ior)
+        assert stored[0, 1:, k] == pytest.approx(np.clip((fresnel - f0) / (1.0 - f0), 0.0, 1.0)[1:], abs=2e-3)
+
+
+def test_the_texture_of_the_gpu_holds_the_fine_table_where_cycles_has_it():
+    coarse, fine = energy.energy_texture(fine=False), energy.energy_texture(fine=True)
+    assert np.array_equal(coarse, fine[:64])
+    stored = energy.tables()["dielectric_fine"]
+    for k in (0, 7, 15, 16, 30):
+        column, row, channel = 32 * (k % 16 % 6), 64 + 32 * (k % 16 // 6), 2 * (k // 16)
+        assert np.array_equal(fine[row : row + 32, column : column + 32, channel], stored[:, :, k].T)
+        assert np.array_equal(fine[row : row + 32, column : column + 32, channel + 1], stored[:, :, k + 1].T)
+
+
 def test_fresnel_has_its_known_values():
     assert energy.fresnel_dielectric(np.array(1.0), 1.5) == pytest.approx(0.04)
     assert energy.fresnel_dielectric(np.array(1e-9), 1.5) == pytest.approx(1.0)

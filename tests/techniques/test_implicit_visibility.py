@@ -262,6 +262,37 @@ def test_nodes_hold_the_discs_of_their_surfels(cells):
             assert (ordered.normal[own] @ ordered.normal[own].mean(axis=0)).min() > 0.0
 
 
+def test_outer_faces_that_see_nothing_have_few_surfels(stage, render):
+    """A room of thick walls: half of its area lies outside. A sheet has no receivers where its back sees nothing."""
+    for low, high in (((-1.2, -1.2, -1.2), (1.2, 1.2, -1)), ((-1.2, -1.2, 1), (1.2, 1.2, 1.2))):
+        slab(stage, low, high)
+    for side in (-1, 1):
+        slab(stage, (min(side, 1.2 * side), -1.2, -1), (max(side, 1.2 * side), 1.2, 1))
+        slab(stage, (-1, min(side, 1.2 * side), -1), (1, max(side, 1.2 * side), 1))
+    stage.light("POINT", (0, 0, 0), shadow_soft_size=0.1)
+    stage.camera((0.3, 0.2, -0.1), (1.2, 0.3, 0.4), angle=1.4)
+    render(1, surfels=1024, size=(8, 8))
+    cells, _, _ = solved(stage)
+    outside = np.abs(cells.place).max(axis=1) > 1.199
+    assert cells.area[outside].sum() > 0.4 * cells.area.sum()
+    assert outside.sum() < 0.15 * len(cells)
+
+
+def slab(stage, low, high):
+    corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return stage.mesh(corners, faces, material=stage.diffuse(0.5))
+
+
+def test_the_back_of_a_sheet_that_sees_nothing_is_dark(stage, render):
+    corner(stage)
+    render(2, size=(8, 8))
+    cells, _, _ = solved(stage)
+    assert cells.sheet.all()
+    stage.camera((0, 6, 1), (-np.pi / 2, 0, np.pi), angle=0.4)  # from behind the wall
+    assert not render(2, size=(8, 8)).any()
+
+
 # What is kept ---------------------------------------------------------------------------------------------------------
 
 

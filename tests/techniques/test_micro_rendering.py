@@ -175,6 +175,7 @@ def test_the_threshold_and_the_test_of_centres_change_the_cost_and_not_the_light
         {"centre_test": False},
         {"levels": 0},
         {"groups": 16, "side": 4},
+        {"side": 24},
     ):
         # Where all is drawn as single discs, the specification knows of holes up to 6 % between so few points.
         within = 0.06 if "threshold" in params else 0.03

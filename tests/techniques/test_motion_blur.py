@@ -11,7 +11,7 @@ from addon.compare.metrics import relative_squared_error
 from addon.frame import slices, time_steps
 from addon.frame.bands import samples_in_parts
 from addon.frame.settings import Settings
-from addon.snapshot import motion
+from addon.snapshot import shutter
 
 SIZE = (64, 48)
 SHUTTER = 0.5
@@ -247,7 +247,7 @@ def test_each_sample_is_drawn_once_whatever_the_slice():
 def test_shutter_times_follow_the_curve(blurred):
     render = blurred.scene.render
     np.testing.assert_allclose(
-        motion.shutter_times(blurred.scene, 4), np.array([-3, -1, 1, 3]) / 8 * SHUTTER, atol=1e-6
+        shutter.shutter_times(blurred.scene, 4), np.array([-3, -1, 1, 3]) / 8 * SHUTTER, atol=1e-6
     )
     curve = render.motion_blur_shutter_curve
     curve.initialize()
@@ -256,7 +256,7 @@ def test_shutter_times_follow_the_curve(blurred):
         for point in curve.curves[0].points:  # open in its second half alone
             point.location.y = float(point.location.x > 0.9)
         curve.update()
-        times = motion.shutter_times(blurred.scene, 4)
+        times = shutter.shutter_times(blurred.scene, 4)
     finally:
         for point, place in zip(curve.curves[0].points, before):
             point.location = place

@@ -420,6 +420,26 @@ def test_relief_shadows_others_as_it_should(stage):
     assert np.abs(relief - mesh)[receiver].mean() < 0.02 * mesh[receiver].max()
 
 
+def test_a_mirror_shows_the_relief(stage):
+    """A cone of .8 metres seen in a mirror above it, aslant, as one of triangles is seen there."""
+
+    def shown(mode):
+        stage.clear()
+        made = height_material(stage, cone, 0.8, mode="RELIEF" if mode == "relief" else "MESH")
+        made = stage.diffuse(0.5) if mode == "flat" else made
+        lattice(stage, made, 96) if mode == "mesh" else stage.card(made, 0, 1)
+        mirror = stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.0)
+        stage.rectangle((-3, -6), (3, 6), 4.0, material=mirror)
+        stage.light("SUN", turn=(0, -1.1, 0), angle=0.0)
+        stage.camera((0, -4.11, 2), (np.pi - 0.6, 0, 0), 0.45)
+        return stage.render(16, (48, 48), bounces=1)["combined"][..., 0]
+
+    relief, mesh, flat = shown("relief"), shown("mesh"), shown("flat")
+    assert mesh.max() > 0.05
+    # What the cone casts on itself rays do not see: the half that looks away from the sun is dark without.
+    assert np.abs(relief - mesh).mean() < 0.25 * np.abs(flat - mesh).mean()
+
+
 def test_a_wall_before_it_and_behind_it(stage):
     """A ramp that rises through a horizontal card: the border is where their heights are equal."""
     stage.card(height_material(stage, along_u, 1.0), 0, 1)

@@ -72,7 +72,7 @@ def test_scenes_without_catchers_make_one_picture(caught, monkeypatch):
     caught.ground.is_shadow_catcher = False
     begun = []
     renderer = engine.session(caught.scene, "final").renderer
-    monkeypatch.setattr(renderer, "begin", lambda *a, begin=renderer.begin, **k: begun.append(1) or begin(*a, **k))
+    monkeypatch.setattr(renderer, "beginning", lambda *a, own=renderer.beginning: begun.append(1) or own(*a))
     found = with_pass(caught, "CANDELA", 2)
     assert len(begun) == 1
     np.testing.assert_array_equal(found["shadow_catcher"], 1.0)

@@ -41,7 +41,16 @@ def test_image_shows_what_is_chosen(compared):
     compared.view = "DIFFERENCE"
     bpy.ops.candela.compare_show(row=1)
     row = compare_editor.latest()[1]
-    assert np.allclose(shown(), np.abs(row.x[..., :3] - row.reference[..., :3]), atol=1e-6)
+    difference = np.abs(row.x[..., :3] - row.reference[..., :3])
+    assert np.allclose(shown(), compared.gain * difference, atol=1e-5)
+    compared.gain = 1.0
+    assert np.allclose(shown(), difference, atol=1e-6)
+
+
+def test_the_panel_lists_each_light_once_and_cuts_nothing_off(compared):
+    listed = [picture.row.label for _, picture in compare_editor.table_of(compare_editor.latest())]
+    assert len({label.removesuffix(" pass") for label in listed}) == len(listed)
+    assert max(map(len, listed)) <= 22
 
 
 def test_every_row_can_be_shown_in_every_view(compared):

@@ -10,10 +10,12 @@ from addon.frame import ledger
 from addon.frame.technique import SCENE, identifier
 from addon.snapshot.scene import Note
 from addon.techniques import REGISTRY
+from addon.techniques.denoise import Denoise
 from addon.ui import ENGINE, blender_panels, notes, panels
 from addon.ui.pass_tree import TREE
 from addon.ui.passes import PASSES, wanted_passes
-from addon.ui.properties import slots
+from addon.ui.properties import _SMALL as SMALL
+from addon.ui.properties import GROUPS, precision_of, settings_of, slots, titled
 
 
 class Layout:
@@ -84,7 +86,7 @@ def test_every_slot_and_parameter_has_a_place(scene):
     others = scene.render, getattr(scene, "cycles", None)  # settings of Blender's, in the panel of the film
     shown = [name for name in shown if not any(hasattr(other, name) for other in others)]
     assert sorted(shown) == sorted(
-        ["pass_tree"]
+        ["pass_tree", "use_denoise", "use_viewport_denoise"]
         + [f"slot_{slot}" for slot in slots()]
         + [identifier(t.name, p.name) for t in REGISTRY for p in t.params_of(SCENE)]
     )
@@ -169,11 +171,11 @@ READ = {
         *("clip_end", "energy", "exposure", "use_temperature", "normalize", "use_soft_falloff", "shadow_soft_size"),
         *("spot_size", "spot_blend", "shape", "size_y", "spread", "angle", "use_shadow"),
     ),
-    "world": ("mist_settings", "Surface", "Volume", "cycles_visibility"),
+    "world": ("lightgroup", "mist_settings", "Surface", "Volume", "cycles_visibility"),
     "material": ("pass_index", "Volume", "Displacement", "Surface", "use_transparent_shadow"),
     "object": (
         *("pass_index", "color", "is_holdout", "shadow_terminator_geometry_offset", "visible_transmission"),
-        *("visible_volume_scatter", "visible_camera", "receiver_collection", "blocker_collection"),
+        *("visible_volume_scatter", "visible_camera", "receiver_collection", "blocker_collection", "lightgroup"),
         "is_shadow_catcher",
     ),
     "render": (
@@ -182,7 +184,11 @@ READ = {
         "motion_blur_shutter_curve",
     ),
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
-    "view_layer": ("material_override", "use_solid", "use_strand", "use_pass_mist", "samples"),
+    "view_layer": (
+        *("material_override", "use_solid", "use_strand", "use_pass_mist", "samples", "aovs", "pass_alpha_threshold"),
+        *("use_pass_cryptomatte_object", "pass_cryptomatte_depth", "lightgroups", "use_pass_uv"),
+        "denoising_store_passes",
+    ),
     "particle": ("root_radius", "tip_radius", "radius_scale", "use_close_tip"),
 }  # fmt: skip
 
@@ -309,6 +315,48 @@ def test_every_setting_has_a_tooltip_and_can_be_keyframed(scene):
     scene.candela.keyframe_insert("samples", frame=9)
     scene.frame_set(9)
     assert scene.candela.samples == 7
+
+
+def test_labels_are_in_title_case_and_items_say_what_they_are(scene):
+    groups = [scene.candela.bl_rna, *(group.bl_rna for _, group in GROUPS.values())]
+    for declared in (one for group in groups for one in group.properties if one.identifier != "rna_type"):
+        words = declared.name.split(" ")
+        assert all(word[:1].isupper() or not word[:1].isalpha() or word in SMALL for word in words), declared.name
+        if declared.type == "ENUM":
+            for item in declared.enum_items:
+                assert item.description, (declared.identifier, item.identifier)
+        if declared.type == "FLOAT" and not declared.is_array and declared.default:
+            assert round(declared.default, declared.precision) > 0.0, declared.identifier  # not shown as zero
+
+
+def test_a_label_is_titled_as_blenders_own():
+    assert titled("Lights per sample") == "Lights per Sample"
+    assert titled("of what is seen") == "Of What Is Seen"
+    assert [precision_of(value) for value in (0.0, 1.0, 0.02, 0.001)] == [3, 3, 3, 5]
+
+
+def test_every_slot_can_be_switched_off(scene):
+    for slot in slots():
+        assert "OFF" in [item.identifier for item in scene.candela.bl_rna.properties[f"slot_{slot}"].enum_items]
+
+
+def test_denoising_is_switched_apart_for_renders_and_the_viewport(scene):
+    strength = lambda viewport: settings_of(scene, viewport).get(Denoise(), "strength")  # noqa: E731
+    assert strength(False) == strength(True) == 1.0
+    scene.candela.use_denoise = False
+    assert (strength(False), strength(True)) == (0.0, 1.0)
+    scene.candela.use_denoise, scene.candela.use_viewport_denoise = True, False
+    assert (strength(False), strength(True)) == (1.0, 0.0)
+
+
+def test_bounces_are_limited_by_kind_in_one_panel_and_simplify_stands_below(scene):
+    assert drawn(panels.CANDELA_RENDER_PT_light_paths)[0] == "bounces"
+    assert len(drawn(panels.CANDELA_RENDER_PT_light_paths)) >= 4
+    order = [panel.__name__ for panel in panels._CLASSES]
+    assert order.index("CANDELA_RENDER_PT_sampling") < order.index("CANDELA_RENDER_PT_simplify")
+    assert ENGINE not in bpy.types.RENDER_PT_simplify.COMPAT_ENGINES
+    shown = drawn(panels.CANDELA_RENDER_PT_simplify)
+    assert {"simplify_subdivision", "simplify_subdivision_render"} <= set(shown)
 
 
 def test_a_setting_that_a_script_changes_is_a_change_of_the_scene(scene):

@@ -13,7 +13,7 @@ from addon.techniques import REGISTRY
 from addon.ui import ENGINE, pass_tree, shown_images
 from addon.ui.pass_nodes import NODES, SHOWING
 from addon.ui.pass_tree import TREE, checked, graph_of, result
-from addon.ui.properties import settings_of
+from addon.ui.properties import settings_of, titled
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def scene(registered, gpu_context, empty_scene):
 
 @pytest.fixture
 def tree(scene):
-    assert bpy.ops.candela.passes_from_auto(tree="Passes") == {"FINISHED"}
+    assert bpy.ops.candela.passes_from_auto(tree="Passes", use=True) == {"FINISHED"}
     made = bpy.data.node_groups["Passes"]
     made.samples, made.percentage, made.reference_samples = 4, 100, 16
     return made
@@ -57,7 +57,7 @@ def test_every_technique_has_a_node_with_its_sockets(registered, empty_scene):
         inputs, outputs = sockets(technique, REGISTRY)
         assert [socket.identifier for socket in made.inputs] == [socket.name for socket in inputs]
         assert [socket.identifier for socket in made.outputs] == [socket.name for socket in outputs]
-        assert made.bl_label == technique.label
+        assert made.bl_label == titled(technique.label)
     assert len(NODES) == len(REGISTRY) + len(SHOWING)
 
 
@@ -68,6 +68,46 @@ def test_new_from_auto_is_fine_and_names_what_auto_runs(scene, tree):
     assert "environment_light" not in found.order, "the world is black"
     assert scene.candela.pass_tree == tree
     assert all(link.is_valid for link in tree.links)
+
+
+def test_new_from_auto_leaves_what_renders_run_alone(scene):
+    assert bpy.ops.candela.passes_from_auto(tree="Passes") == {"FINISHED"}
+    assert "Passes" in bpy.data.node_groups and scene.candela.pass_tree is None
+
+
+def test_nodes_have_the_colour_of_what_they_are_for(tree):
+    colors = {one.technique: tuple(round(c, 3) for c in one.color) for one in tree.nodes if one.technique}
+    assert all(one.use_custom_color for one in tree.nodes if one.technique)
+    assert colors["film"] != colors["surfaces"] != colors["direct_light"] != colors["film"]
+
+
+def test_pictures_of_nodes_are_opaque(tree):
+    """The fourth channel of light is no opacity: an image with it would show nothing."""
+    assert bpy.ops.candela.passes_run(tree=tree.name) == {"FINISHED"}
+    pictures = {one.name: result(one).picture for one in tree.nodes if result(one) and result(one).picture is not None}
+    assert len(pictures) > 3
+    for name, picture in pictures.items():
+        assert picture.shape[-1] < 4 or (picture[..., 3] == 1.0).all(), name
+    assert bpy.ops.candela.passes_run(tree=tree.name, node=node(tree, "direct_light").name) == {"FINISHED"}
+    pixels = np.array(bpy.data.images[f"Candela {tree.name}"].pixels).reshape(-1, 4)
+    assert (pixels[:, 3] == 1.0).all() and pixels[:, :3].max() > 0.0
+
+
+def test_the_time_of_a_first_run_holds_no_compilation(tree, monkeypatch):
+    """Where something was compiled, the picture is drawn once more, and that is what is timed."""
+    from addon.gfx import library
+    from addon.ui import pass_run
+
+    begun = []
+    whole = pass_run._begun
+    monkeypatch.setattr(pass_run, "_begun", lambda *given: begun.append(library.compile_count) or whole(*given))
+    library._release()
+    pass_run.free()
+    assert bpy.ops.candela.passes_run(tree=tree.name) == {"FINISHED"}
+    assert len(begun) == 2 and begun[1] > begun[0]
+    compiled = library.compile_count
+    assert bpy.ops.candela.passes_run(tree=tree.name) == {"FINISHED"}
+    assert len(begun) == 3 and library.compile_count == compiled
 
 
 def test_run_gives_pictures_and_times(tree):

@@ -1,8 +1,13 @@
 """Quality presets: they are found by Blender, set what they name, and cost more the finer they are."""
 
+import ast
+
 import bpy
 import pytest
 
+from addon.frame.settings import SAMPLES
+from addon.frame.technique import SCENE, identifier
+from addon.techniques import REGISTRY
 from addon.ui import quality
 
 NAMES = ("Draft", "Fast", "Balanced", "Fine")
@@ -29,6 +34,38 @@ def set_by_presets(scene):
         own.instant_radiosity_rays, own.light_probes_maps, own.multires_radiosity_virtual_lights,
         own.multires_radiosity_rays, own.clustered_visibility_virtual_lights,
     )  # fmt: skip
+
+
+def declared():
+    """What a preset may set, by the name of its property: parameters of the scene as techniques declare them."""
+    own = {
+        identifier(technique.name, param.name): param for technique in REGISTRY for param in technique.params_of(SCENE)
+    }
+    return own | {"samples": SAMPLES, "viewport_samples": SAMPLES}
+
+
+def written(path):
+    """name -> value of a preset's file, read without running it."""
+    found = {}
+    for line in ast.parse(path.read_text(encoding="utf-8")).body[2:]:
+        (target,) = line.targets
+        assert target.value.id == "candela" and target.attr not in found
+        found[target.attr] = ast.literal_eval(line.value)
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_presets_set_what_techniques_declare_to_values_that_they_allow(name):
+    params = declared()
+    for own, value in written(quality.Path(quality.PATH, "presets", quality.FOLDER) / f"{name}.py").items():
+        assert own in params, f"{name} sets {own}, which no technique declares."
+        assert type(value) is type(params[own].default), own
+        assert params[own].check(value) == value
+
+
+def test_presets_set_the_same_parameters():
+    names = [set(written(quality.Path(quality.PATH, "presets", quality.FOLDER) / f"{name}.py")) for name in NAMES]
+    assert all(own == names[0] for own in names)
 
 
 @pytest.fixture

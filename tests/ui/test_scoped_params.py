@@ -93,7 +93,7 @@ def test_points_and_directions_of_the_active_entry_have_handles(declared):
     cube = bpy.context.object
     assert scoped_panels._handles(cube) == []
     cube.candela.bent_edits.add()
-    assert [name for _, _, name in scoped_panels._handles(cube)] == ["place", "towards"]
+    assert [place.name for place in scoped_panels._handles(cube)] == ["place", "towards"]
 
 
 def test_a_cameras_parameter_is_a_setting_of_the_picture(declared):

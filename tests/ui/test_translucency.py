@@ -29,6 +29,22 @@ def test_new_maps_change_nothing_and_belong_to_the_material(registered):
     assert {image.name for image in bpy.data.images} == before
 
 
+def test_what_is_painted_is_saved_with_the_file(registered, tmp_path):
+    """Blender alone would save the images as they were made."""
+    plane = _plane("Saved")
+    bpy.ops.candela.new_translucency_maps(size=16)
+    path, name = str(tmp_path / "painted.blend"), property_of(translucency.MAPS[0])
+    for value in (0.25, 0.75):  # a second time, too, when it is packed already
+        painted = getattr(plane.active_material.candela, name)
+        painted.pixels[:] = [value] * (16 * 16 * 4)
+        painted.update()
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        plane = bpy.context.view_layer.objects.active
+        assert getattr(plane.active_material.candela, name).pixels[0] == pytest.approx(value, abs=0.01)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
 def test_a_mesh_without_uv_is_told_so(registered):
     plane = _plane()
     plane.data.uv_layers.remove(plane.data.uv_layers[0])

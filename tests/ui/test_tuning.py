@@ -38,7 +38,7 @@ def test_what_was_found_belongs_to_one_scene(floor, monkeypatch):
 
 
 def test_a_scene_with_a_pass_tree_is_refused_with_a_sentence(floor):
-    bpy.ops.candela.passes_from_auto()
+    bpy.ops.candela.passes_from_auto(use=True)
     with pytest.raises(RuntimeError, match="needs a scene without one"):
         bpy.ops.candela.tune()
 

@@ -39,7 +39,7 @@ def push(message):
 
 
 def make_tree():
-    bpy.ops.candela.passes_from_auto()
+    bpy.ops.candela.passes_from_auto(use=True)
     push("New from Auto")  # as the button does
     bpy.context.scene.candela.pass_tree.samples = 1
     push("Samples")

@@ -35,7 +35,8 @@ def steps():
     yield 0.5
     with there(upper):
         result["from_auto"] = list(bpy.ops.candela.passes_from_auto())
-    tree = scene.candela.pass_tree
+    result["used_unasked"] = scene.candela.pass_tree is not None
+    tree = scene.candela.pass_tree = upper.spaces.active.node_tree
     tree.samples, tree.percentage, tree.reference_samples = 4, 100, 16
     upper.spaces.active.show_region_ui = True
     yield 0.3

@@ -74,6 +74,8 @@ def wait_for_rest():
     yield 0.3
     started = time.monotonic()
     while not (viewports() and all(one.done and not one.dirty for one in viewports())):
+        if any(one.error for one in viewports()):
+            break
         if time.monotonic() - started > REST_TIMEOUT_S:
             raise TimeoutError(f"the viewport never rests: {[one.status() for one in viewports()]}")
         yield 0.1

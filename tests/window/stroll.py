@@ -180,7 +180,7 @@ def tree():
         candela.pass_tree = None
     elif window().scene.camera is not None:
         with there():
-            bpy.ops.candela.passes_from_auto()
+            bpy.ops.candela.passes_from_auto(use=True)
     push("tree")
 
 

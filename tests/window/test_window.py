@@ -28,7 +28,7 @@ OUTPUT = ROOT / "build" / "window"
 SAMPLE = ROOT / "sample_blends" / "soft_shadow_garden.blend"
 FRAME = 20  # pixels at the edge of a region, where Blender draws round corners and tabs
 BACKENDS = ("opengl", "vulkan")
-SIMULATED = ("tour", "tune")  # scripts whose keys are simulated: Blender takes no others then
+SIMULATED = ("tour", "tune", "features")  # scripts whose keys are simulated: Blender takes no others then
 ENOUGH_RANGES = 1 << 20  # of memory, that the system allows a process
 MANY_RANGES = 10000  # of memory, mapped within a walk: 40 MiB of pages
 LEAST_NOTES = 6  # of memory, to tell a rise from chance
@@ -267,7 +267,7 @@ def test_pass_tree_is_made_run_and_compared_in_the_window(passed):
     folder, result = passed
     assert result.get("error") is None
     assert not complaints(folder)
-    assert result["from_auto"] == ["FINISHED"]
+    assert result["from_auto"] == ["FINISHED"] and not result["used_unasked"]
     assert result["times"]["Film"] > 0 and result["times"]["Direct light"] > 0
     assert any(line.startswith("Combined: ") for line in result["errors"])
     assert result["links_fine_after_undo"]
@@ -321,6 +321,96 @@ def test_tune_measures_in_the_panel_and_applies_when_confirmed(tuned):
     assert result["trials"] > 1
     assert any(name == "Samples" and now == "1000" for name, now, _ in result["changes"])
     assert result["samples"] == result["proposed"] < 1000
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def grown(request, installed):
+    return run_script(request.param, "growing")
+
+
+def test_a_final_render_is_seen_as_it_grows_while_blender_answers(grown):
+    """Though a viewport is redrawn meanwhile. The bounds are for two busy cores."""
+    folder, result = grown
+    assert result.get("error") is None
+    assert not complaints(folder)
+    assert result["render"] == "complete"
+    assert result["answers"]["count"] > 10
+    assert result["answers"]["longest_s"] < 10.0  # what is compiled, and pictures of the window that this test takes
+    x, y, width, height = result["image"]
+    assert pixels(folder / "growing_1.png", (x, y + 60, width, height - 60)).std() > 8
+    told = [text for text in result["stats"] if text.startswith("Rendering ")]
+    assert told[-1].startswith("Rendering 24 / 24 samples")
+    assert all(text.endswith(" left") for text in told[1:])
+    assert not any(text.startswith("Compiling shaders, 1 of 1") for text in result["stats"][3:])
+
+
+def test_esc_ends_a_final_render_at_once_and_keeps_what_is_there(grown):
+    folder, result = grown
+    if "escaped" not in result:
+        pytest.skip("Esc is pressed by xdotool, which is not installed")
+    assert result["escaped"] == "cancelled"
+    assert result["escape_s"] < 2.0  # half a second where nothing else runs
+    x, y, width, height = result["image"]
+    assert pixels(folder / "escaped.png", (x, y + 60, width, height - 60)).std() > 8
+    assert result["render_after_escape"] == "complete"
+
+
+def test_a_paused_viewport_is_left_alone_until_it_goes_on(grown):
+    _, result = grown
+    same, status, done = result["paused"]
+    assert same and done and status.startswith("Paused")
+    assert result["went_on"]
+
+
+def test_a_script_renders_in_the_main_loop(grown):
+    _, result = grown
+    assert result["render_by_script"] == ["FINISHED"]
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def tried(request, installed):
+    """What needs more than a look: glare, painting, reflections, grass, relief, caustics."""
+    return run_script(request.param, "features")
+
+
+def test_every_feature_can_be_used_with_its_panel(tried):
+    folder, result = tried
+    assert result.get("error") is None
+    assert not result["failed"], result["failed"]
+    assert not complaints(folder)
+    assert set(result["renders"].values()) == {"complete"}
+
+
+def test_one_click_on_a_warning_shows_its_culprit(tried):
+    _, result = tried
+    assert result["culprit"] == [True, True, "MATERIAL"]
+
+
+def test_a_reflection_is_picked_dragged_keyframed_and_rendered(tried):
+    folder, result = tried
+    assert result["pick"] == ["RUNNING_MODAL"] and result["picked"] == 1
+    assert result["dragged"] > 0.05 and result["undragged"] == pytest.approx(0.0, abs=1e-6)
+    assert result["keyframe"] == [True, True]
+    first, tenth = (pixels(folder / f"reflections_{frame}_render.png") for frame in (1, 10))
+    assert np.abs(first - tenth).max() > 30
+    assert result["return_to_view"] == ["FINISHED"]
+    assert result["after_escape"] == 1
+
+
+def test_translucency_is_painted_undone_and_saved(tried):
+    _, result = tried
+    assert result["new_maps"] == result["paint"] == ["FINISHED"]
+    assert result["paint_mode"] == "TEXTURE_PAINT" and "translucency" in result["canvas"]
+    assert result["after_paint"] < result["before_paint"]
+    assert result["after_undo"] == pytest.approx(result["before_paint"])
+    assert result["after_redo"] == result["reopened"] == pytest.approx(result["after_paint"])
+
+
+def test_an_observer_is_chosen_and_its_glare_seen(tried):
+    folder, result = tried
+    assert result["observer"] == result["eye_pictures"] == ["FINISHED"]
+    off, on = pixels(folder / "glare_off.png"), pixels(folder / "glare_on.png")
+    assert np.abs(off - on).max() > 30
 
 
 @pytest.fixture(scope="module", params=BACKENDS)

@@ -107,7 +107,7 @@ class Approximation:
     """What is drawn otherwise than Cycles would, while `socket` is linked or not at its harmless value."""
 
     socket: str
-    harmless: float
+    harmless: float | str  # "whole": any whole number
     sentence: str
     unless_linked: str = ""  # another socket that settles the matter
 

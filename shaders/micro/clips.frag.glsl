@@ -1,0 +1,65 @@
+// Where light at a point holds on its piece of a triangle: up to two lines beyond which something stands between both, found
+// by rays from the point to the corners, a little above the piece. So a floor's piece under the wall between two rooms is lit
+// on one side of it alone. By point and side: angle of the line's normal in the piece's frame and its distance from the middle
+// of the piece's longest edge, twice; NONE: no line.
+#include "lib/math.glsl"
+#include "trace/rays.glsl"
+
+#define NONE 1e30
+#define LIFT 0.03     // half lengths of the piece that rays run above it: what is lower hides nothing
+#define UPRIGHT 0.3   // sine between the piece and what stands on it
+#define APART 0.9     // cosine between two lines that count as one
+
+vec4 tree_texel(int index)
+{
+  return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
+}
+
+void main()
+{
+  out_clips = vec4(0.0, NONE, 0.0, NONE);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  int leaf = leaf_count + ((pixel.y * POINT_ROW + pixel.x) >> 1);
+  vec4 ball = tree_texel(3 * leaf);
+  vec4 shape = tree_texel(3 * leaf + 1);
+  vec4 sides = tree_texel(3 * leaf + 2);
+  if (sides.w <= 0.0 || shape.w <= 0.0) {
+    return;
+  }
+  vec3 axis = octahedral_decode(shape.xy);
+  vec3 along = octahedral_decode(sides.xy);
+  vec3 across = cross(axis, along);
+  vec3 normal = -point_facing_fetch(pixel).xyz;
+  vec3 origin = point_place_fetch(pixel).xyz + (LIFT * shape.w + 8.0 * offset_size) * normal;
+  vec2 nearest = vec2(NONE);
+  for (int k = 0; k < 3; k++) {
+    vec2 place = (k == 0) ? vec2(-shape.w, 0.0) : ((k == 1) ? vec2(shape.w, 0.0) : sides.zw);
+    vec3 to_corner = ball.xyz + place.x * along + place.y * across + (LIFT * shape.w + 8.0 * offset_size) * normal - origin;
+    float distance = length(to_corner);
+    vec3 direction = to_corner / max(distance, 1e-30);
+    ivec2 hit;
+    float t = trace_until(origin, direction, distance, 0.0, 0u, hit);
+    if (t >= distance) {
+      continue;
+    }
+    vec3 stands = triangle_normal(hit);
+    vec2 level = vec2(dot(stands, along), dot(stands, across));
+    float upright = length(level);
+    if (upright < UPRIGHT) {
+      continue;
+    }
+    level *= ((dot(level, vec2(dot(direction, along), dot(direction, across))) < 0.0) ? -1.0 : 1.0) / upright;
+    vec3 met = origin + t * direction - ball.xyz;
+    float off = dot(level, vec2(dot(met, along), dot(met, across)));
+    float angle = atan(level.y, level.x);
+    vec2 first = vec2(cos(out_clips.x), sin(out_clips.x));
+    if (out_clips.y == NONE || dot(first, level) > APART) {
+      out_clips.xy = (t < nearest.x) ? vec2(angle, off) : out_clips.xy;
+      nearest.x = min(nearest.x, t);
+    }
+    else {
+      out_clips.zw = (t < nearest.y) ? vec2(angle, off) : out_clips.zw;
+      nearest.y = min(nearest.y, t);
+    }
+  }
+}

@@ -1,0 +1,59 @@
+// From which group each point takes the light that it reflects once more: of its own and those beside it in the tree, the first
+// whose gathering point faces alike and lies in view. What is gathered on one side of a wall stays there. -1: none.
+//
+// Rays between both points run in an arch, as high as RISE of their distance: a bent surface does not hide its own points.
+#include "lib/math.glsl"
+#include "trace/rays.glsl"
+
+#define RISE 0.25
+#define ALIKE 0.7
+#define CANDIDATES 4
+
+vec4 tree_texel(int index)
+{
+  return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
+}
+
+vec3 leaf_middle(int leaf, out vec3 axis)
+{
+  axis = octahedral_decode(tree_texel(3 * leaf + 1).xy);
+  vec4 sides = tree_texel(3 * leaf + 2);
+  vec3 along = octahedral_decode(sides.xy);
+  return tree_texel(3 * leaf).xyz + ((sides.w > 0.0) ? (sides.z * along + sides.w * cross(axis, along)) / 3.0 : vec3(0.0));
+}
+
+void main()
+{
+  out_share = -1.0;
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  int entry = pixel.y * POINT_ROW + pixel.x;
+  float side = ((entry & 1) == 0) ? 1.0 : -1.0;
+  int group_size = leaf_count / group_count;
+  int own = (entry >> 1) / group_size;
+  vec3 axis;
+  vec3 middle = leaf_middle(leaf_count + (entry >> 1), axis);
+  for (int k = 0; k < CANDIDATES; k++) {
+    int group = own ^ k;
+    if (group >= group_count) {
+      continue;
+    }
+    vec3 other_axis;
+    int gathering = leaf_count + group * group_size + min(int(buffer_choice.x * float(group_size)), group_size - 1);
+    vec3 other = leaf_middle(gathering, other_axis);
+    // A bent group has none but its own.
+    if (k > 0 && dot(axis, other_axis) < ALIKE) {
+      continue;
+    }
+    float apart = length(other - middle);
+    float above = RISE * apart + 8.0 * offset_size;
+    vec3 from = middle + above * side * axis;
+    vec3 way = other + above * side * other_axis - from;
+    float distance = length(way);
+    ivec2 hit;
+    bool clear = apart <= 0.0 || trace_until(from, way / max(distance, 1e-30), distance, distance, 0u, hit) >= distance;
+    if (clear) {
+      out_share = float(2 * group + (entry & 1));
+      break;
+    }
+  }
+}

@@ -1,0 +1,107 @@
+"""Steps that a render's thread hands to the main loop, without a window: this test calls the timer itself."""
+
+import threading
+import time
+
+import bpy  # noqa: F401 - gpu comes with it
+import pytest
+
+from addon import final, main_loop
+
+
+@pytest.fixture
+def handed_over(gpu_context, monkeypatch):
+    """Runs `taken(steps)` in a thread as a render's job does; returns what came there, while the main loop ticks."""
+    monkeypatch.setattr(main_loop, "_is_at_hand", lambda: False)
+    monkeypatch.setattr(main_loop, "BUDGET_S", 0.0)  # one step a tick
+    monkeypatch.setattr(main_loop, "MOST_BUDGET_S", 0.0)
+
+    def run(steps, stop_at=None):
+        told, end = [], {}
+
+        def job():
+            parts = main_loop.taken(steps)
+            try:
+                while True:
+                    news = next(parts)
+                    told.extend([news] if news is not None else [])
+                    if news is not None and news == stop_at:
+                        parts.close()
+                        end["cancelled"] = time.perf_counter()
+                        return
+            except StopIteration as stop:
+                end["result"] = stop.value
+            except ValueError as error:
+                end["error"] = str(error)
+
+        thread = threading.Thread(target=job)
+        thread.start()
+        while thread.is_alive():
+            main_loop._tick()
+            time.sleep(0.005)
+        main_loop._tick()
+        return told, end
+
+    yield run
+    main_loop.close_all()
+
+
+def test_steps_run_in_the_main_thread_and_their_news_come_to_the_job(handed_over):
+    ran = []
+
+    def steps():
+        for number in range(5):
+            ran.append(threading.current_thread())
+            yield number if number % 2 == 0 else None
+        return "done"
+
+    told, end = handed_over(steps())
+    assert told == [0, 2, 4] and end == {"result": "done"}
+    assert set(ran) == {threading.main_thread()}
+
+
+def test_what_a_step_raises_is_raised_in_the_job(handed_over):
+    def steps():
+        yield 1
+        raise ValueError("There is no camera.")
+
+    told, end = handed_over(steps())
+    assert told == [1] and end == {"error": "There is no camera."}
+
+
+def test_a_cancelled_job_waits_for_no_step_and_the_main_loop_closes_them(handed_over):
+    closed = []
+
+    def steps():
+        try:
+            yield from range(1000)
+        finally:
+            closed.append(threading.current_thread())
+
+    told, end = handed_over(steps(), stop_at=2)
+    assert told[-1] == 2 and "cancelled" in end
+    assert closed == [threading.main_thread()]
+    assert not main_loop._errands
+
+
+def test_steps_are_closed_before_another_file_is_opened(gpu_context):
+    closed = []
+
+    def steps():
+        try:
+            yield 1
+        finally:
+            closed.append(True)
+
+    errand = main_loop.Errand(steps())
+    main_loop._errands.append(errand)
+    errand.work(0.0)
+    main_loop.close_all()
+    assert closed and errand.ended.is_set() and not main_loop._errands
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (7.2, "0:07"), (750, "12:30"), (3750, "1:02:30")])
+def test_the_time_that_is_left_is_told_as_clocks_show_it(seconds, text):
+    assert final.clock(seconds) == text
+    assert final.sentence(3, 8, seconds) == f"Rendering 3 / 8 samples, {text} left"
+    assert final.sentence(3, 8, None) == "Rendering 3 / 8 samples"
