@@ -655,7 +655,7 @@ class Renderer:
             settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
-            tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
+            snapshot.own_values,
             snapshot.motion and snapshot.motion.key,
         )  # fmt: skip
 
