@@ -4,6 +4,8 @@
 BLENDER ?= 5.2
 PYTHON3 ?= python3
 STRESS ?= 2000
+# What a driver can do differently: every program compiled, kernels, materials, and light against closed forms.
+VULKAN_TESTS := tests/gfx tests/kernels tests/materials/test_energy.py tests/materials/test_nodes.py tests/techniques/test_furnace.py tests/techniques/test_direct_light.py tests/techniques/test_film.py
 # Two processes: while one compiles shaders or runs Python, the other draws. More would only share a software GPU.
 PARALLEL := -n 2 --dist worksteal
 
@@ -11,7 +13,7 @@ ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo pictures samples test test-fast stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
+.PHONY: help environment demo pictures samples test test-fast test-vulkan stress check matrix mutations package test-window screenshots window-walk nodes bench bench-references bench-quick bench-viewport clean
 
 help: ## this list
 	@echo "make TARGET [BLENDER=5.2|5.3|5.0|4.5]"
@@ -38,6 +40,14 @@ test: environment ## every test that needs no window
 test-fast: environment ## the tests that take seconds
 	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing and not slow"
 	$(PYTHON) -m pytest -m "timing and not slow"
+
+test-vulkan: ## tests of what drivers do differently, with Blender 5.3 on Vulkan, and a picture of both backends compared
+	@$(PYTHON3) tools/environment.py --blender 5.3
+	@$(PYTHON3) tools/environment.py --blender 5.2
+	CANDELA_BACKEND=VULKAN .venv-5.3/bin/python -m pytest $(PARALLEL) -m "not window and not timing and not slow" $(VULKAN_TESTS)
+	mkdir -p build
+	.venv/bin/python -m bench hashes write build/opengl.npz --only "cornell_box, 4"
+	.venv-5.3/bin/python -m bench hashes compare build/opengl.npz --only "cornell_box, 4" --within 0.02
 
 check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff format --check --quiet .

@@ -24,11 +24,12 @@ from .frame.settings import Settings
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
 from .snapshot.errors import unforeseen
+from .snapshot.motion import STEPS, Moment, read_moment
 from .snapshot.scene import Note, Snapshot
 from .techniques import make_registry
 from .techniques.film import check_tree
 from .ui import ENGINE
-from .ui.passes import missing_passes, wanted_passes
+from .ui.passes import cryptomatte_metadata, missing_passes, wanted_passes
 from .ui.properties import settings_of
 
 MOST_SESSIONS = 4  # scenes, and icons of materials, whose meshes, programs and images stay for their next picture
@@ -125,14 +126,30 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._snapshot = None
         self.update_stats("Candela", "Reading the scene")
         try:
-            self._snapshot = take(
-                depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override
-            )
+            around = self._frames_around(depsgraph) if depsgraph.view_layer.use_pass_vector else None
+            size = self.resolution_x, self.resolution_y
+            self._snapshot = take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
         except UnsupportedScene as error:
             self._fail(str(error))
         except Exception as error:  # Blender would print it and go on with a black picture
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
+
+    def _frames_around(self, depsgraph) -> tuple[Moment, ...] | None:
+        """The scene in the frames before and after, for the Vector pass. It stands at its own again afterwards."""
+        if self.is_preview:
+            return None
+        scene, camera = depsgraph.scene, self.camera_override or depsgraph.scene_eval.camera
+        camera = camera and camera.original
+        frame, part = scene.frame_current, scene.frame_subframe
+        found = []
+        try:
+            for step in STEPS:
+                self.frame_set(frame + step, part)
+                found.append(read_moment(depsgraph, self.resolution_x, self.resolution_y, camera))
+        finally:
+            self.frame_set(frame, part)
+        return tuple(found)
 
     def render(self, depsgraph):
         """Draw all samples and hand the passes to Blender. In background mode in the engine's own GPU context, which
@@ -182,6 +199,8 @@ class CandelaEngine(bpy.types.RenderEngine):
                 result = self._begun(pixels["Combined"], layer.name, eye)
             for name, array in pixels.items():
                 _fill(result, name, eye, array)
+            for name, text in cryptomatte_metadata(order.snapshot, layer.name).items():
+                self.get_result().stamp_data_add_field(name, text)
             self.end_result(result)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))

@@ -18,8 +18,10 @@ from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import images
 from .gfx.context import turn
+from .snapshot.light_groups import parts_of
 from .snapshot.scene import Note, Snapshot
-from .ui.passes import GLARE, RenderPass
+from .ui import light_groups
+from .ui.passes import CAMERA_AXES, GLARE, RenderPass
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
@@ -55,15 +57,48 @@ class Order:
 
 
 def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.ndarray], ledgers.Ledger]]:
-    """Draw the picture; returns pass pixels by Blender's name, (H, W, channels) float32, and the ledger.
+    """Draw the picture, for each of its light groups; returns pass pixels by Blender's name, (H, W, channels) float32,
+    and the ledger.
 
     Closed before its end it leaves a frame that the next picture begins anew.
     """
-    renderer = order.renderer
-    before = renderer.frame
     with turn:
         order.before()
-    beginning = renderer.beginning(order.snapshot, order.settings)
+    parts, total, held = parts_of(order.snapshot), light_groups.Sum(order.snapshot.film), None
+    for number, part in enumerate(parts):
+        own = str(number) if len(parts) > 1 else ""  # under which a slice holds the part's images
+        frame = yield from _part(order, part.snapshot, Share(number, len(parts), own, total))
+        with turn:
+            if order.take is not None:
+                held = slices.taken(frame, own, held)
+                order.take(held)
+            total.add(part, mean_images(order.renderer, frame, order.wanted))
+    if len(parts) > 1 and GLARE in order.wanted:
+        text = "glare is that of each light group for itself: without groups it is whole."
+        frame.ledger.notes += (Note("Light groups", text),)
+    return pixels_of(total, frame, order.wanted), frame.ledger
+
+
+@dataclass(frozen=True)
+class Share:
+    """Which of the parts is drawn of a picture that is lit by one light group after the other."""
+
+    number: int = 0
+    of: int = 1
+    name: str = ""  # under which slices hold it
+    before: light_groups.Sum | None = None  # the parts that are drawn
+
+    @property
+    def left(self) -> int:
+        """How many there are, with this one."""
+        return self.of - self.number
+
+
+def _part(order: Order, snapshot: Snapshot, share: Share) -> Generator[Progress | None, None, Frame]:
+    """Draw one of the parts; returns its frame."""
+    renderer = order.renderer
+    before = renderer.frame
+    beginning = renderer.beginning(snapshot, order.settings)
     frame = None
     while frame is None:
         with turn:
@@ -80,24 +115,24 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.n
     frame.ledger.notes += order.notes
     if order.given is not None:
         with turn:
-            renderer.merge(frame, order.given)
+            renderer.merge(frame, slices.images_of_part(order.given, share.name))
         yield None
     else:
         try:
-            yield from _samples(order, frame)
+            yield from _samples(order, frame, share)
         except GeneratorExit:
             with turn:
                 renderer.finish(frame, ())  # what was done stands in the ledger
             raise
-    with turn:
-        if order.take is not None:
-            order.take(slices.taken(frame))
-        return finished(renderer, frame, order.wanted), frame.ledger
+    return frame
 
 
-def _samples(order: Order, frame: Frame) -> Generator[Progress | None, None, None]:
+def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | None, None, None]:
     """Draw all samples. With a time limit only as many as it allows: room is left for what follows the last."""
     renderer, limit = order.renderer, frame.settings.time_limit
+    if limit:  # of what is left of it each part that is still to come has as much
+        passed = time.perf_counter() - order.started
+        limit = passed + max(limit - passed, 0.0) / share.left
     wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
     shown, showing, next_picture = -1, 0.0, first + SHOW_S
     for _ in order.parts(renderer, frame):
@@ -110,12 +145,14 @@ def _samples(order: Order, frame: Frame) -> Generator[Progress | None, None, Non
         if order.shows and before < shown < wanted and (now >= next_picture or shown == before + 1):
             with turn:
                 picture = picture_of(renderer, frame)
+            if share.number:
+                picture[..., :3] += share.before.images[COMBINED][..., :3]
             took = time.perf_counter() - now
             showing += took
             next_picture = now + took + max(SHOW_S, took / SHOW_SHARE)
         each = (now - first) / (shown - before) if shown > before else None
-        left = left_of(order, wanted - shown, each) if order.shows else None
-        yield Progress(sentence(shown, wanted, left), shown / wanted, picture)
+        left = left_of(order, share.left * wanted - shown, each) if order.shows else None
+        yield Progress(sentence(shown, wanted, left), (share.number + shown / wanted) / share.of, picture)
         if limit and shown > before:
             with turn:
                 images.finish()
@@ -157,11 +194,19 @@ def picture_of(renderer: Renderer, frame: Frame) -> np.ndarray:
     return np.nan_to_num(images.read(image if image is not None else shown), posinf=0.0, neginf=0.0)
 
 
-def finished(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
-    """Pass pixels by Blender's name, (H, W, channels) float32."""
+def mean_images(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
+    """Mean images of a frame that passes are made from."""
     renderer.show(frame)
-    arrays = renderer.finish(frame, sorted({COMBINED, *(name for asked in wanted for name in asked.images)}))
+    sources = {COMBINED, *(name for asked in wanted for name in asked.images)}
+    arrays = renderer.finish(frame, sorted(light_groups.frame_images(sources)))
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays[COMBINED]
+    return arrays
+
+
+def pixels_of(total: light_groups.Sum, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
+    """Pass pixels by Blender's name, (H, W, channels) float32."""
+    arrays = total.finished({name for asked in wanted for name in asked.images})
+    arrays[CAMERA_AXES] = frame.snapshot.camera.matrix[:3, :3] * (1.0, 1.0, -1.0)
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays[COMBINED], **pixels}

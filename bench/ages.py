@@ -28,7 +28,9 @@ PAGES = {  # and the commands that write them
     "docs/indirect_light.md": "python -m bench indirect --page docs/indirect_light.md",
     "docs/nodes.md": "make nodes",
     "docs/performance.md": "make bench",
-    "docs/soft_shadows.md": "python -m bench.soft --page, python -m bench.soft_lights --page",
+    "docs/soft_shadows.md": (
+        "python -m bench.soft --page, python -m bench.soft_lights --page, python -m bench soft_sources --page"
+    ),
     "docs/viewport.md": "make bench-viewport",
 }
 

@@ -160,6 +160,10 @@ def _inputs() -> list[Case]:
     layers = ("Color", "Vector", "Fac", "Alpha")
     return [
         *shown("TexCoord", coordinates, name="Texture Coordinate"),
+        *(Case(f"Radial Tiling {sides} {output.lower()}{', normalised' * normalize}", "RadialTiling", output,
+               {"normalize": normalize}, {"Sides": float(sides)}, "Object", "Vector", procedural=True, since=(5, 2))
+          for sides in (3, 6) for normalize in (False, True)
+          for output in ("Segment Coordinates", "Segment ID", "Segment Width", "Segment Rotation")),
         *shown("TexCoord", ("Object",), {"object": "Guide"}, name="Texture Coordinate of another object:"),
         *shown("TexCoord", ("Generated", "UV"), {"from_instancer": True}, name="Texture Coordinate of the instancer:"),
         *shown("UVMap", ("UV",), {"uv_map": "UVMap"}, name="UV Map"),

@@ -6,6 +6,7 @@ The table of nodes is written from the node table itself, the differences are me
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 import addon
 from addon.materials import nodes
 from addon.materials.nodes.entry import Entry
+from addon.materials.reader import DISSOLVED
 from bench import ages
 from bench.markdown import write_whole
 
@@ -80,6 +82,9 @@ def node_rows() -> list[tuple[str, str, str]]:
         except RuntimeError:
             continue
         rows.append((made.bl_label, *_state(made, [entry for entry in nodes.REGISTRY if entry.type == name])))
+    for name in sorted(DISSOLVED):  # by Blender, before anything reads the tree
+        with contextlib.suppress(RuntimeError):
+            rows.append((tree.nodes.new(name).bl_label, "supported", ""))
     return sorted(rows)
 
 

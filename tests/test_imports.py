@@ -55,6 +55,7 @@ ROOMS = {
     "compare.beside": Room(rooms=BELOW_COMPARE, modules=BLENDER),
     "ui": Room(rooms=(*BELOW_COMPARE, "compare"), modules=(*BLENDER, "gpu")),
     "ui.quality": Room(rooms=BELOW_COMPARE, modules=(*BLENDER, "bl_operators", "bl_ui")),
+    "ui.pass_panels": Room(modules=(*BLENDER, "bl_ui")),
     "viewport": Room(rooms=(*BELOW_COMPARE, "ui"), modules=(*BLENDER, "gpu", "gpu_extras")),
     "final": Room(rooms=(*BELOW_COMPARE, "ui"), modules=("numpy",)),
     "main_loop": Room(rooms=("gfx",), modules=BLENDER),

@@ -1,6 +1,6 @@
-"""Write addon/materials/spectra.npz: the colours that Cycles' Blackbody and Wavelength nodes give.
+"""Write addon/materials/spectra.npz: the colours of Cycles' Blackbody and Wavelength nodes, in each working space.
 
-Each value is one pixel of a picture by Cycles: an emission of the node's colour on a tile.
+Each value is one pixel of a picture by Cycles: an emission of the node's colour on a tile. Needs Blender 5.
 """
 
 import sys
@@ -8,26 +8,34 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import bpy
 import numpy as np
 
 from addon.compare.reference import render_passes
 from addon.materials.spectra import BLACKBODY, TABLE, WAVELENGTH
+from addon.materials.working_space import REC709, SPACES
 from bench.node_cases import Case, tile_scene
 
 
-def measured(cases: list[Case]) -> np.ndarray:
+def measured(cases: list[Case], space: str) -> np.ndarray:
     """(cases, 3) radiance in the middle of each tile."""
     scene, side = tile_scene(cases)
+    bpy.ops.wm.set_working_color_space(working_space=space, convert_colors=False)
     emission = render_passes(scene, "CYCLES", 1, size=(side * 4, side * 4), direct_only=True).images["emission"]
     return np.array([emission[4 * (n // side) + 1, 4 * (n % side) + 1, :3] for n in range(len(cases))], np.float32)
 
 
 def main() -> None:
     kelvin = [Case("", "Blackbody", "Color", {}, {"Temperature": 1.0 / place}) for place in BLACKBODY.places()]
-    np.savez_compressed(TABLE, blackbody=measured(kelvin), wavelength=unclamped_wavelengths())
+    tables = {}
+    for space in SPACES:
+        end = "" if space == REC709 else f" {space}"
+        tables[f"blackbody{end}"] = measured(kelvin, space)
+        tables[f"wavelength{end}"] = unclamped_wavelengths(space)
+    np.savez_compressed(TABLE, **tables)
 
 
-def unclamped_wavelengths() -> np.ndarray:
+def unclamped_wavelengths(space: str) -> np.ndarray:
     """(81, 3) colours of wavelengths before Cycles cuts what is negative, which it does after interpolation.
 
     Between rows Cycles' colours are straight lines. Where a row is cut and its neighbour is not, the line from the
@@ -35,7 +43,7 @@ def unclamped_wavelengths() -> np.ndarray:
     """
     places = WAVELENGTH.places()
     at, before, behind = (
-        measured([Case("", "Wavelength", "Color", {}, {"Wavelength": place + step}) for place in places])
+        measured([Case("", "Wavelength", "Color", {}, {"Wavelength": place + step}) for place in places], space)
         for step in (0.0, -1.0, 1.0)
     )
     rows = at.copy()

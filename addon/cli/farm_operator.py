@@ -19,10 +19,13 @@ class CandelaFarmJob(bpy.types.Operator):
     bl_idname = "candela.farm_job"
     bl_label = "Candela Farm Job"
 
-    directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", description="For the job's description")
+    directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", description="Folder for the job description")
     chunk: bpy.props.IntProperty(name="Frames per Task", default=5, min=1)
     split_samples: bpy.props.IntProperty(
-        name="Slices", default=1, min=1, description="Parts of a picture's samples, each rendered by a task of its own"
+        name="Slices",
+        default=1,
+        min=1,
+        description="Number of parts into which a picture's samples are split, each a task of its own",
     )
     format: bpy.props.EnumProperty(name="Format", items=[("exr", "OpenEXR", ""), ("png", "PNG", "")], default="exr")
     gpu: bpy.props.BoolProperty(name="Nodes with a GPU", description="Ask the farm for nodes with a GPU")

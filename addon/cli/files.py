@@ -1,4 +1,4 @@
-"""Files that come in and go out: refused in a sentence before anything is rendered, and never half-written."""
+"""Input and output files: checked before anything is rendered, and never left incomplete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the command ends when it cannot do what it was asked to."""
+"""How a command ends that cannot do what was asked."""
 
 FAILURE, USAGE = 1, 2  # exit codes: the file, scene or output will not do; the command line cannot be meant so
 

@@ -82,11 +82,15 @@ def write(path: Path, about: dict, taken: dict[str, slices.Slice]) -> None:
 
 def _shown(found: slices.Slice) -> np.ndarray:
     """The mean of a slice's light, for viewers."""
-    light = [
-        p for name, p in found.images.items() if name.startswith(("film.", "radiance.")) and name not in slices.FIRST
-    ]
+    light, covered = [], 1.0
+    for name, pixels in found.images.items():
+        name = name.removeprefix(f"{slices.part_of(name)}:")
+        if name.startswith(("film.", "radiance.")) and name not in slices.FIRST:
+            light.append(pixels)
+        if name == "radiance.environment":
+            covered = np.clip(pixels[..., 3] / found.count, 0.0, 1.0)
     total = np.sum(light, axis=0) / found.count
-    total[..., 3] = np.clip(found.images["radiance.environment"][..., 3] / found.count, 0.0, 1.0)
+    total[..., 3] = covered
     return total.astype(np.float32)
 
 

@@ -1,4 +1,4 @@
-"""What appears on the terminal: progress on one line, and none of what Blender prints."""
+"""Terminal output: progress on one line, without Blender's own messages."""
 
 from __future__ import annotations
 

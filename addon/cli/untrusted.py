@@ -1,4 +1,4 @@
-"""What a file may do when it is rendered: read what it refers to, and nothing else.
+"""Untrusted files: rendering one may read what it refers to, and nothing else.
 
 A .blend file can come from anyone. Opening it must run none of its code, and rendering it must write what the command
 line names and nothing besides. Blender itself asks neither. What could write or run, and what becomes of it here:

@@ -1,4 +1,4 @@
-"""A reference made by a second Blender, so that the one with the window goes on answering, and can give up on it.
+"""Reference renders in a second Blender process, so that the one with the window stays responsive and can cancel.
 
 The open file is written to a temporary copy; a Blender without a window opens it, renders the reference into the cache
 under the key that the open scene has, and ends. Cycles tells on its output how far it is.

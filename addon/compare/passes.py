@@ -1,4 +1,4 @@
-"""The names under which render passes are compared, and how each is compared.
+"""Names of the render passes that are compared, and the metric of each.
 
 One table holds, for every picture, Candela's name, Blender's two spellings (the render passes were renamed in 5.0)
 and the view-layer switch that makes Blender produce it. Everything else in this package reads the table.
@@ -36,6 +36,7 @@ PASS_NAMES = (
 OTHER_NAMES = (
     PassName("mist", "Mist", "Mist", "use_pass_mist"),
     PassName("position", "Position", "Position", "use_pass_position"),
+    PassName("uv", "UV", "UV", "use_pass_uv"),
     PassName("object_index", "Object Index", "IndexOB", "use_pass_object_index"),
     PassName("material_index", "Material Index", "IndexMA", "use_pass_material_index"),
 )

@@ -1,4 +1,4 @@
-"""Pictures about pictures: difference, error and values as colours, two pictures side by side. numpy only.
+"""Pictures of differences and errors: false colours, and two pictures side by side. numpy only.
 
 All take and give (H, W, C) float32, bottom row first. What is meant to be read as a colour scale comes out linear, so
 that a display with the standard view shows exactly the colours of the scale.

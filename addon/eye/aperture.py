@@ -1,4 +1,4 @@
-"""All that stands in the pupil at a time, as one list of translucent strokes: discs, fibres and lashes.
+"""The pupil's obstacles at one time, as one list of translucent strokes: discs, fibres and lashes.
 
     T(x, y) = pupil(x, y) lids(x, y) product over strokes of (1 - opacity where the stroke is)
 

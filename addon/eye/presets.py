@@ -1,4 +1,4 @@
-"""Observers to begin with: what each sets of the eye, by the names of `Eye` and of the diffraction (`defocus`)."""
+"""Presets of observers: values of `Eye` and of the diffraction (`defocus`) by name."""
 
 from __future__ import annotations
 

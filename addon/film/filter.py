@@ -29,7 +29,7 @@ Bias: none. Wider and very narrow filters (below half a pixel) have own points o
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -60,6 +60,14 @@ def taps(place: float, width: float) -> tuple[int, np.ndarray]:
     return pixel, weights / weights.sum()
 
 
+@lru_cache(maxsize=4096)
+def _constants_of(place: float, width: float) -> tuple[int, tuple[float, ...], float]:
+    """The pixel of `taps`, the first four of five weights, and the last."""
+    pixel, weights = taps(place, width)
+    padded = [*weights.tolist(), *[0.0] * (2 * FARTHEST + 1 - len(weights))]
+    return pixel, tuple(padded[:4]), padded[4]
+
+
 # What media let pass of an image on its way to the eye: nothing is lost of it, colours are, and of the image that holds
 # the world what media hide counts as covered.
 CLEAR, DIMMED, COVERED = range(3)
@@ -67,6 +75,22 @@ _SEEN = (
     "seen_{0}_fetch(place)", "vec4(passing.rgb, 1.0) * seen_{0}_fetch(place)",
     "film_dimmed(seen_{0}_fetch(place), passing.rgb)",
 )  # fmt: skip
+
+
+# Of programs that read shaders/film/filter_weights.glsl.
+CONSTANTS = (
+    ("FLOAT", "film_share"), ("IVEC2", "film_pixel"), ("VEC4", "weights_x"), ("VEC4", "weights_y"),
+    ("VEC2", "last_weights"),
+)  # fmt: skip
+
+
+def place_constants(frame: Frame, place: tuple[float, float], share: float) -> dict:
+    """Values of CONSTANTS for one point of the film, which counts `share` and lies at `place` of every pixel."""
+    (x, *across), (y, *up) = (_constants_of(one, frame.snapshot.film.filter_width) for one in place)
+    return {
+        "film_share": share, "film_pixel": (x, y), "weights_x": across[0], "weights_y": up[0],
+        "last_weights": (across[1], up[1]),
+    }  # fmt: skip
 
 
 @cache
@@ -79,10 +103,7 @@ def program(count: int, pixels: int, dimmed: tuple[int, ...] = ()) -> Program:
         f"film filter, {count} images, {2 * pixels + 1} pixels wide",
         "film/filter.frag.glsl",
         textures=(*(("RGBA32F", f"seen_{i}") for i in each), *((("RGBA32F", "through"),) if dimmed else ())),
-        constants=(
-            ("FLOAT", "film_share"), ("IVEC2", "film_pixel"), ("VEC4", "weights_x"), ("VEC4", "weights_y"),
-            ("VEC2", "last_weights"),
-        ),
+        constants=CONSTANTS,
         defines=(
             ("PIXELS", str(pixels)),
             ("BEGIN_ALL", " ".join(f"vec4 sum_{i} = vec4(0.0);" for i in each)),
@@ -107,8 +128,7 @@ def add(
     """Add `share` of the images of one point of the film, which lies at `place` of every pixel (as Frame.film_offset),
     to the frame's images of these names. `through`: what media let pass there. Returns the number of passes."""
     width = frame.snapshot.film.filter_width
-    (x, across), (y, up) = (taps(one, width) for one in place)
-    across, up = (np.append(weights, np.zeros(2 * FARTHEST + 1 - len(weights))) for weights in (across, up))
+    constants = place_constants(frame, place, share)
     count = -(-len(seen) // MOST_IMAGES)
     for part in range(count):
         names = tuple(seen)[part::count]
@@ -121,11 +141,8 @@ def add(
                 **{f"seen_{i}": seen[name] for i, name in enumerate(names)},
                 **({"through": through} if dimmed else {}),
             },
-            constants={
-                "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
-                "last_weights": (across[4], up[4]),
-            },
-        )  # fmt: skip
+            constants=constants,
+        )
     return count
 
 

@@ -1,4 +1,4 @@
-"""What neighbouring pixels lend each other where a sample is shown alone: the mean of the light that arrives there.
+"""Filter for samples that are shown alone: the mean of neighbouring pixels' light.
 
 A masked mean over 4x4 pixels, of those on the same surface (normals within 37 degrees, within two pixels of the tangent
 plane), of light without the surface's colour, so that textures stay: neighbours, whose random numbers

@@ -1,4 +1,4 @@
-"""Film points: where a picture has few samples, each reaches the eye from several points of the film.
+"""Film points: with few samples, each is drawn at several points of a pixel.
 
 Light costs more than what reflects it, and is smoother. So each of a few samples draws its surfaces K times, and lights
 them once:
@@ -30,9 +30,12 @@ the next pixel on the surface; light's own edges are half a pixel wider. It ends
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 from ..frame.light_paths import MEDIUM, SURFACE, named
 from ..frame.run import Frame
-from ..frame.technique import Param
+from ..frame.technique import Param, Service
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..scene.materials import may_be_glossy
@@ -50,6 +53,30 @@ MOST = 8  # points of the film that share a sample's light
 PATHS = named(SURFACE)
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
+
+
+@dataclass(frozen=True)
+class AtPoints(Service):
+    """What a technique draws at each point of the film into sums of its own: `add` is called with the frame, which
+    looks there, the surfaces that are seen (as of surface_bindings), the point's place in the pixel (as
+    Frame.film_offset) and its share of the sample."""
+
+    add: Callable[[Frame, dict[str, images.Image], tuple[float, float], float], None]
+
+
+class SurfaceValues(AtPoints):
+    """Values of the surfaces seen that the view layer asks for."""
+
+    name = "values of surfaces"
+
+
+class Coverage(AtPoints):
+    """How much of a pixel each object, material or asset covers."""
+
+    name = "coverage"
+
+
+AT_POINTS = (SurfaceValues, Coverage)
 
 
 class OwnPoint:

@@ -15,6 +15,7 @@ from ..gfx.readback import Readback, Reading, put
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
+from ..materials.working_space import current
 from ..sampling.lens import point_of
 from ..sampling.sequence import FILM, LENS, lot, point, third
 from ..scene.acceleration import Hierarchy, HierarchyCache
@@ -28,8 +29,9 @@ from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View, blackman_harris_offset
 from ..scene.world_tree import WorldTree
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import RANKED, Snapshot
 from ..sources.environment import Environment
+from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
 from . import ledger as ledger_module
 from . import probe
@@ -37,7 +39,7 @@ from .bands import Bands
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
 from .settings import Settings
-from .technique import Service, Technique
+from .technique import Service, Technique, Write
 
 ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
@@ -66,6 +68,7 @@ class Frame:
     surface_means: SurfaceMeans
     measured_opacity: OpacityMaps
     measured_emission: EmissionMaps
+    lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
@@ -78,6 +81,7 @@ class Frame:
     needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
+    more_writes: list[Write] = field(default_factory=list)  # see `add_write`
     readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -111,7 +115,7 @@ class Frame:
     @cached_property
     def emitters(self) -> list[Emitter]:
         """The scene's lights that give something, in an order of their own."""
-        return emitters(self.snapshot, self.geometry.origin)
+        return emitters(self.snapshot, self.geometry.origin, self.lamp_maps)
 
     def random(self, use: str) -> tuple[float, float]:
         """This sample's point of the sequence for `use`."""
@@ -272,6 +276,25 @@ class Frame:
         self._texels.clear()
         return found[:height, : image.width] if image is not None else pixels
 
+    def add_write(self, write: Write) -> images.Image:
+        """An image that this picture alone has, as for passes that its view layer asks for by name; empty.
+        In `begin`."""
+        if write.name not in self.images:
+            self.images[write.name] = images.pool.take(*self.size, write.format)
+            self.more_writes.append(write)
+        self.target(write.name).clear()
+        return self.images[write.name]
+
+    @property
+    def writes(self) -> list[Write]:
+        """What the plan's techniques write, and what was added for this picture."""
+        return [*(write for technique in self.plan.techniques for write in technique.writes), *self.more_writes]
+
+    @property
+    def sums(self) -> set[str]:
+        """Names of what adds up over samples."""
+        return {write.name for write in self.writes if write.accumulates}
+
     def drop(self) -> None:
         """Give back the images of the frame."""
         self.readback.drop()
@@ -318,6 +341,7 @@ class Renderer:
         self.publishes = True  # its ledgers are those that the interface shows; icons of materials have none there
         self._hierarchies, self._surface_means, self._opacity = HierarchyCache(), SurfaceMeans(), OpacityMaps()
         self._glow = EmissionMaps()
+        self._lamp_maps = LampMaps()
         self._environment: tuple[object, Environment] | None = None
         self._keys: dict[str, object] = {}
         self._lasting: dict[type, object] = {}  # what frames share, by class
@@ -362,12 +386,15 @@ class Renderer:
         view = View(snapshot.camera, snapshot.film, self.geometry.origin)
         self.materials.set_view(view)
         environment = self._update_environment(snapshot)
+        self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)
         compile_started = time.perf_counter()
         ledger.times["upload"] = compile_started - started
         yield from compiling(self._programs(plan, snapshot, settings))
         ledger.times["compile"] = time.perf_counter() - compile_started
-        ledger.notes = tuple(dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes)))
+        ledger.notes = tuple(
+            dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes))
+        )
 
         key = self._content_key(snapshot, settings, plan)
         if self.frame is not None and not geometry_changed and key == self._frame_key:
@@ -390,7 +417,7 @@ class Renderer:
         frame = Frame(
             snapshot, settings, view, plan, self.geometry, self.materials, environment,
             {}, Profiler(settings.profile), ledger, self._view_block, self._hierarchies,
-            self._surface_means, self._opacity, self._glow, lasting=self._lasting,
+            self._surface_means, self._opacity, self._glow, self._lamp_maps, lasting=self._lasting,
         )  # fmt: skip
         self.frame = frame
         environment.guide(None)
@@ -506,7 +533,7 @@ class Renderer:
         else:  # the wait for the GPU, with what comes of it first
             read = frame.read_with_counters(frame.to_show(first))
         waited = time.perf_counter()
-        sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
+        sums = frame.sums
         out, bad = {}, 0
         for name in names:
             if name not in frame.images:  # no technique of the plan brings such light
@@ -519,6 +546,8 @@ class Renderer:
                 pixels = np.where(finite, pixels, 0.0).astype(np.float32)
             if name in sums and frame.samples_done:
                 pixels /= frame.samples_done
+            if name.startswith(RANKED) and frame.samples_done:
+                pixels[..., 1::2] /= frame.samples_done
             out[name] = pixels
         ledger = frame.ledger
         took = frame.drawn_s + frame.profiler.awaited + waited - started
@@ -560,6 +589,7 @@ class Renderer:
         self.displacement.release()
         self.materials.release()
         self._hierarchies.release()
+        self._lamp_maps.release()
         self._environment = self._view_block = self._frame_key = None
         self._keys.clear()
         for kept in self._lasting.values():
@@ -580,7 +610,10 @@ class Renderer:
         if world.graph is not None:
             named = (snapshot.images.get(node.image) for node in world.graph.nodes.values())
             tree = (world.graph, tuple((shown.key, shown.version) for shown in named if shown is not None))
-        key = (image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent)
+        key = (
+            image, np.asarray(world.color).tobytes(), mapping, tree, world.visibility, snapshot.film.transparent,
+            current().name,
+        )  # fmt: skip
         if self._environment is None or self._environment[0] != key:
             compiled = WorldTree(world, snapshot.images, self.materials.energy_table) if tree else None
             self._environment = (key, Environment(world, snapshot.film.transparent, compiled))
@@ -615,21 +648,21 @@ class Renderer:
         # Who may throw caustics, where objects are asked one by one (caustic_casters.py).
         casters = () if snapshot.film.caustics_refractive else tuple(i.caustics_caster for i in snapshot.instances)
         return (
-            lights_key(snapshot), casters, self._environment[0], self.materials.fingerprint(),
+            lights_key(snapshot), self._lamp_maps.changes, casters, self._environment[0], self.materials.fingerprint(),
             volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
             settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
-            tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
+            snapshot.own_values,
+            snapshot.motion and snapshot.motion.key,
         )  # fmt: skip
 
     def _clear_sums(self, frame: Frame) -> None:
-        for technique in frame.plan.techniques:
-            for write in technique.writes:
-                if write.accumulates and write.name in frame.images:
-                    frame.target(write.name).clear()
+        for write in frame.writes:
+            if (write.accumulates or write.ranked) and write.name in frame.images:
+                frame.target(write.name).clear()
 
 
 def _stage(frame: Frame, stage: str) -> Iterator[None]:
@@ -661,6 +694,7 @@ def lights_key(snapshot: Snapshot) -> tuple:
     return tuple(
         (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
          light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
-         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own)
+         light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own,
+         *(() if light.graph is None else (light.graph, light.random, light.pass_index, light.color)))
         for light in snapshot.lights
     )  # fmt: skip

@@ -6,6 +6,7 @@ but for the order in which floats were added. What is taken from a finished slic
     sums      light by path, colours, coverage, normals: added up
     first     depth, positions and indices, which every slice has from the picture's first sample: of any slice
     last      surface.position of the last sample, from which Denoise tells surfaces: of the last slice
+    ranked    pairs of ids and weights: weights added by id (kernels/ranks.py)
     halves    what Denoise compares: sums of the first half of the samples, of the slice in which that half ends
 
 What techniques learn from sample to sample (how open the sky is above a pixel, environment_light.py) begins anew in
@@ -15,11 +16,13 @@ each slice: there the merged picture has other noise of the same mean, and no ro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..gfx import images
+from ..kernels import ranks
+from ..snapshot.scene import RANKED
 from .run import Frame
 
 HALF = "_half"
@@ -41,12 +44,13 @@ class Slice:
         return self.first + self.count
 
 
-def taken(frame: Frame) -> Slice:
-    """What a merge needs of a frame whose samples are drawn."""
-    sums = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
-    wanted = {frame.shown.get(name, name) for name in sums} | set(FIRST) | set(LAST)
-    wanted |= {name for name in frame.images if name.endswith(HALF)}
-    read = {name: images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}
+def taken(frame: Frame, part: str = "", before: Slice | None = None) -> Slice:
+    """What a merge needs of a frame whose samples are drawn: of the `part` of a picture, beside those before it."""
+    wanted = {frame.shown.get(name, name) for name in frame.sums} | set(FIRST) | set(LAST)
+    wanted |= {name for name in frame.images if name.endswith(HALF) or name.startswith(RANKED)}
+    read = {joined(part, name): images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}
+    if part and before is not None:
+        read = before.images | read
     settings = frame.settings
     return Slice(settings.sample_offset, frame.samples_done, settings.samples, read)
 
@@ -72,7 +76,36 @@ def merged(slices: Sequence[Slice]) -> dict[str, np.ndarray]:
         place = one.end
     if place < total:
         raise ValueError(f"Samples {place} to {total - 1} of {total} are missing.")
-    return {name: _merged(name, slices) for name in slices[0].images}
+    parts = dict.fromkeys(part_of(name) for name in slices[0].images)
+    if list(parts) != [""]:
+        found = {}
+        for part in parts:
+            alone = [replace(one, images=images_of_part(one.images, part)) for one in slices]
+            found |= {joined(part, name): pixels for name, pixels in merged(alone).items()}
+        return found
+    found = {name: _merged(name, slices) for name in slices[0].images if not name.startswith(RANKED)}
+    mattes: dict[str, list[str]] = {}
+    for name in slices[0].images:
+        if name.startswith(RANKED):
+            mattes.setdefault(name.rpartition(".")[0], []).append(name)
+    for names in mattes.values():
+        found |= zip(names, ranks.merged([[one.images[name] for name in names] for one in slices]))
+    return found
+
+
+# A picture of several light groups is drawn in parts, one for each (snapshot/light_groups.py); a slice holds the images
+# of all of them, those of a part under its number.
+def joined(part: str, name: str) -> str:
+    return f"{part}:{name}" if part else name
+
+
+def part_of(name: str) -> str:
+    return name.partition(":")[0] if ":" in name else ""
+
+
+def images_of_part(found: dict[str, np.ndarray], part: str) -> dict[str, np.ndarray]:
+    """A part's images, by their own names."""
+    return {name.removeprefix(f"{part}:"): pixels for name, pixels in found.items() if part_of(name) == part}
 
 
 def _merged(name: str, slices: Sequence[Slice]) -> np.ndarray:

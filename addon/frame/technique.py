@@ -118,6 +118,7 @@ class Write:
     description: str
     accumulates: bool = False
     by_need: bool = False
+    ranked: bool = False  # pairs (id, weight) to which samples add by id (kernels/ranks.py): no sum, but cleared as one
 
 
 class Service:

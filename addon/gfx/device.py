@@ -1,4 +1,4 @@
-"""What this device does at which cost: a few figures that choices between methods ask, never its name.
+"""Measured costs of the device, by which methods are chosen; its name decides nothing.
 
 The figures are measured once (frame/probe.py) and kept by driver and version in the user's folder for caches, so that
 a picture is drawn alike each time. They are rounded, for the same reason. Tests, and whoever wants the choices of

@@ -1,4 +1,4 @@
-"""Readbacks that wait for each other: what several steps want to know is read at once, when the first of it is needed.
+"""Deferred readbacks: values that several steps need are read back together, when the first of them is needed.
 
 A readback stops the queue: the CPU waits until the GPU has done everything before it, and then the GPU waits for what
 the CPU makes of it. So what is asked for is left where it is (`later`), and the first `pixels` copies all of it into

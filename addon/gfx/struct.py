@@ -71,10 +71,12 @@ class Struct:
 
 
 class Block:
-    """A uniform buffer that holds one record of a struct."""
+    """A uniform buffer of one record of a struct. Images `beside` it, by name, are bound with it, as those beside
+    an image are (images.Image)."""
 
     def __init__(self, struct: Struct, **values):
         self.struct = struct
+        self.beside: dict[str, object] = {}
         self._data = struct.pack(**values)
         self.buffer = gpu.types.GPUUniformBuf(self._bytes())
 

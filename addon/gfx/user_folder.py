@@ -1,4 +1,4 @@
-"""Where Candela keeps what it can make again: a folder of the extension's, or among the user's caches."""
+"""Folder for data that can be made again: the extension's own, or the user's cache folder."""
 
 from __future__ import annotations
 

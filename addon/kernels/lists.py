@@ -1,4 +1,4 @@
-"""Lists of the places of a picture that one compute pass finds and another works on, in no order.
+"""Work lists: one compute pass appends pixels, a second one processes them; their order is undefined.
 
 A pass that has work at a tenth of the pixels leaves most of a GPU's lanes idle; over a list of them all are busy.
 Entries are packed into integers by who fills the list; shaders/lib/entry_list.glsl says where they lie. Not on backends

@@ -1,4 +1,4 @@
-"""Order in space: numbers that are close for points that are close."""
+"""Morton order: numbers that are close for points that are close."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lists in images of COLUMNS entries a row: sorted by keys, and with the sums of what stands before each entry.
+"""Ordered lists in images of COLUMNS entries a row: sorting by key, and prefix sums.
 
 Sorting is by rank: within a row an entry counts the smaller ones, among other rows it finds its place by bisection. It
 is stable, so the same on every device. Sums are those of runs of entries, added up one after the other: their order is

@@ -1,4 +1,4 @@
-"""One texel from a whole image: the sum of its rgb and the largest of its alpha.
+"""Reduction of an image to one texel: the sum of its rgb and the maximum of its alpha.
 
 Blocks of 8 x 8 texels become one, until one is left: 1 + 1/64 + … fetches per texel, four passes for 4096 x 4096.
 Sums of sums keep float32 within 1e-6 of what double precision gives for positive values.

@@ -1,4 +1,4 @@
-"""What throws caustics: the materials, objects and lights whose light a technique of the slot `caustics` carries.
+"""Casters of caustics: the materials, objects and lights that techniques of the slot `caustics` take over.
 
 A material is a caster if it bends light (glass, of any roughness) or mirrors it with no diffuse part to speak of
 (Glossy, Metallic, or Principled with metallic from METALLIC on) and is smooth: roughness up to SMOOTH, known from the
@@ -76,7 +76,7 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     """The casters, or, as a sentence, why there are none."""
     film = snapshot.film
     glass, mirrors = set(), {}
-    for number in {slot for instance in snapshot.instances for slot in instance.materials}:
+    for number in snapshot.used_materials:
         graph = snapshot.materials[number].graph
         if may_refract(graph):
             glass.add(number)

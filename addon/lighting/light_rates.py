@@ -1,4 +1,4 @@
-"""How many points of each light a sample draws, and what of the world is seen: what probes tell the light loop."""
+"""Sampling rates: the number of points of each light in a sample, as light probes found it, for the light loop."""
 
 from __future__ import annotations
 

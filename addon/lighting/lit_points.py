@@ -1,4 +1,4 @@
-"""Points of surfaces with what they reflect and the light that reaches them straight, for who gathers from points.
+"""Lit points: points on surfaces with reflectance and direct light, for techniques that gather from them.
 
 Whatever spreads points over surfaces (points by area: point_runs.py; surfels: surfels.py) has them shaded and lit here.
 Points are records of hits, known beforehand or found by rays; the material's own program is run at each

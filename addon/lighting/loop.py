@@ -44,6 +44,7 @@ from .visibility import (
     Lookup,
     Maps,
     VisibilityProvider,
+    drawn_by_lot,
     ray_bindings,
     source_of,
     traced_roughness,
@@ -133,25 +134,48 @@ def light_surfaces(
     points: list[LightPoint],
     kinds: int,
     sources: lights.Sources,
-    adjust: Callable[[Maps, int], Maps] | None = None,
+    adjust: Callable[[Maps, float], Maps] | None = None,
 ) -> Iterator[None]:
     """Add the light of these points, of light sources of these `kinds`, to the radiance images, in parts. `adjust`:
     changes what tells the visibility of a batch of so many points."""
     by_provider: dict[VisibilityProvider, list[LightPoint]] = {}
-    for point in points:
+    for point in _by_channel(points) if tinted_casters(frame) else points:
         by_provider.setdefault(point.provider, []).append(point)
         kinds |= bool(point.flags & lights.WHOLE_FLAG) << lights.WHOLE
     for provider, own in sorted(by_provider.items(), key=lambda group: group[0].asks_views):
         for batch, maps in provider.batches(frame, technique, own):
             yield from maps.drawing
             yield
-            maps = adjust(maps, len(batch)) if adjust else maps
+            maps = adjust(maps, sum(map(_share, batch))) if adjust else maps
             near = [point.row for point in batch if point.flags & lights.NEAR_FLAG]
             others = [point.row for point in batch if not point.flags & lights.NEAR_FLAG]
             if others:
                 yield from shade(frame, technique, others, kinds, sources, maps)
             if near:
                 yield from shade(frame, technique, near, kinds, sources, _with_rays(frame, maps))
+
+
+def tinted_casters(frame: Frame) -> bool:
+    """Whether something that is drawn colours the light that it lets pass."""
+    return any(frame.materials.compiled[draw.material].tinted for draw in drawn_by_lot(frame))
+
+
+def _share(point: LightPoint) -> float:
+    """Of a point that was drawn: those of one channel are a third."""
+    return 1 / 3 if any(getattr(view, "channel", 0) for view in point.views) else 1.0
+
+
+def _by_channel(points: list[LightPoint]) -> Iterator[LightPoint]:
+    """The same light as points of red, green and blue alone, each with maps of what passes casters of that channel: a
+    lookup says how much arrives, not in which colour. Three times the maps, where casters are coloured."""
+    for point in points:
+        if not any(hasattr(view, "channel") for view in point.views):
+            yield replace(point, row=point.row.copy())
+            continue
+        for channel in range(3):
+            row = point.row.copy()
+            row[3, :3] *= np.arange(3) == channel
+            yield replace(point, row=row, views=[replace(view, channel=channel + 1) for view in point.views])
 
 
 def _with_rays(frame: Frame, maps: Maps) -> Maps:

@@ -1,4 +1,4 @@
-"""What tells a picture which points of a light it sees at less cost: depth maps, or a ray of each pixel.
+"""The choice between depth maps and a ray per pixel for the points of a light, by cost.
 
 A map costs its triangles, texels and calls, a ray the hierarchy's levels on its way, and each pixel needs one:
 

@@ -1,4 +1,4 @@
-"""What shadow techniques share that see a light as a whole, or a part of it, from one depth map.
+"""Soft shadow maps: what techniques share that see a light, or a part of it, from one depth map.
 
 Which part a map stands for follows from the samples: all of the light with one, a part whose extents shrink by sqrt(n)
 with n (PointMaps.cell). Beside its map each view has a min-max pyramid, which tells most pixels at once that they
@@ -88,9 +88,9 @@ def with_contacts(lookup: Lookup) -> Lookup:
 
 def lit_by_others(snapshot: Snapshot) -> bool:
     """Whether the world or an emissive mesh lights something that may stand in shadow."""
-    if not any(instance.visibility.shadow for instance in snapshot.instances):
+    if not snapshot.casts_shadows:
         return False
-    used = {slot for instance in snapshot.instances for slot in instance.materials}
+    used = snapshot.used_materials
     return bool(np.any(snapshot.world.color)) or any(may_emit(snapshot.materials[k].graph) for k in used)
 
 

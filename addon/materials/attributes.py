@@ -22,7 +22,7 @@ def asked_for(node: Node, socket: words.Socket) -> bool:
 def attributes_of(graph: Graph) -> frozenset[Attribute]:
     """All attributes that the nodes of the table look up."""
     found = set()
-    read = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+    read = graph.read
     for node in graph.nodes.values():
         entry = nodes.find(node.type, node.properties)
         for argument in entry.arguments if entry is not None else ():
@@ -53,7 +53,7 @@ _OF_CAMERA = {
 
 def surroundings_of(graph: Graph) -> frozenset[str]:
     """INSTANCE where a tree may give other values for instances of one mesh, CAMERA where for other views."""
-    read = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+    read = graph.read
     found = set()
     for node in graph.nodes.values():
         for name, table in ((INSTANCE, _OF_INSTANCE), (CAMERA, _OF_CAMERA)):

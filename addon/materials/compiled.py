@@ -14,7 +14,9 @@ from .volume import Medium
 class Attribute:
     """A per-corner attribute that a material reads; arrives in the shader as `vec4`."""
 
-    kind: str  # UV, COLOR, TANGENT by name ("" = the active one), NAMED (colour, UV or any other), GENERATED
+    # UV, COLOR, TANGENT by name ("" = the active one), NAMED (colour, UV or any other), GENERATED, UV_PASS (UV, 1),
+    # MOTION_BEFORE, MOTION_AFTER (from where the mesh is to where it was and will be)
+    kind: str
     name: str
 
 
@@ -39,7 +41,7 @@ class CompiledMaterial:
     """GLSL for one material topology plus the values of this material.
 
     `glsl` defines `void evaluate_material(SurfacePoint point, inout Closures closures)`. It reads
-    `material_values.value[k]` (a uniform block of vec4), samplers `material_image0…`, `point.attributes[k]`.
+    `material_value(k)` (rows of the block `material_values`), samplers `material_image0…`, `point.attributes[k]`.
     Materials with equal `program_key` share one program; `values` alone differ.
     """
 
@@ -74,6 +76,9 @@ class CompiledMaterial:
     # the program finds the surface itself, evaluate_material leaves the normal alone. With DISPLACED, UNDISPLACED_PLACE
     # and UNDISPLACED_NORMAL may name attributes: the normal is then that of the tree's own detail.
     displaces: bool = False
+    aovs: tuple[
+        tuple[str, str], ...
+    ] = ()  # name, kind: of the k-th one `glsl` has `material_aov{k}(SurfacePoint point)`
     along_normal: bool = False  # by a height: what it lifts, it lifts along the normal
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
 

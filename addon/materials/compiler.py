@@ -24,7 +24,7 @@ from .compiled import CompiledMaterial
 from .estimate import Estimate, Summary, constant
 from .expressions import Expressions
 from .graph import Graph, Input, Node
-from .nodes.entry import Entry
+from .nodes.entry import Entry, Socket
 from .nodes.shader import IMPLICIT_EMISSION, UNKNOWN_SHADER
 from .values import glsl_number
 from .volume import Medium, medium_of
@@ -63,6 +63,7 @@ class _Compilation:
     def result(self) -> CompiledMaterial:
         self._displacement()
         summary = self._surface()
+        self._aovs()
         medium = medium_of(self.graph)
         self._unused_slots(medium, summary.glass is not None)
         code, glsl, values = self.code, self.code.text(), self.code.values.array()
@@ -99,6 +100,7 @@ class _Compilation:
             medium=medium,
             scatter=summary.scatter,
             fallbacks=tuple(code.fallbacks),
+            aovs=tuple((name, kind) for name, kind, _ in self.graph.aovs),
             displaces=code.exists(self.graph.displacement),
             along_normal=self._lifts_along_normal(),
         )
@@ -134,6 +136,25 @@ class _Compilation:
         self.code.lines.append("closures.base_normal = point.normal;")
         self.code.lines.append("#endif")
         self.code.call_it(name, "vec3 material_displacement")
+
+    def _aovs(self) -> None:
+        """A function of the surface point for each of the graph's AOVs, which only programs that draw them call."""
+        for number, (name, kind, socket) in enumerate(self.graph.aovs):
+            wanted = "FLOAT" if kind == "VALUE" else "COLOR"
+            node = Node(f"AOV {name}", name, "ShaderNodeOutputAOV", {"Value": socket})
+            if kind in ("HIT", "DISTANCE"):
+                continue
+            if kind == "VECTOR":
+                value = f"{self.code.attribute(node, 'MOTION_BEFORE', '')}.xyz"
+                after = f"{self.code.attribute(node, 'MOTION_AFTER', '')}.xyz"
+                self.code.returns(after, f"vec3 material_aov{number}_after")
+            elif kind == "UV":
+                value = f"{self.code.attribute(node, 'UV_PASS', '')}.xyz"
+            elif self.code.exists(socket.link):
+                value = f"{self.code.function(socket.link, wanted)}(point)"
+            else:
+                value = self.code.socket(node, Socket("Value", wanted))
+            self.code.returns(value, f"{'float' if wanted == 'FLOAT' else 'vec3'} material_aov{number}")
 
     def _lifts_along_normal(self) -> bool:
         link = self.graph.displacement

@@ -34,13 +34,11 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 ENERGY_SIZE = 32  # nodes along roughness and along mu
 LAYER_SIZE = 16  # nodes along roughness, mu and z
 FINE_SIZE = 32  # and of the dielectric layer in Cycles 5.3 and later
-IS_FINE = bpy.app.version >= (5, 3, 0)
 TEXTURE_SIZE = 64  # texels along each side of a third of the packed texture: 4 x 4 tiles of LAYER_SIZE
 
 SMALLEST_COSINE = 1e-4  # the node at mu = 0 stands just above the horizon, where the lobe is still defined
@@ -203,7 +201,7 @@ def sheen_tables() -> dict[str, np.ndarray]:
         return {name: stored[name] for name in stored.files}
 
 
-def energy_texture(fine: bool = IS_FINE) -> np.ndarray:
+def energy_texture(fine: bool) -> np.ndarray:
     """The tables packed for the GPU: (64, 192, 4) float32, row first, to be bound as `energy_table`; if `fine`,
     (160, 192, 4), which tells shaders to do as Cycles 5.3.
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .values import LUMINANCE
+from .working_space import current
 
 MEAN_SIZE = 256  # pixels along each side that the mean of a large image is taken from
 
@@ -47,7 +47,7 @@ class Estimate:
         return self.map(lambda value: np.clip(value, 0.0, 1.0))
 
     def luminance(self) -> Estimate:
-        return self.map(lambda value: _weighted(value, LUMINANCE))
+        return self.map(lambda value: _weighted(value, current().luminance))
 
     def average(self) -> Estimate:
         return self.map(lambda value: _weighted(value, np.full(3, 1.0 / 3.0)))

@@ -18,6 +18,7 @@ from .nodes.entry import Entry
 from .nodes.image import FUNCTIONS, MISSING_COLOR, part_functions, tiled_functions
 from .nodes.image import SOURCE as IMAGE_SOURCE
 from .values import ValueBlock, glsl_number, to_kind
+from .working_space import current
 
 MAX_ATTRIBUTES = 8  # SurfacePoint.attributes in lib/closure.glsl
 DEEPEST_BUMP = 3  # bump nodes within the heights of bump nodes: each level is evaluated three times
@@ -40,6 +41,19 @@ def convert(expression: str, kind: str, wanted: str) -> str:
     return f"vec3({expression})"
 
 
+def _working_luminance() -> str:
+    """What tells the luminance of colours in the generated text, where they are no Rec. 709."""
+    space = current()
+    if space.usual:
+        return ""
+    weights = glsl_number(tuple(space.luminance), "COLOR")
+    return (
+        f"float working_luminance(vec3 color)\n{{\n  return dot(color, {weights});\n}}\n"
+        "#define color_luminance(color) working_luminance(color)\n"
+        "#define rgb_to_bw(color, result) result = working_luminance(color)\n"
+    )
+
+
 class _Scope:
     """One GLSL function while it grows: its lines, and what is computed in it."""
 
@@ -60,14 +74,18 @@ class Expressions:
         self.attributes: list[Attribute] = []
         # In sampler order, with the files that their functions call: of one, unless nodes of two kinds read an image.
         self.image_keys: dict[str, dict[str, None]] = {}
-        self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
+        self.includes: dict[str, None] = {
+            "material/values.glsl": None,
+            "lib/closure.glsl": None,
+            "lib/color.glsl": None,
+        }
         self._atlas = self._shared_sampler()
         self._scopes = [_Scope()]
         self._functions: list[str] = []
         self._function_names: dict[tuple[tuple[str, str], str], str] = {}
         self._function_depths: dict[str, int] = {}
         self._constants: dict[tuple[str, words.Argument], str] = {}
-        self._read_outputs = {socket.link for node in graph.nodes.values() for socket in node.inputs.values()}
+        self._read_outputs = graph.read
 
     @property
     def lines(self) -> list[str]:
@@ -83,6 +101,7 @@ class Expressions:
         includes = "".join(f'#include "{path}"\n' for path in self.includes)
         wanted = [(k, source) for k, sources in enumerate(self.image_keys.values()) for source in sources]
         keys = list(self.image_keys)
+        includes += _working_luminance()
         functions = "".join("\n" + self._image_functions(keys[k], k, source) for k, source in wanted)
         functions += "".join(self._functions)
         body = "".join(f"  {line}\n" for line in self.lines)
@@ -134,7 +153,9 @@ class Expressions:
             settled = node.inputs.get(approximation.unless_linked)
             if socket is None or (settled is not None and self.exists(settled.link)):
                 continue
-            if self.exists(socket.link) or to_kind(socket.value, socket.kind, "FLOAT") != approximation.harmless:
+            value = to_kind(socket.value, socket.kind, "FLOAT")
+            harmless = round(value) if approximation.harmless == "whole" else approximation.harmless
+            if self.exists(socket.link) or value != harmless:
                 self.note(node, approximation.sentence)
         if node.properties.get("texture_mapping", PLAIN_MAPPING) != PLAIN_MAPPING:
             self.note(node, "The node's own Texture Mapping panel is not read; use a Mapping node.")
@@ -252,7 +273,7 @@ class Expressions:
             if argument.output and (node.key, argument.output) not in self._read_outputs:
                 return "vec4(0.0)"
             name = argument.name or str(node.properties.get(argument.property, ""))
-            return self._attribute(node, argument.kind, name)
+            return self.attribute(node, argument.kind, name)
         if isinstance(argument, words.Used):
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
         if isinstance(argument, words.Rows):
@@ -299,7 +320,11 @@ class Expressions:
 
     def call_it(self, function: str, head: str) -> None:
         """Give one of the functions of `function` a name that does not depend on the tree."""
-        self._functions.append(f"\n{head}(SurfacePoint point)\n{{\n  return {function}(point);\n}}\n")
+        self.returns(f"{function}(point)", head)
+
+    def returns(self, value: str, head: str) -> None:
+        """A function of the surface point of that name whose value is an expression."""
+        self._functions.append(f"\n{head}(SurfacePoint point)\n{{\n  return {value};\n}}\n")
 
     def socket(self, node: Node, socket: words.Socket) -> str:
         expression = self._socket_value(node, socket)
@@ -326,12 +351,12 @@ class Expressions:
         implicit = "" if given is not None and given.given else socket.implicit
         if implicit == "@RADIAL":
             self.includes["material/input.glsl"] = None
-            generated = self._attribute(node, "GENERATED", "")
+            generated = self.attribute(node, "GENERATED", "")
             return f"surface_tangent(point, vec3(0.5 - {generated}.y, {generated}.x - 0.5, 0.0))"
         if implicit == "@UV":
-            return f"vec3({self._attribute(node, 'UV', '')}.xy, 0.0)"
+            return f"vec3({self.attribute(node, 'UV', '')}.xy, 0.0)"
         if implicit == "@GENERATED":
-            return f"{self._attribute(node, 'GENERATED', '')}.xyz"
+            return f"{self.attribute(node, 'GENERATED', '')}.xyz"
         if implicit:
             return implicit
         value, kind = (socket.default, socket.kind) if given is None else (given.value, given.kind)
@@ -340,7 +365,7 @@ class Expressions:
             return glsl_number(0.0, socket.kind)
         return self._constant(node, socket, constant, socket.kind)
 
-    def _attribute(self, node: Node, kind: str, name: str) -> str:
+    def attribute(self, node: Node, kind: str, name: str) -> str:
         attribute = Attribute(kind, name)
         if attribute not in self.attributes:
             if len(self.attributes) >= MAX_ATTRIBUTES:

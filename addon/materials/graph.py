@@ -37,4 +37,13 @@ class Graph:
     volume: tuple[str, str] | None = None
     displacement: tuple[str, str] | None = None
     displacement_method: str = "BUMP"  # BUMP, DISPLACEMENT or BOTH: what it moves, the normal, the surface or both
+    # What AOV Output nodes give: name, kind (COLOR, VALUE), socket; UV has no name.
+    aovs: tuple[tuple[str, str, Input], ...] = ()
     transparent_shadow: bool = True  # light on its way to a surface passes where the surface is transparent
+
+    @property
+    def read(self) -> set[tuple[str, str] | None]:
+        """The links that nodes and AOVs read."""
+        return {socket.link for node in self.nodes.values() for socket in node.inputs.values()} | {
+            socket.link for _, _, socket in self.aovs
+        }

@@ -7,17 +7,22 @@ treated as if nothing were linked. Node settings are read generically, so that a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import bpy
 
 from .graph import Graph, Input, Node
+from .ies import Profile
 from .sky import sky_of
 from .values import to_kind
 
 Notes = tuple[tuple[str, str], ...]
-ImageKey = Callable[[object, object], str]  # (bpy Image or Sky, ImageUser or None) -> Image.key
+Aovs = tuple[tuple[str, str], ...]
+# (bpy Image or Sky, ImageUser or None) or (Profile, label of its node) -> Image.key
+ImageKey = Callable[[object, object], str]
 
 KINDS = {
     "VALUE": "FLOAT",
@@ -33,6 +38,8 @@ KINDS = {
 # An output's constant may go by another name.
 CONSTANT_NODES = {"ShaderNodeRGB": {}, "ShaderNodeValue": {}, "ShaderNodeNormal": {"Normal": "Direction"}}
 
+OF_INLINED = re.compile(r"^\d+_")  # before the names of nodes that Blender dissolved from groups and zones
+MOST_OF_PROFILE = 1 << 22  # bytes of an IES file: they have some kilobytes
 TABLE_ROWS = 129  # points at which curves, and colour ramps that are no plain blends, are tabulated
 
 SUBSURFACE_SETTINGS = {"subsurface_method", "falloff"}
@@ -43,6 +50,7 @@ _settings_of_type: dict[str, tuple] = {}
 WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
 
 
+FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # Cycles has the fine table of dielectric layers (energy.py)
 INLINES = bpy.app.version >= (5, 0, 0)  # Blender dissolves groups itself before Cycles sees the tree
 
 
@@ -59,26 +67,34 @@ class _Place:
         return () if self.parent is None else (*self.parent.path, self.group.name)
 
 
-def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
-    """The node tree of a material, world or light as a flat graph, and sentences about what could not be read.
+def read_graph(owner, image_key: ImageKey, aovs: Aovs = ()) -> tuple[Graph, Notes]:
+    """The node tree of a material, world or light as a flat graph, and sentences about what could not be read. Of a
+    material with what its AOV Output nodes give for `aovs`, the names and kinds that are wanted.
 
     `image_key(image, image_user)` names the pixels of an image node. An ID without a usable tree gives the graph that
     Blender means by it: diffuse in the viewport colour for a material, the plain colour for a world.
     """
     tree = getattr(owner, "node_tree", None)
+    if not isinstance(owner, bpy.types.Material):
+        aovs = ()
+    uv = tuple((name, kind, Input("VECTOR")) for name, kind in aovs if not name)
     if tree is None or not _uses_nodes(owner):
-        return _graph_without_nodes(owner), ()
+        return replace(_graph_without_nodes(owner), aovs=uv), ()
+    inlined = _inlined(owner, tree)  # holds the tree that is read
+    tree = tree if inlined is None else inlined.node_tree
     output = _active_output(tree)
     if output is None:
-        return Graph(), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
+        return Graph(aovs=uv), ((owner.name, "The node tree has no output node; nothing of it is drawn."),)
     reading = _Reading(image_key, getattr(owner, "pass_index", 0))
     place = _Place(tree)
     links = {}
     for name in ("Surface", "Volume", "Displacement"):
         socket = output.inputs.get(name)
         links[name.lower()] = None if socket is None else reading.source(place, output, socket).link
+    given = reading.aovs(place, {name: kind for name, kind in aovs if name}) if aovs else ()
     reading.read_pending()
-    found = reading.cut_cycles(links)
+    roots = {**links, **{f"AOV {name}": socket.link for name, _, socket in given}}
+    found = reading.cut_cycles(roots)
     if isinstance(owner, bpy.types.Material) and links["volume"] is not None and links["surface"] is None:
         # A volume alone has no surface; only a tree without either is black.
         clear = Node("No surface", owner.name, "ShaderNodeBsdfTransparent", {"Color": WHITE}, {"BSDF": "SHADER"})
@@ -86,8 +102,37 @@ def read_graph(owner, image_key: ImageKey) -> tuple[Graph, Notes]:
     shadow = bool(getattr(owner, "use_transparent_shadow", True))
     method = getattr(owner, "displacement_method", "BUMP")
     return (
-        Graph(found, **links, displacement_method=method, transparent_shadow=shadow),
+        Graph(found, **links, displacement_method=method, transparent_shadow=shadow, aovs=(*uv, *given)),
         tuple(dict.fromkeys(reading.notes)),
+    )
+
+
+# What only Blender dissolves, as it does before Cycles sees the tree: zones, closures, bundles, switches by menu.
+DISSOLVED = {
+    "GeometryNodeRepeatOutput", "NodeClosureOutput", "NodeEvaluateClosure", "NodeCombineBundle", "NodeSeparateBundle",
+    "NodeJoinBundle", "GeometryNodeMenuSwitch", "FunctionNodeInputBool", "FunctionNodeInputInt",
+}  # fmt: skip
+
+
+def _inlined(owner, tree):
+    """Blender's own flat copy of a tree, which lives as long as what comes back; None where the tree can be read as it
+    is, in which nodes keep their names."""
+    makers = getattr(bpy.types, "InlineShaderNodes", None)
+    if makers is None or not _has_dissolved(tree, set()):
+        return None
+    if isinstance(owner, bpy.types.Material):
+        return makers.from_material(owner)
+    return makers.from_world(owner) if isinstance(owner, bpy.types.World) else makers.from_light(owner)
+
+
+def _has_dissolved(tree, seen: set) -> bool:
+    """Whether some node of the tree, or of a group in it, is one that Blender dissolves."""
+    if tree is None or tree.as_pointer() in seen:
+        return False
+    seen.add(tree.as_pointer())
+    return any(
+        node.bl_idname in DISSOLVED or (node.bl_idname == "ShaderNodeGroup" and _has_dissolved(node.node_tree, seen))
+        for node in tree.nodes
     )
 
 
@@ -131,7 +176,11 @@ class _Reading:
         self._links: dict[int, dict[int, object]] = {}
 
     def _link_into(self, tree, socket):
-        """The link that feeds an input socket, or None. One pass per tree: asking a socket searches the whole tree."""
+        """The link that feeds an input socket, or None."""
+        return self._links_of(tree).get(socket.as_pointer())
+
+    def _links_of(self, tree) -> dict[int, object]:
+        """Links by the address of the input that each feeds: asking a socket searches the whole tree."""
         links = self._links.get(tree.as_pointer())
         if links is None:
             links = {}
@@ -145,7 +194,7 @@ class _Reading:
                     continue
                 links[link.to_socket.as_pointer()] = link
             self._links[tree.as_pointer()] = links
-        return links.get(socket.as_pointer())
+        return links
 
     def source(self, place: _Place, node, socket) -> Input:
         """What an input socket reads. Follows groups, reroutes, muted nodes.
@@ -209,6 +258,22 @@ class _Reading:
         given = INLINES and socket != asked and socket.node.bl_idname == "ShaderNodeGroup"
         return Input(wanted, _converted(value, kind, wanted), given=given and (texture or not socket.hide_value))
 
+    def aovs(self, place: _Place, wanted: dict[str, str]) -> tuple[tuple[str, str, Input], ...]:
+        """What AOV Output nodes of a tree and the groups in it give for the wanted names, of kinds COLOR and VALUE."""
+        found: dict[str, tuple[str, str, Input]] = {}
+        for node in place.tree.nodes:
+            if node.mute:
+                continue
+            if node.bl_idname == "ShaderNodeOutputAOV" and node.aov_name in wanted:
+                kind = wanted[node.aov_name]
+                socket = node.inputs["Color" if kind == "COLOR" else "Value"]
+                found[node.aov_name] = node.aov_name, kind, self.source(place, node, socket)
+            elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+                inside = self._inside(place, node)
+                if inside is not None:
+                    found = {entry[0]: entry for entry in self.aovs(inside, wanted)} | found
+        return tuple(found.values())
+
     def _inside(self, place: _Place, group) -> _Place | None:
         """The tree of a group node; None, with a sentence, for a missing tree or one that contains itself."""
         if group.node_tree is None:
@@ -244,11 +309,14 @@ class _Reading:
             self.nodes[key] = self._node(key, place, node)
 
     def _node(self, key: str, place: _Place, node) -> Node:
-        inputs = {}
+        inputs, links = {}, self._links_of(place.tree)
         for socket in node.inputs:
             if not socket.enabled:
                 continue
-            inputs[socket.identifier] = self.source(place, node, socket)
+            if socket.as_pointer() in links:
+                inputs[socket.identifier] = self.source(place, node, socket)
+            else:  # most
+                inputs[socket.identifier] = Input(_kind(socket), _default(socket))
         if node.bl_idname in CONSTANT_NODES:
             for socket in node.outputs:
                 # The Normal node has an input of the same name beside the direction in its output.
@@ -256,9 +324,12 @@ class _Reading:
                 if hasattr(socket, "default_value") and name not in inputs:
                     inputs[name] = Input(_kind(socket), _default(socket))
         outputs = {socket.identifier: _kind(socket) for socket in node.outputs}
-        label = node.label or node.name
+        label = node.label or OF_INLINED.sub("", node.name)
         settings = _settings(node)
         image = sky_of(settings) if node.bl_idname == "ShaderNodeTexSky" else getattr(node, "image", None)
+        user = getattr(node, "image_user", None)
+        if node.bl_idname == "ShaderNodeTexIES":
+            image, user = _profile(node), label
         return Node(
             key,
             " / ".join((*place.path, label)),
@@ -266,7 +337,7 @@ class _Reading:
             inputs,
             outputs,
             {**settings, **self._surroundings(node)},
-            "" if image is None else self.image_key(image, getattr(node, "image_user", None)),
+            "" if image is None else self.image_key(image, user),
         )
 
     def _surroundings(self, node) -> dict[str, object]:
@@ -318,6 +389,17 @@ class _Reading:
         self.notes.append((node.label, f"The link into '{identifier}' closes a circle and was cut."))
 
 
+def _profile(node) -> Profile:
+    """What an IES Texture reads, from a text in the file or from one beside it."""
+    if node.mode == "INTERNAL":
+        return Profile(node.ies.as_string() if node.ies is not None else "")
+    path = Path(bpy.path.abspath(node.filepath, library=node.id_data.library))
+    try:
+        return Profile(path.read_bytes()[:MOST_OF_PROFILE].decode("latin-1"))
+    except (OSError, ValueError):
+        return Profile("")
+
+
 def _pass_through(conversions: list[str], kind: str) -> None:
     if not conversions or conversions[-1] != kind:
         conversions.append(kind)
@@ -339,11 +421,11 @@ def _kind(socket) -> str:
 def _default(socket) -> tuple[float, ...] | float | None:
     """The constant of an unlinked socket; None for shaders and for kinds that are neither numbers nor names."""
     value = getattr(socket, "default_value", None)
-    if isinstance(value, str):
+    if value is None or isinstance(value, str):
         return value
-    if socket.type in {"VECTOR", "RGBA", "ROTATION"} and value is not None:
-        return tuple(value)
-    return float(value) if isinstance(value, (bool, int, float)) else None
+    if isinstance(value, (bool, int, float)):
+        return float(value)
+    return tuple(value) if socket.type in {"VECTOR", "RGBA", "ROTATION"} else None
 
 
 def _converted(value, kind: str, wanted: str):

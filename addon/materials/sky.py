@@ -27,6 +27,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .working_space import WorkingSpace, current
+
 WIDTH, HEIGHT = 512, 256  # columns over the azimuth from the sun, rows over elevation
 XYZ_TO_RGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
@@ -115,6 +117,20 @@ def sky_pixels(sky: Sky) -> np.ndarray:
     return pixels
 
 
+@lru_cache(maxsize=8)
+def _turned(sky: Sky, space: WorkingSpace) -> np.ndarray:
+    pixels = sky_pixels(sky).copy()
+    pixels[:HEIGHT, :, :3] = np.maximum(pixels[:HEIGHT, :, :3] @ space.from_rec709.T, 0.0)
+    pixels[HEIGHT, :2, :3] = pixels[HEIGHT, :2, :3] @ space.from_rec709.T
+    pixels.setflags(write=False)
+    return pixels
+
+
+def working_sky_pixels(sky: Sky) -> np.ndarray:
+    """The same in the current working space."""
+    return sky_pixels(sky) if current().usual else _turned(sky, current())
+
+
 def horizon(sky: Sky) -> float:
     """Elevation above which the sun's disc shows, radians."""
     if sky.level:
@@ -142,8 +158,8 @@ def sun_radiance(sky: Sky) -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_radiance(sky: Sky) -> np.ndarray:
-    """(3,) mean radiance over the whole disc; what the horizon hides counts as dark."""
-    low, high = sun_radiance(sky)
+    """(3,) mean radiance over the whole disc, in the current working space; what the horizon hides counts as dark."""
+    low, high = (radiance @ current().from_rec709.T for radiance in sun_radiance(sky))
     half = sky.sun_size / 2
     reach = np.clip((sky.sun_elevation - horizon(sky)) / max(half, 1e-9), -1.0, 1.0)
     seen = 1.0 - (np.arccos(reach) - reach * np.sqrt(1.0 - reach * reach)) / np.pi

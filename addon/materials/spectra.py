@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .working_space import current
+
 TABLE = Path(__file__).with_name("spectra.npz")
 
 
@@ -29,7 +31,10 @@ class Spectrum:
         return self.start + self.extent * np.arange(self.count) / (self.count - 1)
 
     def rows(self) -> list[tuple[float, float, float, float]]:
-        return [(*map(float, color), 1.0) for color in _colors()[self.name]]
+        """In the current working space."""
+        space = current()
+        stored = _colors()[self.name if space.usual else f"{self.name} {space.name}"]
+        return [(*map(float, color), 1.0) for color in stored]
 
 
 BLACKBODY = Spectrum("blackbody", 1.0 / 12000.0, 1.0 / 800.0 - 1.0 / 12000.0, 129)  # over 1 / kelvin

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-BLOCK_LIMIT = 1024  # vec4 in the 16 KiB that every backend guarantees for a uniform block
+from .working_space import current
 
-LUMINANCE = np.array([0.2126390, 0.7151687, 0.0721923])
+BLOCK_LIMIT = 1024  # vec4 in the 16 KiB that every backend guarantees for a uniform block
 
 
 def to_kind(value, kind: str, wanted: str) -> float | tuple[float, float, float]:
@@ -17,7 +17,7 @@ def to_kind(value, kind: str, wanted: str) -> float | tuple[float, float, float]
     if wanted == "FLOAT":
         if number.size < 3:
             return float(number[0]) if number.size else 0.0
-        return float(number[:3] @ LUMINANCE) if kind == "COLOR" else float(number[:3].mean())
+        return float(number[:3] @ current().luminance) if kind == "COLOR" else float(number[:3].mean())
     if number.size == 1:
         number = np.repeat(number, 3)
     triple = np.zeros(3)
@@ -55,12 +55,12 @@ class ValueBlock:
         if triple:
             self._rows[row][:3] = value
             self._free.append((row, 3))
-            return f"material_values.value[{row}].xyz"
+            return f"material_value({row}).xyz"
         if not self._free:
             self._free += [(row, component) for component in range(4)]
         row, component = self._free.pop(0)
         self._rows[row][component] = value
-        return f"material_values.value[{row}].{'xyzw'[component]}"
+        return f"material_value({row}).{'xyzw'[component]}"
 
     def add_rows(self, rows) -> tuple[int, int]:
         """Whole rows of four that stand one after the other: (first row, how many fitted)."""

@@ -1,4 +1,4 @@
-"""A four-wide tree of boxes around many small boxes, for rays: which child holds what, not yet where.
+"""A four-wide bounding volume hierarchy over many small boxes, for rays: its topology, not its bounds.
 
 Built bottom-up by parallel locally-ordered clustering (Meister & Bittner 2018): boxes stand in Morton order; each looks
 at REACH of them to either side for the one with which it has the smallest common box, and pairs that chose each other

@@ -7,6 +7,8 @@ import numpy as np
 from ..materials.compiled import Attribute
 from ..snapshot.scene import Mesh
 
+MOTIONS = ("MOTION_BEFORE", "MOTION_AFTER")
+
 
 def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
     """A named attribute over the corners as (C, 4) float32; zeros where the mesh does not have it, as in Blender."""
@@ -15,6 +17,12 @@ def corner_attribute(mesh: Mesh, attribute: Attribute) -> np.ndarray:
         source = mesh.uv_maps.get(attribute.name or mesh.active_uv)
         if source is None and attribute.name in mesh.colors:
             source = mesh.colors[attribute.name][:, :3]  # what is no map, too, may be named
+    elif attribute.kind == "UV_PASS":
+        source = mesh.uv_maps.get(mesh.active_uv)
+        out[:, 2] = 1.0 if source is not None else 0.0
+    elif attribute.kind in MOTIONS:
+        moved = mesh.motion and mesh.motion[MOTIONS.index(attribute.kind)]
+        source = None if moved is None else moved[mesh.corner_vertices]
     elif attribute.kind == "COLOR":
         source = mesh.colors.get(attribute.name or mesh.active_color)
         if source is None and attribute.name in mesh.uv_maps:

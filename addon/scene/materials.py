@@ -17,6 +17,8 @@ from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
+from ..materials.reader import FINE_LAYERS
+from ..materials.working_space import current
 from ..snapshot.scene import Image, Note, Snapshot
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
@@ -37,6 +39,8 @@ CAMERA_DEFINES = (
     ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
     ("VISIBILITY_FLAG", "film_view.visibility"),
 )
+SHARED_ROWS = 1024  # of values in a block that materials of one program share: 16 KiB, what every GPU allows
+FIRST_VALUE = "first_value"  # constant of programs of such materials: where in the block those of a draw begin
 MOST_DECLARED = 4096  # materials whose programs are remembered
 SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
 
@@ -54,19 +58,26 @@ class MaterialSet:
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int], images.Image] = {}
         self._used: list[str] = []
+        # By material: the first one of those that share its program and block, and where in that its values begin.
+        self.leaders: list[int] = []
+        self.first_rows: list[int] = []
+        self.sharing = 0  # changes of these
+        self._shared: dict[int, Block] = {}  # by leader
         self.own_images: dict[int, dict[str, images.Image]] = {}  # by material: textures of its own surface program
 
     def update(self, snapshot: Snapshot) -> None:
         """Compile and upload what changed."""
         if self.energy_table is None:
-            self.energy_table = images.upload(energy_texture())
+            self.energy_table = images.upload(energy_texture(FINE_LAYERS))
+        before = self.compiled
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
-            if cached is None or cached[0] != (material.graph, versions):
+            key = material.graph, versions, current().name
+            if cached is None or cached[0] != key:
                 cached = (
-                    (material.graph, versions),
+                    key,
                     compile_material(material.name, material.graph, snapshot.images, lean=to_hold(True, False)),
                 )
             cache[material.key] = cached
@@ -93,6 +104,33 @@ class MaterialSet:
             else:
                 block.update(value=values)
 
+        if len(before) != len(self.compiled) or any(one is not other for one, other in zip(before, self.compiled)):
+            self._share()
+
+    def _share(self) -> None:
+        """Find which materials can be drawn by one program with one block."""
+        self.sharing += 1
+        self.leaders, self.first_rows = list(range(len(self.compiled))), [0] * len(self.compiled)
+        rows: dict[int, list[np.ndarray]] = {}
+        open_groups: dict[tuple, int] = {}
+        for k, compiled in enumerate(self.compiled):
+            if not may_share(compiled):
+                continue
+            key = (compiled.program_key, compiled.glows, compiled.added)
+            leader = open_groups.setdefault(key, k)
+            used = sum(map(len, rows.get(leader, ())))
+            if used + len(compiled.values) > SHARED_ROWS:
+                leader, used = k, 0
+                open_groups[key] = k
+            self.leaders[k], self.first_rows[k] = leader, used
+            rows.setdefault(leader, []).append(np.asarray(compiled.values, np.float32))
+        shared, self._shared = self._shared, {}
+        for leader, parts in rows.items():
+            values = np.zeros((SHARED_ROWS, 4), np.float32)
+            values[: sum(map(len, parts))] = np.concatenate(parts)
+            block = self._shared[leader] = shared.get(leader) or Block(_struct(SHARED_ROWS), value=values)
+            block.update(value=values)
+
     def set_view(self, view: View) -> None:
         """Tell the node trees from where the scene is seen."""
         camera, (left, right, bottom, top) = view.camera, view.camera.frame
@@ -109,6 +147,16 @@ class MaterialSet:
             self._scene = Block(MATERIAL_SCENE, **values)
         else:
             self._scene.update(**values)
+
+    @property
+    def scene_block(self) -> Block:
+        """From where the scene is seen, for node trees; once `set_view` was called."""
+        return self._scene
+
+    @property
+    def view_key(self) -> tuple:
+        """Equal in two frames if they are seen alike."""
+        return self._view
 
     @property
     def soft(self) -> bool:
@@ -151,6 +199,10 @@ class MaterialSet:
         """Draws what of material `index` light enters elsewhere, where the surface images show it."""
         return _scatter_program(self.compiled[index])
 
+    def aov_program(self, index: int, layout: AovLayout) -> Program:
+        """Draws what AOV Output nodes of material `index` give."""
+        return _aov_program(self.compiled[index], layout)
+
     def glow_program(self, index: int) -> Program:
         """Adds what layers of material `index` emit that this sample passes."""
         return _glow_program(self.compiled[index])
@@ -171,18 +223,23 @@ class MaterialSet:
         """Adds up what material `index` emits."""
         return _emission_program(self.compiled[index])
 
-    def bindings(self, index: int, instances: images.Image, own: bool = True) -> dict:
-        """Textures and blocks that programs of a material need; without `own` of those that draw its mesh as it is."""
+    def bindings(self, index: int, instances: images.Image, own: bool = True, shared: bool = False) -> dict:
+        """Textures and blocks that programs of a material need; without `own` of those that draw its mesh as it is;
+        `shared`: of those that draw all materials that share its block."""
         compiled = self.compiled[index]
         textures = {"instances": instances, "energy_table": self.energy_table}
         for slot, name in enumerate(compiled.images):
             textures[f"material_image{slot}"] = self._images[name, self._versions[name]]
         if compiled.own_surface and own:
             textures |= self.own_images[index]
-        return {
-            "textures": textures,
-            "blocks": {"material_values": self._blocks[self._keys[index]], "material_scene": self._scene},
-        }
+        values = self._shared[self.leaders[index]] if shared else self._blocks[self._keys[index]]
+        return {"textures": textures, "blocks": {"material_values": values, "material_scene": self._scene}}
+
+    def drawing(self, index: int, program: Program, instances: images.Image) -> tuple[dict, dict[str, int]]:
+        """What a program that draws the mesh of a material binds: as `bindings`, and constants."""
+        shared = ("INT", FIRST_VALUE) in program.constants
+        constants = {FIRST_VALUE: self.first_rows[index]} if shared else {}
+        return self.bindings(index, instances, shared=shared), constants
 
     def in_shell(self, index: int) -> bool:
         """Whether material `index` is drawn by a shell over its mesh."""
@@ -210,6 +267,17 @@ def upload_image(image: Image) -> images.Image:
     """The pixels of an image as materials sample them."""
     # Eight-bit content fits a half float exactly enough only when it stays encoded; floats keep full precision.
     return images.upload(image.pixels, "RGBA32F")
+
+
+def may_share(compiled: CompiledMaterial) -> bool:
+    """Whether a material can be drawn together with others of its program: it binds nothing of its own but values."""
+    alone = compiled.images or compiled.attributes or compiled.own_surface
+    return not alone and len(compiled.values) <= SHARED_ROWS
+
+
+def shared_struct() -> Struct:
+    """The block of materials that are drawn together."""
+    return _struct(SHARED_ROWS)
 
 
 def values_struct(compiled: CompiledMaterial) -> Struct:
@@ -287,13 +355,14 @@ def _once(make: Callable[[CompiledMaterial], Program]) -> Callable[[CompiledMate
 
 @_once
 def _surface_program(compiled: CompiledMaterial) -> Program:
+    shares = may_share(compiled)
     return Program(
         name=f"surface {compiled.program_key[:8]}",
         fragment="surface/surface.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
         blocks=(
             (VIEW, "film_view"),
-            (_struct(len(compiled.values)), "material_values"),
+            (shared_struct() if shares else values_struct(compiled), "material_values"),
             (MATERIAL_SCENE, "material_scene"),
         ),
         constants=(
@@ -301,10 +370,14 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             ("INT", "transparent_mode"),
             ("INT", "glass_bends"),
             ("INT", "index_shown"),
+            *((("INT", FIRST_VALUE),) if shares else ()),
         ),
-        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
+        defines=(
+            *CAMERA_DEFINES, *_layer_defines(compiled),
+            *((("MATERIAL_BASE", "(instance_flat.y >> 1)"),) if shares else ()),
+        ),
         **_shared(compiled),
-    )
+    )  # fmt: skip
 
 
 @_once
@@ -366,6 +439,66 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
     )
 
 
+AOV_GROUP = 6  # images that Blender lets a pass draw into
+AovLayout = tuple[tuple[tuple[str, str], ...], ...]  # by image, what its channels hold: name and kind
+_aov_programs: dict[tuple[int, AovLayout], tuple[CompiledMaterial, Program]] = {}
+
+
+def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
+    known = _aov_programs.get((id(compiled), layout))
+    if known is None or known[0] is not compiled:
+        if len(_aov_programs) >= MOST_DECLARED:
+            _aov_programs.clear()
+        layered = (("LAYERED", "1"),) * compiled.transparent
+        shared = _shared(compiled)
+        moving = any(kind == "VECTOR" for held in layout for _, kind in held)
+        program = Program(
+            name=f"AOVs {compiled.program_key[:8]}",
+            fragment="surface/aov.frag.glsl",
+            outputs=tuple(("VEC4", f"out_{k}") for k in range(len(layout))),
+            blocks=(
+                (VIEW, "film_view"),
+                (_struct(len(compiled.values)), "material_values"),
+                (MATERIAL_SCENE, "material_scene"),
+            ),
+            constants=(("INT", "first_instance"), ("INT", "layers"), ("FLOAT", "alpha_threshold")),
+            defines=(*CAMERA_DEFINES, *layered, *((("MOTION", "1"),) if moving else ()), *_own_defines(compiled)),
+            **{
+                **shared,
+                "textures": (
+                    *shared["textures"],
+                    ("RGBA32F", "surface_position"),
+                    *((("RGBA32F", "motion_table"),) if moving else ()),
+                ),
+                "snippets": (*shared["snippets"], ("generated/aovs", _aov_texts(compiled.aovs, layout))),
+            },
+        )
+        known = _aov_programs[id(compiled), layout] = (compiled, program)
+    return known[1]
+
+
+def _aov_texts(given: tuple[tuple[str, str], ...], layout: AovLayout) -> str:
+    """GLSL that sets the images of a layout from the AOVs that a material gives."""
+    none = " ".join(f"out_{k} = vec4(0.0);" for k in range(len(layout)))
+    written = []
+    for k, held in enumerate(layout):
+        for channel, aov in enumerate(held):
+            if aov not in given:
+                continue
+            value, to = f"material_aov{given.index(aov)}", f"out_{k}.{'xyzw'[channel]}"
+            written.append(
+                {
+                    "VALUE": f"{to} = {value}(point);",
+                    "HIT": f"{to} = surface;",
+                    "DISTANCE": f"{to} = surface * aov_distance(point.position);",
+                    "UV": f"out_{k} = surface * vec4({value}(point), 1.0);",
+                    "VECTOR": f"out_{k} = surface * motion_vector(point.position, instance_flat.x, {value}(point), "
+                    f"{value}_after(point));",
+                }.get(aov[1], f"out_{k} = vec4({value}(point), 1.0);")
+            )
+    return f"#define AOV_NONE {none}\n#define AOV_WRITE {' '.join(written)}\n"
+
+
 @_once
 def _glow_program(compiled: CompiledMaterial) -> Program:
     return replace(
@@ -384,7 +517,13 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
         fragment="depth_map/alpha.frag.glsl",
         outputs=(("VEC4", "out_depth"),),
         blocks=((_struct(len(compiled.values)), "material_values"), (MATERIAL_SCENE, "material_scene")),
-        constants=(*PROJECTION_CONSTANTS, ("INT", "sample_index"), ("VEC4", "light_point"), ("INT", "glass_blocks")),
+        constants=(
+            *PROJECTION_CONSTANTS,
+            ("INT", "sample_index"),
+            ("VEC4", "light_point"),
+            ("INT", "glass_blocks"),
+            ("INT", "channel_asked"),
+        ),
         defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
         **_shared(compiled),
     )
@@ -406,7 +545,7 @@ def _emission_program(compiled: CompiledMaterial) -> Program:
         name=f"emission {compiled.program_key[:8]}",
         fragment="surface/emission.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
-        constants=tuple(one for one in like.constants if one[1] != "glass_blocks"),
+        constants=tuple(one for one in like.constants if one[1] not in ("glass_blocks", "channel_asked")),
         defines=(*EVERY_DEFINES, *_own_defines(compiled, "light_point")),
     )
 
@@ -442,7 +581,7 @@ def _emission_map_program(compiled: CompiledMaterial) -> Program:
 
 def may_be_glossy(snapshot: Snapshot) -> bool:
     """Whether a material that is shown may have a glossy lobe; that of empty slots has one since Blender 5.0."""
-    shown = {index for instance in snapshot.instances for index in instance.materials or (0,)}
+    shown = {index for slots in snapshot.material_sets for index in slots or (0,)}
     return any(_material_may_be_glossy(snapshot.materials[index]) for index in shown)
 
 

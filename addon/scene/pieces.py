@@ -1,5 +1,4 @@
-"""Triangles in pieces, points far from each other, and directions in two numbers: what every spreading of points over
-surfaces needs."""
+"""Triangles in pieces, well-spaced points and octahedral directions, for spreading points over surfaces."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from ..gfx import images
 from ..kernels.morton import morton_codes
 from ..materials import translucency
 from ..materials.translucency import maps_of
-from ..materials.values import LUMINANCE
+from ..materials.working_space import current
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance, Mesh, Snapshot
 from .pieces import farthest, octahedral
@@ -246,7 +246,7 @@ def _painted(material: np.ndarray, uv: np.ndarray, maps: list, pictures: dict) -
                 out[own, :3] = translucency.sampled(pictures[image], uv[own])
             elif name == translucency.TRANSLUCENCY:
                 color = translucency.sampled(pictures[image], uv[own])
-                out[own, 3] = np.clip(color @ LUMINANCE, 0.0, 1.0)
+                out[own, 3] = np.clip(color @ current().luminance, 0.0, 1.0)
     return out
 
 

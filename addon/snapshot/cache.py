@@ -1,4 +1,4 @@
-"""What one sync may take over from the last one, and the rule that decides it.
+"""What a sync may reuse from the previous one, and the rule that decides it.
 
 Meshes. Blender gives an evaluated mesh a new `session_uid` each time it evaluates the geometry, so the same
 number means the same content, and nothing is read. A new number, or a data-block that an update names, only
@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..materials.graph import Graph
-from .scene import Image, Instance, Mesh, Note, Volume
+from .scene import Aov, Image, Instance, Mesh, Note, Volume
 
 # Versions never repeat in this Blender session, not even across caches: a GPU mesh that is stored under
 # (key, version) by one engine instance can then never be mistaken for another content.
@@ -82,6 +82,7 @@ class GraphEntry:
     graph: Graph
     notes: tuple[Note, ...]
     images: tuple[tuple[object, str], ...]
+    aovs: tuple[Aov, ...] = ()  # that were asked for
 
 
 @dataclass

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..materials.graph import Graph, Node
+from ..materials.working_space import current
 
 # Nodes that are one value: bl_idname -> the input under which the reader keeps it.
 _VALUE_NODES = {"ShaderNodeRGB": "Color", "ShaderNodeValue": "Value"}
@@ -21,7 +22,7 @@ def constant_number(graph: Graph, node: Node, socket: str) -> tuple[float, bool]
     """A number input; a colour counts as its luminance."""
     value, exact = _constant(graph, node, socket)
     numbers = np.atleast_1d(np.asarray(value if value is not None else 0.0, np.float64))
-    return float(numbers[0] if numbers.size == 1 else numbers[:3] @ (0.2126, 0.7152, 0.0722)), exact
+    return float(numbers[0] if numbers.size == 1 else numbers[:3] @ current().luminance), exact
 
 
 def _constant(graph: Graph, node: Node, socket: str):
@@ -36,10 +37,10 @@ def _constant(graph: Graph, node: Node, socket: str):
     if linked is not None and linked.type == "ShaderNodeBlackbody":
         temperature, exact = constant_number(graph, linked, "Temperature")
         return blackbody(temperature), exact
-    if linked is not None and linked.type == "ShaderNodeLightFalloff":
+    if linked is not None and linked.type == "ShaderNodeLightFalloff" and source.link[1] == "Quadratic":
         strength, exact = constant_number(graph, linked, "Strength")
-        smooth, _ = constant_number(graph, linked, "Smooth")
-        return strength, exact and source.link[1] == "Quadratic" and smooth == 0.0
+        smooth, constant = constant_number(graph, linked, "Smooth")
+        return strength, exact and constant and smooth == 0.0
     return source.value, False
 
 
@@ -74,7 +75,8 @@ _BLACK_BODIES = np.array(
 
 
 def blackbody(kelvin: float) -> np.ndarray:
-    """(3,) linear colour of Blender's Blackbody node."""
+    """(3,) linear colour of Blender's Blackbody node, in the current working space."""
     mired = np.linspace(1e6 / 12000.0, 1e6 / 800.0, len(_BLACK_BODIES))
     at = 1e6 / max(kelvin, 1.0)
-    return np.array([np.interp(at, mired, channel) for channel in _BLACK_BODIES.T])
+    color = np.array([np.interp(at, mired, channel) for channel in _BLACK_BODIES.T])
+    return np.maximum(current().from_rec709 @ color, 0.0)

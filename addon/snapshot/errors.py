@@ -1,4 +1,4 @@
-"""Why there is no picture to draw at all; everything less becomes a Note."""
+"""Errors for scenes that cannot be rendered at all; everything less becomes a Note."""
 
 
 class UnsupportedScene(ValueError):

@@ -6,18 +6,37 @@ import gc
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import reduce
 from operator import or_
 
+import bpy
 import numpy as np
 
+from ..materials import working_space
 from . import camera as cameras
+from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .meshes import Wanted, build_mesh, read_mesh
-from .scene import Camera, Film, Instance, Light, Mesh, Mist, Moment, Note, Snapshot, Visibility, World
+from .motion import with_motion
+from .scene import (
+    CRYPTOMATTES,
+    Aov,
+    Camera,
+    Film,
+    Instance,
+    Light,
+    Mesh,
+    Mist,
+    Moment,
+    Note,
+    Snapshot,
+    Visibility,
+    World,
+)
 from .shading import ShadingTable
 from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
@@ -45,6 +64,7 @@ def take(
     view: Camera | None = None,
     border: tuple[int, int, int, int] | None = None,
     shown: Callable | None = None,
+    around: tuple[motions.Moment, motions.Moment] | None = None,
 ) -> Snapshot:
     """Read the evaluated scene for a picture of `width` x `height` pixels.
 
@@ -52,11 +72,13 @@ def take(
     in renders, a viewport's leaves out what is hidden there. `camera`: object that overrides the scene's camera.
     `view`: a ready view (see `camera_of_view`), no camera is needed then. `border`: pixels (x0, y0, x1, y1);
     without one the scene's render border counts, unless `view` is given. `shown`: predicate on objects, for a
-    viewport's local view. Raises UnsupportedScene when there is nothing to look through.
+    viewport's local view. `around`: the frames before and after, for the Vector pass. Raises UnsupportedScene when
+    there is nothing to look through.
     """
     start = time.perf_counter()
     scene = depsgraph.scene_eval
     notes: list[Note] = []
+    working_space.follow(getattr(getattr(bpy.data, "colorspace", None), "working_space", working_space.REC709))
     if view is None:
         camera = camera or scene.camera
         view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)
@@ -64,12 +86,12 @@ def take(
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)
-    shading = ShadingTable(cache, images)
+    shading = ShadingTable(cache, images, aovs_of(depsgraph.view_layer_eval))
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
     meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
     notes += mesh_notes
-    lights = _lights(*_at_a_place(light_places, notes), shading, notes)
+    lights = _lights(*_at_a_place(light_places, notes), shading)
     volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
@@ -92,7 +114,7 @@ def take(
         sync_stats=stats,
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start
-    return snapshot
+    return snapshot if around is None else with_motion(snapshot, *around)
 
 
 def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np.ndarray]:
@@ -175,7 +197,8 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                 Instance(
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
-                    of_object.terminator, of_object.own, of_object.caustics_caster,
+                    of_object.terminator, of_object.own, of_object.caustics_caster, of_object.asset,
+                    of_object.group,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
@@ -248,19 +271,23 @@ def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> 
     return entry, True
 
 
-def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable, notes: list[Note]) -> tuple[Light, ...]:
+def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable) -> tuple[Light, ...]:
     made = []
     for place, matrix in zip(places, transforms, strict=True):
         facts, block = place.source.facts, place.source.data
-        tint = np.ones(3)
+        tint, of_tree = np.ones(3), {}
         if uses_nodes(block):
             key = f"light {(block.original or block).session_uid}"
             graph = shading.graph_of(block, key, f"Light '{facts.name}'")
-            tint, remarks = emission_of_graph(graph, facts.name)
-            notes.extend(remarks)
-        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint)
+            tint = emission_of_graph(graph)
+            if tint is None:
+                tint = np.ones(3)
+                of_tree = {
+                    "graph": graph, "random": place.random, "pass_index": facts.pass_index, "color": facts.color,
+                }  # fmt: skip
+        light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint, **of_tree)
         if light is not None:
-            made.append(light)
+            made.append(replace(light, group=facts.group) if facts.group else light)
     return tuple(made)
 
 
@@ -281,7 +308,7 @@ def _world(
     graph, sun = sun_of(graph, visibility)
     world, remarks = read_world(graph, block.name, images.images, visibility)
     notes.extend(remarks)
-    return world, sun
+    return replace(world, group=block.lightgroup), sun and replace(sun, group=block.lightgroup)
 
 
 # Exponents of the Mist pass, as Cycles has them.
@@ -303,7 +330,21 @@ def _film(scene, layer, width: int, height: int, border) -> Film:
         mist=_mist(scene.world) if layer.use_pass_mist else None,
         position=layer.use_pass_position,
         indices=layer.use_pass_object_index or layer.use_pass_material_index,
+        aovs=aovs_of(layer),
+        alpha_threshold=layer.pass_alpha_threshold,
+        cryptomattes=tuple(kind for kind in CRYPTOMATTES if getattr(layer, f"use_pass_cryptomatte_{kind}")),
+        cryptomatte_levels=layer.pass_cryptomatte_depth,
+        light_groups=tuple(group.name for group in layer.lightgroups),
     )
+
+
+def aovs_of(layer) -> tuple[Aov, ...]:
+    """What a view layer asks for of the surfaces seen, passes without a name first."""
+    named = [Aov(aov.name, aov.type) for aov in layer.aovs if aov.is_valid]
+    vector, cycles = layer.use_pass_vector, getattr(layer, "cycles", None)  # there while the Cycles add-on is enabled
+    denoising = getattr(cycles, "denoising_store_passes", False)
+    wanted = (("UV", layer.use_pass_uv), ("VECTOR", vector), ("HIT", vector), ("DISTANCE", denoising))
+    return (*(Aov("", kind) for kind, asked in wanted if asked), *named)
 
 
 def _clear_glass(cycles) -> float:

@@ -15,8 +15,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..materials import working_space
 from ..materials.atlas import layout, packed
-from ..materials.sky import Sky, sky_pixels
+from ..materials.estimate import srgb_decode
+from ..materials.ies import Profile, profile_pixels
+from ..materials.sky import Sky, working_sky_pixels
 from .cache import ImageEntry, SnapshotCache, next_version
 from .image_files import frame_of, read_file, read_layer, sequence_path, tile_path, to_scene_linear
 from .scene import Image, Note
@@ -61,9 +64,20 @@ class ImageTable:
 
     def key_of_sky(self, sky: Sky) -> str:
         """Image.key of the table of a Sky Texture, which depends on its settings alone."""
-        key = sky.name
+        space = working_space.current()
+        key = sky.name if space.usual else f"{sky.name} {space.name}"
         if key not in self.images:
-            self.images[key] = Image(key, 0, sky_pixels(sky), "LINEAR", "NONE", "Sky")
+            self.images[key] = Image(key, 0, working_sky_pixels(sky), "LINEAR", "NONE", "Sky")
+        return key
+
+    def key_of_profile(self, profile: Profile, label: str) -> str:
+        """Image.key of the table of an IES Texture, which depends on the file's text alone."""
+        key = profile.name
+        pixels, remark = profile_pixels(profile)
+        if remark:
+            self.notes.append(Note(f"Node '{label}'", remark))
+        if key not in self.images:
+            self.images[key] = Image(key, 0, pixels, "LINEAR", "NONE", "IES")
         return key
 
     def _read(self, key: str, original, part: Part, old: ImageEntry | None) -> ImageEntry:
@@ -78,6 +92,8 @@ class ImageTable:
         elif alpha in ("STRAIGHT", "PREMUL"):
             kept = original.source != "GENERATED" and not BYTES_ARE_STRAIGHT
             alpha = "PREMUL" if is_float else alpha if kept else "STRAIGHT"
+        if not missing and not isinstance(part, Layer) and _is_rec709(original):
+            pixels, encoding = _turned(pixels, encoding), "LINEAR"
         if encoding == "" and not missing:
             pixels, encoding = to_scene_linear(pixels, original.colorspace_settings.name), "LINEAR"
         same = (
@@ -207,6 +223,20 @@ def _encoding(original) -> str:
     return "SRGB" if space == "sRGB" else ""
 
 
+def _is_rec709(original) -> bool:
+    """Whether the pixels are colours of Rec. 709 while others are wanted. Floats are what Blender made of them."""
+    space = original.colorspace_settings.name
+    colours = not original.is_float and not original.colorspace_settings.is_data
+    return colours and not working_space.current().usual and space in ("sRGB", "Linear", "Linear Rec.709")
+
+
+def _turned(pixels: np.ndarray, encoding: str) -> np.ndarray:
+    """Colours of Rec. 709, stored in that way, in the working space."""
+    colors = srgb_decode(pixels[..., :3]) if encoding == "SRGB" else pixels[..., :3]
+    turned = colors @ working_space.current().from_rec709.T
+    return np.concatenate([turned, pixels[..., 3:]], axis=2).astype(np.float32)
+
+
 def _state(original, part: Part) -> tuple:
     """Facts that change when the pixels of a saved or generated image do."""
     path = _path(original)
@@ -226,6 +256,7 @@ def _state(original, part: Part) -> tuple:
         original.is_float,
         original.alpha_mode,
         original.colorspace_settings.name,
+        working_space.current().name,
         (original.generated_type, tuple(original.generated_color)) if original.source == "GENERATED" else None,
     )
 

@@ -10,11 +10,14 @@ import numpy as np
 from ..materials.graph import Graph
 from .constants import constant_color, constant_number
 from .own_settings import own_settings
-from .scene import Light, Note, Visibility
+from .scene import Light, Visibility
 
 
-def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibility, tint: np.ndarray) -> Light | None:
-    """A `bpy.types.Light` placed by `matrix` (4, 4); `tint` (3,) is what its node tree emits (ones without one).
+def read_light(
+    data, key: str, name: str, matrix: np.ndarray, visibility: Visibility, tint: np.ndarray, **of_tree
+) -> Light | None:
+    """A `bpy.types.Light` placed by `matrix` (4, 4); `tint` (3,) is what its node tree emits (ones without one), where
+    that is one colour; `of_tree`: fields of a Light whose tree is more.
 
     None when it gives no light: zero power, or an area light's portal, which in Cycles only guides sampling.
     """
@@ -49,6 +52,7 @@ def read_light(data, key: str, name: str, matrix: np.ndarray, visibility: Visibi
         bounces=getattr(cycles, "max_bounces", 1) > 0,  # other limits of single lights are not followed
         visibility=visibility,
         own=own_settings(data),
+        **of_tree,
         **own,
     )
 
@@ -60,20 +64,13 @@ def uses_nodes(data) -> bool:
     return data.node_tree is not None and (always or data.use_nodes)
 
 
-def emission_of_graph(graph: Graph, name: str) -> tuple[np.ndarray, tuple[Note, ...]]:
-    """Colour x strength that a light's node tree emits; what varies over the light becomes the socket's own value."""
-    notes: list[Note] = []
+def emission_of_graph(graph: Graph) -> np.ndarray | None:
+    """Colour x strength that a light's node tree emits, (3,); None where it has to be run to know."""
     node = graph.nodes.get(graph.surface[0]) if graph.surface else None
     if node is None:
-        return np.zeros(3), ()  # an output with nothing linked emits nothing, as in Cycles
+        return np.zeros(3)  # an output with nothing linked emits nothing, as in Cycles
     if node.type != "ShaderNodeEmission":
-        text = (
-            f"node '{node.label}' is not supported in a light's node tree; the light's own colour and power are used."
-        )
-        return np.ones(3), (Note(f"Light '{name}'", text, node=node.label),)
+        return None
     color, exact_color = constant_color(graph, node, "Color")
     strength, exact_strength = constant_number(graph, node, "Strength")
-    if not (exact_color and exact_strength):
-        text = f"what is linked to node '{node.label}' varies over the light and is drawn as one constant value."
-        notes.append(Note(f"Light '{name}'", text, node=node.label))
-    return color * strength, tuple(notes)
+    return color * strength if exact_color and exact_strength else None

@@ -57,6 +57,7 @@ class Mesh:
     # Where materials are relief: the mesh before they move it, and by material the first number of its triangles.
     undisplaced: Mesh | None = None
     shells: tuple[tuple[int, int], ...] = ()
+    motion: tuple[np.ndarray, np.ndarray] | None = None  # (V, 3) each: to where vertices were a frame ago, and will be
 
     @property
     def triangle_count(self) -> int:
@@ -101,6 +102,8 @@ class Instance:
     terminator: float = 0.1  # the object's geometry offset against the shadow terminator; 0: none
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the object, see snapshot/own_settings.py
     caustics_caster: bool = False  # set to cast shadow caustics
+    asset: str = ""  # name of the topmost parent, if it has one
+    group: str = ""  # light group of the object
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +132,7 @@ class VolumeInstance:
     visibility: Visibility = Visibility()
     key: str = ""
     density: float = 1.0  # factor of all coefficients, so that a scaled object stays as opaque
+    group: str = ""  # light group of the object
 
 
 @dataclass(frozen=True)
@@ -186,6 +190,11 @@ class Light:
     bounces: bool = True  # whether surfaces send its light on
     visibility: Visibility = Visibility()
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the lamp
+    group: str = ""  # light group of the object
+    graph: Graph | None = None  # a tree that is more than one colour and strength; `strength` is then without it
+    random: float = 0.0  # what the tree may ask of the object
+    pass_index: int = 0
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -231,11 +240,33 @@ class World:
     visibility: Visibility = Visibility()
     medium: Medium | None = None  # what fills all space
     volume: Graph | None = None  # the tree that says so
+    group: str = ""  # its light group
 
     @property
     def even(self) -> bool:
         """Whether it has the same colour all around."""
         return self.image is None and self.graph is None
+
+
+@dataclass(frozen=True)
+class Aov:
+    """A value of the surface seen that the view layer asks for: what AOV Output nodes of this name give, or its UV."""
+
+    name: str
+    # COLOR, VALUE; by no name UV, the map that renders, VECTOR, how the surface moves, HIT, 1 where one is, and
+    # DISTANCE of it from where the camera's rays begin.
+    kind: str
+
+    @property
+    def of_surface(self) -> bool:
+        """Whether a layer that is too thin to be what passes of surfaces show has no part in it."""
+        return self.kind in ("UV", "VECTOR", "HIT", "DISTANCE")
+
+
+CRYPTOMATTES = ("object", "material", "asset")
+MOST_LEVELS = 16
+RANKED = "crypto."  # names of images that hold pairs of ids and weights (kernels/ranks.py) begin so
+CRYPTO_DEFAULT = "default_surface"  # name of the material of empty slots, as in Cycles
 
 
 @dataclass(frozen=True)
@@ -254,6 +285,20 @@ class Film:
     mist: Mist | None = None  # this and what follows: what passes ask for beside light and colours
     position: bool = False
     indices: bool = False
+    aovs: tuple[Aov, ...] = ()
+    alpha_threshold: float = 0.5  # opacity from which on a layer is what passes of surfaces show
+    cryptomattes: tuple[str, ...] = ()  # of CRYPTOMATTES
+    cryptomatte_levels: int = 6  # names that a pixel of a Cryptomatte holds
+    light_groups: tuple[str, ...] = ()  # names; see light_groups.py
+
+    @property
+    def cryptomatte_images(self) -> int:
+        """Of a Cryptomatte: each holds two levels."""
+        return (min(self.cryptomatte_levels, MOST_LEVELS) + 1) // 2
+
+    def cryptomatte_names(self, kind: str) -> list[str]:
+        """Names of the frame's images of a Cryptomatte."""
+        return [f"{RANKED}{kind}.{k}" for k in range(self.cryptomatte_images)]
 
     @property
     def border_size(self) -> tuple[int, int]:
@@ -268,6 +313,20 @@ class Mist:
     start: float
     depth: float
     exponent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """How a scene moves from a frame before to a frame after; vertices: Mesh.motion."""
+
+    cameras: tuple[Camera, Camera]
+    matrices: dict[str, tuple[np.ndarray, np.ndarray]]  # (4, 4) each, by key of the instance
+
+    @cached_property
+    def key(self) -> tuple:
+        """Equal for motions that are alike."""
+        cameras = [(one.matrix.tobytes(), one.kind, one.frame) for one in self.cameras]
+        return (*cameras, *((name, *(one.tobytes() for one in pair)) for name, pair in self.matrices.items()))
 
 
 @dataclass(frozen=True)
@@ -297,8 +356,29 @@ class Snapshot:
     notes: tuple[Note, ...] = ()
     scene_name: str = ""
     moment: Moment = Moment()
+    motion: Motion | None = None  # where the view layer asks for it
     volumes: tuple[VolumeInstance, ...] = ()
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
+
+    @cached_property
+    def used_materials(self) -> frozenset[int]:
+        """Of all instances."""
+        return frozenset(slot for slots in self.material_sets for slot in slots)
+
+    @cached_property
+    def material_sets(self) -> frozenset[tuple[int, ...]]:
+        """What instances have in their slots."""
+        return frozenset(one.materials for one in self.instances)
+
+    @cached_property
+    def casts_shadows(self) -> bool:
+        """Whether any instance does."""
+        return any(one.visibility.shadow for one in self.instances)
+
+    @cached_property
+    def own_values(self) -> tuple[tuple[str, tuple], ...]:
+        """What has been set of techniques' parameters on objects and materials, by key."""
+        return tuple((one.key, one.own) for one in (*self.instances, *self.materials) if one.own)
 
     @cached_property
     def triangle_count(self) -> int:

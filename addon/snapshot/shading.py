@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
 from ..materials.attributes import attributes_of
 from ..materials.graph import Graph, Input, Node
+from ..materials.ies import Profile
 from ..materials.nodes.inputs import FLAT
 from ..materials.reader import read_graph
 from ..materials.sky import Sky
@@ -14,7 +17,7 @@ from .cache import GraphEntry, SnapshotCache
 from .images import ImageTable
 from .meshes import Wanted
 from .own_settings import own_settings
-from .scene import Material, Note
+from .scene import Aov, Material, Note
 
 GREY = (0.8, 0.8, 0.8)
 
@@ -51,12 +54,14 @@ def empty_slot_graph() -> Graph:
 class ShadingTable:
     """Collects materials in order of first use; index 0 is the neutral default."""
 
-    def __init__(self, cache: SnapshotCache, images: ImageTable):
+    def __init__(self, cache: SnapshotCache, images: ImageTable, aovs: tuple[Aov, ...] = ()):
         self.materials: list[Material] = [Material("default", "Default", empty_slot_graph())]
         self.wanted: list[Wanted] = [Wanted()]
         self.notes: list[Note] = []
         self.graphs: set[str] = set()
-        self._cache, self._images = cache, images
+        self._cache, self._images, self._aovs = cache, images, aovs
+        uv = tuple((aov.name, aov.kind, Input("VECTOR")) for aov in aovs if aov.of_surface)
+        self.materials[0] = replace(self.materials[0], graph=replace(self.materials[0].graph, aovs=uv))
         self._index: dict[int, int] = {}
         self._images_by_uid: dict[int, object] | None = None
 
@@ -95,11 +100,13 @@ class ShadingTable:
                 key = self._images.key_of_sky(image)
                 shown.append((image, key))
                 return key
+            if isinstance(image, Profile):
+                return self._images.key_of_profile(image, user)
             key = self._images.key_of(image, user)
             shown.append(((image.original or image).session_uid, key))
             return key
 
-        graph, remarks = read_graph(block, image_key)
+        graph, remarks = read_graph(block, image_key, tuple((aov.name, aov.kind) for aov in self._aovs))
         if isinstance(block, bpy.types.Material):
             named = ((name, bpy.data.images.get(image)) for name, image in names_of(own_settings(block)).items())
             graph = with_maps(graph, {name: image_key(image, None) for name, image in named if image is not None})
@@ -107,15 +114,19 @@ class ShadingTable:
             graph = old.graph  # the same object, so that whoever compiled it need not compare again
         name = block.name if isinstance(block, bpy.types.Material) else ""
         notes = tuple(Note(subject, text, material=name, node=node) for node, text in remarks)
-        return GraphEntry(graph, notes, tuple(dict.fromkeys(shown)))
+        return GraphEntry(graph, notes, tuple(dict.fromkeys(shown)), self._aovs)
 
     def _reusable(self, entry: GraphEntry, block) -> bool:
         """Nothing was said about it since the last sync, and its images can be handed on again."""
         cache = self._cache
+        if entry.aovs != self._aovs:
+            return False
         if not cache.informed or (block.original or block).session_uid in cache.changed:
             return False
         if any("object_matrix" in node.properties for node in entry.graph.nodes.values()):
             return False  # another object's place is part of it
+        if any(node.type == "ShaderNodeTexIES" for node in entry.graph.nodes.values()):
+            return False  # its file, or text, changes without a trace
         if entry.images and self._images_by_uid is None:
             self._images_by_uid = {image.session_uid: image for image in bpy.data.images}
         for uid, key in entry.images:

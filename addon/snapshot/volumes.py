@@ -45,7 +45,9 @@ def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], sh
         ids = "-".join(str(number) for number in instance.persistent_id)
         key = f"{name} {len(found)} {ids}"
         density = _density(thing.data, matrix)
-        found.append(VolumeInstance(name, volume, matrix, material, visibility_of(owner), key, density))
+        found.append(
+            VolumeInstance(name, volume, matrix, material, visibility_of(owner), key, density, owner.lightgroup)
+        )
     for key in set(cache.volumes) - used:
         del cache.volumes[key]
     return tuple(found)

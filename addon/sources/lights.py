@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from ..gfx import images
 from ..gfx.context import to_hold
 from ..gfx.struct import Block, Struct
 from ..snapshot.scene import Light, Snapshot
+from .lamp_maps import LampMaps
 
 TEXELS = 8
 VIEW_TEXELS = 5
@@ -33,6 +36,7 @@ TRANSMISSION_FLAG = 256
 SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
 EVEN_FLAG = 1024  # of a world of one colour
 GLASS_BLOCKS_FLAG = 2048  # what passes glass arrives as photons of caustics
+MAPPED_FLAG, MAP_SHIFT = 4096, 13  # its node tree varies; the bits above are the number of its map (lamp_maps.py)
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,7 @@ class Emitter:
     u: np.ndarray  # (3,) half width vector, or (4,) rows for spots
     v: np.ndarray
     w: np.ndarray
+    maps: images.Image | None = None  # of lamp_maps.py, where MAPPED_FLAG is set
 
     @property
     def has_span(self) -> bool:
@@ -110,6 +115,17 @@ class Emitter:
         """World position (relative to the origin) of a sample; not for suns."""
         return self.centre + sample if self.kind in (POINT, SPHERE) else sample
 
+    @cached_property
+    def _fixed(self) -> np.ndarray:
+        """What is the same in each row of it."""
+        rows = np.zeros((TEXELS, 4))
+        rows[1] = *self.centre, self.radius
+        rows[3, 3] = self.area
+        rows[4] = *self.axis, self.spread
+        for k, row in enumerate((self.u, self.v, self.w)):
+            rows[5 + k, : len(row)] = row
+        return rows
+
     def row(
         self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0, rate: float = 1.0,
         points: float = np.inf,
@@ -117,23 +133,45 @@ class Emitter:
         """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen, `rate` how many
         points of this light a sample of the picture has on average, and `points` how many the whole picture has."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
-        rows = np.zeros((TEXELS, 4))
+        rows = self._fixed.copy()
         rows[0] = self.kind, flags, first_view, view_count
-        rows[1] = *self.centre, self.radius
-        rows[2] = *sample, rate
-        rows[3] = *(self.radiance * weight / rate), self.area
-        rows[4] = *self.axis, self.spread
-        for k, row in enumerate((self.u, self.v, self.w)):
-            rows[5 + k, : len(row)] = row
+        rows[2, :3], rows[2, 3] = sample, rate
+        rows[3, :3] = self.radiance * weight / rate
         rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
-        return rows
+        return rows if self.maps is None else MappedRow.of(rows, self.maps)
 
 
-def emitters(snapshot: Snapshot, origin: np.ndarray) -> list[Emitter]:
+class MappedRow(np.ndarray):
+    """A row for the light list, with the image that holds the map of its lamp."""
+
+    maps: images.Image | None = None
+
+    @classmethod
+    def of(cls, rows: np.ndarray, maps: images.Image) -> MappedRow:
+        made = rows.view(cls)
+        made.maps = maps
+        return made
+
+    def __array_finalize__(self, source) -> None:
+        self.maps = getattr(source, "maps", None)
+
+
+def emitters(snapshot: Snapshot, origin: np.ndarray, maps: LampMaps | None = None) -> list[Emitter]:
     """The scene's lights that give something, in an order of their own, so that random choices do not depend on names
-    and on the order in the scene."""
-    found = (emitter(light, origin) for light in snapshot.lights)
+    and on the order in the scene. `maps`: what their node trees make of their light."""
+    found = (
+        emitter(light, origin) if light.graph is None else _mapped(light, origin, maps) for light in snapshot.lights
+    )
     return sorted((one for one in found if one is not None), key=_order)
+
+
+def _mapped(light: Light, origin: np.ndarray, maps: LampMaps | None) -> Emitter | None:
+    """A lamp with a node tree."""
+    scale, number = (1.0, -1) if maps is None else maps.of(light)
+    made = emitter(replace(light, strength=np.asarray(light.strength) * scale), origin)
+    if made is None or number < 0:
+        return made
+    return replace(made, flags=made.flags | MAPPED_FLAG | number << MAP_SHIFT, maps=maps.image)
 
 
 def _order(one: Emitter) -> tuple:
@@ -234,6 +272,8 @@ class Sources:
             self._block = Block(SOURCES, light=light, view=view)
         else:
             self._block.update(light=light, view=view)
+        maps = next((row.maps for row in rows if isinstance(row, MappedRow)), None)
+        self._block.beside = {} if maps is None else {"lamp_maps": maps}
         return self._block
 
     def release(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import cache
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..scene.culling import calls
-from ..scene.materials import SURFACE_IMAGES
+from ..scene.joint_draws import Joint, JointDraws
+from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
+from ..scene.view import VIEW
 
 STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
 TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
@@ -58,9 +61,17 @@ def drawing_constants(mode: int, glass: bool) -> dict[str, int]:
 def draw_indices(frame: Frame, technique: Technique, target: images.Target) -> None:
     """Draw the pass indices of the objects and materials that the camera sees in this sample into the first image of a
     target as of draw_surfaces; what the others hold then is of no use."""
+    _draw_indices(frame, technique, target, [material.pass_index for material in frame.snapshot.materials])
+
+
+def draw_numbers(frame: Frame, technique: Technique, target: images.Target) -> None:
+    """The same of numbers: y of the material, z of the instance (a row of frame.geometry.placed), w 0 for none."""
+    _draw_indices(frame, technique, target, list(range(len(frame.snapshot.materials))))
+
+
+def _draw_indices(frame: Frame, technique: Technique, target: images.Target, indices: list[int]) -> None:
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     constants = drawing_constants(STOCHASTIC, refracts(frame))
-    indices = [material.pass_index for material in frame.snapshot.materials]
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
 
@@ -117,6 +128,58 @@ def add_glow(frame: Frame, technique: Technique, position: images.Image, emissio
     frame.count(technique, "passes")
 
 
+@cache
+def motion_behind(layout: AovLayout) -> Program:
+    """Draws the motion of the background into images of a layout that holds VECTOR and HIT."""
+    outs = {kind: f"out_{k}" + (f".{'xyzw'[c]}" if kind == "HIT" else "")
+            for k, held in enumerate(layout) for c, (_, kind) in enumerate(held)}  # fmt: skip
+    none = " ".join(f"out_{k} = vec4(0.0);" for k in range(len(layout)))
+    return passes.fullscreen_program(
+        "motion behind all",
+        "surface/motion_behind.frag.glsl",
+        textures=(("RGBA32F", "motion_table"),),
+        blocks=((VIEW, "film_view"),),
+        defines=(("AOV_NONE", none), ("VECTOR_OUT", outs["VECTOR"]), ("HIT_OUT", outs["HIT"])),
+        outputs=tuple(("VEC4", f"out_{k}") for k in range(len(layout))),
+    )
+
+
+MOTION_BEHIND = motion_behind(((("", "VECTOR"),), (("", "HIT"),)))
+
+
+def draw_aovs(
+    frame: Frame,
+    technique: Technique,
+    target: images.Target,
+    layout: AovLayout,
+    position: images.Image,
+    motion: images.Image | None = None,
+) -> None:
+    """Draw what AOV Output nodes give of the surfaces that the camera sees now, before or at those at `position` (of
+    SURFACE_IMAGES), into images of this layout with a depth buffer. `motion`: see shaders/surface/motion.glsl."""
+    target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
+
+    def program_of(material: int) -> Program:
+        return frame.materials.aov_program(material, layout)
+
+    threshold = frame.snapshot.film.alpha_threshold
+    textures = {"surface_position": position}
+    if any(kind == "VECTOR" for held in layout for _, kind in held):
+        textures["motion_table"] = motion
+        blocks = {"film_view": frame.view_block}
+        passes.fullscreen(
+            motion_behind(layout), images.Target(target.colors), textures={"motion_table": motion}, blocks=blocks
+        )
+    thin = {k for k, material in enumerate(frame.materials.compiled) if material.transparent and threshold > 0.0}
+    for layers, wanted in ((0, None), (1, thin)):
+        if wanted is None or wanted:
+            blend = "ADDITIVE_PREMULT" if layers else "NONE"
+            with passes.drawing(target, blend=blend, depth_write=not layers):
+                constants = {"layers": layers, "alpha_threshold": threshold}
+                _submit(frame, technique, program_of, wanted, constants, textures)
+            frame.count(technique, "passes")
+
+
 def draw_scatter(
     frame: Frame, technique: Technique, target: images.Target, objects: images.Image, materials: set[int]
 ) -> None:
@@ -148,21 +211,33 @@ def _submit(
     """Draw what a view (None: the camera) may see of `materials` (None: of all), each with its own program. `indices`:
     by material, what is shown instead of where surfaces lie."""
     rows = frame.view_rows if rows is None else rows
-    seen = np.flatnonzero(frame.geometry.boxes.seen(rows))
+    geometry, view = frame.geometry, view or frame.view_block
+    left = None
+    of_surfaces = program_of == frame.materials.surface_program
+    stand_ins = frame.shared(StandIns).of if of_surfaces else {}
+    if of_surfaces and materials is None and indices is None and not stand_ins:
+        joint = frame.kept(JointDraws).update(geometry, frame.materials)
+        if joint is not None:
+            _submit_joint(frame, technique, joint, constants, view, rows)
+            left = joint.left
+    if left is not None and not left.any():
+        return
+    seen = geometry.boxes.seen(rows) if left is None else geometry.boxes.seen(rows) & left
     material = None
-    stand_ins = frame.shared(StandIns).of if program_of == frame.materials.surface_program else {}
     unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
-    for call in calls(frame.geometry.draws, seen):
+    for call in calls(geometry.draws, np.flatnonzero(seen)):
         if call.draw.material in unseen or (materials is not None and call.draw.material not in materials):
             continue
         if call.draw.material != material:
             material = call.draw.material
             stand_in = stand_ins.get(material)
-            shader = passes.get(stand_in[0] if stand_in else program_of(material))
-            bindings = frame.materials.bindings(material, frame.geometry.instances)
-            bindings["blocks"]["film_view"] = view or frame.view_block
+            program = stand_in[0] if stand_in else program_of(material)
+            shader = passes.get(program)
+            bindings, shown = frame.materials.drawing(material, program, geometry.instances)
+            bindings["blocks"]["film_view"] = view
             bindings["textures"] |= textures or {}
-            shown = {"index_shown": indices[material]} if indices is not None else {}
+            if indices is not None:
+                shown["index_shown"] = indices[material]
             if stand_in:
                 bindings["textures"] |= stand_in[1]
                 shown |= stand_in[2]
@@ -170,3 +245,16 @@ def _submit(
         shader.set_constant("first_instance", call.first)
         passes.draw(shader, call.draw.batch, call.count)
         frame.count(technique, "triangles", call.triangles)
+
+
+def _submit_joint(frame: Frame, technique: Technique, joint: Joint, constants: dict, view: Block, rows) -> None:
+    """The same of materials that are drawn together."""
+    for part, runs in joint.calls(rows):
+        program = frame.materials.surface_program(part.leader)
+        shader = passes.get(program)
+        bindings, _ = frame.materials.drawing(part.leader, program, frame.geometry.instances)
+        bindings["blocks"]["film_view"] = view
+        shader.bind(**bindings, constants={**constants, "first_instance": 0, FIRST_VALUE: 0})
+        for first, count in runs:
+            passes.draw_range(shader, part.batch, first, count)
+            frame.count(technique, "triangles", count)

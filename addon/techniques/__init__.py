@@ -7,6 +7,7 @@ from .accumulated_maps import AccumulatedMaps
 from .airlight import Airlight
 from .caustics_mapping import CausticsMapping
 from .clustered_visibility import ClusteredVisibility
+from .cryptomatte import Cryptomatte
 from .cssm import ConvolutionSoftShadows
 from .denoise import Denoise
 from .depth_complexity import DepthComplexity
@@ -31,6 +32,7 @@ from .reflection_editing import ReflectionEditing
 from .relief import Relief
 from .screen_space_photons import ScreenSpacePhotons
 from .shaded_reflections import ShadedReflections
+from .shader_aovs import ShaderAovs
 from .shadows_by_light import ShadowsByLight
 from .ssdo import ScreenSpaceBounce
 from .surfaces import Surfaces
@@ -73,6 +75,8 @@ REGISTRY: tuple[type[Technique], ...] = (
     ScreenSpacePhotons,
     ShadedReflections,
     ImageSpaceSubsurface,
+    ShaderAovs,
+    Cryptomatte,
     Film,
     Denoise,
     TemporalGlare,

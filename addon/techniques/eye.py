@@ -1,4 +1,4 @@
-"""Eye: what the observer's eye does to a point of light, at the scene's time.
+"""Eye: how the observer's eye scatters a point of light, at the scene's time.
 
 Provides the point spread function of a living eye (addon/eye): the pupil with its restlessness, particles and fibres of
 the lens, which the ciliary muscle moves, the vitreous body, which swings after each jump of the eye, lids and lashes;

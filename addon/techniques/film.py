@@ -1,4 +1,4 @@
-"""Film: gathers the samples that need no light (emission, the visible world, colours, normals), depth, and the sum.
+"""Film: samples that need no light (emission, visible world, colours, normals), depth, and the sum of all.
 
 Colours are what Cycles puts into its colour passes: diffuse albedo with all layer weights, and the estimated albedo
 of the glossy lobe. Light is stored with its colour; engine.py divides, after the mean, as Cycles does. Lights with
@@ -114,7 +114,7 @@ class Film(Technique):
     )
     reads = SURFACES
     finishes = tuple(path.image for path in LIGHT)
-    requests = (MediaService, MediaEmission)
+    requests = (MediaService, MediaEmission, *film_points.AT_POINTS)
     writes = (
         *SUMS,
         *(Write(path.image, "RGBA32F", path.description, True, path.by_need) for path in LIGHT),
@@ -258,6 +258,9 @@ class Film(Technique):
         seen = {name: image for name, image in seen.items() if name in self._shown}
         media = frame.service(MediaService)
         offset = frame.film_offset(point)
+        for service in map(frame.service, film_points.AT_POINTS):
+            if service is not None:
+                service.add(frame, surfaces, offset, share)
         if media is None:
             frame.count(self, "passes", film_filter.add(frame, seen, offset, share))
             return

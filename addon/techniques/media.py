@@ -1,4 +1,4 @@
-"""Media: what fog, smoke and coloured solids take away from light, along the view and on its way from lights.
+"""Media: the light that fog, smoke and coloured solids absorb and scatter away, along the view and towards lights.
 
     T(a, b) = exp(-integral of the extinction of all media from a to b)
 

@@ -1,4 +1,4 @@
-"""Reflection editing: mirrors, gloss, highlights and glass show what an artist wants them to, where they want it.
+"""Reflection editing: mirrors, gloss, highlights and glass show what an artist wants, where the artist wants it.
 
 Constraints of an object say that a place of it is to show another target than it would; regions say where that acts.
 In every pixel of the object the rotation of reflected directions is solved from them (surfaces/reflection_edits.py),
@@ -139,7 +139,7 @@ class ReflectionEditing(Technique):
         self._kept: dict[object, _Edited] = {}
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        if not any(_edits(instance)[0] for instance in snapshot.instances):
+        if not any(_edits(instance)[0] for instance in snapshot.instances if instance.own):
             return "no object has an edit of its reflections"
         return None
 

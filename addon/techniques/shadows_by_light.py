@@ -1,4 +1,4 @@
-"""Shadow maps by light: each light gets the kind of map that its penumbrae ask for, in pictures of one sample.
+"""Shadow maps by light: each light gets the kind of map that suits its penumbrae, in pictures of one sample.
 
 | light | kind | why |
 |---|---|---|

@@ -1,4 +1,4 @@
-"""Temporal glare: the picture as a living eye sees it, with needles, halo and veil around what is bright.
+"""Temporal glare: the picture as a human eye sees it, with needles, halo and veil around bright pixels.
 
     lens = I - s w H + s (H * kernel)     H what exceeds white, kernel the eye's tail (addon/techniques/eye.py)
 

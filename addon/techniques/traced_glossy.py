@@ -101,8 +101,8 @@ class TracedGlossy(Technique):
     def begin(self, frame: Frame) -> None:
         """Tell the techniques that draw points of lights, which run before this one, what share the rays take over."""
         frame.provide(TracedLobes(frame.settings.get(self, "roughness")))
-        found = (lights.emitter(light, frame.geometry.origin) for light in frame.snapshot.lights)
-        shown = lights.traceable([emitter for emitter in found if emitter is not None])
+        found = {emitter.light.key: emitter for emitter in frame.emitters}
+        shown = lights.traceable([found[light.key] for light in frame.snapshot.lights if light.key in found])
         points = frame.service(PointsDrawn)  # whole lights have one point, whatever their rate
         drawn = points.per_sample if points else {}
         rates = [drawn.get(e.light.key, rate_of(frame, e.light.key).per_sample) for e in shown]

@@ -85,15 +85,16 @@ class CandelaComparison(bpy.types.PropertyGroup):
         max=65536,
     )  # fmt: skip
     percentage: bpy.props.IntProperty(
-        name="Resolution", description="Size of the comparison, of the render's resolution", default=50, min=1, max=100,
+        name="Resolution", description="Size of the compared pictures, in percent of the render resolution",
+        default=50, min=1, max=100,
         subtype="PERCENTAGE",
     )  # fmt: skip
     view: bpy.props.EnumProperty(name="View", description="What the image shows", items=VIEWS, update=_show)
     gain: bpy.props.FloatProperty(
-        name="Gain", description="How many times as bright as they are differences are shown", default=8.0, min=0.01,
+        name="Gain", description="Factor by which differences are brightened", default=8.0, min=0.01,
         soft_max=64.0, update=_show,
     )  # fmt: skip
-    row: bpy.props.IntProperty(name="Light Path", description="Which light path it shows", min=0, update=_show)
+    row: bpy.props.IntProperty(name="Light Path", description="Light path that the image shows", min=0, update=_show)
 
 
 class CANDELA_OT_compare(Job, bpy.types.Operator):
@@ -133,7 +134,7 @@ class CANDELA_OT_compare_show(bpy.types.Operator):
 
 
 class CANDELA_OT_compare_swap(bpy.types.Operator):
-    """Swap the picture by Candela and the one by Cycles in place"""
+    """Switch between Candela's and Cycles' picture in place"""
 
     bl_idname = "candela.compare_swap"
     bl_label = "Swap Candela and Cycles"

@@ -1,4 +1,4 @@
-"""The eye in the camera's tab: observers to begin with, and a picture of its pupil and of what it makes of a light.
+"""The eye in the camera's tab: presets of observers, and previews of the pupil and of its glare.
 
 The pictures are image data-blocks, "Candela Pupil" and "Candela Glare": the Image Editor shows them, and the compositor
 convolves with the second one (Convolve node, or an Image node for older ones), which sums up to 1 in each channel. They
@@ -29,7 +29,7 @@ _ICON_SCALE = 7.0
 
 
 class CANDELA_OT_eye_preset(bpy.types.Operator):
-    """Set the eye of this camera to one of some observers; keyframes of what it sets are left as they are"""
+    """Set the eye of this camera to a preset observer; keyframes of its settings are kept"""
 
     bl_idname = "candela.eye_preset"
     bl_label = "Observer"
@@ -66,7 +66,7 @@ class CANDELA_OT_eye_pictures(bpy.types.Operator):
 
     whole: bpy.props.BoolProperty(
         name="With Core", default=True,
-        description="With the light that is not scattered, so that a convolution of the whole picture keeps its light",
+        description="Include the light that is not scattered, so that convolution with the image preserves energy",
     )  # fmt: skip
 
     @classmethod
@@ -152,7 +152,7 @@ def _camera(context):
 
 
 class CANDELA_CAMERA_PT_eye_pictures(bpy.types.Panel):
-    """Observers to begin with, the pupil, and what the eye makes of a point of light"""
+    """Presets of observers, the pupil, and the glare of a point of light"""
 
     bl_label = "Observer"
     bl_space_type = "PROPERTIES"

@@ -15,19 +15,27 @@ from .jobs import Job
 
 
 class CandelaGrassPatch(Job, bpy.types.Operator):
-    """Render a tile of grass by Cycles from all directions, for materials to show; goes on where it was stopped"""
+    """Render a tile of grass with Cycles from all directions, as a patch for materials; continues after a stop"""
 
     bl_idname = "candela.grass_patch"
     bl_label = "Candela Grass Patch"
 
     filepath: bpy.props.StringProperty(name="Patch", subtype="FILE_PATH", default=f"//meadow{SUFFIX}")
-    tile: bpy.props.FloatProperty(name="Tile", default=0.25, min=0.01, unit="LENGTH", description="Side of the tile")
-    height: bpy.props.FloatProperty(name="Height", default=0.1, min=0.001, unit="LENGTH", description="Longest blades")
+    tile: bpy.props.FloatProperty(
+        name="Tile", default=0.25, min=0.01, unit="LENGTH", description="Side length of the tile"
+    )
+    height: bpy.props.FloatProperty(
+        name="Height", default=0.1, min=0.001, unit="LENGTH", description="Height of the longest blades"
+    )
     blades: bpy.props.IntProperty(name="Blades", default=500, min=1, max=100_000)
     seed: bpy.props.IntProperty(name="Seed", default=1, min=0)
-    texels: bpy.props.IntProperty(name="Texels", default=64, min=4, max=256, description="Along the tile's side")
+    texels: bpy.props.IntProperty(
+        name="Texels", default=64, min=4, max=256, description="Texels along each side of the tile"
+    )
     views: bpy.props.IntProperty(name="Views", default=81, min=7, max=81)
-    grazing: bpy.props.BoolProperty(name="Grazing Views", default=True, description="24 more views at 85 degrees")
+    grazing: bpy.props.BoolProperty(
+        name="Grazing Views", default=True, description="Add 24 views at 85 degrees from the normal"
+    )
     lights: bpy.props.IntProperty(name="Lights", default=21, min=5, max=21)
     samples: bpy.props.IntProperty(name="Samples", default=16, min=1, max=65536)
     luma: bpy.props.IntProperty(name="Components", default=8, min=1, max=8)

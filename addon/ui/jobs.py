@@ -1,4 +1,4 @@
-"""Work that takes its time, as an operator: at once from a script, step by step with progress and Esc in a window."""
+"""Long work as an operator: at once from a script, step by step with progress and Esc in a window."""
 
 from __future__ import annotations
 

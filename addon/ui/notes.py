@@ -1,4 +1,4 @@
-"""Whom a note is about, so that the interface can select the culprit."""
+"""Which object or material a note is about, so that the interface can select it."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class _OnTree:
 
 
 class CANDELA_OT_passes_from_auto(_OnTree, bpy.types.Operator):
-    """Make a pass tree of what Auto would run for this scene now"""
+    """Make a pass tree of the techniques that Auto chooses for this scene now"""
 
     bl_idname = "candela.passes_from_auto"
     bl_label = "New from Auto"
@@ -61,7 +61,7 @@ class CANDELA_OT_passes_from_auto(_OnTree, bpy.types.Operator):
 
     use: bpy.props.BoolProperty(
         name="Render With It", default=False,
-        description="Let renders of the scene and its viewports run the new tree in place of what Auto chooses",
+        description="Render the scene and its viewports by the new tree instead of what Auto chooses",
     )  # fmt: skip
 
     def execute(self, context):
@@ -162,7 +162,7 @@ def _ended(called: set[str]) -> set[str]:
 
 
 class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
-    """Run only what the active node needs, and show what it gives"""
+    """Run only what the active node needs, and show its picture"""
 
     bl_idname = "candela.passes_run_to_node"
     bl_label = "Run to Node"
@@ -192,7 +192,7 @@ class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
 
 
 class CANDELA_OT_passes_bake(_OnTree, bpy.types.Operator):
-    """Keep a node's picture of the last run as an image in this file, in scene-linear floats"""
+    """Store a node's picture of the last run as an image in this file, in scene-linear floats"""
 
     bl_idname = "candela.passes_bake"
     bl_label = "Bake to Image"

@@ -31,7 +31,7 @@ class CandelaPassTree(bpy.types.NodeTree):
         name="Samples", description="Samples of a run of this tree", default=16, min=1, max=65536
     )
     percentage: bpy.props.IntProperty(
-        name="Resolution", description="Size of a run, of the render's resolution", default=50, min=1, max=100,
+        name="Resolution", description="Size of a run, in percent of the render resolution", default=50, min=1, max=100,
         subtype="PERCENTAGE",
     )  # fmt: skip
     reference_samples: bpy.props.IntProperty(

@@ -9,7 +9,7 @@ from ..gfx import context, device
 
 
 class CANDELA_OT_measure_device(bpy.types.Operator):
-    """Measure anew what this device does, as after a change of its clocks; takes a fraction of a second"""
+    """Measure the costs of this device again, for example after a change of its clocks; takes a fraction of a second"""
 
     bl_idname = "candela.measure_device"
     bl_label = "Measure Again"

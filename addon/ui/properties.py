@@ -44,10 +44,11 @@ _SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "
 
 def titled(label: str) -> str:
     """A label as Blender writes its own: Title Case but for small words in its middle."""
-    words = label.split(" ")
-    return " ".join(
-        word if number and word in _SMALL else word[:1].upper() + word[1:] for number, word in enumerate(words)
-    )
+    words = [
+        word if number and word in _SMALL else "-".join(part[:1].upper() + part[1:] for part in word.split("-"))
+        for number, word in enumerate(label.split(" "))
+    ]
+    return " ".join(words)
 
 
 def precision_of(default: float) -> int:
@@ -117,17 +118,22 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "split_light_groups": bpy.props.BoolProperty(
+            name="Direct and Indirect", update=_redraw,
+            description="Write two more passes for each light group: its direct light with what is seen of it, and its "
+            "indirect light",
+        ),
         "use_denoise": bpy.props.BoolProperty(
             name="Denoise Render", default=True, update=_redraw,
-            description="Take what is left of noise out of final renders, after their last sample",
+            description="Filter the remaining noise of final renders after the last sample",
         ),
         "use_viewport_denoise": bpy.props.BoolProperty(
             name="Denoise Viewport", default=True, update=_redraw,
-            description="Take what is left of noise out of the viewport's picture, after its last sample",
+            description="Filter the remaining noise of the viewport after its last sample",
         ),
         "viewport_pause": bpy.props.BoolProperty(
             name="Pause Viewport", default=False, update=_redraw,
-            description="Leave the pictures of rendered viewports as they are, so that the GPU is free for other work",
+            description="Stop updating rendered viewports, so that the GPU is free for other work",
         ),
     }  # fmt: skip
     out["pass_tree"] = bpy.props.PointerProperty(
@@ -207,14 +213,29 @@ def _values(scene, depsgraph) -> dict[tuple[str, str], object]:
     """What is set of the parameters of which a picture has one value each."""
     values = {}
     blocks = {scope: block_of(scope, scene, depsgraph) for scope in OF_A_PICTURE}
-    for technique in REGISTRY:
-        for param in technique.params:
-            block = blocks.get(param.scope)
-            if block is None or param.many or param.image:
-                continue
-            value = getattr(block.candela, identifier(technique.name, param.name))
-            values[technique.name, param.name] = tuple(value) if isinstance(param.default, tuple) else value
+    groups = {scope: block.candela for scope, block in blocks.items() if block is not None}
+    for scope, key, name, is_tuple in _of_a_picture(REGISTRY):
+        if scope in groups:
+            value = getattr(groups[scope], name)
+            values[key] = tuple(value) if is_tuple else value
     return values
+
+
+@cache
+def _of_a_picture(registry: tuple) -> list[tuple[str, tuple[str, str], str, bool]]:
+    """Scope, key in the settings and property of each parameter of which a picture has one value; whether that is a
+    tuple."""
+    return [
+        (
+            param.scope,
+            (technique.name, param.name),
+            identifier(technique.name, param.name),
+            isinstance(param.default, tuple),
+        )
+        for technique in registry
+        for param in technique.params
+        if param.scope in OF_A_PICTURE and not (param.many or param.image)
+    ]
 
 
 def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgraph=None) -> Settings:

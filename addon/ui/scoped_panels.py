@@ -198,7 +198,7 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
         return context.engine == ENGINE and context.object is not None and bool(_handles(context.object))
 
     def setup(self, context):
-        self.shown, self.dragged = None, False
+        self.shown = None
         self.refresh(context)
 
     def refresh(self, context):
@@ -214,28 +214,44 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
             if place.param.handle == POINT:
                 gizmo = self.gizmos.new("GIZMO_GT_move_3d")
                 gizmo.draw_options = {"FILL_SELECT", "ALIGN_VIEW"}  # a ring is hardly seen from its side
-                gizmo.target_set_handler("offset", get=_reader(place), set=_writer(place))
+                gizmo.target_set_handler("offset", get=_reader(place), set=_writer(place, gizmo))
             else:
                 gizmo = self.gizmos.new("GIZMO_GT_dial_3d")
-                gizmo.target_set_handler("offset", get=lambda: 0.0, set=_turner(place, _vector(place)))
+                gizmo.target_set_handler("offset", get=lambda: 0.0, set=_turner(place, gizmo, _vector(place)))
             gizmo.color, gizmo.alpha = (1.0, 0.7, 0.2), 0.8
             gizmo.color_highlight, gizmo.alpha_highlight = (1.0, 0.9, 0.6), 1.0
             gizmo.scale_basis = 0.3
 
     def draw_prepare(self, context):
-        """Dials stand where their object is; a drag that has ended is a step for undo, which Blender makes for its own
-        handles alone."""
-        dragged = any(gizmo.is_modal for gizmo in self.gizmos)
-        if self.dragged and not dragged:
-            bpy.app.timers.register(_push_drag, first_interval=0.0)
-        self.dragged = dragged
+        """Dials stand where their object is."""
         for gizmo, place in zip(self.gizmos, self.shown[1] if self.shown else ()):
             if place.param.handle != POINT and not gizmo.is_modal:
                 gizmo.matrix_basis = _turned(context.object, _vector(place))
 
 
-def _push_drag() -> None:
-    bpy.ops.ed.undo_push(message="Drag Handle")
+DRAG_S = 0.05  # between two looks whether a drag goes on
+
+
+class _Drag:
+    """Makes a step for undo when a drag of a handle has ended, as Blender does for its own handles alone."""
+
+    def __init__(self, gizmo):
+        self._gizmo, self._goes_on = gizmo, False
+
+    def moved(self) -> None:
+        if not self._goes_on:
+            self._goes_on = True
+            bpy.app.timers.register(self._look, first_interval=DRAG_S)
+
+    def _look(self) -> float | None:
+        try:
+            if self._gizmo.is_modal:
+                return DRAG_S
+        except ReferenceError:
+            pass  # it has gone since
+        self._goes_on = False
+        bpy.ops.ed.undo_push(message="Drag Handle")
+        return None
 
 
 def _vector(place: Place) -> Vector:
@@ -247,12 +263,15 @@ def _reader(place: Place):
     return lambda: bpy.context.object.matrix_world @ _vector(place)
 
 
-def _writer(place: Place):
+def _writer(place: Place, gizmo):
+    drag = _Drag(gizmo)
+
     def write(value):
         shown = bpy.context.object
         settings = place.settings(shown)
         if settings is not None:
             setattr(settings, place.name, shown.matrix_world.inverted_safe() @ Vector(value))
+            drag.moved()
 
     return write
 
@@ -263,11 +282,14 @@ def _turned(shown, direction: Vector) -> Matrix:
     return Matrix.Translation(shown.matrix_world.translation) @ axis.to_track_quat("Z", "Y").to_matrix().to_4x4()
 
 
-def _turner(place: Place, began: Vector):
+def _turner(place: Place, gizmo, began: Vector):
+    drag = _Drag(gizmo)
+
     def write(angle):
         settings = place.settings(bpy.context.object)
         if settings is not None:
             setattr(settings, place.name, Quaternion(began.orthogonal().normalized(), angle) @ began)
+            drag.moved()
 
     return write
 

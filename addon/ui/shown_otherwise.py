@@ -1,4 +1,4 @@
-"""What the viewport shows otherwise than a render.
+"""Differences between viewport and render.
 
 Python can ask Blender for the scene as the viewport has it alone; a render evaluates it anew, with its own levels of
 modifiers and its own hidden objects. Comparisons in the interface take Candela's picture from the one and Cycles' from

@@ -143,7 +143,7 @@ def _draw_maps(self, context):
     column.operator("candela.new_translucency_maps", icon="IMAGE_DATA")
     row = column.row(align=True)
     for name, label in LABELS.items():
-        row.operator("candela.paint_translucency_map", text=label.title(), icon="TPAINT_HLT").name = name
+        row.operator("candela.paint_translucency_map", text=f"Paint {label.title()}", icon="TPAINT_HLT").name = name
 
 
 _CLASSES = (CANDELA_OT_new_translucency_maps, CANDELA_OT_paint_translucency_map)

@@ -87,15 +87,17 @@ class CandelaTuning(bpy.types.PropertyGroup):
     """What Tune is asked for."""
 
     milliseconds: bpy.props.FloatProperty(
-        name="Time", description="Milliseconds that a picture of the size below may take", default=1000.0, min=1.0,
+        name="Time", description="Time limit of a picture of the size below, in milliseconds", default=1000.0, min=1.0,
         soft_max=60000.0, precision=0,
     )  # fmt: skip
     percentage: bpy.props.IntProperty(
-        name="Resolution", description="Size of the pictures, of the render's resolution", default=25, min=1, max=100,
+        name="Resolution", description="Size of the pictures, in percent of the render resolution",
+        default=25, min=1, max=100,
         subtype="PERCENTAGE",
     )  # fmt: skip
     budget: bpy.props.IntProperty(
-        name="Search", description="Seconds to measure in, after Cycles has rendered the reference", default=120, min=1,
+        name="Search", description="Duration of the search in seconds, after Cycles has rendered the reference",
+        default=120, min=1,
         soft_max=600,
     )  # fmt: skip
     reference_samples: bpy.props.IntProperty(
@@ -189,7 +191,7 @@ def _within(steps: Iterator[str], budget: float, trials: list[tune.Trial]) -> It
 
 
 class CANDELA_OT_tune_apply(bpy.types.Operator):
-    """Use these settings, after a look at what they change"""
+    """Apply these settings, after showing what they change"""
 
     bl_idname = "candela.tune_apply"
     bl_label = "Apply Tuned Settings"

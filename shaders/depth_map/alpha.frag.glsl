@@ -55,7 +55,9 @@ void main()
   Closures c = closures_begin(point.normal, to_unit(bits.y), 0.0);
   evaluate_material(point, c);
   closures_end(c);
-  if (to_unit(bits.x) < dot(c.transparency, vec3(1.0 / 3.0))) {
+  // Of one channel, where light is asked for by channel (addon/lighting/loop.py).
+  float passing = (channel_asked > 0) ? c.transparency[channel_asked - 1] : dot(c.transparency, vec3(1.0 / 3.0));
+  if (to_unit(bits.x) < passing) {
     discard;
   }
   out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn at random

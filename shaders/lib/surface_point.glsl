@@ -4,6 +4,7 @@
 #define RAY_SHADOW 1  // light asks whether the point lets it pass
 #define RAY_LIGHT 2   // a surface is lit by the point, which belongs to the world
 #define RAY_GLOSSY 3  // a surface reflects the point, or bends the way to it
+#define RAY_LAMP 4    // a lamp lights something: instancer_generated.x is how far, m, instancer_uv the place on the lamp
 
 struct SurfacePoint {
   vec3 position;          // world space, metres, relative to the render origin

@@ -12,6 +12,9 @@
 //   6: half height vector, or row 1;  w: 1 / ((1 - cosine) blend), 0 = hard edge
 //   7: row 2;                         w: least squared distance at which the point stands for its part of the light
 #include "lib/math.glsl"
+#ifdef HAS_LAMP_MAPS
+#include "light/lamp_map.glsl"
+#endif
 
 #define LIGHT_TEXELS 8
 #define LIGHT_POINT 0
@@ -32,6 +35,8 @@
 #define LIGHT_SIDED 512
 #define LIGHT_EVEN 1024
 #define LIGHT_GLASS_BLOCKS 2048
+#define LIGHT_MAPPED 4096  // its node tree varies: factors of light/lamp_map.glsl
+#define LIGHT_MAP_SHIFT 13  // the bits above are the number of its map
 
 // What the lights of a pass may be, as bits: each kind by its number, and lights as a whole (addon/sources/lights.py). What
 // is left out some drivers would compute and mask.
@@ -82,6 +87,17 @@ Light light_read(int index)
   return light;
 }
 
+// What the node tree of a lamp makes of light that leaves it along `direction` (unit), from a place, and goes so far.
+vec3 light_tree(Light light, vec3 direction, vec3 from, float path)
+{
+#ifdef HAS_LAMP_MAPS
+  if ((light.flags & LIGHT_MAPPED) != 0) {
+    return lamp_map(light.flags >> LIGHT_MAP_SHIFT, direction, from, path);
+  }
+#endif
+  return vec3(1.0);
+}
+
 // Falloff of a spot for a ray that leaves it along `direction`.
 float spot_attenuation(Light light, vec3 direction)
 {
@@ -130,12 +146,13 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       return light.radiance;
     }
     density = 1.0 / light.area;
-    return light.radiance * light.area;
+    return light.radiance * (light.area * light_tree(light, -direction, vec3(0.0), 1.0));
   }
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE) || LIGHT_IS(light, LIGHT_SURFACE)) {
     vec3 to_light = light.point - position;
     float squared = max(dot(to_light, to_light), 1e-30);
     direction = to_light * inversesqrt(squared);
+    float path = sqrt(squared);
     squared = max(squared, sources.light[light.base + 7].w);
     float cos_light = -dot(direction, light.axis);
     if (LIGHT_IS(light, LIGHT_SURFACE)) {
@@ -146,7 +163,8 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
     }
     float solid_angle = light.area * cos_light / squared;
     density = 1.0 / max(solid_angle, 1e-30);
-    return light.radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
+    vec3 radiance = light.radiance * light_tree(light, -direction, light.point, path);
+    return radiance * (solid_angle * spread_attenuation(light.spread, cos_light));
   }
   if (!LIGHTS_HAVE(LIGHT_POINT) && !LIGHTS_HAVE(LIGHT_SPHERE)) {
     return vec3(0.0);
@@ -157,6 +175,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
   vec3 axis = to_centre * inversesqrt(distance_squared);
   vec3 result;
   vec3 from_light;
+  float path = sqrt(distance_squared);
   if (light.radius <= 0.0) {
     direction = axis;
     result = light.radiance / distance_squared;
@@ -170,7 +189,7 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       if (sin_squared >= 1.0) {
         direction = safe_normalize(light.point);
         density = 1.0 / (4.0 * PI);
-        return light.radiance * (4.0 * PI);
+        return light.radiance * (4.0 * PI * light_tree(light, -direction, light.centre + light.point, light.radius));
       }
       float one_minus_cos = sin_squared / (1.0 + sqrt(1.0 - sin_squared));
       float rho_squared = min(dot(across, across) / (light.radius * light.radius), 1.0);
@@ -180,6 +199,9 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       float solid_angle = 2.0 * PI * one_minus_cos;
       density = 1.0 / solid_angle;
       result = light.radiance * solid_angle;
+      float along = dot(to_centre, direction);
+      vec3 missed = to_centre - along * direction;
+      path = along - sqrt(max(light.radius * light.radius - dot(missed, missed), 0.0));
     }
     else {
       vec3 to_point = to_centre + across;
@@ -189,13 +211,14 @@ vec3 light_sample(Light light, vec3 position, out vec3 direction, out float dens
       float solid_angle = light.area * max(dot(direction, axis), 0.0) / squared;
       density = 1.0 / max(solid_angle, 1e-30);
       result = light.radiance * solid_angle;
+      path = length(to_point);
     }
     from_light = -direction;
   }
   if ((light.flags & LIGHT_SPOT) != 0) {
     result *= spot_attenuation(light, from_light);
   }
-  return result;
+  return result * light_tree(light, from_light, position - path * from_light, path);
 }
 
 // Distance from `origin` to the point of a light that light_sample found in `direction`; 1e29 for lights at infinity.
@@ -236,7 +259,7 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
       return vec3(0.0);
     }
     density = 1.0 / light.area;
-    return light.radiance;
+    return light.radiance * light_tree(light, -direction, vec3(0.0), 1.0);
   }
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     float cos_light = -dot(direction, light.axis);
@@ -254,7 +277,8 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     }
     hit_distance = t;
     density = t * t / max(light.area * cos_light, 1e-30);
-    return light.radiance * spread_attenuation(light.spread, cos_light);
+    vec3 radiance = light.radiance * light_tree(light, -direction, origin + t * direction, t);
+    return radiance * spread_attenuation(light.spread, cos_light);
   }
   if ((!LIGHTS_HAVE(LIGHT_POINT) && !LIGHTS_HAVE(LIGHT_SPHERE)) || LIGHT_IS(light, LIGHT_DIRECTION)
       || LIGHT_IS(light, LIGHT_SURFACE) || light.radius <= 0.0) {
@@ -291,5 +315,5 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     density = t * t / max(light.area * cos_light, 1e-30);
   }
   float attenuation = ((light.flags & LIGHT_SPOT) != 0) ? spot_attenuation(light, -direction) : 1.0;
-  return light.radiance * attenuation;
+  return light.radiance * (attenuation * light_tree(light, -direction, origin + hit_distance * direction, hit_distance));
 }

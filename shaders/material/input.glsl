@@ -2,6 +2,7 @@
 
 #include "lib/closure.glsl"
 #include "lib/color.glsl"
+#include "material/values.glsl"
 
 // An alpha of 2 marks coordinates of two dimensions, whose number is the first.
 void input_attribute(vec4 stored, out vec3 color, out vec3 vector, out float average, out float alpha)
@@ -80,8 +81,8 @@ void input_texture_coordinate_object(SurfacePoint point, vec4 generated_attribut
   input_texture_coordinate(point, generated_attribute, uv_attribute, generated, normal, uv, object, camera, window,
                            reflection);
   vec4 place = vec4(point.position + material_scene.origin.xyz, 1.0);
-  object = vec3(dot(material_values.value[first], place), dot(material_values.value[first + 1], place),
-                dot(material_values.value[first + 2], place));
+  object = vec3(dot(material_value(first), place), dot(material_value(first + 1), place),
+                dot(material_value(first + 2), place));
 }
 
 // A direction of object space as a tangent: turned to world space and laid into the surface.
@@ -100,7 +101,8 @@ void input_geometry(SurfacePoint point, vec4 generated, vec4 shape, vec4 island,
   tangent = surface_tangent(point, vec3(0.5 - generated.y, generated.x - 0.5, 0.0));
   true_normal = point.geometric_normal;
   incoming = point.incoming;
-  parametric = vec3(0.0);  // not known: corners are shared between triangles
+  // Not known of triangles, whose corners are shared.
+  parametric = (point.ray == RAY_LAMP) ? vec3(point.instancer_uv, 0.0) : vec3(0.0);
   backfacing = point.backfacing ? 1.0 : 0.0;
   pointiness = shape.x;
   random_per_island = island.x;
@@ -143,11 +145,29 @@ void input_light_path(SurfacePoint point, out float camera_ray, out float shadow
   volume_ray = 0.0;
   ray_length = length(point.position - material_scene.camera_position.xyz);
   ray_depth = shadow_ray;
+  if (point.ray == RAY_LAMP) {  // as if light came after the first surface, by no kind of ray
+    ray_length = point.instancer_generated.x;
+    ray_depth = 1.0;
+  }
   diffuse_depth = 0.0;
   glossy_depth = 0.0;
   transparent_depth = 0.0;
   transmission_depth = 0.0;
   portal_depth = 0.0;
+}
+
+// Light that falls off otherwise than with the square of its way. Infinitely far away is nowhere in particular.
+void input_light_falloff(SurfacePoint point, float strength, float smoothness, out float with_square, out float with_distance,
+                         out float with_nothing)
+{
+  float path = (point.ray == RAY_LAMP) ? point.instancer_generated.x :
+                                         length(point.position - material_scene.camera_position.xyz);
+  float squared = path * path;
+  bool far = path > 1e18;
+  float share = (smoothness > 0.0 && !far) ? squared / (smoothness + squared) : 1.0;
+  with_square = strength * share;
+  with_distance = strength * share * (far ? 1.0 : path);
+  with_nothing = strength * share * (far ? 1.0 : squared);
 }
 
 // On strands alone: what addon/snapshot/strands.py stores with their corners. Elsewhere the first number is 0.

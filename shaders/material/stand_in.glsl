@@ -40,18 +40,6 @@ void no_particle(out float index, out float random, out float age, out float lif
   angular_velocity = vec3(0.0);
 }
 
-void no_falloff(float strength, out float with_square, out float with_distance, out float with_nothing)
-{
-  with_square = strength;
-  with_distance = strength;
-  with_nothing = strength;
-}
-
-void no_light_profile(float strength, out float share)
-{
-  share = strength;
-}
-
 void no_hit(float reach, out float hit, out float own, out float distance, out vec3 position, out vec3 normal)
 {
   hit = 0.0;

@@ -1,6 +1,7 @@
 // Nodes that turn and bend vectors.
 
 #include "lib/closure.glsl"
+#include "lib/math.glsl"
 
 // Rotation by Euler angles in radians, about x first, then y, then z.
 mat3 mapping_rotation(vec3 angles)
@@ -133,4 +134,28 @@ void rotate_euler_xyz(vec3 vector, vec3 center, vec3 rotation, bool invert, out 
   mat3 turn = mapping_rotation(rotation);
   vec3 arm = vector - center;
   result = (invert ? arm * turn : turn * arm) + center;
+}
+
+// Sectors of a regular polygon around z: coordinates along a sector's side and away from the centre, the sector's number,
+// half the length of its side at distance 1, and the angle of its middle.
+void radial_tiling(vec3 vector, float sides, bool normalized, out vec3 coordinates, out float number, out float width,
+                   out float rotation)
+{
+  float sector = 2.0 * PI / max(sides, 2.0);
+  float half_sector = 0.5 * sector;
+  float angle = (vector.x == 0.0 && vector.y == 0.0) ? 0.0 : atan(vector.y, vector.x);
+  angle += (vector.y < 0.0) ? 2.0 * PI : 0.0;
+  number = floor(angle / sector);
+  float beside = angle - number * sector - half_sector;
+  float away = length(vector.xy);
+  vec2 place = away * vec2(sin(beside), cos(beside));
+  width = (sides > 2.0) ? tan(half_sector) : 0.0;
+  rotation = number * sector + half_sector;
+  if (normalized) {
+    float reach = place.y * width;
+    coordinates = vec3((reach > 0.0) ? 0.5 + 0.5 * place.x / reach : 0.0, place.y, 0.0);
+  }
+  else {
+    coordinates = vec3(place.x, place.y - 1.0, 0.0);
+  }
 }

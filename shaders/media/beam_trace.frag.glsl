@@ -83,6 +83,7 @@ void main()
     if ((light.flags & LIGHT_SPOT) != 0) {
       flux *= spot_attenuation(light, direction);
     }
+    flux *= light_tree(light, direction, position, length(to_casters));
     spread = 0.5 * sqrt(solid_angle);
   }
   uint seed = salt;

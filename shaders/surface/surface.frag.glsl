@@ -74,6 +74,6 @@ void main()
   own_store(point, own);
 #endif
   if (index_shown >= 0) {
-    out_position = vec4(point.object_index, float(index_shown), 0.0, 1.0);
+    out_position = vec4(point.object_index, float(index_shown), float(instance_flat.x), 1.0);
   }
 }

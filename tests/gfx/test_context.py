@@ -1,7 +1,10 @@
-"""Who is called when GPU resources are freed."""
+"""Which backend draws, and who is called when GPU resources are freed."""
 
 import gc
+import os
 import weakref
+
+import pytest
 
 from addon.gfx import context
 
@@ -31,3 +34,11 @@ def test_registration_keeps_no_object_alive(gpu_context):
     gc.collect()
     assert kept() is None
     context.release_all()
+
+
+def test_the_backend_is_the_one_that_was_asked_for(gpu_context):
+    """Blender takes OpenGL where Vulkan fails: `make test-vulkan` must not pass by that."""
+    asked = os.environ.get("CANDELA_BACKEND")
+    if not asked:
+        pytest.skip("no backend was asked for in CANDELA_BACKEND")
+    assert context.describe().rpartition(", ")[2] == asked

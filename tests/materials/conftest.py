@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from addon.materials.energy import energy_texture
+from addon.materials.reader import FINE_LAYERS
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +25,7 @@ def evaluate(gpu_context):
         camera_backward=(0.0, 0.0, 1.0, 0.0),
         window=(-0.5, -0.5, 1.0, 1.0),
     )
-    table = gpu_images.upload(energy_texture())
+    table = gpu_images.upload(energy_texture(FINE_LAYERS))
 
     def run(material, at=None, images=None):
         at = points() if at is None else at

@@ -5,11 +5,14 @@ import warnings
 
 import bpy
 import numpy as np
+import OpenEXR
 import pytest
 
 from addon import engine
+from addon.compare import reference
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.kernels.ranks import ids_of
 
 
 class Stage:
@@ -181,6 +184,67 @@ def kept_stage(registered):
 def stage(kept_stage):
     kept_stage.clear()
     return kept_stage
+
+
+ORDER = "XYZWUVRGBArgba"
+
+
+def read_with_openexr(path) -> dict[str, np.ndarray]:
+    """As addon.snapshot.exr.read_exr, by the reference implementation; and the file's header under "header"."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        found: dict[str, dict[str, np.ndarray]] = {}
+        for part in range(len(file.parts)):
+            for name, channel in file.channels(part).items():
+                layer, _, letter = name.rpartition(".")
+                found.setdefault(layer, {})[letter] = np.asarray(channel.pixels, np.float32)[::-1]
+        header = dict(file.header(0))
+    stacked = {
+        layer: np.stack([channels[k] for k in sorted(channels, key=lambda k: f"{ORDER.find(k):02d}")], -1)
+        for layer, channels in found.items()
+    }
+    return stacked | {"header": header}
+
+
+def all_of(layers: dict, view_layer: str) -> dict:
+    prefix = view_layer + "."
+    named = {name.removeprefix(prefix): pixels for name, pixels in layers.items() if name.startswith(prefix)}
+    made = next((layers[name] for name in ("Composite.Combined", "") if name in layers), None)  # by the compositor
+    return {**named, "combined": named["Combined"], "composed": made, "header": layers["header"]}
+
+
+def coverage(passes, kind, name) -> np.ndarray:
+    """(H, W) what a reader of the standard finds for a name."""
+    ranks = [passes[key] for key in sorted(passes) if key.startswith(f"Crypto{kind}")]
+    pairs = np.concatenate(ranks, axis=-1)
+    wanted = ids_of([name])[0]
+    return np.where(pairs[..., 0::2] == wanted, pairs[..., 1::2], 0.0).sum(axis=-1)
+
+
+@pytest.fixture
+def written(stage, monkeypatch):
+    """The stage; `written.both(samples)` are the passes of Candela and of Cycles by the names in their files."""
+    monkeypatch.setattr(reference, "read_exr", read_with_openexr)
+    monkeypatch.setattr(reference, "named_images", all_of)
+    layer = stage.scene.view_layers[0]
+
+    def rendered(engine, samples, size=(48, 40), **options):
+        return reference.render_passes(stage.scene, engine, samples, 1, size=size, **options).images
+
+    stage.written = rendered
+    stage.layer, stage.coverage = layer, coverage
+    stage.both = lambda samples, cycles_samples=None, **options: (
+        rendered("CANDELA", samples, **options), rendered("CYCLES", cycles_samples or samples, **options)
+    )  # fmt: skip
+    yield stage
+    for name in dir(layer):
+        if name.startswith("use_pass_") and name not in ("use_pass_combined",):
+            setattr(layer, name, False)
+    while layer.aovs:
+        layer.aovs.remove(layer.aovs[0])
+    while len(layer.lightgroups):
+        layer.lightgroups.remove(layer.lightgroups[0])
+    layer.cycles.denoising_store_passes = False
+    layer.pass_alpha_threshold, layer.pass_cryptomatte_depth = 0.5, 6
 
 
 def places(size, span=4.0):

@@ -259,13 +259,13 @@ def test_absorption_begins_a_new_picture(room):
 
 def test_passes_that_are_not_written_are_named(room):
     layer = room.scene.view_layers[0]
-    layer.use_pass_uv = layer.use_pass_shadow = True
+    layer.use_pass_ambient_occlusion = layer.use_pass_shadow = True
     try:
         room.render(1)
     finally:
-        layer.use_pass_uv = layer.use_pass_shadow = False
+        layer.use_pass_ambient_occlusion = layer.use_pass_shadow = False
     (note,) = (note for note in room.ledger.notes if note.subject == f"View layer '{layer.name}'")
-    assert "UV, Shadow" in note.text
+    assert "Shadow, Ambient Occlusion" in note.text
 
 
 def test_sums_begin_at_zero_in_every_picture(room):

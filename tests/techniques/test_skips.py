@@ -107,7 +107,14 @@ def grassy(stage):
     stage.floor_materials[0].candela.grass_patch = "MEADOW"
 
 
+def passes_wanted(stage):
+    layer = stage.scene.view_layers[0]
+    layer.use_pass_uv = layer.use_pass_cryptomatte_object = True
+
+
 WITH = {
+    "shader_aovs": passes_wanted,
+    "cryptomatte": passes_wanted,
     "grass": grassy,
     "media": foggy,
     "airlight": foggy,
@@ -118,6 +125,8 @@ WITH = {
 SAMPLES = 4  # with fewer, a picture is not denoised
 # For each technique, what to take from the full scene so that it is not needed any more.
 WITHOUT = {
+    "shader_aovs": no_needs,
+    "cryptomatte": no_needs,
     "media": no_needs,
     "airlight": no_needs,
     "volume_caustics": no_needs,
@@ -170,7 +179,9 @@ def room(stage):
     stage.world((0.2, 0.3, 0.4))
     stage.camera_above(4.0)
     stage.bounces = 2
-    return stage
+    yield stage
+    layer = stage.scene.view_layers[0]
+    layer.use_pass_uv = layer.use_pass_cryptomatte_object = False
 
 
 @pytest.fixture

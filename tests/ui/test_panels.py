@@ -171,18 +171,22 @@ READ = {
         *("clip_end", "energy", "exposure", "use_temperature", "normalize", "use_soft_falloff", "shadow_soft_size"),
         *("spot_size", "spot_blend", "shape", "size_y", "spread", "angle", "use_shadow"),
     ),
-    "world": ("mist_settings", "Surface", "Volume", "cycles_visibility"),
+    "world": ("lightgroup", "mist_settings", "Surface", "Volume", "cycles_visibility"),
     "material": ("pass_index", "Volume", "Displacement", "Surface", "use_transparent_shadow"),
     "object": (
         *("pass_index", "color", "is_holdout", "shadow_terminator_geometry_offset", "visible_transmission"),
-        *("visible_volume_scatter", "visible_camera"),
+        *("visible_volume_scatter", "visible_camera", "lightgroup"),
     ),
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
         "use_simplify",
     ),
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
-    "view_layer": ("material_override", "use_solid", "use_strand", "use_pass_mist", "samples"),
+    "view_layer": (
+        *("material_override", "use_solid", "use_strand", "use_pass_mist", "samples", "aovs", "pass_alpha_threshold"),
+        *("use_pass_cryptomatte_object", "pass_cryptomatte_depth", "lightgroups", "use_pass_uv"),
+        "denoising_store_passes",
+    ),
     "particle": ("root_radius", "tip_radius", "radius_scale", "use_close_tip"),
 }  # fmt: skip
 

@@ -30,7 +30,7 @@ def steps():
     open_panels()
     left, right = yield from two_areas()
     result["properties"] = [right.x, window().height - right.y - right.height, right.width, right.height]
-    for step in (warning, reflections, glare, painting, grass, relief, caustics):
+    for step in (warning, painting, reflections, glare, grass, relief, caustics):
         name, started = step.__name__, time.monotonic()
         if ONLY and name not in ONLY:
             continue
@@ -249,8 +249,8 @@ def painting(left, right):
     yield from rendered(left)
     yield 0.5
     picture("painting_before.png")
-    with there(right):
-        result["new_maps"] = list(bpy.ops.candela.new_translucency_maps("EXEC_DEFAULT", size=128))
+    with there(right):  # True: a step for undo, as a click on the button makes one
+        result["new_maps"] = list(bpy.ops.candela.new_translucency_maps("EXEC_DEFAULT", True, size=128))
     yield 0.5
     scroll(right, 2)
     yield 0.7
@@ -259,14 +259,18 @@ def painting(left, right):
     translucency = skin.candela.image_space_subsurface_translucency_map
     result["before_paint"] = mean(translucency)
     with there(right):
-        result["paint"] = list(bpy.ops.candela.paint_translucency_map("INVOKE_DEFAULT", name="translucency_map"))
+        result["paint"] = list(bpy.ops.candela.paint_translucency_map("INVOKE_DEFAULT", True, name="translucency_map"))
     yield 0.5
     result["paint_mode"] = ball.mode
     result["canvas"] = scene.tool_settings.image_paint.canvas.name if scene.tool_settings.image_paint.canvas else ""
     brush = scene.tool_settings.image_paint.brush
     result["brush"] = brush.name if brush else ""
     picture("painting_mode.png")
-    scene.tool_settings.unified_paint_settings.color = (0.0, 0.0, 0.0)
+    tools = scene.tool_settings
+    for holder in (tools, tools.image_paint):  # of the brush, of all brushes, and of all since Blender 5.0
+        unified = getattr(holder, "unified_paint_settings", None)
+        if unified is not None:
+            unified.color = (0.0, 0.0, 0.0)
     if brush:
         brush.color = (0.0, 0.0, 0.0)
     x, y = on_screen(left, (0.0, -1.0, 1.0))

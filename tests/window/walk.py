@@ -137,8 +137,7 @@ def switches():
 def render_meanwhile():
     """F12 while the viewport turns, then while it rests, and Esc: the times between two steps of this script tell.
 
-    A viewport that is drawn while an engine renders on the GPU waits for the end of that render, and with it all of
-    Blender, with EEVEE as with Candela: so the pauses are measured with a viewport at rest.
+    With EEVEE, which holds a GPU context, all of Blender waits for the end of a render when a viewport is drawn.
     """
     scene = window().scene
     scene.render.resolution_percentage = 25

@@ -86,7 +86,7 @@ class ImageFlags:
 
 @dataclass(frozen=True)
 class Rows:
-    """A table out of a property, such as the stops of a colour ramp, as rows of `material_values.value`.
+    """A table out of a property, such as the stops of a colour ramp, as rows of `material_values`.
 
     Gives two int literals, the first row and the number of rows; their number is topology, their content is not.
     """
@@ -107,7 +107,7 @@ class Approximation:
     """What is drawn otherwise than Cycles would, while `socket` is linked or not at its harmless value."""
 
     socket: str
-    harmless: float
+    harmless: float | str  # "whole": any whole number
     sentence: str
     unless_linked: str = ""  # another socket that settles the matter
 

@@ -133,6 +133,24 @@ void material_image{k}_sky(vec3 direction, SurfacePoint point, float sun_is_lamp
 """
 
 
+# The lookup in the table of an IES Texture, made by materials/ies.py: by the angle from -Z, and around it.
+PROFILE_FUNCTIONS = """\
+void material_image{k}_profile(vec3 direction, float strength, out float share)
+{{
+  vec3 d = safe_normalize(direction);
+  ivec2 last = material_image{k}_size() - ivec2(1);
+  float turn = (d.x == 0.0 && d.y == 0.0) ? PI : atan(d.x, d.y) + PI;
+  vec2 at = clamp(vec2(turn / (2.0 * PI), acos(clamp(-d.z, -1.0, 1.0)) / PI), 0.0, 1.0) * vec2(last);
+  ivec2 texel = min(ivec2(at), last - ivec2(1));
+  vec2 part = at - vec2(texel);
+  float low = mix(material_image{k}_fetch(texel).r, material_image{k}_fetch(texel + ivec2(1, 0)).r, part.x);
+  texel.y += 1;
+  float high = mix(material_image{k}_fetch(texel).r, material_image{k}_fetch(texel + ivec2(1, 0)).r, part.x);
+  share = strength * mix(low, high, part.y);
+}}
+"""
+
+
 def part_functions(k: int, part: int, place: tuple[int, int, int, int]) -> str:
     """The functions of one part of sampler `k`, which lies at x, y and is so wide and high."""
     x, y, width, height = place
@@ -173,7 +191,12 @@ LOOKUP = (
 OUTPUTS = (("Color", "COLOR"), ("Alpha", "FLOAT"))
 SOURCE = "material/image.glsl"
 SKY_SOURCE = "material/sky.glsl"
-FUNCTIONS = {SOURCE: IMAGE_FUNCTIONS, SKY_SOURCE: SKY_FUNCTIONS}  # by the file that they call
+PROFILE_SOURCE = "material/profile.glsl"
+FUNCTIONS = {
+    SOURCE: IMAGE_FUNCTIONS,
+    SKY_SOURCE: SKY_FUNCTIONS,
+    PROFILE_SOURCE: PROFILE_FUNCTIONS,
+}  # by the file that they call
 
 ENTRIES = (
     Entry(
@@ -214,6 +237,17 @@ ENTRIES = (
         (Socket("Vector", "VECTOR", implicit="@GENERATED"), POINT, Setting("sun_is_lamp")),
         (("Color", "COLOR"),),
         SKY_SOURCE,
+        image=True,
+    ),
+    Entry(
+        "ShaderNodeTexIES",
+        "material_image{image}_profile",
+        (
+            Socket("Vector", "VECTOR", implicit="object_from_world_normal(point, point.incoming)"),
+            Socket("Strength", "FLOAT", 1.0),
+        ),
+        (("Fac", "FLOAT"),),
+        PROFILE_SOURCE,
         image=True,
     ),
 )

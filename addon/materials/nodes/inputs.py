@@ -23,6 +23,7 @@ LIGHT_PATH = (
 )
 # Light samples ask casters as shadow rays, the world as no ray of the camera; traced rays take a material's means.
 ONLY_TWO_RAYS = "Node trees are asked by camera and shadow rays alone; for other rays, materials count at their mean."
+NO_PARAMETRIC = "Where a point lies in its triangle is not known; Parametric is 0."
 
 
 def _matrix(rows) -> list[tuple[float, float, float, float]]:
@@ -130,7 +131,7 @@ ENTRIES = (
             ("Random Per Island", "FLOAT"),
         ),
         SURFACE,
-        output_approximations=(("Parametric", "Where a point lies in its triangle is not known; Parametric is 0."),),
+        output_approximations=(("Parametric", NO_PARAMETRIC),),
     ),
     Entry(
         "ShaderNodeObjectInfo",
@@ -160,6 +161,13 @@ ENTRIES = (
         tuple((name, "FLOAT") for name in LIGHT_PATH),
         SURFACE,
         output_approximations=tuple((name, ONLY_TWO_RAYS) for name in LIGHT_PATH[2:] if name != "Ray Length"),
+    ),
+    Entry(
+        "ShaderNodeLightFalloff",
+        "input_light_falloff",
+        (POINT, Socket("Strength", "FLOAT", 100.0), Socket("Smooth", "FLOAT", 0.0)),
+        (("Quadratic", "FLOAT"), ("Linear", "FLOAT"), ("Constant", "FLOAT")),
+        SURFACE,
     ),
     Entry(
         "ShaderNodeTangent",

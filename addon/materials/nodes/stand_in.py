@@ -48,22 +48,6 @@ ENTRIES = (
         note="Rays are not cast from materials; the node says that nothing is hit.",
     ),
     Entry(
-        "ShaderNodeTexIES",
-        "no_light_profile",
-        (Socket("Strength", "FLOAT", 1.0),),
-        _floats("Fac"),
-        SOURCE,
-        note="Light profiles are not read; the node gives its strength in all directions.",
-    ),
-    Entry(
-        "ShaderNodeLightFalloff",
-        "no_falloff",
-        (Socket("Strength", "FLOAT", 100.0),),
-        _floats("Quadratic", "Linear", "Constant"),
-        SOURCE,
-        note="All outputs give the strength; light falls off with the square of the distance.",
-    ),
-    Entry(
         "ShaderNodeParticleInfo",
         "no_particle",
         outputs=(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .entry import POINT, Attribute, Choice, Entry, Heights, Socket
+from .entry import POINT, Approximation, Attribute, Choice, Entry, Heights, Socket
 
 SOURCE = "material/vector.glsl"
 BUMP = "material/bump.glsl"
@@ -141,5 +141,25 @@ ENTRIES = (
         (("Vector", "VECTOR"),),
         "material/vector_transform.glsl",
         choices={"vector_type": ("VECTOR", "POINT", "NORMAL")},
+    ),
+    Entry(
+        "ShaderNodeRadialTiling",
+        "radial_tiling",
+        (
+            Socket("Vector", "VECTOR"),
+            Socket("Sides", "FLOAT", 5.0),
+            Choice("normalize", {True: "true", False: "false"}, missing="false"),
+        ),
+        (
+            ("Segment Coordinates", "VECTOR"),
+            ("Segment ID", "FLOAT"),
+            ("Segment Width", "FLOAT"),
+            ("Segment Rotation", "FLOAT"),
+        ),
+        SOURCE,
+        approximations=(
+            Approximation("Roundness", 0.0, "Corners are not rounded."),
+            Approximation("Sides", "whole", "A side that is not whole is drawn as part of a regular one."),
+        ),
     ),
 )

@@ -1,0 +1,56 @@
+// What AOV Output nodes of a material give at the surface that a pixel sees. As in Cycles a layer gives all of it, and
+// what lies behind follows where the layer is less opaque than the threshold and this sample passes it: LAYERS adds such
+// layers to what the first surface from the threshold on has drawn.
+// generated/aovs: AOV_NONE and AOV_WRITE set the outputs, from functions of generated/material.
+#include "lib/math.glsl"
+#include "lib/closure.glsl"
+#include "lib/instance.glsl"
+#include "generated/material"
+#include "surface/point.glsl"
+#ifdef MOTION
+#include "surface/motion.glsl"
+#endif
+// How far a camera's ray goes to a place from the near end of what is seen, where it begins.
+float aov_distance(vec3 position)
+{
+  vec3 away = position - film_view.eye.xyz;
+  float depth = -dot(away, film_view.backward.xyz);
+  return (film_view.eye.w > 0.5) ? depth - film_view.film.z : length(away) * (1.0 - film_view.film.z / depth);
+}
+
+#include "generated/aovs"
+
+void main()
+{
+  AOV_NONE
+  vec3 eye = film_view.eye.xyz;
+  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
+  Instance instance = instance_read(instance_flat.x);
+  SurfacePoint point = surface_point(incoming, instance);
+#ifdef OWN_SURFACE
+  if (!own_surface(point, instance)) {
+    discard;
+  }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+#endif
+  float depth = dot(eye - point.position, film_view.backward.xyz);
+  vec4 hit = surface_position_fetch(ivec2(gl_FragCoord.xy));
+  float hit_depth = dot(eye - hit.xyz, film_view.backward.xyz);
+  // Interpolated positions of one point differ by some units of the last place between two programs.
+  bool behind = hit.w != 0.0 && depth > hit_depth + 1e-6 * (abs(hit_depth) + length(hit.xyz - eye));
+  if (behind || depth < film_view.film.z || depth > film_view.film.w) {
+    discard;
+  }
+  point.refracts = true;
+#ifdef LAYERED
+  Closures c = closures_begin(point.normal, 0.5, 0.0);
+  evaluate_material(point, c);
+  closures_end(c);
+  bool thin = 1.0 - dot(c.transparency, vec3(1.0 / 3.0)) < alpha_threshold;
+  if (thin != (layers != 0)) {
+    discard;
+  }
+#endif
+  float surface = (layers != 0) ? 0.0 : 1.0;  // passes of surfaces show no thin layers
+  AOV_WRITE
+}

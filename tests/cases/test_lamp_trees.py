@@ -1,0 +1,196 @@
+"""Node trees of lamps: gobos, light profiles, falloffs, for every kind of lamp, beside Cycles."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.compare.metrics import relative_squared_error
+
+from .conftest import agree
+
+PROFILE = """IESNA:LM-63-1995
+TILT=NONE
+1 1000 1 7 3 1 1 0.1 0.1 0.1
+1 1 100
+0 15 30 45 60 75 90
+0 45 90
+1000 900 600 400 200 50 0
+1000 800 500 700 100 20 0
+1000 700 900 100 300 60 0
+"""
+ROUND = """IESNA91
+TILT=NONE
+1 -1 2 5 1 1 2 0 0 0
+1 1 100
+0 45 90 135 180
+0
+100 200 300 400 50
+"""
+
+
+@pytest.fixture
+def lamp(stage):
+    """A function that makes a lamp above a floor, and gives its tree and a function that adds a node linked to it."""
+
+    def make(kind, location=(0.4, -0.3, 1.5), turn=(0.4, 0.2, 0.7), scale=(1, 1, 1), **settings):
+        stage.scene.render.filter_size = 1.5
+        stage.floor()
+        stage.camera_above()
+        light = stage.light(kind, location, turn, scale, **settings).data
+        if bpy.app.version < (5, 2):
+            light.use_nodes = True
+        tree = light.node_tree
+        return tree, next(node for node in tree.nodes if node.type == "EMISSION")
+
+    return make
+
+
+def chain(tree, emission, socket, *nodes):
+    """Nodes one behind the other, the last one into the emission: (type, output, input of the next, settings)."""
+    before = None
+    for kind, output, into, settings in nodes:
+        made = tree.nodes.new(kind)
+        for name, value in settings.items():
+            if name in made.inputs:
+                made.inputs[name].default_value = value
+            else:
+                setattr(made, name, value)
+        if before is not None:
+            tree.links.new(before, made.inputs[into])
+        before = made.outputs[output]
+    tree.links.new(before, emission.inputs[socket])
+
+
+def same(own, cycles, most=0.01):
+    own, cycles = own["combined"][..., :3], cycles["combined"][..., :3]
+    assert cycles.max() > 0.01
+    error = relative_squared_error(own, cycles).mean()
+    assert error <= most, f"relMSE {error:.4f}"
+    agree(own.mean((0, 1)), cycles.mean((0, 1)))
+
+
+CHECKER = ("ShaderNodeTexChecker", "Color", "Vector", {"Scale": 6.0})
+FEW = ("ShaderNodeTexChecker", "Color", "Vector", {"Scale": 2.0})
+
+
+@pytest.mark.parametrize(("kind", "output", "pattern", "settings"), [
+    ("POINT", "Normal", CHECKER, {"shadow_soft_size": 0.0}),
+    ("POINT", "Normal", CHECKER, {"shadow_soft_size": 0.2}),
+    ("POINT", "Normal", CHECKER, {"shadow_soft_size": 0.2, "use_soft_falloff": False}),
+    ("POINT", "UV", CHECKER, {"shadow_soft_size": 0.05}),
+    ("SPOT", "Normal", CHECKER, {"shadow_soft_size": 0.0, "spot_size": 1.2}),
+    ("SPOT", "UV", CHECKER, {"shadow_soft_size": 0.02, "spot_size": 1.2, "spot_blend": 0.3}),
+    ("SPOT", "Normal", CHECKER, {"shadow_soft_size": 0.02, "spot_size": 1.2, "scale": (1.6, 0.7, 1)}),
+    ("SUN", "Normal", CHECKER, {"angle": 0.2}),
+    ("SUN", "Generated", FEW, {"angle": 0.0}),
+    ("AREA", "UV", FEW, {"size": 1.5, "location": (0, 0, 0.5), "turn": (0, 0, 0.3)}),
+    ("AREA", "Generated", FEW, {"size": 1.5, "shape": "DISK", "location": (0, 0, 0.5), "turn": (0, 0, 0.3)}),
+])  # fmt: skip
+def test_gobo(lamp, beside, kind, output, pattern, settings):
+    tree, emission = lamp(kind, **settings)
+    chain(tree, emission, "Color", ("ShaderNodeTexCoord", output, "", {}), pattern)
+    same(*beside(64, (48, 48), 0, 256))
+
+
+def test_light_by_the_angle_at_which_it_leaves_an_area(lamp, beside):
+    tree, emission = lamp("AREA", (0, 0, 0.8), (0, 0, 0), size=1.0)
+    absolute = ("ShaderNodeVectorMath", "Vector", 0, {"operation": "ABSOLUTE"})
+    chain(tree, emission, "Color", ("ShaderNodeNewGeometry", "Incoming", "", {}), absolute)
+    same(*beside(32, (32, 32), 0, 128))
+
+
+@pytest.mark.parametrize(("kind", "output", "smooth"), [
+    ("POINT", "Quadratic", 1.0), ("POINT", "Linear", 0.0), ("POINT", "Constant", 0.0), ("SPOT", "Linear", 0.5),
+    ("SUN", "Constant", 1.0), ("AREA", "Constant", 0.0),
+])  # fmt: skip
+def test_falloff(lamp, beside, kind, output, smooth):
+    tree, emission = lamp(kind)
+    chain(tree, emission, "Strength", ("ShaderNodeLightFalloff", output, "", {"Strength": 0.5, "Smooth": smooth}))
+    same(*beside(16, (32, 32), 0, 64))
+
+
+def test_falloff_of_a_gobo_in_reflected_light(stage, lamp, beside):
+    tree, emission = lamp("POINT", shadow_soft_size=0.1)
+    chain(tree, emission, "Strength", ("ShaderNodeLightFalloff", "Linear", "", {"Strength": 0.5}))
+    chain(tree, emission, "Color", ("ShaderNodeTexCoord", "Normal", "", {}), CHECKER)
+    ceiling = stage.rectangle((-2, -2), (2, 2), 2.0, material=stage.diffuse(0.8))
+    ceiling.visible_camera = False
+    same(*beside(64, (48, 48), 3, 256))
+
+
+@pytest.mark.parametrize("output", ["Ray Length", "Ray Depth"])
+def test_light_path(lamp, beside, output):
+    tree, emission = lamp("POINT")
+    half = ("ShaderNodeMath", 0, 0, {"operation": "MULTIPLY"})
+    chain(tree, emission, "Strength", ("ShaderNodeLightPath", output, "", {}), half)
+    same(*beside(8, (16, 16), 0, 64))
+
+
+@pytest.mark.parametrize("output", ["Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray"])
+def test_rays_to_lamps_are_of_no_kind(lamp, beside, output):
+    tree, emission = lamp("POINT")
+    chain(tree, emission, "Strength", ("ShaderNodeLightPath", output, "", {}))
+    own, cycles = beside(2, (8, 8), 0, 4)
+    assert not own["combined"][..., :3].any() and not cycles["combined"][..., :3].any()
+
+
+@pytest.mark.parametrize(("kind", "text", "settings"), [
+    ("POINT", PROFILE, {"shadow_soft_size": 0.0}), ("POINT", ROUND, {"shadow_soft_size": 0.1}),
+    ("SPOT", PROFILE, {"spot_size": 2.5, "shadow_soft_size": 0.0}), ("AREA", PROFILE, {"size": 0.5}),
+    ("POINT", "no profile", {}), ("POINT", "", {}),
+])  # fmt: skip
+@pytest.mark.parametrize("file", [False, True])
+def test_light_profile(lamp, beside, tmp_path, kind, text, settings, file):
+    tree, emission = lamp(kind, **settings)
+    if file:
+        path = tmp_path / "profile.ies"
+        path.write_text(text)
+        chosen = {"mode": "EXTERNAL", "filepath": str(path)}
+    else:
+        block = bpy.data.texts.new("profile")
+        block.write(text)
+        chosen = {"mode": "INTERNAL", "ies": block}
+    chain(tree, emission, "Strength", ("ShaderNodeTexIES", 0, "", {**chosen, "Strength": 0.5}))
+    same(*beside(16, (32, 32), 0, 64))
+
+
+def test_a_lamp_that_is_seen_in_a_mirror_shows_its_tree(stage, beside):
+    stage.camera_above()
+    stage.rectangle((-2, -2), (2, 2), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.05))
+    light = stage.light("AREA", (0, 0, 12), size=3.0, energy=300.0).data
+    if bpy.app.version < (5, 2):
+        light.use_nodes = True
+    emission = next(node for node in light.node_tree.nodes if node.type == "EMISSION")
+    chain(light.node_tree, emission, "Color", ("ShaderNodeTexCoord", "UV", "", {}), FEW)
+    own, cycles = beside(32, (24, 24), 0, 256)
+    agree(own["combined"][2:10, 2:10, :3].mean((0, 1)), cycles["combined"][2:10, 2:10, :3].mean((0, 1)), 0.06)
+    same(own, cycles, 0.03)
+
+
+def test_a_moved_lamp_and_a_new_image_are_seen(stage, lamp):
+    tree, emission = lamp("POINT", shadow_soft_size=0.0)
+    chain(tree, emission, "Color", ("ShaderNodeTexCoord", "Normal", "", {}), CHECKER)
+    first = stage.render(2)["combined"]
+    maps = stage.renderer.frame.lamp_maps
+    changes = maps.changes
+    assert np.array_equal(stage.render(2)["combined"], first) and maps.changes == changes
+    stage.scene.objects["POINT"].rotation_euler.x += 0.3
+    assert not np.array_equal(stage.render(2)["combined"], first)
+    tree.nodes["Checker Texture"].inputs["Scale"].default_value = 3.0
+    changes = maps.changes
+    stage.render(2)
+    assert maps.changes == changes + 1
+
+
+def test_plain_lamps_have_no_maps(stage, lamp):
+    tree, emission = lamp("POINT")
+    emission.inputs["Color"].default_value = (1.0, 0.5, 0.2, 1.0)
+    stage.render()
+    maps = stage.renderer.frame.lamp_maps
+    changes = maps.changes
+    emission.inputs["Strength"].default_value = 2.0
+    stage.render()
+    assert maps.image is None and maps.changes == changes
+    chain(tree, emission, "Color", ("ShaderNodeBlackbody", 0, "", {}), ("ShaderNodeGamma", 0, "Color", {"Gamma": 2.0}))
+    stage.render()
+    assert stage.renderer.frame.lamp_maps.image is None  # run once, and the same all around
