@@ -9,7 +9,8 @@
 #ifdef SHARED_VALUES
 #include "hits/shared.glsl"
 
-int material_base;  // where the values of the material begin that is met here
+// Where the values of the material begin that is met here: an expression, since Metal has no globals.
+#define MET_MATERIAL_BASE shared_base(int(hit_material_fetch(ivec2(gl_FragCoord.xy)).r + 0.5))
 #endif
 #include "generated/material"
 #include "hits/point.glsl"
@@ -24,9 +25,6 @@ int material_base;  // where the values of the material begin that is met here
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-#ifdef SHARED_VALUES
-  material_base = shared_base(int(hit_material_fetch(pixel).r + 0.5));
-#endif
   int id = int(hit_triangle_fetch(pixel).x);
   SurfacePoint point = hit_point(pixel, instance_read(id), id);
   point.refracts = glass_bends != 0;
