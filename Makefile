@@ -41,9 +41,13 @@ test-fast: environment ## the tests that take seconds
 	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing and not slow"
 	$(PYTHON) -m pytest -m "timing and not slow"
 
-test-vulkan: ## tests of what drivers do differently, with Blender 5.3 on Vulkan
+test-vulkan: ## tests of what drivers do differently, with Blender 5.3 on Vulkan, and a picture of both backends compared
 	@$(PYTHON3) tools/environment.py --blender 5.3
+	@$(PYTHON3) tools/environment.py --blender 5.2
 	CANDELA_BACKEND=VULKAN .venv-5.3/bin/python -m pytest $(PARALLEL) -m "not window and not timing and not slow" $(VULKAN_TESTS)
+	mkdir -p build
+	.venv/bin/python -m bench hashes write build/opengl.npz --only "cornell_box, 4"
+	.venv-5.3/bin/python -m bench hashes compare build/opengl.npz --only "cornell_box, 4" --within 0.02
 
 check: environment ## format, lint, every shader compiled, fast tests
 	$(PYTHON) -m ruff format --check --quiet .

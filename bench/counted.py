@@ -1,4 +1,8 @@
-"""What a piece of work asks of the GPU, counted, and Python's own time in it: figures that need no GPU to be true.
+"""What a picture asks of the GPU, and Python's own time in it, counted: `python -m bench counted`, which needs no GPU.
+
+Of each scene, at 16x12 pixels and one sample after a move of the camera: readbacks, draws, dispatches, uploads,
+framebuffers, and the functions that take the longest themselves. Of several pictures each function's least time counts,
+so that what else the machine does adds little.
 
 Calls into Blender's GPU module are counted by Python's profiler, framebuffers where `gfx` makes them. Own time is what
 the add-on's functions take themselves, without what they call in numpy, Blender and the driver.
@@ -6,10 +10,11 @@ the add-on's functions take themselves, without what they call in numpy, Blender
 
 from __future__ import annotations
 
+import argparse
 import cProfile
 import pstats
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 DRAWS = ("draw", "draw_instanced", "draw_range")
 
@@ -29,6 +34,25 @@ class Counts:
 
 def counted(work: Callable[[], object]) -> Counts:
     """Run `work` under the profiler and count."""
+    stats, framebuffers = _profiled(work)
+    return of_stats(stats, framebuffers)
+
+
+def counted_often(work: Callable[[], object], times: int) -> tuple[Counts, list[tuple[float, int, str]]]:
+    """The same of the last of several runs, with the least time of each function among them; and the add-on's functions
+    as (milliseconds, calls, name), those first that take the longest."""
+    least: dict[tuple, float] = {}
+    for _ in range(times):
+        stats, framebuffers = _profiled(work)
+        for function, (_, _, own, *_) in stats.items():
+            least[function] = min(own, least.get(function, own))
+    found = {function: (row[0], row[1], least[function], *row[3:]) for function, row in stats.items()}
+    rows = [(1000 * row[2], row[1], _name(function)) for function, row in found.items() if _is_own(function)]
+    return of_stats(found, framebuffers), sorted(rows, reverse=True)
+
+
+def _profiled(work: Callable[[], object]) -> tuple[dict, int]:
+    """pstats' rows of a run, and how many framebuffers it made."""
     from addon.gfx import images
 
     made = [0]
@@ -41,18 +65,25 @@ def counted(work: Callable[[], object]) -> Counts:
     finally:
         profiler.disable()
         images.gpu = original
-    return of_stats(pstats.Stats(profiler).stats, made[0])
+    return pstats.Stats(profiler).stats, made[0]
+
+
+def _is_own(function: tuple[str, int, str]) -> bool:
+    return "/addon/" in function[0].replace("\\", "/")
+
+
+def _name(function: tuple[str, int, str]) -> str:
+    file, _, name = function
+    return f"{file.replace(chr(92), '/').rpartition('/addon/')[2]}:{name}" if _is_own(function) else name
 
 
 def of_stats(stats: dict, framebuffers: int) -> Counts:
     """The same from pstats' rows."""
     calls: dict[str, int] = {}
     own = 0.0
-    for (file, _, name), (_, count, seconds, *_) in stats.items():
-        path = file.replace("\\", "/")
-        if "/addon/" in path:
-            own += seconds
-            name = f"{path.rpartition('/addon/')[2]}:{name}"
+    for function, (_, count, seconds, *_) in stats.items():
+        own += seconds if _is_own(function) else 0.0
+        name = _name(function)
         calls[name] = calls.get(name, 0) + count
 
     def gpu_calls(kind: str, method: str) -> int:
@@ -82,3 +113,45 @@ class _Watched:
         if name == "GPUFrameBuffer":
             self._made[0] += 1
         return getattr(self._module, name)
+
+
+# ------------------------------------------------------------------------------------------------------------- command
+
+
+COUNTED = ("cornell_box", "window_interior", "soft_shadow_garden", "instances")
+SIZE = (16, 12)
+PICTURES, BEFORE = 8, 4  # that are profiled, and drawn before
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenes", nargs="*", default=list(COUNTED), metavar="SCENE", help="of sample_blends")
+    parser.add_argument("--top", type=int, default=0, metavar="N", help="list the N functions that take the longest")
+
+
+def command(options: argparse.Namespace) -> int:
+    import bpy
+
+    import addon
+    from addon.cli.terminal import quiet
+    from bench.cells import SCENES
+
+    addon.register()
+    with quiet() as terminal:
+        for name in options.scenes:
+            bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
+            scene = bpy.context.scene
+            scene.render.engine, scene.candela.samples = "CANDELA", 1
+            scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = *SIZE, 100
+
+            def moved(scene=scene) -> None:
+                scene.camera.location.x += 1e-3
+                bpy.ops.render.render(scene=scene.name)
+
+            for _ in range(BEFORE):
+                moved()
+            counts, functions = counted_often(moved, PICTURES)
+            figures = ", ".join(f"{field.name} {getattr(counts, field.name)}" for field in fields(Counts)[:-1])
+            print(f"{name}: {figures}; Python's own {counts.own_ms:.1f} ms", file=terminal, flush=True)
+            for milliseconds, calls, function in functions[: options.top]:
+                print(f"  {milliseconds:7.2f} ms {calls:6}  {function}", file=terminal, flush=True)
+    return 0

@@ -1,6 +1,7 @@
 """Hashes of pictures, to show that a change of the code changes none: `python -m bench hashes write FILE`.
 
-After the change: `python -m bench hashes compare FILE`.
+After the change: `python -m bench hashes compare FILE`. Pictures of two drivers differ in the last digits, and in what
+depends on those: `--within` sets how far the combined picture may be off.
 
 The sample scenes at 64 x 48 pixels with four samples and with one, every technique of every slot, and viewport drafts.
 A picture is hashed with all its light paths. Pictures of one driver and one Blender are equal to the bit when the code
@@ -31,6 +32,10 @@ def add_options(parser) -> None:
     parser.add_argument("verb", choices=("write", "compare"))
     parser.add_argument("file", type=Path, help="the archive of pictures, .npz")
     parser.add_argument("--only", default="", help="pictures whose name holds this")
+    parser.add_argument(
+        "--within", type=float, default=0.0, metavar="SHARE",
+        help="compare: pictures count as equal if the root mean square of the difference is at most that of the mean",
+    )  # fmt: skip
 
 
 def command(options) -> int:
@@ -44,6 +49,8 @@ def command(options) -> int:
             print(f"{name:<52} new {digest(pixels)}", flush=True)
         elif digest(known[name]) == digest(pixels):
             print(f"{name:<52} equal {digest(pixels)}", flush=True)
+        elif options.within and apart(known[name], pixels) <= options.within:
+            print(f"{name:<52} within {apart(known[name], pixels):.3g}", flush=True)
         else:
             changed += 1
             print(f"{name:<52} DIFFERS {difference(known[name], pixels)}", flush=True)
@@ -56,12 +63,18 @@ def digest(pixels: np.ndarray) -> str:
     return hashlib.blake2b(repr(pixels.shape).encode() + pixels.tobytes(), digest_size=8).hexdigest()
 
 
+def apart(before: np.ndarray, after: np.ndarray) -> float:
+    """Root mean square difference of two combined pictures, the first three channels, by the mean of the first."""
+    one, other = (picture[..., :3].astype(np.float64) for picture in (before, after))
+    return float(np.sqrt(np.square(one - other).mean()) / max(np.abs(one).mean(), 1e-30))
+
+
 def difference(before: np.ndarray, after: np.ndarray) -> str:
     """The largest difference of two pictures relative to their mean, as a sentence."""
     if before.shape != after.shape:
         return f"in shape: {before.shape} and {after.shape}"
-    apart = np.abs(before.astype(np.float64) - after)
-    return f"by at most {apart.max() / max(np.abs(before).mean(), 1e-30):.3g} of the mean"
+    most = np.abs(before.astype(np.float64) - after).max() / max(np.abs(before).mean(), 1e-30)
+    return f"by at most {most:.3g} of the mean, RMS of the combined picture {apart(before, after):.3g}"
 
 
 def pictures(only: str = "") -> Iterator[tuple[str, np.ndarray]]:

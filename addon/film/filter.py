@@ -29,7 +29,7 @@ Bias: none. Wider and very narrow filters (below half a pixel) have own points o
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -60,6 +60,14 @@ def taps(place: float, width: float) -> tuple[int, np.ndarray]:
     return pixel, weights / weights.sum()
 
 
+@lru_cache(maxsize=4096)
+def _constants_of(place: float, width: float) -> tuple[int, tuple[float, ...], float]:
+    """The pixel of `taps`, the first four of five weights, and the last."""
+    pixel, weights = taps(place, width)
+    padded = [*weights.tolist(), *[0.0] * (2 * FARTHEST + 1 - len(weights))]
+    return pixel, tuple(padded[:4]), padded[4]
+
+
 # What media let pass of an image on its way to the eye: nothing is lost of it, colours are, and of the image that holds
 # the world what media hide counts as covered.
 CLEAR, DIMMED, COVERED = range(3)
@@ -78,11 +86,10 @@ CONSTANTS = (
 
 def place_constants(frame: Frame, place: tuple[float, float], share: float) -> dict:
     """Values of CONSTANTS for one point of the film, which counts `share` and lies at `place` of every pixel."""
-    (x, across), (y, up) = (taps(one, frame.snapshot.film.filter_width) for one in place)
-    across, up = (np.append(weights, np.zeros(2 * FARTHEST + 1 - len(weights))) for weights in (across, up))
+    (x, *across), (y, *up) = (_constants_of(one, frame.snapshot.film.filter_width) for one in place)
     return {
-        "film_share": share, "film_pixel": (x, y), "weights_x": tuple(across[:4]), "weights_y": tuple(up[:4]),
-        "last_weights": (across[4], up[4]),
+        "film_share": share, "film_pixel": (x, y), "weights_x": across[0], "weights_y": up[0],
+        "last_weights": (across[1], up[1]),
     }  # fmt: skip
 
 

@@ -698,7 +698,7 @@ class Renderer:
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
             tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
-            tuple((one.key, one.own) for one in (*snapshot.instances, *snapshot.materials) if one.own),
+            snapshot.own_values,
             snapshot.motion and snapshot.motion.key,
         )  # fmt: skip
 

@@ -143,26 +143,29 @@ class _Framebuffers:
     """Framebuffers of a GPU context by the images that they hold. They go with any of those."""
 
     def __init__(self):
-        self._of: WeakKeyDictionary[Image, dict[tuple, gpu.types.GPUFrameBuffer]] = WeakKeyDictionary()
+        # By first image, then by the numbers of all: the framebuffer, and what tells whether one of them is gone.
+        self._of: WeakKeyDictionary[Image, dict[tuple, tuple[gpu.types.GPUFrameBuffer, list]]] = WeakKeyDictionary()
 
     def over(self, colors: tuple[Image, ...], depth: Image | None) -> gpu.types.GPUFrameBuffer:
         """The framebuffer of these images, made when first asked for."""
         global framebuffer_count
-        key = (*map(ref, colors), depth and ref(depth))
-        own = self._of.setdefault(colors[0] if colors else depth, {})
+        key = (*[image.number for image in colors], -1 if depth is None else -2 - depth.number)
+        own = self._of.get(colors[0] if colors else depth)
+        if own is None:
+            own = self._of[colors[0] if colors else depth] = {}
         found = own.pop(key, None)
         if found is None:
-            for gone in [known for known in own if any(one is not None and one() is None for one in known)]:
+            for gone in [known for known, (_, held) in own.items() if any(one() is None for one in held)]:
                 del own[gone]
             while len(own) >= MOST_FRAMEBUFFERS:
                 del own[next(iter(own))]
             slots = {"color_slots": [image.texture for image in colors]} if colors else {}
             if depth is not None:
                 slots["depth_slot"] = depth.texture
-            found = gpu.types.GPUFrameBuffer(**slots)
+            found = gpu.types.GPUFrameBuffer(**slots), [ref(one) for one in (*colors, depth) if one is not None]
             framebuffer_count += 1
         own[key] = found
-        return found
+        return found[0]
 
 
 # A framebuffer works in one GPU context only and must end before it. Images, programs and buffers are shared by all
@@ -264,6 +267,8 @@ class Pool:
 
     def _free_before(self, picture: int) -> None:
         for key, stock in list(self._free.items()):
+            if all(one[2] >= picture for one in stock):
+                continue
             self.allocated_bytes -= sum(image.bytes for _, image, given in stock if given < picture)
             self._free[key] = [one for one in stock if one[2] >= picture]
             heapq.heapify(self._free[key])

@@ -141,61 +141,79 @@ class Shader:
         self.program = program
         self.handle = _compile(program)
         self.used = 0  # the last picture that asked for it
-        self._constants = {name: kind for kind, name in program.constants}
-        self._textures = {name for _, name in program.textures}
-        self._images = {name for name, *_ in program.images}
-        self._loaded = set(program.loaded)
-        self._blocks = {name for _, name in program.blocks}
+        handle, loaded = self.handle, program.loaded
+        # By kind and name, how each is set; one that the driver dropped is not set again.
+        self._textures = {
+            name: handle.image if name in loaded else handle.uniform_sampler for _, name in program.textures
+        }
+        self._images = {name: handle.image for name, *_ in program.images}
+        self._blocks = {name: handle.uniform_block for _, name in program.blocks}
+        self._constants = {name: _constant_setter(handle, kind) for kind, name in program.constants}
+        self._count = len(self._textures) + len(self._images) + len(self._blocks) + len(self._constants)
 
     def bind(self, textures=None, images=None, blocks=None, constants=None) -> None:
         """Bind the shader and all its resources. Values: gfx Images, gfx Blocks, numbers or arrays."""
         textures, images, blocks, constants = textures or {}, images or {}, blocks or {}, constants or {}
-        self._check("texture", self._textures, textures)
-        self._check("image", self._images, images)
-        self._check("block", self._blocks, blocks)
-        self._check("constant", self._constants.keys(), constants)
-        shader = self.handle
-        shader.bind()
-        for name, block in blocks.items():
-            _set(shader.uniform_block, name, block.buffer)
-        for name, image in textures.items():
-            _set(shader.image if name in self._loaded else shader.uniform_sampler, name, image.texture)
-        for name, image in images.items():
-            _set(shader.image, name, image.texture)
-        for name, value in constants.items():
-            self.set_constant(name, value)
+        if len(textures) + len(images) + len(blocks) + len(constants) != self._count:
+            self._refuse(textures, images, blocks, constants)
+        self.handle.bind()
+        try:
+            for name, block in blocks.items():
+                self._blocks[name](name, block.buffer)
+            for name, image in textures.items():
+                self._textures[name](name, image.texture)
+            for name, image in images.items():
+                self._images[name](name, image.texture)
+            for name, value in constants.items():
+                self._constants[name](name, value)
+        except KeyError:
+            self._refuse(textures, images, blocks, constants)
+            raise
+        except ValueError:  # some are not used, which `change` finds out
+            self.change(textures, blocks, constants)
+            _set_all(self._images, [(name, image.texture) for name, image in images.items()])
 
     def change(self, textures=None, blocks=None, constants=None) -> None:
         """Bind some of what `bind` has bound anew, between draws."""
-        for name, block in (blocks or {}).items():
-            _set(self.handle.uniform_block, name, block.buffer)
-        for name, image in (textures or {}).items():
-            setter = self.handle.image if name in self._loaded else self.handle.uniform_sampler
-            _set(setter, name, image.texture)
-        for name, value in (constants or {}).items():
-            self.set_constant(name, value)
+        if blocks:
+            _set_all(self._blocks, [(name, block.buffer) for name, block in blocks.items()])
+        if textures:
+            _set_all(self._textures, [(name, image.texture) for name, image in textures.items()])
+        if constants:
+            _set_all(self._constants, constants.items())
 
     def set_constant(self, name: str, value) -> None:
         """Set one push constant between draws."""
-        kind = self._constants[name]
-        if kind in ("INT", "IVEC2", "IVEC4"):
-            _set(self.handle.uniform_int, name, value)
-        elif kind == "BOOL":
-            _set(self.handle.uniform_bool, name, bool(value))
-        else:
-            _set(self.handle.uniform_float, name, value)
+        _set_all(self._constants, ((name, value),))
 
-    def _check(self, what: str, declared, given: dict) -> None:
-        wrong = sorted(set(declared) ^ set(given))
-        if wrong:
-            raise ShaderError(f"Program {self.program.name}: {what} {', '.join(wrong)} is missing or not declared.")
+    def _refuse(self, *given: dict) -> None:
+        """ShaderError that says which names are missing or too many."""
+        declared = (self._textures, self._images, self._blocks, self._constants)
+        for what, names, found in zip(("texture", "image", "block", "constant"), declared, given):
+            wrong = sorted(names.keys() ^ found.keys())
+            if wrong:
+                raise ShaderError(f"Program {self.program.name}: {what} {', '.join(wrong)} is missing or not declared.")
 
 
-def _set(setter, name: str, value) -> None:
-    try:
-        setter(name, value)
-    except ValueError:
-        pass  # Declared but unused: the driver dropped it, which is no fault of the caller.
+def _constant_setter(handle, kind: str):
+    if kind in ("INT", "IVEC2", "IVEC4"):
+        return handle.uniform_int
+    if kind == "BOOL":
+        return lambda name, value: handle.uniform_bool(name, bool(value))
+    return handle.uniform_float
+
+
+def _set_all(setters: dict, values) -> None:
+    for name, value in values:
+        try:
+            setters[name](name, value)
+        except ValueError:
+            # Declared but unused: the driver dropped it, which is no fault of the caller.
+            setters[name] = _leave
+
+
+def _leave(_name: str, _value) -> None:
+    pass
 
 
 MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120

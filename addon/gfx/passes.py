@@ -118,6 +118,15 @@ def _for_images(program: Program, bindings: dict) -> Shader:
     """The shader of a program, with what the images that it reads define and bring along, if it has room for that."""
     read = bindings.get("textures") or {}
     bound = (*read.values(), *(bindings.get("blocks") or {}).values())
+    for one in bound:
+        if one.beside:
+            break
+    else:
+        for image in read.values():
+            if image.defines:
+                break
+        else:
+            return get(program)
     beside = {name: image for one in bound for name, image in one.beside.items() if name not in read}
     if len(program.textures) + len(beside) > MOST_TEXTURES:
         beside = {}
@@ -136,28 +145,44 @@ def _with_images(program: Program, defines: tuple[tuple[str, str], ...], beside:
     return replace(program, defines=(*program.defines, *defines, *there), textures=textures)
 
 
-@contextmanager
-def _state(target: Target, viewport=None, blend="NONE", depth_test="NONE", depth_write=False, cull="NONE", rows=None):
-    with target.framebuffer.bind():
+class _state:
+    """What is set around draws into a target, and afterwards set back. A class, since it is entered for each pass."""
+
+    __slots__ = ("_blend", "_bound", "_cull", "_depth_test", "_depth_write", "_rows", "_target", "_viewport")
+
+    def __init__(
+        self, target: Target, viewport=None, blend="NONE", depth_test="NONE", depth_write=False, cull="NONE", rows=None
+    ):
+        self._target, self._viewport, self._blend, self._depth_test = target, viewport, blend, depth_test
+        self._depth_write, self._cull, self._rows = depth_write, cull, rows
+
+    def __enter__(self) -> None:
+        state, target = gpu.state, self._target
+        self._bound = target.framebuffer.bind()
+        self._bound.__enter__()
         # Of the bound framebuffer. GPUFrameBuffer.viewport_set says the same but takes no arguments before Blender 5.2.
-        gpu.state.viewport_set(*(viewport or (0, 0, *target.size)))
-        gpu.state.blend_set(blend)
-        gpu.state.depth_test_set(depth_test)
-        gpu.state.depth_mask_set(depth_write)
-        gpu.state.face_culling_set(cull)
-        gpu.state.color_mask_set(True, True, True, True)
-        if rows:
-            gpu.state.scissor_test_set(True)
-            gpu.state.scissor_set(0, rows[0], target.size[0], rows[1] - rows[0])
-        try:
-            yield
-        finally:
-            if rows:
-                gpu.state.scissor_test_set(False)
-            gpu.state.blend_set("NONE")
-            gpu.state.depth_test_set("NONE")
-            gpu.state.depth_mask_set(False)
-            gpu.state.face_culling_set("NONE")
+        state.viewport_set(*(self._viewport or (0, 0, *target.size)))
+        state.blend_set(self._blend)
+        state.depth_test_set(self._depth_test)
+        state.depth_mask_set(self._depth_write)
+        state.face_culling_set(self._cull)
+        state.color_mask_set(True, True, True, True)
+        if self._rows:
+            state.scissor_test_set(True)
+            state.scissor_set(0, self._rows[0], target.size[0], self._rows[1] - self._rows[0])
+
+    def __exit__(self, *raised):
+        state = gpu.state
+        if self._rows:
+            state.scissor_test_set(False)
+        if self._blend != "NONE":
+            state.blend_set("NONE")
+        if self._depth_test != "NONE" or self._depth_write:
+            state.depth_test_set("NONE")
+            state.depth_mask_set(False)
+        if self._cull != "NONE":
+            state.face_culling_set("NONE")
+        self._bound.__exit__(*raised)
 
 
 def _fullscreen_batch() -> gpu.types.GPUBatch:

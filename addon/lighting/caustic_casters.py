@@ -76,7 +76,7 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
     """The casters, or, as a sentence, why there are none."""
     film = snapshot.film
     glass, mirrors = set(), {}
-    for number in {slot for instance in snapshot.instances for slot in instance.materials}:
+    for number in snapshot.used_materials:
         graph = snapshot.materials[number].graph
         if may_refract(graph):
             glass.add(number)

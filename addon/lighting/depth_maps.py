@@ -9,14 +9,16 @@ Every view is shifted and turned at random each sample, so that texel edges aver
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..gfx import images, passes
+from ..gfx.geometry import Batch
 from ..gfx.library import Program, Shader
 from ..scene.casters import Clusters
-from ..scene.culling import CORNERS, Boxes, calls
+from ..scene.culling import CORNERS, Boxes, calls, joined
 from ..scene.geometry import Draw, SceneGeometry
 from ..scene.projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES, ROWS
 from ..scene.receivers import Receivers
@@ -120,37 +122,37 @@ def point_views(
             far = float(depth[_that_meet(tangents, low, high)].max())
             views.append(_perspective(position, u, v, forward, low, high, geometry.size, far))
         return views
-    views = []
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
-    for face_forward, face_u, face_v in (
+    faces = np.array((
         (forward, u, v), (u, v, forward), (-u, v, -forward), (v, forward, u), (-v, forward, -u), (-forward, u, -v),
-    ):  # fmt: skip
-        # A box meets the face's pyramid if its sphere lies on the inner side of all four planes.
-        inside = np.ones(len(centre), bool)
-        for side in (face_u, -face_u, face_v, -face_v):
-            inside &= (centre @ (face_forward - side)) > -np.sqrt(2.0) * radius
-        if axis is not None and face_forward is not forward and not (offsets[inside] @ axis > 0).any():
-            continue
-        if inside.any():
-            size = max(resolution // 2, 1)
-            slack = 2.0 / size  # faces overlap by more than their jitter
-            low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
-            shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
-            far = (offsets[inside] @ face_forward).max()
-            views.append(
-                _perspective(position, face_u, face_v, face_forward, low + shift, high + shift, geometry.size, far, 2)
-            )
-    return views
+    ))  # fmt: skip
+    # A box meets the face's pyramid if its sphere lies on the inner side of all four planes.
+    along, beside = centre @ faces[:, 0].T, np.abs(centre @ faces[:, 1:].reshape(12, 3).T).reshape(-1, 6, 2)
+    inside = along - beside.max(axis=2) > (-np.sqrt(2.0) * radius)[:, None]
+    met = inside.any(axis=0)
+    if axis is not None:  # beside the first face, what lies behind the light is not lit
+        lit = (offsets @ axis > 0).any(axis=1)
+        met[1:] &= inside[lit, 1:].any(axis=0)
+    far = np.where(inside, (offsets @ faces[:, 0].T).max(axis=1), -np.inf).max(axis=0)
+    size = max(resolution // 2, 1)
+    slack = 2.0 / size  # faces overlap by more than their jitter
+    low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
+    shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
+    low, high = low + shift, high + shift
+    return [
+        _perspective(position, *faces[k, 1:], faces[k, 0], low, high, geometry.size, far[k], 2)
+        for k in np.flatnonzero(met)
+    ]
 
 
 def _perspective(position, u, v, forward, low, high, size, far, scale=1) -> MapView:
     near = 1e-4 * min(size, max(float(far), 1e-6 * size))  # what is seen may be small in a scene with a far background
-    row_w = np.append(forward, -forward @ position)
-    x, y = np.append(u, -u @ position), np.append(v, -v @ position)
-    row_x = (2 * x - (low[0] + high[0]) * row_w) / (high[0] - low[0])
-    row_y = (2 * y - (low[1] + high[1]) * row_w) / (high[1] - low[1])
-    one = np.array([0.0, 0.0, 0.0, 1.0])
-    return MapView(np.stack([row_x, row_y, row_w, one]), near, (*position, 1.0), scale, 1.0 / max(float(far), near))
+    rows = np.zeros((4, 4))
+    rows[:3, :3] = u, v, forward
+    rows[:3, 3] = -(rows[:3, :3] @ position)
+    rows[:2] = (2 * rows[:2] - (low + high)[:, None] * rows[2]) / (high - low)[:, None]
+    rows[3, 3] = 1.0
+    return MapView(rows, near, (*position, 1.0), scale, 1.0 / max(float(far), near))
 
 
 def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float):
@@ -310,6 +312,7 @@ def draw_views(
     atlas.target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
     # What has not moved since the first sample is worth being written out; a view that turns finds it so.
     resting = geometry.resting_casters(make=sample > 0 and lasting)
+    together = geometry.casters_together() if resting is None else None
     boxes, alpha_boxes = geometry.caster_boxes, Boxes.of(alpha.draws)
     shells = np.array([draw.closed for draw in geometry.opaque_casters], bool)
     for view, (x, y, side) in zip(views, cells):
@@ -321,13 +324,24 @@ def draw_views(
         if resting is not None:
             for clusters in resting:
                 sent += _draw_resting(atlas, viewport, constants, clusters, view, light_point)
+        elif together is not None:
+            parts, chunks, closed = together
+            seen = chunks.seen(view.rows, view.least_q)
+            one_sided = seen & closed & (True if light_point is None else chunks.without(light_point))
+            for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
+                for casters, own in parts:
+                    runs = joined(casters.first, drawn[own])
+                    sent += _draw_runs(atlas, viewport, constants, geometry, casters.batch, runs, cull)
         else:
             seen = boxes.seen(view.rows, view.least_q)
             one_sided = seen & shells & (True if light_point is None else boxes.without(light_point))
             for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
                 sent += _draw_instanced(atlas, viewport, constants, geometry, np.flatnonzero(drawn), cull)
-        with passes.drawing(atlas.target, viewport=viewport):
-            for call in calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q))):
+        layered = (
+            [*calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q)))] if alpha.draws else []
+        )
+        with passes.drawing(atlas.target, viewport=viewport) if layered else nullcontext():
+            for call in layered:
                 shader, bindings = alpha.programs[call.draw.material]
                 own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point,
                        "glass_blocks": int(view.glass_blocks), "channel_asked": view.channel}  # fmt: skip
@@ -343,17 +357,32 @@ def _draw_resting(atlas: Atlas, viewport, constants: dict, clusters: Clusters, v
     one_sided = seen & clusters.one_sided(light_point)
     sent = 0
     for drawn, cull in ((one_sided, "BACK"), (seen & ~one_sided, "NONE")):
-        with passes.drawing(atlas.target, viewport=viewport, cull=cull):
-            shader.bind(constants=constants)
-            for first, count in clusters.runs(drawn):
-                passes.draw_range(shader, clusters.batch, first, count)
-                sent += count
+        runs = clusters.calls(drawn)
+        if runs:
+            with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+                shader.bind(constants=constants)
+                for first, count in runs:
+                    passes.draw_range(shader, clusters.batch, first, count)
+                    sent += count
     return sent
+
+
+def _draw_runs(atlas: Atlas, viewport, constants: dict, geometry: SceneGeometry, batch: Batch, runs, cull) -> int:
+    if not runs:
+        return 0
+    shader = passes.get(OPAQUE)
+    with passes.drawing(atlas.target, viewport=viewport, cull=cull):
+        shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
+        for first, count in runs:
+            passes.draw_range(shader, batch, first, count)
+    return sum(count for _, count in runs)
 
 
 def _draw_instanced(atlas: Atlas, viewport, constants: dict, geometry: SceneGeometry, seen: np.ndarray, cull) -> int:
     shader = passes.get(OPAQUE)
     sent = 0
+    if not len(seen):
+        return sent
     with passes.drawing(atlas.target, viewport=viewport, cull=cull):
         shader.bind(textures={"instances": geometry.instances}, constants={**constants, "first_instance": 0})
         for call in calls(geometry.opaque_casters, seen):

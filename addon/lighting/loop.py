@@ -144,15 +144,14 @@ def light_surfaces(
     """Add the light of these points, of light sources of these `kinds`, to the radiance images, in parts. `adjust`:
     changes what tells the visibility of a batch of so many points."""
     by_provider: dict[VisibilityProvider, list[LightPoint]] = {}
-    channels = 3 if tinted_casters(frame) else 1
-    for point in _by_channel(points) if channels == 3 else points:
+    for point in _by_channel(points) if tinted_casters(frame) else points:
         by_provider.setdefault(point.provider, []).append(point)
         kinds |= bool(point.flags & lights.WHOLE_FLAG) << lights.WHOLE
     for provider, own in sorted(by_provider.items(), key=lambda group: group[0].asks_views):
         for batch, maps in provider.batches(frame, technique, own):
             yield from maps.drawing
             yield
-            maps = adjust(maps, len(batch) / channels) if adjust else maps
+            maps = adjust(maps, sum(map(_share, batch))) if adjust else maps
             near = [point.row for point in batch if point.flags & lights.NEAR_FLAG]
             others = [point.row for point in batch if not point.flags & lights.NEAR_FLAG]
             if others:
@@ -164,6 +163,11 @@ def light_surfaces(
 def tinted_casters(frame: Frame) -> bool:
     """Whether something that is drawn colours the light that it lets pass."""
     return any(frame.materials.compiled[draw.material].tinted for draw in drawn_by_lot(frame))
+
+
+def _share(point: LightPoint) -> float:
+    """Of a point that was drawn: those of one channel are a third."""
+    return 1 / 3 if any(getattr(view, "channel", 0) for view in point.views) else 1.0
 
 
 def _by_channel(points: list[LightPoint]) -> Iterator[LightPoint]:

@@ -52,7 +52,7 @@ class PathSources:
         """Once per picture, before `rows`."""
         wanted = sum(PATHS[path] for path in self.paths)
         self._emitters = [emitter for emitter in frame.emitters if emitter.flags & wanted]
-        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        used = frame.snapshot.used_materials
         self._triangles = None
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
             triangles = EmissiveTriangles(frame, self.paths)
@@ -90,9 +90,9 @@ class PathSources:
                 rows.append(self._triangles.row(drawn, self.emissive_points, lights.SHADOW_FLAG))
         if self.world_flags:
             seen = lights.SHADOW_FLAG + self.world_flags
-            for k in range(self.directions):
-                index = frame.sample * self.directions + k
-                direction, radiance, density = frame.environment.draw(*frame.random_at(index, f"{self.use}/world"))
+            numbers = range(frame.sample * self.directions, (frame.sample + 1) * self.directions)
+            chosen = np.array([frame.random_at(index, f"{self.use}/world") for index in numbers]).reshape(-1, 2)
+            for direction, radiance, density in zip(*frame.environment.draw(*chosen.T)):
                 light = radiance / density
                 rows.append(lights.direction_row(direction, light, density, seen, 0, 1, self.directions))
         return rows

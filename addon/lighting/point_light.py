@@ -52,7 +52,7 @@ class PointLight:
 
     def begin(self, frame: Frame) -> None:
         """Find the meshes that emit."""
-        used = {material for instance in frame.snapshot.instances for material in instance.materials}
+        used = frame.snapshot.used_materials
         self._emissive = None
         if any(may_emit(frame.snapshot.materials[material].graph) for material in used):
             triangles = EmissiveTriangles(frame, ("diffuse",))

@@ -56,7 +56,7 @@ class PointMaps(Technique, VisibilityProvider):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not any(light.cast_shadow and np.any(light.strength) for light in snapshot.lights):
             return "no light casts a shadow"
-        if not any(instance.visibility.shadow for instance in snapshot.instances):
+        if not snapshot.casts_shadows:
             return "no object casts a shadow"
         return None
 

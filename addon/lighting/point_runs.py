@@ -31,7 +31,7 @@ from ..scene.pieces import octahedral
 from ..scene.point_tree import PointTree, fitted, split
 from ..scene.seen import UNSEEN, seen_triangles
 from ..scene.view import VIEW
-from ..surfaces.hits import Hits
+from ..surfaces.hits import Hits, Records
 from .lit_points import LitPoints
 
 ROW = 128  # entries of a row of images of points
@@ -64,6 +64,7 @@ class Run:
     own: tuple[images.Image, ...]
     facing: images.Image
     clips: images.Image
+    materials: frozenset[int]
     shaded: images.Target | None = None
 
     @property
@@ -171,10 +172,14 @@ class PointRuns:
             },
             constants={"leaf_count": tree.leaves, "offset_size": frame.offset_size},
         )  # fmt: skip
-        return Run(points, tree, nodes, own, facing, clips)
+        materials = frozenset(material[np.isfinite(position).all(axis=1)].astype(int).tolist())
+        return Run(points, tree, nodes, own, facing, clips, materials)
 
     def _shade(self, frame: Frame, technique: Technique, run: Run) -> None:
-        place = lambda hits, records: hits.place(frame, technique, run.own, records)  # noqa: E731
+        def place(hits: Hits, records: Records) -> frozenset[int]:
+            hits.place(frame, technique, run.own, records)
+            return run.materials
+
         run.shaded = self._lit.shade(frame, technique, run.facing, place)
         frame.count(technique, "points shaded", 2 * run.tree.leaves)
 

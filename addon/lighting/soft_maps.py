@@ -88,9 +88,9 @@ def with_contacts(lookup: Lookup) -> Lookup:
 
 def lit_by_others(snapshot: Snapshot) -> bool:
     """Whether the world or an emissive mesh lights something that may stand in shadow."""
-    if not any(instance.visibility.shadow for instance in snapshot.instances):
+    if not snapshot.casts_shadows:
         return False
-    used = {slot for instance in snapshot.instances for slot in instance.materials}
+    used = snapshot.used_materials
     return bool(np.any(snapshot.world.color)) or any(may_emit(snapshot.materials[k].graph) for k in used)
 
 

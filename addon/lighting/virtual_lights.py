@@ -252,7 +252,7 @@ class VirtualLights:
         emitters = frame.emitters
         self._emitters = [e for e in emitters if e.light.bounces and e.light.visibility.diffuse]
         self._emissive = None
-        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        used = frame.snapshot.used_materials
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
             triangles = EmissiveTriangles(frame, ("diffuse",))
             self._emissive = triangles if triangles.power > 0 else None

@@ -41,7 +41,7 @@ class CompiledMaterial:
     """GLSL for one material topology plus the values of this material.
 
     `glsl` defines `void evaluate_material(SurfacePoint point, inout Closures closures)`. It reads
-    `material_values.value[k]` (a uniform block of vec4), samplers `material_image0…`, `point.attributes[k]`.
+    `material_value(k)` (rows of the block `material_values`), samplers `material_image0…`, `point.attributes[k]`.
     Materials with equal `program_key` share one program; `values` alone differ.
     """
 

@@ -74,7 +74,11 @@ class Expressions:
         self.attributes: list[Attribute] = []
         # In sampler order, with the files that their functions call: of one, unless nodes of two kinds read an image.
         self.image_keys: dict[str, dict[str, None]] = {}
-        self.includes: dict[str, None] = {"lib/closure.glsl": None, "lib/color.glsl": None}
+        self.includes: dict[str, None] = {
+            "material/values.glsl": None,
+            "lib/closure.glsl": None,
+            "lib/color.glsl": None,
+        }
         self._atlas = self._shared_sampler()
         self._scopes = [_Scope()]
         self._functions: list[str] = []

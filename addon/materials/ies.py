@@ -37,22 +37,24 @@ class Profile:
 
 
 @lru_cache(maxsize=32)
-def profile_pixels(profile: Profile) -> tuple[np.ndarray, bool]:
-    """(HEIGHT, WIDTH, 4) float32, grey, and whether the file could be read."""
+def profile_pixels(profile: Profile) -> tuple[np.ndarray, str]:
+    """(HEIGHT, WIDTH, 4) float32, grey, and what has to be said about it."""
     try:
-        vertical, horizontal, watts = _measured(profile.text)
+        vertical, horizontal, watts, kind = _measured(profile.text)
     except (ValueError, IndexError):
-        return np.full((HEIGHT, WIDTH, 4), UNREADABLE, np.float32), False
+        text = "the light profile is missing or cannot be read; the node gives 100 times its strength, as in Cycles."
+        return np.full((HEIGHT, WIDTH, 4), UNREADABLE, np.float32), text
     asked = np.linspace(0.0, 180.0, HEIGHT)
     rows = np.stack([_along(vertical, line, asked, wraps=False) for line in watts])
     table = np.stack([_along(horizontal, column, np.linspace(0, 360, WIDTH), wraps=True) for column in rows.T])
     table = np.maximum(table, 0.0)
     table[(asked < vertical[0]) | (asked > vertical[-1])] = 0.0
-    return np.repeat(table[..., None], 4, axis=2).astype(np.float32), True
+    remark = "" if kind == TYPE_C else "light profiles of the types A and B may be turned; use one of type C."
+    return np.repeat(table[..., None], 4, axis=2).astype(np.float32), remark
 
 
-def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertical angles (V) and horizontal ones from 0 to 360 (H), degrees, and watts (H, V). ValueError: no profile."""
+def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Vertical angles (V) and horizontal ones from 0 to 360 (H), degrees, watts (H, V), type. Raises ValueError."""
     tilt = re.search(r"^\s*TILT\s*=\s*(\S+).*$", text, re.MULTILINE)
     if tilt is None:
         raise ValueError("no TILT line")
@@ -69,8 +71,8 @@ def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     values = np.array(numbers[start + count + lines : start + count + lines + count * lines])
     watts = values.reshape(lines, count) * factor
     if kind == TYPE_C:
-        return _around(vertical, horizontal, watts)
-    return _on_its_side(vertical, horizontal, watts, kind)
+        return *_around(vertical, horizontal, watts), kind
+    return *_on_its_side(vertical, horizontal, watts, kind), kind
 
 
 def _around(vertical, horizontal, watts):

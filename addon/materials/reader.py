@@ -176,7 +176,11 @@ class _Reading:
         self._links: dict[int, dict[int, object]] = {}
 
     def _link_into(self, tree, socket):
-        """The link that feeds an input socket, or None. One pass per tree: asking a socket searches the whole tree."""
+        """The link that feeds an input socket, or None."""
+        return self._links_of(tree).get(socket.as_pointer())
+
+    def _links_of(self, tree) -> dict[int, object]:
+        """Links by the address of the input that each feeds: asking a socket searches the whole tree."""
         links = self._links.get(tree.as_pointer())
         if links is None:
             links = {}
@@ -190,7 +194,7 @@ class _Reading:
                     continue
                 links[link.to_socket.as_pointer()] = link
             self._links[tree.as_pointer()] = links
-        return links.get(socket.as_pointer())
+        return links
 
     def source(self, place: _Place, node, socket) -> Input:
         """What an input socket reads. Follows groups, reroutes, muted nodes.
@@ -305,11 +309,14 @@ class _Reading:
             self.nodes[key] = self._node(key, place, node)
 
     def _node(self, key: str, place: _Place, node) -> Node:
-        inputs = {}
+        inputs, links = {}, self._links_of(place.tree)
         for socket in node.inputs:
             if not socket.enabled:
                 continue
-            inputs[socket.identifier] = self.source(place, node, socket)
+            if socket.as_pointer() in links:
+                inputs[socket.identifier] = self.source(place, node, socket)
+            else:  # most
+                inputs[socket.identifier] = Input(_kind(socket), _default(socket))
         if node.bl_idname in CONSTANT_NODES:
             for socket in node.outputs:
                 # The Normal node has an input of the same name beside the direction in its output.
@@ -414,11 +421,11 @@ def _kind(socket) -> str:
 def _default(socket) -> tuple[float, ...] | float | None:
     """The constant of an unlinked socket; None for shaders and for kinds that are neither numbers nor names."""
     value = getattr(socket, "default_value", None)
-    if isinstance(value, str):
+    if value is None or isinstance(value, str):
         return value
-    if socket.type in {"VECTOR", "RGBA", "ROTATION"} and value is not None:
-        return tuple(value)
-    return float(value) if isinstance(value, (bool, int, float)) else None
+    if isinstance(value, (bool, int, float)):
+        return float(value)
+    return tuple(value) if socket.type in {"VECTOR", "RGBA", "ROTATION"} else None
 
 
 def _converted(value, kind: str, wanted: str):

@@ -55,12 +55,12 @@ class ValueBlock:
         if triple:
             self._rows[row][:3] = value
             self._free.append((row, 3))
-            return f"material_values.value[{row}].xyz"
+            return f"material_value({row}).xyz"
         if not self._free:
             self._free += [(row, component) for component in range(4)]
         row, component = self._free.pop(0)
         self._rows[row][component] = value
-        return f"material_values.value[{row}].{'xyzw'[component]}"
+        return f"material_value({row}).{'xyzw'[component]}"
 
     def add_rows(self, rows) -> tuple[int, int]:
         """Whole rows of four that stand one after the other: (first row, how many fitted)."""

@@ -336,6 +336,8 @@ class HierarchyCache:
 
     def __init__(self):
         self._kept: dict[object, Tree] = {}
+        self._kinds: tuple[object, dict] = (None, {})  # of instances: one for each visibility among them
+        self._looks: tuple[object, tuple] = (None, ())  # of materials: what decides about rays, and what they emit
 
     def get(self, frame, path: str, passing: frozenset[int] = frozenset()) -> Hierarchy | None:
         """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`).
@@ -347,15 +349,18 @@ class HierarchyCache:
         if too_many(snapshot):
             return None
         materials, maps, glow = frame.measured_materials, frame.opacity_maps, frame.emission_maps
-        kinds = {id(i.visibility): i for i in snapshot.instances}
-        alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in kinds.values())
+        if self._kinds[0] is not snapshot.instances:
+            self._kinds = snapshot.instances, {id(i.visibility): i for i in snapshot.instances}
+        if self._looks[0] is not materials:  # the same for all paths of a picture
+            self._looks = materials, tuple((_mean_code(m), _emission(m)) for m in materials)
+        alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in self._kinds[1].values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))
         if passing:
             shown = tuple(i for i in shown if i.links.blocker not in passing)
         key = shown, (
             None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
-            tuple((_mean_code(m), _emission(m)) for m in materials), maps.changes, glow.changes, tuple(origin),
+            self._looks[1], maps.changes, glow.changes, tuple(origin),
         )  # fmt: skip
         tree = self._kept.get(key)
         if tree is None and draft:

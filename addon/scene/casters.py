@@ -22,7 +22,7 @@ from ..gfx import geometry as gfx_geometry
 from ..kernels.morton import morton_codes
 from ..materials.compiled import CompiledMaterial
 from ..snapshot.scene import Instance, Mesh
-from .culling import Boxes, closed_triangles
+from .culling import Boxes, closed_triangles, joined
 
 LARGEST = 2_000_000  # triangles
 NOBODY = np.zeros(0, np.int64)
@@ -53,6 +53,10 @@ class Clusters:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]])))
         for start, end in edges.reshape(-1, 2):
             yield int(start) * CLUSTER, min(int(end) * CLUSTER, self.batch.triangles) - int(start) * CLUSTER
+
+    def calls(self, seen: np.ndarray) -> list[tuple[int, int]]:
+        """The same with what lies between two runs where that is cheaper (culling.joined)."""
+        return joined(np.minimum(np.arange(len(seen) + 1) * CLUSTER, self.batch.triangles), seen)
 
 
 def clusters(
@@ -89,6 +93,61 @@ def clusters(
             if own.any():
                 sorts[is_closed].append(_Part(world, triangles[own]))
     return [_cluster(parts, is_closed) for is_closed, parts in sorts.items() if parts]
+
+
+@dataclass(frozen=True)
+class Together:
+    """Opaque casters of many meshes in one batch, their vertices in the space of their mesh, with the number of their
+    instance: what moves uploads nothing here. Chunks are culled together."""
+
+    batch: gfx_geometry.Batch
+    first: np.ndarray  # (C + 1,) triangle with which each chunk begins; at the end their number
+    rows: np.ndarray  # (M,) instances
+    edges: np.ndarray  # (C,) where among those each chunk begins
+    closed: bool
+
+
+MOST_TOGETHER, CHUNK = 300_000, 600  # triangles of all instances; of a chunk, about
+
+
+def together(
+    instances: list[Instance], meshes: dict[str, Mesh], materials: list[CompiledMaterial], shell: np.ndarray
+) -> list[Together]:
+    """Of closed meshes that are opaque all over (`shell`, by instance), and of others. None of too many."""
+    if sum(meshes[instance.mesh].triangle_count for instance in instances) > MOST_TOGETHER:
+        return []
+    opaque = ~np.array([material.casts_by_lot for material in materials], bool)
+    positions, numbers, start = [], [], 0
+    sorts: dict[bool, list[tuple[int, np.ndarray]]] = {True: [], False: []}
+    known: dict[tuple, np.ndarray] = {}
+    for k, instance in enumerate(instances):
+        mesh, kind = meshes[instance.mesh], (instance.mesh, instance.materials)
+        if kind not in known:
+            blocks = opaque[mesh.triangle_materials(instance.materials)]
+            known[kind] = mesh.corner_vertices[mesh.triangle_corners][blocks]
+        if len(known[kind]):
+            positions.append(mesh.positions)
+            numbers.append(np.full(len(mesh.positions), k, np.int32))
+            sorts[bool(shell[k])].append((k, known[kind] + start))
+            start += len(mesh.positions)
+    if not positions:
+        return []
+    vertices = gfx_geometry.vertex_buffer(position=np.concatenate(positions), local_instance=np.concatenate(numbers))
+    found = []
+    for is_closed, parts in sorts.items():
+        if parts:
+            first, edges = chunks([len(triangles) for _, triangles in parts], CHUNK)
+            batch = gfx_geometry.triangle_batch(vertices, np.concatenate([triangles for _, triangles in parts]))
+            found.append(Together(batch, first, np.array([k for k, _ in parts]), edges, is_closed))
+    return found
+
+
+def chunks(sizes: list[int], chunk: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cut parts of so many triangles into chunks of about `chunk`: the first triangle of each (C + 1,), and the part
+    with which it begins (C,)."""
+    before = np.cumsum(sizes) - sizes
+    edges = np.flatnonzero(np.diff(before // chunk, prepend=-1))
+    return np.append(before[edges], sum(sizes)), edges
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..gfx import device
 from ..snapshot.scene import Mesh
 
 if TYPE_CHECKING:
@@ -89,6 +90,28 @@ def calls(draws: list[Draw], indices: Iterable[int]) -> Iterator[Call]:
             current = Call(draw, draw.first, draw.count)
     if current is not None:
         yield current
+
+
+CALL_OF_PASS = 0.2  # what a call takes, by a pass with all its bindings
+
+
+def joined(first: np.ndarray, seen: np.ndarray) -> list[tuple[int, int]]:
+    """First triangle and number of triangles of the calls that draw the chunks of a mask `seen` (C,), which begin with
+    triangles `first` (C + 1,): what lies between two runs is drawn, too, where that costs this device less than a
+    call."""
+    if not seen.any():
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]])))
+    starts, ends = first[edges[0::2]].tolist(), first[edges[1::2]].tolist()
+    costs = device.current()
+    most = CALL_OF_PASS * costs.python / max(costs.triangle, 1e-9)
+    runs, begin, end = [], starts[0], ends[0]
+    for start, stop in zip(starts[1:], ends[1:]):
+        if start - end > most:
+            runs.append((begin, end - begin))
+            begin = start
+        end = stop
+    return [*runs, (begin, end - begin)]
 
 
 def closed(positions: np.ndarray, triangles: np.ndarray) -> bool:

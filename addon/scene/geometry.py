@@ -32,6 +32,7 @@ TRANSMISSION_FLAG = 32  # no shader asks for it, but the frame begins anew when 
 TEXELS_PER_INSTANCE = 8  # layout in shaders/lib/instance.glsl
 MOST_MOVED = 32  # instances; for more the whole list is uploaded, sorted anew
 JOINED_TRIANGLES = 2000  # about so many triangles of joined meshes make one draw: enough to fill a GPU, few to cull
+FEW_DRAWS = 4  # of casters, which need not be joined
 GROUP_TRIANGLES = 600  # the same for groups of instances
 
 
@@ -79,6 +80,7 @@ class SceneGeometry:
         self.origin = np.zeros(3)
         self.bounds_min = np.zeros(3)  # of all instances, world space, float64
         self.bounds_max = np.zeros(3)
+        self.size = 1.0  # diagonal of the bounds in metres; 1 for an empty scene
         self.instances: images.Image | None = None
         self.draws: list[Draw] = []  # by material, corner attributes: surfaces, and casters with alpha
         self.opaque_casters: list[Draw] = []  # positions only, materials ignored
@@ -87,8 +89,11 @@ class SceneGeometry:
         # Instances with triangles, by their rows in `instances`; meshes; materials.
         self.placed: tuple[list[Instance], dict[str, Mesh], list[CompiledMaterial]] = ([], {}, [])
         self.changes = 0  # updates that changed anything: what was drawn of the same number still stands
+        self.drawn = 0  # the same for which meshes and materials instances show, wherever they stand
         self.uploads = 0  # meshes uploaded since the start; tests assert on its growth
         self._draw_key = None
+        self._any = False  # whether there is any instance
+        self._told: tuple = (None, ())  # the instances of the last update, and what of meshes and materials was asked
         self.instance_rows = np.zeros((0, TEXELS_PER_INSTANCE, 4), np.float32)
         self._order: list[int] = []  # of the snapshot's instances with triangles
         self._kinds: tuple = ()
@@ -97,13 +102,9 @@ class SceneGeometry:
         self._moved: list[Block] = []
         self._mesh_draws: dict = {}
         self._closed: dict[tuple[str, int], bool] = {}
+        self._together: tuple[int, list[casters.Together]] = (-1, [])
+        self._chunks: tuple[int, tuple | None] = (-1, None)
         self._clusters: tuple[int, list[casters.Clusters] | None] = (-1, None)
-
-    @property
-    def size(self) -> float:
-        """Diagonal of the scene's bounds in metres; 1 for an empty scene."""
-        diagonal = float(np.linalg.norm(self.bounds_max - self.bounds_min))
-        return diagonal if diagonal > 0.0 else 1.0
 
     @property
     def triangles(self) -> int:
@@ -111,6 +112,20 @@ class SceneGeometry:
 
     def update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""
+        told = (
+            tuple((key, mesh.version) for key, mesh in snapshot.meshes.items()),
+            tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials),
+        )
+        known = snapshot.instances is self._told[0] and told == self._told[1]
+        if known and np.array_equal(self.origin, self._origin(snapshot.camera)):  # the camera alone has moved
+            self.placed = (self.placed[0], snapshot.meshes, materials)
+            return False
+        self._told = (None, ())  # until they are there
+        changed = self._update(snapshot, materials)
+        self._told = (snapshot.instances, told)
+        return changed
+
+    def _update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         instances = [i for i in snapshot.instances if snapshot.meshes[i.mesh].triangle_count]
         instances = self._ordered(instances)
         changed = self._update_transforms(instances, snapshot)
@@ -125,9 +140,15 @@ class SceneGeometry:
                 self._set_bounds()
             return changed
         self._draw_key = None  # until they are there
+        self.drawn += 1
         self._make_draws(instances, snapshot.meshes, materials)
         self._draw_key = key
         return True
+
+    @property
+    def instance_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 3) ends of the boxes of the placed instances, relative to the origin."""
+        return self._low - self.origin, self._high - self.origin
 
     def rows_showing(self, material: int) -> bytes:
         """What the instance image holds of the instances that show a material."""
@@ -142,6 +163,29 @@ class SceneGeometry:
                 return None
             self._clusters = (self.changes, casters.clusters(*self.placed, self.origin))
         return self._clusters[1]
+
+    def casters_together(self) -> tuple[list[tuple[casters.Together, slice]], Boxes, np.ndarray] | None:
+        """Opaque casters in few batches, each with its part of all chunks; the boxes of those, and (C,) whether back
+        faces of a chunk may be left out. None where there are too many triangles, or few draws anyhow."""
+        if len(self.opaque_casters) <= FEW_DRAWS:
+            return None
+        if self._together[0] != self.drawn:
+            self._together = (self.drawn, casters.together(*self.placed, self._shell))
+            self._chunks = (-1, None)
+        if not self._together[1]:
+            return None
+        if self._chunks[0] != self.changes:
+            low, high, count = *self.instance_bounds, 0
+            lows, highs, closed, parts = [], [], [], []
+            for one in self._together[1]:
+                lows.append(np.minimum.reduceat(low[one.rows], one.edges))
+                highs.append(np.maximum.reduceat(high[one.rows], one.edges))
+                closed.append(~np.maximum.reduceat(self._mirrored[one.rows], one.edges) & one.closed)
+                parts.append((one, slice(count, count + len(one.edges))))
+                count += len(one.edges)
+            boxes = Boxes.between(np.concatenate(lows), np.concatenate(highs))
+            self._chunks = (self.changes, (parts, boxes, np.concatenate(closed)))
+        return self._chunks[1]
 
     def is_closed(self, mesh: Mesh) -> bool:
         """Whether a mesh that is shown bounds a volume and faces outwards."""
@@ -171,6 +215,13 @@ class SceneGeometry:
             return place
         return place + forward * np.clip((middle - place) @ forward, camera.clip_start, camera.clip_end)
 
+    def _origin(self, camera) -> np.ndarray:
+        """Near the camera, where float32 has most digits; snapping keeps the origin, and with it all uploads, over
+        small moves. In a landscape the steps are smaller: at its rim float32 knows a place to .2 mm only."""
+        step = np.clip(self.size / STEPS, min(self.size, LARGE), self.size)
+        grid = 2.0 ** np.ceil(np.log2(step)) if self._any else 1.0
+        return np.round(self._where_seen(camera) / grid) * grid
+
     def _update_transforms(self, instances: list[Instance], snapshot: Snapshot) -> bool:
         if not instances:
             self.bounds_min = self.bounds_max = np.zeros(3)
@@ -191,12 +242,10 @@ class SceneGeometry:
             reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :3, :3]), half)
             self._low, self._high = world - reach, world + reach  # per instance
             self.bounds_min, self.bounds_max = self._low.min(axis=0), self._high.max(axis=0)
-        camera = self._where_seen(snapshot.camera)
-        # Near the camera float32 has most digits; snapping keeps the origin, and with it all uploads, over small moves.
-        # In a landscape the steps are smaller: at its rim float32 knows a place to .2 mm only.
-        step = np.clip(self.size / STEPS, min(self.size, LARGE), self.size)
-        grid = 2.0 ** np.ceil(np.log2(step)) if instances else 1.0
-        self.origin = np.round(camera / grid) * grid
+        diagonal = float(np.linalg.norm(self.bounds_max - self.bounds_min))
+        self.size = diagonal if diagonal > 0.0 else 1.0
+        self._any = bool(instances)
+        self.origin = self._origin(snapshot.camera)
         rows = np.zeros((max(len(instances), 1), TEXELS_PER_INSTANCE, 4), np.float32)
         if len(self._written) == len(instances) and len(self.instance_rows) == len(rows):
             rows[:, 3:] = self.instance_rows[:, 3:]

@@ -39,6 +39,8 @@ CAMERA_DEFINES = (
     ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
     ("VISIBILITY_FLAG", "film_view.visibility"),
 )
+SHARED_ROWS = 1024  # of values in a block that materials of one program share: 16 KiB, what every GPU allows
+FIRST_VALUE = "first_value"  # constant of programs of such materials: where in the block those of a draw begin
 MOST_DECLARED = 4096  # materials whose programs are remembered
 SURFACE_IMAGES = ("position", "normal", "diffuse", "tint", "lobe", "emission")
 
@@ -56,12 +58,18 @@ class MaterialSet:
         self._blocks: dict[str, Block] = {}
         self._images: dict[tuple[str, int], images.Image] = {}
         self._used: list[str] = []
+        # By material: the first one of those that share its program and block, and where in that its values begin.
+        self.leaders: list[int] = []
+        self.first_rows: list[int] = []
+        self.sharing = 0  # changes of these
+        self._shared: dict[int, Block] = {}  # by leader
         self.own_images: dict[int, dict[str, images.Image]] = {}  # by material: textures of its own surface program
 
     def update(self, snapshot: Snapshot) -> None:
         """Compile and upload what changed."""
         if self.energy_table is None:
             self.energy_table = images.upload(energy_texture(FINE_LAYERS))
+        before = self.compiled
         cache, self.compiled, notes, self.own_images = {}, [], [], {}
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
@@ -95,6 +103,33 @@ class MaterialSet:
                 self._blocks[key] = Block(_struct(len(values)), value=values)
             else:
                 block.update(value=values)
+
+        if len(before) != len(self.compiled) or any(one is not other for one, other in zip(before, self.compiled)):
+            self._share()
+
+    def _share(self) -> None:
+        """Find which materials can be drawn by one program with one block."""
+        self.sharing += 1
+        self.leaders, self.first_rows = list(range(len(self.compiled))), [0] * len(self.compiled)
+        rows: dict[int, list[np.ndarray]] = {}
+        open_groups: dict[tuple, int] = {}
+        for k, compiled in enumerate(self.compiled):
+            if not may_share(compiled):
+                continue
+            key = (compiled.program_key, compiled.glows, compiled.added)
+            leader = open_groups.setdefault(key, k)
+            used = sum(map(len, rows.get(leader, ())))
+            if used + len(compiled.values) > SHARED_ROWS:
+                leader, used = k, 0
+                open_groups[key] = k
+            self.leaders[k], self.first_rows[k] = leader, used
+            rows.setdefault(leader, []).append(np.asarray(compiled.values, np.float32))
+        shared, self._shared = self._shared, {}
+        for leader, parts in rows.items():
+            values = np.zeros((SHARED_ROWS, 4), np.float32)
+            values[: sum(map(len, parts))] = np.concatenate(parts)
+            block = self._shared[leader] = shared.get(leader) or Block(_struct(SHARED_ROWS), value=values)
+            block.update(value=values)
 
     def set_view(self, view: View) -> None:
         """Tell the node trees from where the scene is seen."""
@@ -188,18 +223,23 @@ class MaterialSet:
         """Adds up what material `index` emits."""
         return _emission_program(self.compiled[index])
 
-    def bindings(self, index: int, instances: images.Image, own: bool = True) -> dict:
-        """Textures and blocks that programs of a material need; without `own` of those that draw its mesh as it is."""
+    def bindings(self, index: int, instances: images.Image, own: bool = True, shared: bool = False) -> dict:
+        """Textures and blocks that programs of a material need; without `own` of those that draw its mesh as it is;
+        `shared`: of those that draw all materials that share its block."""
         compiled = self.compiled[index]
         textures = {"instances": instances, "energy_table": self.energy_table}
         for slot, name in enumerate(compiled.images):
             textures[f"material_image{slot}"] = self._images[name, self._versions[name]]
         if compiled.own_surface and own:
             textures |= self.own_images[index]
-        return {
-            "textures": textures,
-            "blocks": {"material_values": self._blocks[self._keys[index]], "material_scene": self._scene},
-        }
+        values = self._shared[self.leaders[index]] if shared else self._blocks[self._keys[index]]
+        return {"textures": textures, "blocks": {"material_values": values, "material_scene": self._scene}}
+
+    def drawing(self, index: int, program: Program, instances: images.Image) -> tuple[dict, dict[str, int]]:
+        """What a program that draws the mesh of a material binds: as `bindings`, and constants."""
+        shared = ("INT", FIRST_VALUE) in program.constants
+        constants = {FIRST_VALUE: self.first_rows[index]} if shared else {}
+        return self.bindings(index, instances, shared=shared), constants
 
     def in_shell(self, index: int) -> bool:
         """Whether material `index` is drawn by a shell over its mesh."""
@@ -227,6 +267,17 @@ def upload_image(image: Image) -> images.Image:
     """The pixels of an image as materials sample them."""
     # Eight-bit content fits a half float exactly enough only when it stays encoded; floats keep full precision.
     return images.upload(image.pixels, "RGBA32F")
+
+
+def may_share(compiled: CompiledMaterial) -> bool:
+    """Whether a material can be drawn together with others of its program: it binds nothing of its own but values."""
+    alone = compiled.images or compiled.attributes or compiled.own_surface
+    return not alone and len(compiled.values) <= SHARED_ROWS
+
+
+def shared_struct() -> Struct:
+    """The block of materials that are drawn together."""
+    return _struct(SHARED_ROWS)
 
 
 def values_struct(compiled: CompiledMaterial) -> Struct:
@@ -304,13 +355,14 @@ def _once(make: Callable[[CompiledMaterial], Program]) -> Callable[[CompiledMate
 
 @_once
 def _surface_program(compiled: CompiledMaterial) -> Program:
+    shares = may_share(compiled)
     return Program(
         name=f"surface {compiled.program_key[:8]}",
         fragment="surface/surface.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SURFACE_IMAGES),
         blocks=(
             (VIEW, "film_view"),
-            (_struct(len(compiled.values)), "material_values"),
+            (shared_struct() if shares else values_struct(compiled), "material_values"),
             (MATERIAL_SCENE, "material_scene"),
         ),
         constants=(
@@ -318,10 +370,14 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             ("INT", "transparent_mode"),
             ("INT", "glass_bends"),
             ("INT", "index_shown"),
+            *((("INT", FIRST_VALUE),) if shares else ()),
         ),
-        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
+        defines=(
+            *CAMERA_DEFINES, *_layer_defines(compiled),
+            *((("MATERIAL_BASE", "(instance_flat.y >> 1)"),) if shares else ()),
+        ),
         **_shared(compiled),
-    )
+    )  # fmt: skip
 
 
 @_once
@@ -525,7 +581,7 @@ def _emission_map_program(compiled: CompiledMaterial) -> Program:
 
 def may_be_glossy(snapshot: Snapshot) -> bool:
     """Whether a material that is shown may have a glossy lobe; that of empty slots has one since Blender 5.0."""
-    shown = {index for instance in snapshot.instances for index in instance.materials or (0,)}
+    shown = {index for slots in snapshot.material_sets for index in slots or (0,)}
     return any(_material_may_be_glossy(snapshot.materials[index]) for index in shown)
 
 

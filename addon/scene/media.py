@@ -88,7 +88,7 @@ def has_media(snapshot: Snapshot) -> bool:
     """Whether anything of the scene is a volume. Cheap, no GPU."""
     if snapshot.world.medium is not None or snapshot.volumes:
         return True
-    used = {k for one in snapshot.instances for k in one.materials}
+    used = snapshot.used_materials
     return any(snapshot.materials[k].graph.volume is not None for k in used)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class View:
         eye = eye - self.origin + lens[0] * right_axis + lens[1] * up
 
         def affine(direction, constant=0.0):
-            return np.append(direction, constant - direction @ eye)
+            return np.array((*direction.tolist(), constant - float(direction @ eye)))
 
         depth = affine(-backward)  # distance along the axis
         one = np.array([0.0, 0.0, 0.0, 1.0])
@@ -128,6 +128,7 @@ def _blackman_harris() -> tuple[np.ndarray, np.ndarray]:
     return t, np.concatenate([[0.0], cumulative / cumulative[-1]])
 
 
+@lru_cache(maxsize=4096)
 def blackman_harris_offset(u: float, width: float) -> float:
     """Film offset in pixels for a uniform number, distributed as the Blackman-Harris filter of support +-width."""
     places, cumulative = _blackman_harris()

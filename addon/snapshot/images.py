@@ -73,12 +73,9 @@ class ImageTable:
     def key_of_profile(self, profile: Profile, label: str) -> str:
         """Image.key of the table of an IES Texture, which depends on the file's text alone."""
         key = profile.name
-        pixels, read = profile_pixels(profile)
-        if not read:
-            text = (
-                "the light profile is missing or cannot be read; the node gives 100 times its strength, as in Cycles."
-            )
-            self.notes.append(Note(f"Node '{label}'", text))
+        pixels, remark = profile_pixels(profile)
+        if remark:
+            self.notes.append(Note(f"Node '{label}'", remark))
         if key not in self.images:
             self.images[key] = Image(key, 0, pixels, "LINEAR", "NONE", "IES")
         return key

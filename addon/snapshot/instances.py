@@ -33,7 +33,7 @@ class Place:
     source: Source
     key: str
     random: float
-    matrix: object  # mathutils.Matrix, a copy; many are converted at once
+    matrix: np.ndarray  # (4, 4) float32
     generated: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where on its instancer an instance stands
     uv: tuple[float, float] = (0.0, 0.0)
 
@@ -91,14 +91,17 @@ def walk(
     included = {"MESH": view_layer.use_solid, "CURVES": strands}  # point clouds are always, as in Cycles
     # Asked of each object only where some collection says so: these two are slower than all else.
     indirect_only, holdout = _collections_say(view_layer.layer_collection)
-    for instance in depsgraph.object_instances:
+    listed = _listed(depsgraph.object_instances)
+    for instance, is_instance, shows_self, placed, numbers, number, orco, uv in zip(
+        depsgraph.object_instances, *listed, strict=True
+    ):
         found = instance.object
         kind = found.type
         if kind not in _DRAWN and kind != "LIGHT":
             continue
-        is_instance = instance.is_instance
         owner, parent = (instance.instance_object, instance.parent) if is_instance else (found, None)
-        shells = [found.data] if instance.show_self and found.data is not None else []
+        own_mesh = found.data if shows_self else None
+        shells = [own_mesh] if own_mesh is not None else []
         if hairy and instance.show_particles and kind == "MESH":
             shells += hair_systems(owner, final)
         for data in shells:
@@ -154,21 +157,34 @@ def walk(
                 continue
             own = f"/hair {data.number}" if hair else ""
             if is_instance:
-                numbers = instance.persistent_id[:]
                 if numbers[1] == _UNUSED_ID and numbers[2] == _UNUSED_ID:  # nearly always
                     ids = "" if numbers[0] == _UNUSED_ID else str(numbers[0])
                 else:
                     ids = "-".join([str(number) for number in numbers if number != _UNUSED_ID])
                 key = f"{facts.uid}/{facts.parent_uid}/{ids}{own}"
-                random = (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
-                place = Place(
-                    source, key, random, instance.matrix_world.copy(), tuple(instance.orco), tuple(instance.uv)
-                )
+                place = Place(source, key, (number & 0xFFFFFFFF) / 0xFFFFFFFF, placed, tuple(orco), tuple(uv))
             else:
-                place = Place(source, f"{facts.uid}{own}", facts.random, instance.matrix_world.copy())
+                place = Place(source, f"{facts.uid}{own}", facts.random, placed)
             (lights if kind == "LIGHT" else meshes).append(place)
     cache.facts = kept
     return meshes, lights, tuple(notes)
+
+
+def _listed(found) -> list:
+    """What Blender says of all instances in numbers, of all at once: asked one by one that takes most of the walk."""
+    count = len(found)
+
+    def values(name: str, width: int, kind) -> np.ndarray:
+        out = np.zeros(count * width, kind)
+        found.foreach_get(name, out)
+        return out.reshape(count, width) if width > 1 else out
+
+    return [
+        values("is_instance", 1, bool).tolist(), values("show_self", 1, bool).tolist(),
+        values("matrix_world", 16, np.float32).reshape(-1, 4, 4).transpose(0, 2, 1),
+        values("persistent_id", 8, np.int32).tolist(), values("random_id", 1, np.int32).tolist(),
+        values("orco", 3, np.float32).tolist(), values("uv", 2, np.float32).tolist(),
+    ]  # fmt: skip
 
 
 def _collections_say(top) -> tuple[bool, bool]:
@@ -282,4 +298,4 @@ def matrices(places: list[Place]) -> np.ndarray:
     """(N, 4, 4) float64 of the places' matrices."""
     if not places:
         return np.zeros((0, 4, 4))
-    return np.array([place.matrix for place in places], np.float64)
+    return np.stack([place.matrix for place in places]).astype(np.float64)

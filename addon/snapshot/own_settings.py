@@ -6,6 +6,8 @@ whatever has been set, by the property's identifier; what was never touched has 
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import bpy
 
 Own = tuple[tuple[str, object], ...]  # (identifier, value), in the properties' order; hashable
@@ -20,21 +22,36 @@ def own_settings(block) -> Own:
 
 def _values(group, every: bool, library=None) -> Own:
     found = []
-    for prop in group.bl_rna.properties:
-        name = prop.identifier
-        if name in ("rna_type", "name") or (prop.is_runtime and name.endswith("_active")):
-            continue
-        if prop.type == "COLLECTION":
+    for name, kind, is_array, is_path in _properties(type(group)):
+        if kind == "COLLECTION":
             entries = tuple(_values(entry, True, library) for entry in getattr(group, name))
             if entries:
                 found.append((name, entries))
         elif every or group.is_property_set(name):
             value = getattr(group, name)
-            if prop.type == "POINTER":
+            if kind == "POINTER":
                 value = value.name if value is not None else ""
-            elif prop.type == "STRING" and prop.subtype == "FILE_PATH":
+            elif is_path:
                 value = bpy.path.abspath(value, library=library) if value else ""
-            elif getattr(prop, "is_array", False):
+            elif is_array:
                 value = tuple(value)
             found.append((name, value))
     return tuple(found)
+
+
+def _properties(group: type) -> list[tuple[str, str, bool, bool]]:
+    """Of each property that says something: name, type, whether it is an array, whether a path. Kept by class, since
+    each object of a scene has such a group; when the add-on is registered anew there is another class."""
+    known = _known.get(group)
+    if known is None:
+        known = _known[group] = []
+        for prop in group.bl_rna.properties:
+            name = prop.identifier
+            if name in ("rna_type", "name") or (prop.is_runtime and name.endswith("_active")):
+                continue
+            is_path = prop.type == "STRING" and prop.subtype == "FILE_PATH"
+            known.append((name, prop.type, bool(getattr(prop, "is_array", False)), is_path))
+    return known
+
+
+_known: WeakKeyDictionary[type, list[tuple[str, str, bool, bool]]] = WeakKeyDictionary()

@@ -377,6 +377,26 @@ class Snapshot:
     sync_stats: dict = field(default_factory=dict)  # meshes_read, meshes_reused, seconds: what the sync cost
 
     @cached_property
+    def used_materials(self) -> frozenset[int]:
+        """Of all instances."""
+        return frozenset(slot for slots in self.material_sets for slot in slots)
+
+    @cached_property
+    def material_sets(self) -> frozenset[tuple[int, ...]]:
+        """What instances have in their slots."""
+        return frozenset(one.materials for one in self.instances)
+
+    @cached_property
+    def casts_shadows(self) -> bool:
+        """Whether any instance does."""
+        return any(one.visibility.shadow for one in self.instances)
+
+    @cached_property
+    def own_values(self) -> tuple[tuple[str, tuple], ...]:
+        """What has been set of techniques' parameters on objects and materials, by key."""
+        return tuple((one.key, one.own) for one in (*self.instances, *self.materials) if one.own)
+
+    @cached_property
     def triangle_count(self) -> int:
         """Triangles of all instances together."""
         return sum(self.meshes[instance.mesh].triangle_count for instance in self.instances)

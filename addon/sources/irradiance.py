@@ -8,13 +8,19 @@ the horizon, its part of E is exactly the dot product with n. The table holds E 
 which meet the axes, to be read bilinearly; the few cells that bring most of it (a sun) stand beside it as directions,
 since E has an edge at their horizons. The table is scaled so that its mean is exactly that of E over all normals.
 
+Cells and normals stand on grids of the same step in azimuth, so that the sum over a row of cells is a circular
+convolution: in a frame that turns with the cell, n depends on the difference of azimuths alone, and a cell counts while
+its centre lies above the horizon. Fourier transforms along the rows leave a product of small matrices for each
+frequency. Worlds that are tilted have no such grid and take the sum itself.
+
 Error: cells that the horizon cuts, and the interpolation, below 0.3 % of the mean, 0.7 % where the horizon cuts a sun
-(`test_irradiance.py`). 0.05 s a table.
+(`test_irradiance.py`). 2 ms a table, 30 where the world is tilted; 20 once for each turn of a world.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -93,34 +99,92 @@ class WorldCells:
         azimuth = (0.5 - (np.arange(COLUMNS) + 0.5) / COLUMNS) * 2 * np.pi
         return _directions(latitude, azimuth)
 
+    @cached_property
+    def _power(self) -> np.ndarray:
+        """(C,) over all colours."""
+        return np.linalg.norm(self.vectors, axis=2).sum(axis=1)
+
+    @cached_property
+    def _by_columns(self) -> np.ndarray:
+        """(COLUMNS, ROWS, 3, 3 colours): the vectors along radius, east and north of their cells, whose azimuth grows
+        with the column."""
+        vectors = self.vectors.reshape(ROWS, COLUMNS, 3, 3)[:, ::-1].transpose(1, 0, 3, 2)
+        latitude = ((np.arange(ROWS) + 0.5) / ROWS - 0.5) * np.pi
+        azimuth = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * 2 * np.pi
+        return _axes(latitude, azimuth) @ vectors
+
     def irradiance(self, to_world: np.ndarray, openness: np.ndarray | float = 1.0) -> Irradiance:
         """With the openness (C,) of each cell. `to_world` (3, 3) turns the image's directions into those of the
         world."""
-        part = np.broadcast_to(openness, len(self.light))
-        vectors = self.vectors @ to_world.T * part[:, None, None]
-        light = self.light * part[:, None]
-        power = np.linalg.norm(vectors, axis=2).sum(axis=1)
+        part = np.broadcast_to(np.asarray(openness, np.float64), len(self.light)).copy()
+        power = self._power * part
         order = np.argsort(-power, kind="stable")[:MOST_BRIGHT]
         alone = order[power[order] > BRIGHT * power.sum()]
-        directions = vectors[alone].sum(axis=1)
+        vectors = self.vectors[alone] @ to_world.T * part[alone, None, None]
+        directions = vectors.sum(axis=1)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
-        bright = np.einsum("kci,ki->kc", vectors[alone], directions)
-        rest = np.delete(np.arange(len(power)), alone)
-        rest = rest[power[rest] > 0]
-        latitude, azimuth = (np.arange(ROWS + 1) / ROWS - 0.5) * np.pi, (np.arange(COLUMNS) / COLUMNS - 0.5) * 2 * np.pi
-        normals = _directions(latitude, azimuth).astype(np.float32)
+        bright = np.einsum("kci,ki->kc", vectors, directions)
+        part[alone] = 0.0
+        turn = _turn_of(to_world)
+        table = self._table(to_world, part) if turn is None else self._table_by_rows(turn, part)
+        # The mean of a cosine that is cut at 0 over all normals is a quarter.
+        return Irradiance(_of_mean(table, np.cos(_latitudes()), part @ self.light / 4), directions, bright)
+
+    def _table_by_rows(self, turn: float, part: np.ndarray) -> np.ndarray:
+        """The table of all cells by `part` of their light, in a world that is turned about its axis."""
+        counted = self._by_columns * part.reshape(ROWS, COLUMNS).T[::-1, :, None, None]
+        light = np.fft.rfft(counted.reshape(COLUMNS, 3 * ROWS, 3), axis=0)
+        return np.fft.irfft(_facing_spectra(turn) @ light, COLUMNS, axis=0).transpose(1, 0, 2)
+
+    def _table(self, to_world: np.ndarray, part: np.ndarray) -> np.ndarray:
+        """The same in any world."""
+        rest = np.flatnonzero(self._power * part)
+        vectors, light = self.vectors[rest] @ to_world.T * part[rest, None, None], self.light[rest]
+        normals = _directions(_latitudes(), _azimuths()).astype(np.float32)
         table = np.empty((len(normals), 3))
         for channel in range(3):
             # Negative light (worlds may subtract) falls on what faces away from its vector.
-            sign = np.where(light[rest, channel] < 0, -1.0, 1.0).astype(np.float32)
-            across = np.ascontiguousarray(vectors[rest, channel].T, np.float32) * sign
+            sign = np.where(light[:, channel] < 0, -1.0, 1.0).astype(np.float32)
+            across = np.ascontiguousarray(vectors[:, channel].T, np.float32) * sign
             for first in range(0, len(normals), PART):
                 facing = normals[first : first + PART] @ across
                 np.maximum(facing, 0.0, out=facing)
                 table[first : first + PART, channel] = facing @ sign
-        table = table.reshape(ROWS + 1, COLUMNS, 3)
-        # The mean of a cosine that is cut at 0 over all normals is a quarter.
-        return Irradiance(_of_mean(table, np.cos(latitude), light[rest].sum(axis=0) / 4), directions, bright)
+        return table.reshape(ROWS + 1, COLUMNS, 3)
+
+
+def _turn_of(to_world: np.ndarray) -> float | None:
+    """By how much a world is turned about its axis; None where it is turned otherwise."""
+    upright = np.allclose(to_world[2], (0.0, 0.0, 1.0), atol=1e-6) and np.linalg.det(to_world) > 0
+    return round(float(np.arctan2(to_world[1, 0], to_world[0, 0])), 9) if upright else None
+
+
+@lru_cache(maxsize=4)
+def _facing_spectra(turn: float) -> np.ndarray:
+    """(COLUMNS / 2 + 1, ROWS + 1, 3 x ROWS): of normals' components along the axes of cells above their horizon, by
+    the difference of azimuths."""
+    latitude = ((np.arange(ROWS) + 0.5) / ROWS - 0.5) * np.pi
+    normals = _directions(_latitudes(), (np.arange(COLUMNS) - 0.5) / COLUMNS * 2 * np.pi - turn)
+    along = np.einsum("nk,rak->nra", normals, _axes(latitude, np.zeros(1))[0])
+    along[along[..., 0] <= 0.0] = 0.0
+    return np.fft.rfft(along.reshape(ROWS + 1, COLUMNS, 3 * ROWS).transpose(1, 0, 2), axis=0)
+
+
+def _latitudes() -> np.ndarray:
+    return (np.arange(ROWS + 1) / ROWS - 0.5) * np.pi
+
+
+def _azimuths() -> np.ndarray:
+    return (np.arange(COLUMNS) / COLUMNS - 0.5) * 2 * np.pi
+
+
+def _axes(latitude: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    """(columns, rows, 3, 3): unit vectors along radius, east and north."""
+    shape = (len(azimuth), len(latitude))
+    x, y = (np.broadcast_to(part[:, None], shape) for part in (np.cos(azimuth), np.sin(azimuth)))
+    ring, z = (np.broadcast_to(part, shape) for part in (np.cos(latitude), np.sin(latitude)))
+    axes = ((ring * x, ring * y, z), (-y, x, np.zeros(shape)), (-z * x, -z * y, ring))
+    return np.stack([np.stack(axis, axis=-1) for axis in axes], axis=-2)
 
 
 def _of_mean(table: np.ndarray, weight: np.ndarray, mean: np.ndarray) -> np.ndarray:

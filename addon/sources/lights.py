@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -117,6 +118,17 @@ class Emitter:
         """World position (relative to the origin) of a sample; not for suns."""
         return self.centre + sample if self.kind in (POINT, SPHERE) else sample
 
+    @cached_property
+    def _fixed(self) -> np.ndarray:
+        """What is the same in each row of it."""
+        rows = np.zeros((TEXELS, 4))
+        rows[1] = *self.centre, self.radius
+        rows[3, 3] = self.area
+        rows[4] = *self.axis, self.spread
+        for k, row in enumerate((self.u, self.v, self.w)):
+            rows[5 + k, : len(row)] = row
+        return rows
+
     def row(
         self, sample: np.ndarray, first_view: int, view_count: int, weight: float = 1.0, rate: float = 1.0,
         points: float = np.inf,
@@ -124,15 +136,11 @@ class Emitter:
         """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen, `rate` how many
         points of this light a sample of the picture has on average, and `points` how many the whole picture has."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
-        rows = np.zeros((TEXELS, 4))
+        rows = self._fixed.copy()
         kind = self.kind + (unlit_bits(self.light.links) if self.light is not None else 0)
         rows[0] = kind, flags, first_view, view_count
-        rows[1] = *self.centre, self.radius
-        rows[2] = *sample, rate
-        rows[3] = *(self.radiance * weight / rate), self.area
-        rows[4] = *self.axis, self.spread
-        for k, row in enumerate((self.u, self.v, self.w)):
-            rows[5 + k, : len(row)] = row
+        rows[2, :3], rows[2, 3] = sample, rate
+        rows[3, :3] = self.radiance * weight / rate
         rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
         return rows if self.maps is None else MappedRow.of(rows, self.maps)
 

@@ -13,7 +13,8 @@ from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
 from ..scene.culling import calls
-from ..scene.materials import SURFACE_IMAGES, AovLayout
+from ..scene.joint_draws import Joint, JointDraws
+from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
 from ..scene.view import VIEW
 
 STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
@@ -210,21 +211,33 @@ def _submit(
     """Draw what a view (None: the camera) may see of `materials` (None: of all), each with its own program. `indices`:
     by material, what is shown instead of where surfaces lie."""
     rows = frame.view_rows if rows is None else rows
-    seen = np.flatnonzero(frame.geometry.boxes.seen(rows))
+    geometry, view = frame.geometry, view or frame.view_block
+    left = None
+    of_surfaces = program_of == frame.materials.surface_program
+    stand_ins = frame.shared(StandIns).of if of_surfaces else {}
+    if of_surfaces and materials is None and indices is None and not stand_ins:
+        joint = frame.kept(JointDraws).update(geometry, frame.materials)
+        if joint is not None:
+            _submit_joint(frame, technique, joint, constants, view, rows)
+            left = joint.left
+    if left is not None and not left.any():
+        return
+    seen = geometry.boxes.seen(rows) if left is None else geometry.boxes.seen(rows) & left
     material = None
-    stand_ins = frame.shared(StandIns).of if program_of == frame.materials.surface_program else {}
     unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
-    for call in calls(frame.geometry.draws, seen):
+    for call in calls(geometry.draws, np.flatnonzero(seen)):
         if call.draw.material in unseen or (materials is not None and call.draw.material not in materials):
             continue
         if call.draw.material != material:
             material = call.draw.material
             stand_in = stand_ins.get(material)
-            shader = passes.get(stand_in[0] if stand_in else program_of(material))
-            bindings = frame.materials.bindings(material, frame.geometry.instances)
-            bindings["blocks"]["film_view"] = view or frame.view_block
+            program = stand_in[0] if stand_in else program_of(material)
+            shader = passes.get(program)
+            bindings, shown = frame.materials.drawing(material, program, geometry.instances)
+            bindings["blocks"]["film_view"] = view
             bindings["textures"] |= textures or {}
-            shown = {"index_shown": indices[material]} if indices is not None else {}
+            if indices is not None:
+                shown["index_shown"] = indices[material]
             if stand_in:
                 bindings["textures"] |= stand_in[1]
                 shown |= stand_in[2]
@@ -232,3 +245,16 @@ def _submit(
         shader.set_constant("first_instance", call.first)
         passes.draw(shader, call.draw.batch, call.count)
         frame.count(technique, "triangles", call.triangles)
+
+
+def _submit_joint(frame: Frame, technique: Technique, joint: Joint, constants: dict, view: Block, rows) -> None:
+    """The same of materials that are drawn together."""
+    for part, runs in joint.calls(rows):
+        program = frame.materials.surface_program(part.leader)
+        shader = passes.get(program)
+        bindings, _ = frame.materials.drawing(part.leader, program, frame.geometry.instances)
+        bindings["blocks"]["film_view"] = view
+        shader.bind(**bindings, constants={**constants, "first_instance": 0, FIRST_VALUE: 0})
+        for first, count in runs:
+            passes.draw_range(shader, part.batch, first, count)
+            frame.count(technique, "triangles", count)

@@ -8,8 +8,9 @@ pass tests for EQUAL, so a driver skips blocks of other pixels. Whatever reads s
 
 The first picture flags the materials that were met and compiles those programs alone. Reading flags stops the queue, so
 where rays can meet no more than MOST_UNASKED materials, later pictures compile the rest (in a viewport one each) and
-draw all of them without asking: vertices of a material that was not met leave the screen by the same flags. Scenes of
-more materials read the flags in each round.
+draw all of them without asking; of many programs the vertices of one that was not met leave the screen by the same
+flags. Scenes of more materials read the flags in each round. Materials that differ in values alone are one pass, in
+which a pixel finds its own values in their block (scene/materials.py).
 
 `owners` gives for each triangle of the hierarchy its instance and its number within its material, and each material has
 a list of corner attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
@@ -18,7 +19,7 @@ a list of corner attributes by that number, made when it is first met. Bumps use
 
 | cost | per round of rays |
 |---|---|
-| passes | 1 trace, 1 that flags the materials met, 1 for each of those; 1 that ends at its vertices for others |
+| passes | 1 trace, 1 for each program; of many programs those met, and 1 that flags them |
 | readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
@@ -45,7 +46,7 @@ from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..scene.acceleration import Hierarchy
 from ..scene.geometry import corner_attribute
-from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, values_struct
+from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, may_share, shared_struct, values_struct
 from ..scene.view import VIEW
 from ..snapshot.scene import Instance, Mesh
 from .draw import refracts
@@ -53,8 +54,11 @@ from .reflectance import Reflectance
 
 MOST_IMAGES = 9  # of a material: 16 textures less those of records
 MOST_UNASKED = 64  # materials that are all evaluated, without a readback that tells which were met
+MOST_UNFLAGGED = 12  # programs that are drawn over the screen without a flag for each that tells whether it was met
 MOST_MATERIALS = 8000  # that depth tells apart, see trace.frag.glsl
 ROW = 256  # of lists by material
+MET_ROWS = -(-MOST_MATERIALS // ROW)
+LEADER_BITS = 13  # of numbers that hold two, as in hits/shared.glsl
 RECORDS = ("place", "triangle", "normals", "passed")
 RECORD_TEXTURES = tuple(("RGBA32F", f"hit_{name}") for name in RECORDS[:3])
 RAYS = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"))
@@ -72,7 +76,12 @@ TRACE = passes.fullscreen_program(
 MATERIALS_MET = Program(
     name="materials met",
     compute="hits/met.comp.glsl",
-    textures=(("RGBA32F", "hit_place"), ("R32F", "hit_material")),
+    textures=(
+        ("RGBA32F", "hit_place"),
+        ("R32F", "hit_material"),
+        ("RGBA32F", "rays"),
+        ("RGBA32F", "absorption"),
+    ),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
 COUNT_MET = passes.fullscreen_program(
@@ -82,7 +91,10 @@ COUNT_MET = passes.fullscreen_program(
 PLACE = passes.fullscreen_program(
     "points as hits",
     "hits/place.frag.glsl",
-    textures=tuple(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
+    textures=(
+        *(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
+        ("RGBA32F", "absorption"),
+    ),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
     writes_depth=True,
 )
@@ -133,6 +145,7 @@ def hit_program(compiled: CompiledMaterial) -> Program:
 def _hit_program(compiled: CompiledMaterial) -> Program:
     listed = (("RGBA32F", "hit_attributes"),) if compiled.attributes else ()
     relief = (("RGBA32F", "shell_corners"),) if _has_relief(compiled) else ()
+    shared = may_share(compiled)
     room = len(compiled.images) + len(listed) + len(relief) < MOST_IMAGES + 1
     return Program(
         name=f"hits {compiled.program_key[:8]}{' relief' * len(relief)}",
@@ -141,8 +154,12 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
             *relief, *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
+            *((("R32F", "hit_material"), ("RGBA32F", "absorption")) if shared else ()),
         ),
-        blocks=((VIEW, "film_view"), (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
+        blocks=(
+            (VIEW, "film_view"), (shared_struct() if shared else values_struct(compiled), "material_values"),
+            (MATERIAL_SCENE, "material_scene"),
+        ),
         constants=(
             ("INT", "ray_number"), ("INT", "glass_bends"), ("FLOAT", "material_depth"), ("INT", "material_number"),
         ),
@@ -150,7 +167,8 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
         **{
             **MASKED,
             "defines": (
-                *MASKED["defines"], *((("ASKS_IF_MET", "1"),) if room else ()),
+                *MASKED["defines"], *((("ASKS_IF_MET", str(MET_ROWS)),) if room else ()),
+                *((("SHARED_VALUES", "1"), ("MATERIAL_BASE", "material_base")) if shared else ()),
                 *((("OWN_SURFACE", ""),) if relief else ()),
             ),
         },
@@ -188,13 +206,14 @@ class Records:
     """What rays of a round met: RECORDS, the number of the material, and that as depth."""
 
     target: images.Target
-    met: images.Image  # by material, in rows of ROW: 1 if any ray has met it
+    # By material, in rows of ROW: 1 if any ray has met it; in the second half, if any has met one of its program.
+    met: images.Image
 
     @classmethod
     def take(cls, size: tuple[int, int]) -> Records:
         """Images of the pool, undefined."""
         colors = [images.pool.take(*size, "RGBA32F") for _ in RECORDS] + [images.pool.take(*size, "R32F")]
-        met = images.pool.take(ROW, -(-MOST_MATERIALS // ROW), "R32UI")
+        met = images.pool.take(ROW, 2 * MET_ROWS, "R32UI")
         return cls(images.Target(tuple(colors), images.pool.take(*size, "DEPTH_COMPONENT32F")), met)
 
     @property
@@ -237,6 +256,8 @@ class Hits:
         self._attributes: dict[int, tuple[object, images.Image]] = {}
         self._absorption: tuple[object, images.Image] | None = None
         self._possible: tuple[object, set[int]] | None = None
+        self._rays: images.Image | None = None  # of the last records; zero where there is none
+        self._flagged = False  # which materials they met is told by flags
         self._compiled: set[str] = set()  # keys of programs that have been drawn with
         self._asked: weakref.ref[Frame] | None = None  # the first picture
         self._ahead: object = None  # the view of the last picture that compiled a program ahead
@@ -249,6 +270,7 @@ class Hits:
         they meet, and return the materials that may be there. `number` below 20 tells rounds of a sample apart."""
         hierarchy = frame.hierarchy(path)
         owners = self._owners_of(frame, hierarchy)
+        images.Target((), records.target.depth).clear(depth=0.0)
         passes.fullscreen(
             TRACE,
             records.target,
@@ -263,18 +285,19 @@ class Hits:
             },
         )  # fmt: skip
         frame.count(technique, "passes")
+        self._rays = rays[1]
         return self._to_shade(frame, hierarchy, records, path)
 
     def place(
         self, frame: Frame, technique: Technique, points: tuple[images.Image, ...], records: Records
-    ) -> set[int]:  # fmt: skip
-        """Take points that are known as hits, and return their materials: images as the first three of RECORDS, and
-        one of the number of the material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
-        names = (name for _, name in PLACE.textures)
-        passes.fullscreen(PLACE, records.target, textures=dict(zip(names, points)))
+    ) -> None:  # fmt: skip
+        """Take points that are known as hits: images as the first three of RECORDS, and one of the number of the
+        material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
+        textures = {name: image for (_, name), image in zip(PLACE.textures, points)}
+        passes.fullscreen(PLACE, records.target, textures={**textures, "absorption": self._absorption_of(frame)})
         frame.count(technique, "passes")
+        self._rays = records.images["hit_place"]
         self._flag_met(frame, records)
-        return set(np.flatnonzero(images.read(records.met)).tolist())
 
     def numbers(self, frame: Frame, instance: Instance) -> np.ndarray:
         """(T,) of each triangle of an instance's mesh, its number among those of its material: y of the record
@@ -284,17 +307,20 @@ class Hits:
 
     def shade(
         self, frame: Frame, technique: Technique, ray_direction: images.Image, records: Records, materials: set[int],
-        closures: images.Target, number: int = 0,
+        closures: images.Target, number: int = 0, masked: bool = False,
     ) -> None:  # fmt: skip
-        """Evaluate these materials at the records into `closures` (take_closures), which is cleared before."""
-        images.Target(closures.colors).clear()
+        """Evaluate these materials at the records into `closures` (take_closures), which is cleared before; `masked`:
+        of it the place alone, since whoever reads it does so where something was met, and nothing if its w is 0."""
+        images.Target(closures.colors[:1] if masked else closures.colors).clear()
         found = records.images
         shared = {f"hit_{name}": found[f"hit_{name}"] for name in RECORDS[:3]}
         shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
+        lists = {"hit_material": found["hit_material"], "absorption": self._absorption_of(frame)}
         view, shader = {"film_view": frame.view_block}, None
+        leaders = {frame.materials.leaders[k] for k in materials}
         with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
             # One program after the other: between materials that share one, only what differs is bound.
-            for material in sorted(materials, key=lambda k: (_program_key(frame.materials.compiled[k]), k)):
+            for material in sorted(leaders, key=lambda k: (_program_key(frame.materials.compiled[k]), k)):
                 program, own = self._own_bindings(frame, material, number)
                 if program.textures and ("UINT_2D", "materials_met") in program.textures:
                     own["textures"]["materials_met"] = records.met
@@ -304,14 +330,18 @@ class Hits:
                 else:
                     shader = wanted
                     textures, blocks = own["textures"] | shared, own["blocks"] | view
+                    if ("R32F", "hit_material") in program.textures:
+                        textures |= lists
                     shader.bind(textures=textures, blocks=blocks, constants=own["constants"])
                 passes.draw_screen(shader)
                 self._compiled.add(_program_key(frame.materials.compiled[material]))
-        with images.borrowed(1, 1, "R32F") as count:
-            number_of_all = {"material_count": len(frame.materials.compiled)}
-            passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
-            frame.count_texel(technique, "materials", count.colors[0])
-        frame.count(technique, "passes", len(materials) + 1)
+        if self._flagged:
+            with images.borrowed(1, 1, "R32F") as count:
+                number_of_all = {"material_count": len(frame.materials.compiled)}
+                passes.fullscreen(COUNT_MET, count, textures={"materials_met": records.met}, constants=number_of_all)
+                frame.count_texel(technique, "materials", count.colors[0])
+        frame.count(technique, "programs", len(leaders))
+        frame.count(technique, "passes", len(leaders) + 1)
 
     def _own_bindings(self, frame: Frame, material: int, number: int) -> tuple[Program, dict]:
         """The program of a material, and what it binds besides records, rays, instances and the view."""
@@ -320,7 +350,9 @@ class Hits:
         if len(compiled.images) > MOST_IMAGES:
             textures = {"reflectance": self._mean_reflectance(frame)}
             return MEAN, {"textures": textures, "blocks": {}, "constants": constants}
-        bound = frame.materials.bindings(material, frame.geometry.instances, own=False)
+        bound = frame.materials.bindings(
+            material, frame.geometry.instances, own=False, shared=may_share(compiled)
+        )  # fmt: skip
         textures = {name: image for name, image in bound["textures"].items() if name != "instances"}
         if _has_relief(compiled):
             textures |= frame.materials.own_images[material]
@@ -334,7 +366,6 @@ class Hits:
     def _to_shade(self, frame: Frame, hierarchy: Hierarchy, records: Records, path: str) -> set[int]:
         """Materials that are to be evaluated at these records: all that the rays may have met, without asking which,
         once their programs exist; else those that they have met."""
-        self._flag_met(frame, records)
         possible = self._possible_of(frame, hierarchy, path)
         if len(possible) <= MOST_UNASKED:
             unknown = {_program_key(frame.materials.compiled[k]) for k in possible} - self._compiled
@@ -344,14 +375,21 @@ class Hits:
                 self._ahead = frame.view  # one for each picture that has to move at once
                 unknown -= unknown if frame.settings.whole else {min(unknown)}
             if not unknown:
+                if len({frame.materials.leaders[k] for k in possible}) > MOST_UNFLAGGED:
+                    self._flag_met(frame, records)
+                else:
+                    records.met.texture.clear(format="UINT", value=(1,))
+                    self._flagged = False
                 return possible
-        return set(np.flatnonzero(images.read(records.met)).tolist())
+        self._flag_met(frame, records)
+        return set(np.flatnonzero(images.read(records.met)[:MET_ROWS]).tolist())
 
-    @staticmethod
-    def _flag_met(frame: Frame, records: Records) -> None:
+    def _flag_met(self, frame: Frame, records: Records) -> None:
         """Write flags of the materials of these records."""
+        self._flagged = True
         records.met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
+        textures |= {"rays": self._rays, "absorption": self._absorption_of(frame)}
         passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
 
     def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:
@@ -429,13 +467,16 @@ class Hits:
         return known[1]
 
     def _absorption_of(self, frame: Frame) -> images.Image:
-        """What insides of solids absorb, per metre, by material."""
-        media = [material.medium if material.glass else None for material in frame.materials.compiled]
-        key = tuple(medium and medium.key for medium in media)
+        """By material: what insides of solids absorb, per metre; which material leads those of its program, and where
+        its values begin among theirs."""
+        materials = frame.materials
+        media = [material.medium if material.glass else None for material in materials.compiled]
+        key = (*(medium and medium.key for medium in media), *materials.leaders, *materials.first_rows)
         if self._absorption is None or self._absorption[0] != key:
             table = np.zeros((-(-max(len(media), 1) // ROW) * ROW, 4), np.float32)
-            for row, medium in zip(table, media):
-                row[:3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
+            for k, medium in enumerate(media[:MOST_MATERIALS]):
+                table[k, :3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
+                table[k, 3] = materials.leaders[k] + (materials.first_rows[k] << LEADER_BITS)
             self._absorption = (key, images.upload(table.reshape(-1, ROW, 4)))
         return self._absorption[1]
 

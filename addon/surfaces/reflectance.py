@@ -109,12 +109,14 @@ class Reflectance:
         all_draws = frame.geometry.draws
         own = some([k for k, draw in enumerate(all_draws) if draw.material == material], all_draws)
         draws = [all_draws[k] for k in own]
-        shader = passes.get(frame.materials.surface_program(material))
-        bindings = frame.materials.bindings(material, frame.geometry.instances)
+        program = frame.materials.surface_program(material)
+        shader = passes.get(program)
+        bindings, own_constants = frame.materials.drawing(material, program, frame.geometry.instances)
         low, high = np.min([d.low for d in draws], axis=0), np.max([d.high for d in draws], axis=0)
         bindings["blocks"]["film_view"] = Block(VIEW, **_values(overview(low, high, backward)))
         with passes.drawing(target, viewport=viewport, depth_test="NONE", depth_write=False):
-            shader.bind(**bindings, constants={"first_instance": 0, **drawing_constants(STOCHASTIC, False)})
+            constants = {"first_instance": 0, **drawing_constants(STOCHASTIC, False), **own_constants}
+            shader.bind(**bindings, constants=constants)
             for call in calls(all_draws, own):
                 shader.set_constant("first_instance", call.first)
                 passes.draw(shader, call.draw.batch, call.count)

@@ -237,7 +237,7 @@ class Airlight(Technique):
     def begin(self, frame: Frame) -> None:
         """Find what shines into the media."""
         self._emitters = [one for one in frame.emitters if one.light.visibility.volume]
-        used = {slot for instance in frame.snapshot.instances for slot in instance.materials}
+        used = frame.snapshot.used_materials
         self._triangles = None
         if any(may_emit(frame.snapshot.materials[slot].graph) for slot in used):
             triangles = EmissiveTriangles(frame, ("diffuse",))
@@ -293,7 +293,7 @@ def places_of(rays: int, rows: int) -> int:
 
 def volume_graphs(snapshot: Snapshot) -> list[Graph]:
     """Trees of all volumes of the scene."""
-    used = {k for one in snapshot.instances for k in one.materials} | {one.material for one in snapshot.volumes}
+    used = snapshot.used_materials | {one.material for one in snapshot.volumes}
     graphs = [snapshot.materials[k].graph for k in sorted(used)]
     world = [snapshot.world.volume] if snapshot.world.volume is not None else []
     return world + [graph for graph in graphs if graph.volume is not None]

@@ -69,7 +69,7 @@ class EmissiveLight(Technique):
         self._traced = False  # rays take the place of maps
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        used = snapshot.used_materials
         if not any(may_emit(snapshot.materials[slot].graph) for slot in used):
             return "no material emits light"
         return None

@@ -96,7 +96,7 @@ class EnvironmentAreaLights(Technique):
         maps_of = self._shadows[frame.settings.get(self, "shadows")]
         resolution = maps_of.resolution(frame)
         cell = maps_of.cell(frame, frame.sample, frame.settings.samples)
-        shadows = any(instance.visibility.shadow for instance in frame.snapshot.instances)
+        shadows = frame.snapshot.casts_shadows
         jitter = (*frame.random("map/environment"), *frame.random("map/environment/turn"))
         kinds = 1 << lights.SUN | (cell >= 1.0) << lights.WHOLE
         points = []

@@ -11,16 +11,17 @@ irradiance of a normal (addon/sources/irradiance.py). Diffuse surfaces subtract 
 arrived in the samples before (a control variate, shaders/lib/known_irradiance.glsl): an open floor has its exact light
 in every sample. Directions count there by how open the probes found the scene.
 
-Where many pixels see little of the world (a gallery behind columns), each pixel of a final picture traces a ray instead
-of each two directions, drawn from a table of its tile (addon/sources/world_tiles.py); the probes tell beforehand which
-of the two leaves less error. Where a ray of each pixel costs less than a map, rays answer for shared directions, too.
-Auto draws one to eight directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
+Where many pixels see little of the world (a gallery behind columns), each pixel of a final picture traces rays drawn
+from a table of its tile (addon/sources/world_tiles.py): as many as leave the noise of the directions that would be
+shared, and no more than take the time of their maps; the probes tell beforehand which of the two leaves less error.
+Where a ray of each pixel costs less than a map, rays answer for shared directions, too. Auto draws one to eight
+directions a sample, up to 16 in pictures of few samples (addon/sources/rates.py).
 
 | cost | per sample |
 |---|---|
 | maps | `directions` orthographic views (more where the picture is deep), or as many rays per pixel |
 | passes | 2 over the screen |
-| rays | 1 per pixel instead of each 2 maps |
+| rays | per pixel, about 1 instead of each 4 or more maps |
 
 Bias: the first sample takes its own share of the known light, an error that falls with directions and samples; the
 irradiance is known to within 0.3 %.
@@ -155,6 +156,7 @@ class EnvironmentLight(Technique):
         self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._edges: images.Image | None = None  # of the tiles' tables; None: directions are shared
+        self._rays_for_direction = 1.0  # rays of a pixel that leave as little noise as a shared direction does
         self._traced = False  # directions are shared, and rays take the place of their maps
         self._openness: list[images.Target] = []  # sums before this sample, and a place for those after it
 
@@ -186,7 +188,8 @@ class EnvironmentLight(Technique):
         if self._edges is not None:
             # Direction, radiance and density are each pixel's own; the rate is what narrow lobes take it for.
             row = lights.direction_row((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, flags, 0, 1, rate.per_sample)
-            rays = max(1, int(rate.per_sample * min(self._maps_per_ray(frame, resolution), 1.0)))
+            affordable = min(self._maps_per_ray(frame, resolution), 1.0)
+            rays = max(1, int(min(rate.per_sample * affordable, self._needed(rate))))
             points = [LightPoint(row, self._rays)] * rays
             yield from light_surfaces(
                 frame, self, points, 1 << lights.DIRECTION, self._sources, lambda *_: self._own_rays(frame)
@@ -195,8 +198,9 @@ class EnvironmentLight(Technique):
             return
         shadows = _cast_shadows(frame)
         points, patches = [], self._patches(frame)
-        for number in rate.points(frame.sample):
-            direction, radiance, density = frame.environment.draw(*frame.random_at(number, "environment"))
+        numbers = list(rate.points(frame.sample))
+        chosen = np.array([frame.random_at(number, "environment") for number in numbers]).reshape(-1, 2)
+        for number, direction, radiance, density in zip(numbers, *frame.environment.draw(*chosen.T), strict=True):
             if patches is not None:
                 points.append(_patch(frame, patches, flags, rate, number, direction, radiance, density, shadows))
                 continue
@@ -221,6 +225,10 @@ class EnvironmentLight(Technique):
         yield from light_surfaces(frame, self, points, 1 << lights.DIRECTION, self._sources, known)
         if self._openness and points and frame.sample + 1 < frame.settings.samples:
             self._sum_openness(frame)
+
+    def _needed(self, rate: Rate) -> float:
+        """Rays of a pixel in a sample that leave as little noise as the shared directions do."""
+        return float(np.ceil(rate.per_sample * self._rays_for_direction))
 
     def _resolution(self, frame: Frame) -> int:
         return map_resolution(frame, frame.settings.get(self, "texels_per_pixel"))
@@ -287,6 +295,7 @@ class EnvironmentLight(Technique):
             return None
         if frame.hierarchy("shadow") is None:
             return None
+        self._rays_for_direction = own / (UNSHARED * shared)
         chance = world_tiles.tables(world_tiles.arriving(useful, moments[0]), moments[0])
         self._tiles = (useful.shape[1], useful.shape[0])
         return images.upload(world_tiles.lower_edges(chance), "R32F")
@@ -330,4 +339,4 @@ def _patch(
 
 
 def _cast_shadows(frame: Frame) -> bool:
-    return any(instance.visibility.shadow for instance in frame.snapshot.instances)
+    return frame.snapshot.casts_shadows

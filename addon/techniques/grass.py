@@ -138,7 +138,7 @@ def _wanted(snapshot: Snapshot) -> list[int]:
     grown = [k for k, one in enumerate(snapshot.materials) if one.own and own_value(one.own, Grass, "patch") != NONE]
     if not grown:
         return []
-    shown = {material for instance in snapshot.instances for material in instance.materials}
+    shown = snapshot.used_materials
     return [material for material in grown if material in shown]
 
 

@@ -155,7 +155,7 @@ class ImageSpaceSubsurface(Technique):
         self._shapes: images.Image | None = None  # of cells: normal and mean length of lines through the object
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        shown = {material for instance in snapshot.instances for material in instance.materials}
+        shown = snapshot.used_materials
         if not any(may_scatter(snapshot.materials[material].graph) for material in shown):
             return "no material scatters light below its surface"
         return acceleration.too_many(snapshot)

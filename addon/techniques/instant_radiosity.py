@@ -143,7 +143,7 @@ def no_diffuse_light(snapshot: Snapshot) -> str | None:
 
 
 def _used(snapshot: Snapshot) -> list[Graph]:
-    return [snapshot.materials[m].graph for m in {m for one in snapshot.instances for m in one.materials}]
+    return [snapshot.materials[m].graph for m in snapshot.used_materials]
 
 
 def _may_reflect(graph) -> bool:

@@ -139,7 +139,7 @@ class ReflectionEditing(Technique):
         self._kept: dict[object, _Edited] = {}
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        if not any(_edits(instance)[0] for instance in snapshot.instances):
+        if not any(_edits(instance)[0] for instance in snapshot.instances if instance.own):
             return "no object has an edit of its reflections"
         return None
 

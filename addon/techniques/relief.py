@@ -90,7 +90,7 @@ class Relief(Technique):
     )  # fmt: skip
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        shown = {index for instance in snapshot.instances for index in instance.materials}
+        shown = snapshot.used_materials
         modes = {displacement.mode_of(snapshot.materials[index]) for index in shown}
         if modes & {displacement.AUTO, displacement.RELIEF}:
             return None

@@ -189,7 +189,7 @@ class ShadedReflections(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
             return "the scene has no surface"
-        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        used = snapshot.used_materials
         if not may_be_glossy(snapshot) and not any(may_refract(snapshot.materials[slot].graph) for slot in used):
             return "no material mirrors or bends light"
         if settings.bounces == 0:
@@ -233,7 +233,7 @@ class ShadedReflections(Technique):
                 round_ = {**reach, "ray_number": number, "shaded_roughness": onward_roughness}
                 met = hits.trace(frame, self, rays.colors[:2], records, number=number)
                 yield
-                hits.shade(frame, self, rays.colors[1], records, met, closures, number)
+                hits.shade(frame, self, rays.colors[1], records, met, closures, number, masked=True)
                 yield
                 self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
                 if not met:
@@ -264,7 +264,7 @@ class ShadedReflections(Technique):
 
     def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before) -> None:
         """Rays of the lobes of `surfaces`, into `rays`."""
-        rays.clear()
+        images.Target(rays.colors[1:2]).clear()  # a ray without direction is none, whatever else stands there
         passes.fullscreen(
             scatter_program(bool(before)),
             images.Target(rays.colors, depth),

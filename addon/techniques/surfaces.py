@@ -159,7 +159,7 @@ def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
         camera.aperture, frame.snapshot.film, settings.seed, settings.draft, refracts(frame),
         frame.geometry.changes, frame.geometry.origin.tobytes(), frame.materials.fingerprint(),
         tuple(sorted(settings.values.items())), tuple(technique.name for technique in frame.plan.techniques),
-        tuple((one.key, one.own) for one in (*frame.snapshot.instances, *frame.snapshot.materials) if one.own),
+        frame.snapshot.own_values,
     )  # fmt: skip
 
 

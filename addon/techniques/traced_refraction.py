@@ -115,7 +115,7 @@ class TracedRefraction(Technique):
         self._interfaces: images.Image | None = None
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        used = {slot for instance in snapshot.instances for slot in instance.materials}
+        used = snapshot.used_materials
         if not any(may_refract(snapshot.materials[slot].graph) for slot in used):
             return "no material is glass"
         return acceleration.too_many(snapshot)

@@ -104,7 +104,7 @@ class VolumeCaustics(Technique):
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not has_media(snapshot) or not any(may_send(graph) for graph in volume_graphs(snapshot)):
             return "the scene has no volume that scatters"
-        used = {k for one in snapshot.instances for k in one.materials}
+        used = snapshot.used_materials
         if not any(may_bend(snapshot.materials[k].graph) for k in used):
             return "no material is smooth glass or a smooth mirror"
         if not any(np.any(light.strength) and light.visibility.volume for light in snapshot.lights):

@@ -228,14 +228,29 @@ def _values(scene, depsgraph) -> dict[tuple[str, str], object]:
     """What is set of the parameters of which a picture has one value each."""
     values = {}
     blocks = {scope: block_of(scope, scene, depsgraph) for scope in OF_A_PICTURE}
-    for technique in REGISTRY:
-        for param in technique.params:
-            block = blocks.get(param.scope)
-            if block is None or param.many or param.image:
-                continue
-            value = getattr(block.candela, identifier(technique.name, param.name))
-            values[technique.name, param.name] = tuple(value) if isinstance(param.default, tuple) else value
+    groups = {scope: block.candela for scope, block in blocks.items() if block is not None}
+    for scope, key, name, is_tuple in _of_a_picture(REGISTRY):
+        if scope in groups:
+            value = getattr(groups[scope], name)
+            values[key] = tuple(value) if is_tuple else value
     return values
+
+
+@cache
+def _of_a_picture(registry: tuple) -> list[tuple[str, tuple[str, str], str, bool]]:
+    """Scope, key in the settings and property of each parameter of which a picture has one value; whether that is a
+    tuple."""
+    return [
+        (
+            param.scope,
+            (technique.name, param.name),
+            identifier(technique.name, param.name),
+            isinstance(param.default, tuple),
+        )
+        for technique in registry
+        for param in technique.params
+        if param.scope in OF_A_PICTURE and not (param.many or param.image)
+    ]
 
 
 def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgraph=None) -> Settings:

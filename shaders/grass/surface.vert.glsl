@@ -16,6 +16,9 @@ void main()
   normal_heights.x = dot(world_position - instance_origin(instance), world_normal);
   normal_heights.yz = (instance_volume(instance) * unit) * envelope;
   instance_flat = ivec2(id, (instance.mirrored != projection_mirrors(PROJECTION)) ? 1 : 0);
+#ifdef MATERIAL_BASE
+  instance_flat.y += 2 * first_value;
+#endif
   copy_attributes();
   gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
 }

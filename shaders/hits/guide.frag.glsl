@@ -9,7 +9,7 @@ void main()
   out_shown = vec4(0.0);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 path = met_path_fetch(pixel);
-  if (!path_is_glossy(int(path.w + 0.5))) {
+  if (!path_is_glossy(int(path.w + 0.5)) || surface_position_fetch(pixel).w == 0.0) {
     return;
   }
   Surface s = SURFACE_READ(pixel);

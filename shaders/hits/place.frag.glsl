@@ -1,4 +1,6 @@
 // Points of surfaces that are known beforehand, as records of hits (hits/trace.frag.glsl).
+#include "hits/shared.glsl"
+
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -8,5 +10,5 @@ void main()
   out_normals = point_normals_fetch(pixel);
   out_passed = vec4(1.0, 1.0, 1.0, 0.0);
   out_material = material.x;
-  gl_FragDepth = (material.y > 0.5) ? 0.5 + (material.x + 1.0) * (1.0 / 16384.0) : 0.0;
+  gl_FragDepth = (material.y > 0.5) ? shared_depth(int(material.x + 0.5)) : 0.0;
 }

@@ -6,6 +6,11 @@
 #include "lib/random.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/instance.glsl"
+#ifdef SHARED_VALUES
+#include "hits/shared.glsl"
+
+int material_base;  // where the values of the material begin that is met here
+#endif
 #include "generated/material"
 #include "hits/point.glsl"
 #ifdef OWN_SURFACE
@@ -19,6 +24,9 @@
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
+#ifdef SHARED_VALUES
+  material_base = shared_base(int(hit_material_fetch(pixel).r + 0.5));
+#endif
   int id = int(hit_triangle_fetch(pixel).x);
   SurfacePoint point = hit_point(pixel, instance_read(id), id);
   point.refracts = glass_bends != 0;

@@ -8,8 +8,9 @@
 //              triangle emits, times distance squared over cosine: a density per steradian times the power of all
 //   material   its number
 //
-// Depth: 0 where there is no ray, 0.5 where one meets nothing, above where one does, by material.
+// Depth: as it was, 0, where there is no ray, as is all else there; 0.5 where one meets nothing, above where one does, by program.
 #include "trace/hierarchy.glsl"
+#include "hits/shared.glsl"
 
 vec4 owner_texel(int index)
 {
@@ -25,11 +26,11 @@ void main()
   out_passed = vec4(1.0, 1.0, 1.0, 0.0);
   out_material = 0.0;
   gl_FragDepth = 0.0;
-  vec4 start = ray_origin_fetch(pixel);
   vec3 direction = ray_direction_fetch(pixel).xyz;
   if (dot(direction, direction) == 0.0) {
-    return;
+    discard;  // after some mirrors most pixels have no ray, and what is not written costs nothing
   }
+  vec4 start = ray_origin_fetch(pixel);
   gl_FragDepth = 0.5;
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 61 + ray_number);
   ivec2 hit;
@@ -60,5 +61,5 @@ void main()
     out_passed.rgb = exp(-absorption_fetch(ivec2(material_index & 255, material_index >> 8)).rgb * t);
   }
   out_material = float(material_index);
-  gl_FragDepth = 0.5 + float(material_index + 1) * (1.0 / 16384.0);
+  gl_FragDepth = shared_depth(material_index);
 }

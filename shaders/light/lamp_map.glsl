@@ -57,9 +57,9 @@ vec3 lamp_map(int number, vec3 direction, vec3 from, float path)
   vec4 far = lamp_maps_fetch(ivec2(5, number));
   if (far.z > 0.5) {
     float at = clamp((log(max(path, 1e-30)) - far.w) * u.w, 0.0, far.z - 1.0);
-    int step = min(int(at), int(far.z) - 2);
-    ivec2 texel = ivec2(far.xy + 0.5) + ivec2(step, 0);
-    vec3 found = mix(lamp_maps_fetch(texel).rgb, lamp_maps_fetch(texel + ivec2(1, 0)).rgb, at - float(step));
+    int first = min(int(at), int(far.z) - 2);
+    ivec2 texel = ivec2(far.xy + 0.5) + ivec2(first, 0);
+    vec3 found = mix(lamp_maps_fetch(texel).rgb, lamp_maps_fetch(texel + ivec2(1, 0)).rgb, at - float(first));
     factor *= found * (1.0 + path * path);
   }
   return factor;

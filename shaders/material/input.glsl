@@ -2,6 +2,7 @@
 
 #include "lib/closure.glsl"
 #include "lib/color.glsl"
+#include "material/values.glsl"
 
 // An alpha of 2 marks coordinates of two dimensions, whose number is the first.
 void input_attribute(vec4 stored, out vec3 color, out vec3 vector, out float average, out float alpha)
@@ -80,8 +81,8 @@ void input_texture_coordinate_object(SurfacePoint point, vec4 generated_attribut
   input_texture_coordinate(point, generated_attribute, uv_attribute, generated, normal, uv, object, camera, window,
                            reflection);
   vec4 place = vec4(point.position + material_scene.origin.xyz, 1.0);
-  object = vec3(dot(material_values.value[first], place), dot(material_values.value[first + 1], place),
-                dot(material_values.value[first + 2], place));
+  object = vec3(dot(material_value(first), place), dot(material_value(first + 1), place),
+                dot(material_value(first + 2), place));
 }
 
 // A direction of object space as a tangent: turned to world space and laid into the surface.

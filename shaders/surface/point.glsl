@@ -47,7 +47,7 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
     flat_normal = -flat_normal;
   }
   point.geometric_normal = flat_normal;
-  point.backfacing = gl_FrontFacing == (instance_flat.y == 1);
+  point.backfacing = gl_FrontFacing == ((instance_flat.y & 1) == 1);
   vec3 shading_normal = safe_normalize(world_normal);
   if (dot(shading_normal, shading_normal) < 0.5) {
     shading_normal = flat_normal;

@@ -5,7 +5,8 @@
 
 void main()
 {
-  int id = first_instance + local_instance + gl_InstanceID;
+  // Where materials share a block, corners drawn together say which rows are theirs (addon/scene/joint_draws.py).
+  int id = first_instance + (local_instance & 0x1fffff) + gl_InstanceID;
   Instance instance = instance_read(id);
   world_position = instance_position(instance, position);
   // Between corners normals run as Cycles has them: of unit length in world space where no other object shows this mesh.
@@ -16,6 +17,9 @@ void main()
   normal_heights.x = dot(world_position - instance_origin(instance), world_normal);
   normal_heights.yz = (instance_volume(instance) * unit) * envelope;
   instance_flat = ivec2(id, (instance.mirrored != projection_mirrors(PROJECTION)) ? 1 : 0);
+#ifdef MATERIAL_BASE
+  instance_flat.y += 2 * (first_value + (local_instance >> 21));
+#endif
   copy_attributes();
   gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
 }

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.scene import casters
+from addon.scene import casters, culling
 from addon.scene.culling import Boxes, calls, closed, closed_triangles
 
 
@@ -103,6 +103,15 @@ def test_neighbouring_groups_of_one_batch_are_one_call():
     draws = [SimpleNamespace(batch=x, first=f, count=c) for x, f, c in ((a, 0, 2), (a, 2, 3), (a, 9, 1), (b, 0, 1))]
     found = [(call.draw.batch is a, call.first, call.count) for call in calls(draws, [0, 1, 2, 3])]
     assert found == [(True, 0, 5), (True, 9, 1), (False, 0, 1)]
+
+
+def test_what_lies_between_two_runs_is_drawn_where_a_call_costs_more(monkeypatch):
+    first, seen = np.array([0, 10, 20, 520, 530]), np.array([True, False, True, True])
+    for triangle, expected in ((1.0, [(0, 530)]), (100.0, [(0, 10), (20, 510)])):
+        costs = SimpleNamespace(triangle=triangle, python=500.0)
+        monkeypatch.setattr(culling.device, "current", lambda costs=costs: costs)
+        assert culling.joined(first, seen) == expected
+    assert culling.joined(first, np.zeros(4, bool)) == []
 
 
 def test_runs_of_clusters_cover_exactly_what_is_seen():

@@ -51,9 +51,11 @@ def test_irradiance_is_the_sum_over_texels(name):
     assert not found[:, 2].any()
 
 
-def test_irradiance_turns_with_the_world():
+@pytest.mark.parametrize("tilted", (False, True))
+def test_irradiance_turns_with_the_world(tilted):
     angle = 0.7
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
+    turn = np.roll(turn, (1, 1), axis=(0, 1)) if tilted else turn
     cells = WorldCells(np.repeat(SKIES["window"][..., None], 3, axis=2))
     straight, turned = cells.irradiance(np.eye(3)), cells.irradiance(turn)
     some = normals()

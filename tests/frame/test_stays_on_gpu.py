@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 from addon import engine
-from addon.gfx import images, library
+from addon.gfx import images, library, passes
 from addon.surfaces import hits
 
 from ..viewport.region import Region
@@ -62,6 +62,19 @@ def test_a_picture_with_a_moved_camera_is_read_back_and_little_else(counted, nam
     counted.clear()
     moved(scene)
     assert counted["reads"] + counted["waits"] <= 3
+
+
+def test_two_thousand_instances_are_few_draws(monkeypatch):
+    """Of meshes: at each of eight points of the film, and into depth maps."""
+    scene = opened("instances", 1)
+    for _ in range(2):
+        moved(scene)
+    drawn = []
+    for draw in ("draw", "draw_range"):
+        original = getattr(passes, draw)
+        monkeypatch.setattr(passes, draw, lambda *a, of=original: drawn.append(a) or of(*a))
+    moved(scene)
+    assert 0 < len(drawn) <= 100
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -24,8 +24,10 @@ def steps(stage):
 
 
 def surfaces(cycles) -> np.ndarray:
-    """Where Cycles sees a surface in all samples: a background is 1e36 away, and 0 in Candela."""
-    return cycles["Denoising Depth"][..., 0] < 1e9
+    """Where Cycles sees a surface in all samples: a background is 1e36 away since Blender 5, and before it 0, as in
+    Candela."""
+    depth = cycles["Denoising Depth"][..., 0]
+    return (depth > 0.0) & (depth < 1e9)
 
 
 def test_albedo_normal_and_depth_are_those_of_cycles(asked):

@@ -202,7 +202,10 @@ def test_known_light_leaves_the_mean_where_things_stand_in_the_way(floor, monkey
 
 @pytest.mark.slow
 def test_rays_by_tiles_have_the_mean_of_shared_directions(stage, monkeypatch):
-    monkeypatch.setattr(environment_light, "UNSHARED", np.inf)  # rays, whatever they leave
+    monkeypatch.setattr(environment_light, "UNSHARED", np.inf)  # rays, whatever they leave,
+    monkeypatch.setattr(
+        environment_light.EnvironmentLight, "_needed", lambda self, rate: np.inf
+    )  # and all there may be
     gallery(stage)
     stage.scene.candela.light_probes_maps = (
         3.0  # 64 samples double it, and the world has twice of that, for the error it would leave
@@ -215,6 +218,14 @@ def test_rays_by_tiles_have_the_mean_of_shared_directions(stage, monkeypatch):
     np.testing.assert_allclose(by_rays.mean(axis=(0, 1)), shared.mean(axis=(0, 1)), rtol=0.01)
     halves = [picture.reshape(4, 12, 4, 16, 3).mean(axis=(1, 3)) for picture in (by_rays, shared)]
     np.testing.assert_allclose(halves[0], halves[1], rtol=0.06)
+
+
+def test_rays_by_tiles_are_as_many_as_leave_the_noise_of_shared_directions():
+    technique, rate = environment_light.EnvironmentLight(), Rate(4)
+    technique._rays_for_direction = 0.2
+    assert technique._needed(rate) == 4.0
+    technique._rays_for_direction = 0.01
+    assert technique._needed(rate) == 1.0
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, -2.0])

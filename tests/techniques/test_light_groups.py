@@ -106,8 +106,8 @@ def test_a_picture_without_groups_is_drawn_once(grouped, monkeypatch):
     from addon.frame.run import Renderer
 
     begun = []
-    begin = Renderer.begin
-    monkeypatch.setattr(Renderer, "begin", lambda self, *given: begun.append(1) or begin(self, *given))
+    beginning = Renderer.beginning
+    monkeypatch.setattr(Renderer, "beginning", lambda self, *given: begun.append(1) or beginning(self, *given))
     grouped.written("CANDELA", 1, bounces=0)
     assert len(begun) == 1
     group(grouped, "Key", "Fill", "Nobody")

@@ -249,8 +249,8 @@ def painting(left, right):
     yield from rendered(left)
     yield 0.5
     picture("painting_before.png")
-    with there(right):
-        result["new_maps"] = list(bpy.ops.candela.new_translucency_maps("EXEC_DEFAULT", size=128))
+    with there(right):  # True: a step for undo, as a click on the button makes one
+        result["new_maps"] = list(bpy.ops.candela.new_translucency_maps("EXEC_DEFAULT", True, size=128))
     yield 0.5
     scroll(right, 2)
     yield 0.7
@@ -259,7 +259,7 @@ def painting(left, right):
     translucency = skin.candela.image_space_subsurface_translucency_map
     result["before_paint"] = mean(translucency)
     with there(right):
-        result["paint"] = list(bpy.ops.candela.paint_translucency_map("INVOKE_DEFAULT", name="translucency_map"))
+        result["paint"] = list(bpy.ops.candela.paint_translucency_map("INVOKE_DEFAULT", True, name="translucency_map"))
     yield 0.5
     result["paint_mode"] = ball.mode
     result["canvas"] = scene.tool_settings.image_paint.canvas.name if scene.tool_settings.image_paint.canvas else ""

@@ -86,7 +86,7 @@ class ImageFlags:
 
 @dataclass(frozen=True)
 class Rows:
-    """A table out of a property, such as the stops of a colour ramp, as rows of `material_values.value`.
+    """A table out of a property, such as the stops of a colour ramp, as rows of `material_values`.
 
     Gives two int literals, the first row and the number of rows; their number is topology, their content is not.
     """
