@@ -136,8 +136,8 @@ class Emitter:
         """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen, `rate` how many
         points of this light a sample of the picture has on average, and `points` how many the whole picture has."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
-        rows = self._fixed.copy()
         kind = self.kind + (unlit_bits(self.light.links) if self.light is not None else 0)
+        rows = self._fixed.copy()
         rows[0] = kind, flags, first_view, view_count
         rows[2, :3], rows[2, 3] = sample, rate
         rows[3, :3] = self.radiance * weight / rate
