@@ -11,7 +11,7 @@ Jacobi iteration).
 | cost | for n points, G groups, K x K pixels |
 |---|---|
 | micro-buffers of groups | 2 G trees walked, 4 K^2 bytes each, of the pool |
-| who takes light from which group | 2 n rays, up to four times as many where walls part groups |
+| who takes light from which group | 2 n rays, up to eight times as many where walls part groups |
 | each bounce | 2 G K^2 fetches, 2 passes and, for each 7 levels of the tree, one more; 8 fetches a node |
 | radiance | 64 bytes a point, twice |
 """

@@ -9,10 +9,20 @@
 #define LIFT 0.03     // half lengths of the piece that rays run above it: what is lower hides nothing
 #define UPRIGHT 0.3   // sine between the piece and what stands on it
 #define APART 0.9     // cosine between two lines that count as one
+#define BEYOND 0.2    // half lengths behind such a line, and
+#define WIDE 0.4      // to both sides, where it must hide, too: posts and legs end no light
 
 vec4 tree_texel(int index)
 {
   return tree_nodes_fetch(ivec2(index & 2047, index >> 11));
+}
+
+bool hidden(vec3 origin, vec3 place)
+{
+  vec3 way = place - origin;
+  float distance = length(way);
+  ivec2 hit;
+  return trace_until(origin, way / max(distance, 1e-30), distance, distance, 0u, hit) < distance;
 }
 
 void main()
@@ -49,6 +59,11 @@ void main()
       continue;
     }
     level *= ((dot(level, vec2(dot(direction, along), dot(direction, across))) < 0.0) ? -1.0 : 1.0) / upright;
+    vec3 behind = origin + t * direction + BEYOND * shape.w * (level.x * along + level.y * across);
+    vec3 beside = WIDE * shape.w * (level.y * along - level.x * across);
+    if (!hidden(origin, behind + beside) || !hidden(origin, behind - beside)) {
+      continue;
+    }
     vec3 met = origin + t * direction - ball.xyz;
     float off = dot(level, vec2(dot(met, along), dot(met, across)));
     float angle = atan(level.y, level.x);

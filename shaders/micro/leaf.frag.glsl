@@ -13,9 +13,7 @@ void main()
   vec3 sent = direct_fetch(pixel).rgb;
   if (group_count > 0) {
     int group = int(shares_fetch(pixel).x);
-    if (group >= 0) {
-      sent += albedo_fetch(pixel).rgb * (1.0 / PI) * arriving_fetch(ivec2(group % NODE_ROW, group / NODE_ROW)).rgb;
-    }
+    sent += albedo_fetch(pixel).rgb * (1.0 / PI) * arriving_fetch(ivec2(group % NODE_ROW, group / NODE_ROW)).rgb;
   }
   // A point that is not there (its material has no surface) sends nothing, but what lies behind it is hidden.
   bool finite = is_finite(sent.r + sent.g + sent.b);

@@ -1,5 +1,6 @@
 // From which group each point takes the light that it reflects once more: of its own and those beside it in the tree, the first
-// whose gathering point faces alike and lies in view. What is gathered on one side of a wall stays there. -1: none.
+// whose gathering point faces alike and lies in view; its own, where none does. So what is gathered on one side of a wall stays
+// there, but for a point that is shut in.
 //
 // Rays between both points run in an arch, as high as RISE of their distance: a bent surface does not hide its own points.
 #include "lib/math.glsl"
@@ -7,7 +8,7 @@
 
 #define RISE 0.25
 #define ALIKE 0.7
-#define CANDIDATES 4
+#define CANDIDATES 8
 
 vec4 tree_texel(int index)
 {
@@ -24,12 +25,13 @@ vec3 leaf_middle(int leaf, out vec3 axis)
 
 void main()
 {
-  out_share = -1.0;
+  out_share = 0.0;
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   int entry = pixel.y * POINT_ROW + pixel.x;
   float side = ((entry & 1) == 0) ? 1.0 : -1.0;
   int group_size = leaf_count / group_count;
   int own = (entry >> 1) / group_size;
+  out_share = float(2 * own + (entry & 1));
   vec3 axis;
   vec3 middle = leaf_middle(leaf_count + (entry >> 1), axis);
   for (int k = 0; k < CANDIDATES; k++) {
@@ -40,7 +42,7 @@ void main()
     vec3 other_axis;
     int gathering = leaf_count + group * group_size + min(int(buffer_choice.x * float(group_size)), group_size - 1);
     vec3 other = leaf_middle(gathering, other_axis);
-    // A bent group has none but its own.
+    // A bent group may have a gathering point that faces another way.
     if (k > 0 && dot(axis, other_axis) < ALIKE) {
       continue;
     }
