@@ -17,12 +17,13 @@ import bpy
 import numpy as np
 
 from . import final, main_loop, viewport
+from .film.catcher import has_catchers
 from .frame import slices
 from .frame.bands import Leash, samples_in_parts
 from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import context, images
-from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, take
+from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, shutter, take
 from .snapshot.errors import unforeseen
 from .snapshot.motion import STEPS, Moment, read_moment
 from .snapshot.scene import Note, Snapshot
@@ -123,17 +124,37 @@ class CandelaEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         scene = depsgraph.scene
         shared = session(scene, "preview" if self.is_preview else "final")
-        self._snapshot = None
+        self._snapshot = self._moments = None
         self.update_stats("Candela", "Reading the scene")
         try:
             around = self._frames_around(depsgraph) if depsgraph.view_layer.use_pass_vector else None
             size = self.resolution_x, self.resolution_y
             self._snapshot = take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
+            if shutter.is_blurred(scene, depsgraph.view_layer) and not self.is_preview:
+                # What the Vector pass asks for would tell the frame from the moments.
+                central = self._snapshot if around is None else self._take(depsgraph, shared)
+                self._moments = self._take_moments(depsgraph, shared, central)
         except UnsupportedScene as error:
             self._fail(str(error))
         except Exception as error:  # Blender would print it and go on with a black picture
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
+
+    def _take(self, depsgraph, shared: Session) -> Snapshot:
+        return take(depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override)
+
+    def _take_moments(self, depsgraph, shared: Session, central: Snapshot) -> shutter.Moments | None:
+        """The scene while the shutter is open, where anything moves. It is evaluated now, while Blender keeps it."""
+        scene = depsgraph.scene
+        settings = settings_of(scene, viewport=False, layer=depsgraph.view_layer, depsgraph=depsgraph)
+        own = scene.frame_current + scene.frame_subframe
+
+        def moved_to(time: float) -> None:
+            frame, subframe = divmod(own + time, 1.0)
+            self.frame_set(int(frame), subframe)
+
+        times = shutter.shutter_times(scene, min(settings.motion_steps, settings.samples))
+        return shutter.take_moments(central, times, moved_to, lambda: self._take(depsgraph, shared))
 
     def _frames_around(self, depsgraph) -> tuple[Moment, ...] | None:
         """The scene in the frames before and after, for the Vector pass. It stands at its own again afterwards."""
@@ -180,7 +201,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         result = None
         try:
             check_tree(settings.passes)
-            order = self._order(scene, layer, self._seen(depsgraph, snapshot, eye), settings, started)
+            order = self._order(scene, layer, self._seen(depsgraph, snapshot, eye), settings, started, eye)
             parts = main_loop.taken(final.steps(order))
             while True:
                 try:
@@ -215,7 +236,9 @@ class CandelaEngine(bpy.types.RenderEngine):
             if ledger.bad_pixels:
                 self.report({"WARNING"}, f"{ledger.bad_pixels} values were not finite and were set to 0.")
 
-    def _order(self, scene, layer, snapshot: Snapshot, settings: Settings, started: float) -> final.Order:
+    def _order(
+        self, scene, layer, snapshot: Snapshot, settings: Settings, started: float, eye: str = ""
+    ) -> final.Order:
         """What this render asks for."""
         shared = session(scene, "preview" if self.is_preview else "final")
         missing, notes = missing_passes(layer), ()
@@ -225,11 +248,18 @@ class CandelaEngine(bpy.types.RenderEngine):
         keep = None
         if taken is not None:
             keep = partial(taken.__setitem__, layer.name)
+        catches, moments = has_catchers(snapshot) and not self.is_preview, self._moments
+        if catches and (taken is not None or given or settings.is_slice):
+            raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
+        if moments is not None and eye:  # seen through the eye's camera at the frame itself
+            seen = (replace(one, camera=snapshot.camera) for one in moments.snapshots)
+            moments = replace(moments, snapshots=tuple(seen))
         return final.Order(
             shared.renderer, snapshot, settings, wanted_passes(layer, scene),
             parts=_whole_samples if bpy.app.background else samples_in_parts, notes=notes,
             shows=not bpy.app.background and not self.is_preview, started=started, sync_seconds=self._sync_seconds,
             before=_free_old_sessions, given=given.get(layer.name), take=keep,
+            moments=moments, catches=catches,
         )  # fmt: skip
 
     def _begun(self, picture: np.ndarray, layer: str, eye: str):
@@ -281,10 +311,10 @@ def eyes(scene) -> list[str]:
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
     leash = Leash(frame.profiler, BEHIND_S)
     yield
-    while frame.samples_done < frame.settings.samples_to_draw:
+    while frame.samples_done < frame.samples_to_draw:
         with context.turn:
             renderer.advance(frame)
-            if frame.samples_done < frame.settings.samples_to_draw:  # the picture is read next, which waits
+            if frame.samples_done < frame.samples_to_draw:  # the picture is read next, which waits
                 leash.sample()
         yield
 

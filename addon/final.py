@@ -8,25 +8,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .film import catcher
+from .film.noise import NoiseMeter
 from .frame import ledger as ledgers
-from .frame import slices
+from .frame import slices, time_steps
 from .frame.run import Frame, Renderer
 from .frame.settings import Settings
 from .gfx import images
 from .gfx.context import turn
 from .snapshot.light_groups import parts_of
 from .snapshot.scene import Note, Snapshot
+from .snapshot.shutter import Moments
 from .ui import light_groups
-from .ui.passes import CAMERA_AXES, GLARE, RenderPass
+from .ui.passes import CAMERA_AXES, CATCHER, GLARE, RenderPass
 
 AFTER_LAST = 1.0  # time of what follows the last sample (denoising, reading back), at most, by that of a sample
 SHOW_S = 1.0  # at least, between two pictures of a render that goes on
 SHOW_SHARE = 0.04  # of the render's time, at most, that is spent on showing it
 COMBINED = "film.combined"
+PICTURES_OF_CATCHERS = 3  # of which a picture with shadow catchers is made
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,15 @@ class Order:
     before: Callable[[], None] = lambda: None  # in the GPU's context, first of all
     given: dict[str, np.ndarray] | None = None  # sums of samples that were drawn before, in place of drawing
     take: Callable[[slices.Slice], None] | None = None  # what is drawn, as a slice
+    moments: Moments | None = None  # the scene while the shutter is open, where motion blur finds that it moves
+    catches: bool = False  # whether shadow catchers are drawn as such
+
+    def of_scene(self, changed: Callable[[Snapshot], Snapshot], settings: Settings) -> Order:
+        """The same of a scene of which something is changed."""
+        moments = self.moments
+        if moments is not None:
+            moments = replace(moments, snapshots=tuple(changed(one) for one in moments.snapshots))
+        return replace(self, snapshot=changed(self.snapshot), moments=moments, settings=settings)
 
 
 def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.ndarray], ledgers.Ledger]]:
@@ -64,6 +77,9 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.n
     """
     with turn:
         order.before()
+    plates = None
+    if order.catches:
+        order, plates = yield from _plates(order)
     parts, total, held = parts_of(order.snapshot), light_groups.Sum(order.snapshot.film), None
     for number, part in enumerate(parts):
         own = str(number) if len(parts) > 1 else ""  # under which a slice holds the part's images
@@ -72,11 +88,32 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.n
             if order.take is not None:
                 held = slices.taken(frame, own, held)
                 order.take(held)
-            total.add(part, mean_images(order.renderer, frame, order.wanted))
+            total.add(part, mean_images(order.renderer, frame, order.wanted, catcher.IMAGES if plates else ()))
     if len(parts) > 1 and GLARE in order.wanted:
         text = "glare is that of each light group for itself: without groups it is whole."
         frame.ledger.notes += (Note("Light groups", text),)
-    return pixels_of(total, frame, order.wanted), frame.ledger
+    return pixels_of(total, frame, order.wanted, plates), frame.ledger
+
+
+def _plates(order: Order) -> Generator[Progress | None, None, tuple[Order, tuple]]:
+    """Draw the pictures with all and with shadow catchers alone; returns what is left to be drawn, and what that is
+    composed with: both as catcher.Layer, and whether the film is transparent. The first tells how many samples all
+    have, and has a third of a time limit."""
+    found, settings = [], replace(order.settings, time_limit=order.settings.time_limit / PICTURES_OF_CATCHERS)
+    for changed in (catcher.over_nothing, catcher.catchers_alone):
+        plate = order.of_scene(lambda one, changed=changed: _ungrouped(changed(one)), settings)
+        plate.shows, plate.notes, plate.started = False, (), time.perf_counter()
+        frame = yield from _part(plate, plate.snapshot, Share())
+        with turn:
+            found.append(catcher.layer(mean_images(order.renderer, frame, [], catcher.IMAGES), plate.snapshot))
+        settings = replace(settings, samples=frame.samples_done, time_limit=0.0, noise_threshold=0.0)
+    transparent = order.snapshot.film.transparent
+    return order.of_scene(catcher.catchers_unseen, settings), (*found, transparent)
+
+
+def _ungrouped(snapshot: Snapshot) -> Snapshot:
+    """The same as one picture, lit by all light groups."""
+    return replace(snapshot, film=replace(snapshot.film, light_groups=()))
 
 
 @dataclass(frozen=True)
@@ -96,9 +133,13 @@ class Share:
 
 def _part(order: Order, snapshot: Snapshot, share: Share) -> Generator[Progress | None, None, Frame]:
     """Draw one of the parts; returns its frame."""
-    renderer = order.renderer
-    before = renderer.frame
-    beginning = renderer.beginning(snapshot, order.settings)
+    renderer, settings = order.renderer, order.settings
+    before, steps, numbers = renderer.frame, _time_steps(order, share), None
+    if steps:
+        # What Denoise keeps for a picture that may end early counts the samples of one step.
+        settings = replace(settings, time_limit=0.0, noise_threshold=0.0)
+        snapshot, numbers = steps[0].snapshot, steps[0].numbers
+    beginning = renderer.beginning(snapshot, settings, numbers)
     frame = None
     while frame is None:
         with turn:
@@ -113,18 +154,55 @@ def _part(order: Order, snapshot: Snapshot, share: Share) -> Generator[Progress 
             images.pool.trim()  # nobody asks for images of the old size again
     frame.ledger.times["sync"] = order.sync_seconds
     frame.ledger.notes += order.notes
+    if steps and order.settings.noise_threshold:
+        text = "the noise threshold does not count where something moves: all samples are drawn."
+        frame.ledger.notes += (Note("Motion blur", text),)
     if order.given is not None:
         with turn:
             renderer.merge(frame, slices.images_of_part(order.given, share.name))
         yield None
     else:
         try:
-            yield from _samples(order, frame, share)
+            yield from _samples_in_steps(order, steps, settings, share) if steps else _samples(order, frame, share)
         except GeneratorExit:
             with turn:
-                renderer.finish(frame, ())  # what was done stands in the ledger
+                renderer.finish(renderer.frame or frame, ())  # what was done stands in the ledger
             raise
+    if renderer.frame is not frame:  # the last of several, one for each time step
+        ledger, frame = frame.ledger, renderer.frame
+        frame.ledger.times |= ledger.times
+        frame.ledger.notes = ledger.notes
     return frame
+
+
+def _time_steps(order: Order, share: Share) -> list[time_steps.Step]:
+    """Those of a part of a picture with motion blur; none where nothing moves."""
+    if order.moments is None or order.given is not None:
+        return []
+    snapshots = [parts_of(one)[share.number].snapshot for one in order.moments.snapshots]
+    return time_steps.shared_out(snapshots, order.moments.steps, order.settings)
+
+
+def _samples_in_steps(
+    order: Order, steps: list[time_steps.Step], settings: Settings, share: Share
+) -> Generator[Progress | None, None, None]:
+    """Draw all samples of a picture with motion blur, which is not shown while it grows."""
+    first, wanted, shown = time.perf_counter(), settings.samples_to_draw, -1
+    passed = first - order.started
+    limit = order.settings.time_limit and passed + max(order.settings.time_limit - passed, 0.0) / share.left
+    for done, stop in time_steps.drawn(order.renderer, steps, settings, order.parts):
+        if done == shown:
+            yield None
+            continue
+        shown = done
+        yield Progress(sentence(shown, wanted, None), (share.number + shown / wanted) / share.of)
+        if limit and shown:
+            with turn:
+                images.finish()
+            now = time.perf_counter()
+            # A step that follows learns in one more sample.
+            if shown < wanted and now - order.started + (2 + AFTER_LAST) * (now - first) / shown > limit:
+                stop()
 
 
 def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | None, None, None]:
@@ -135,6 +213,7 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
         limit = passed + max(limit - passed, 0.0) / share.left
     wanted, first, before = frame.settings.samples_to_draw, time.perf_counter(), frame.samples_done
     shown, showing, next_picture = -1, 0.0, first + SHOW_S
+    meter = NoiseMeter(frame.settings.noise_threshold) if frame.settings.noise_threshold else None
     for _ in order.parts(renderer, frame):
         if frame.samples_done == shown:
             yield None
@@ -153,6 +232,11 @@ def _samples(order: Order, frame: Frame, share: Share) -> Generator[Progress | N
         each = (now - first) / (shown - before) if shown > before else None
         left = left_of(order, share.left * wanted - shown, each) if order.shows else None
         yield Progress(sentence(shown, wanted, left), (share.number + shown / wanted) / share.of, picture)
+        if meter is not None and shown < wanted:
+            with turn:
+                if meter.look(frame):
+                    renderer.stop(frame)
+                    return
         if limit and shown > before:
             with turn:
                 images.finish()
@@ -194,19 +278,29 @@ def picture_of(renderer: Renderer, frame: Frame) -> np.ndarray:
     return np.nan_to_num(images.read(image if image is not None else shown), posinf=0.0, neginf=0.0)
 
 
-def mean_images(renderer: Renderer, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
+def mean_images(
+    renderer: Renderer, frame: Frame, wanted: list[RenderPass], more: tuple[str, ...] = ()
+) -> dict[str, np.ndarray]:
     """Mean images of a frame that passes are made from."""
     renderer.show(frame)
-    sources = {COMBINED, *(name for asked in wanted for name in asked.images)}
+    sources = {COMBINED, *more, *(name for asked in wanted for name in asked.images)} - {CATCHER.source}
     arrays = renderer.finish(frame, sorted(light_groups.frame_images(sources)))
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays[COMBINED]
     return arrays
 
 
-def pixels_of(total: light_groups.Sum, frame: Frame, wanted: list[RenderPass]) -> dict[str, np.ndarray]:
+def pixels_of(
+    total: light_groups.Sum, frame: Frame, wanted: list[RenderPass], plates: tuple | None = None
+) -> dict[str, np.ndarray]:
     """Pass pixels by Blender's name, (H, W, channels) float32."""
     arrays = total.finished({name for asked in wanted for name in asked.images})
+    arrays[CATCHER.source] = np.ones_like(arrays[COMBINED][..., :3])
+    if plates:
+        everything, plate, transparent = plates
+        things = catcher.layer(arrays, frame.snapshot)
+        arrays[CATCHER.source] = change = catcher.change_of(everything, plate, things, transparent)
+        arrays[COMBINED] = catcher.composed(change, everything, things, transparent, CATCHER in wanted)
     arrays[CAMERA_AXES] = frame.snapshot.camera.matrix[:3, :3] * (1.0, 1.0, -1.0)
     pixels = {asked.name: asked.pixels(arrays, frame.snapshot.film.exposure) for asked in wanted}
     return {"Combined": arrays[COMBINED], **pixels}

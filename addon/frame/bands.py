@@ -83,7 +83,7 @@ def samples_in_parts(renderer, frame) -> Iterator[None]:
     end, leash = object(), None
     frame.shared_out = bands = Bands()
     frame.profiler.wait = True
-    while frame.samples_done < frame.settings.samples_to_draw:
+    while frame.samples_done < frame.samples_to_draw:
         parts, part, began = renderer.steps(frame), None, time.perf_counter()
         while part is not end:
             with turn:

@@ -29,7 +29,7 @@ from ..scene.receivers import Receivers
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View, blackman_harris_offset
 from ..scene.world_tree import WorldTree
-from ..snapshot.scene import RANKED, Snapshot
+from ..snapshot.scene import NO_LINKS, RANKED, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
@@ -72,6 +72,8 @@ class Frame:
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
     samples_done: int = 0
+    numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
+    first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
     drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
     find_receivers: Callable[[], Receivers] | None = None
     counters: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -86,7 +88,7 @@ class Frame:
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
     _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
-    _hierarchies: dict[str, Hierarchy | None] = field(default_factory=dict)  # by path, of this frame
+    _hierarchies: dict[tuple, Hierarchy | None] = field(default_factory=dict)  # of this frame, see `hierarchy`
     _receivers: Receivers | None = None
     _texels: list[tuple[str, str, int]] = field(default_factory=list)  # technique, name and factor; see `count_texel`
     _texel_sums: images.Target | None = None
@@ -99,6 +101,14 @@ class Frame:
     def is_first(self) -> bool:
         """Whether the first sample is running: for counters that are the same in each sample, read once."""
         return self.sample == 0
+
+    @property
+    def samples_to_draw(self) -> int:
+        return self.settings.samples_to_draw if self.numbers is None else len(self.numbers)
+
+    def number_of(self, drawn: int) -> int:
+        """Which of the picture's samples is drawn after `drawn` others."""
+        return self.settings.sample_offset + drawn if self.numbers is None else self.numbers[drawn]
 
     @property
     def receivers(self) -> Receivers | None:
@@ -175,6 +185,12 @@ class Frame:
         return 1e-6 * min(self.geometry.size, reach)
 
     @cached_property
+    def blocker_sets(self) -> frozenset[frozenset[int]]:
+        """Groups of blockers that lights let pass, all that differ."""
+        snapshot = self.snapshot
+        return frozenset(one.links.passing for one in (*snapshot.lights, *snapshot.instances) if one.links.passing)
+
+    @cached_property
     def measured_materials(self) -> list[CompiledMaterial]:
         """The scene's materials, with the means that they have on the surfaces that show them."""
         return self.surface_means.of(self.materials, self.geometry)
@@ -191,12 +207,13 @@ class Frame:
         self.measured_emission.update(self.materials, self.geometry)
         return self.measured_emission
 
-    def hierarchy(self, path: str = "glossy") -> Hierarchy | None:
-        """Triangles that rays of a path (a name of Visibility) can meet; None where there are too many. Built on the
-        first call."""
-        if path not in self._hierarchies:  # to find it again each sample would mean to go through all instances
-            self._hierarchies[path] = self.hierarchies.get(self, path)
-        return self._hierarchies[path]
+    def hierarchy(self, path: str = "glossy", passing: frozenset[int] = frozenset()) -> Hierarchy | None:
+        """Triangles that rays of a path (a name of Visibility) can meet, without objects of the groups of blockers
+        `passing` (snapshot/linking.py); None where there are too many. Built on the first call."""
+        key = path, passing
+        if key not in self._hierarchies:  # to find it again each sample would mean to go through all instances
+            self._hierarchies[key] = self.hierarchies.get(self, path, passing)
+        return self._hierarchies[key]
 
     def provide(self, service: Service, kind: type[Service] | None = None) -> None:
         """Hand a service to the other techniques of this picture, as one of its class, or of the base `kind`."""
@@ -349,23 +366,28 @@ class Renderer:
         self._view_block: Block | None = None
         context.on_release(self.release)
 
-    def begin(self, snapshot: Snapshot, settings: Settings) -> Frame:
-        """Make everything ready for samples of this snapshot. Raises ValueError if there is no camera.
+    def begin(self, snapshot: Snapshot, settings: Settings, numbers: tuple[int, ...] | None = None) -> Frame:
+        """Make everything ready for samples of this snapshot: the settings' slice of them, or those of the `numbers`
+        in ascending order. Raises ValueError if there is no camera.
 
         If nothing differs from the frame before, that frame comes back with the samples it already has. Where something
         is raised, the next frame begins anew.
         """
-        parts = self.beginning(snapshot, settings)
+        parts = self.beginning(snapshot, settings, numbers)
         while True:
             try:
                 next(parts)
             except StopIteration as end:
                 return end.value
 
-    def beginning(self, snapshot: Snapshot, settings: Settings) -> Generator[tuple[int, int], None, Frame]:
+    def beginning(
+        self, snapshot: Snapshot, settings: Settings, numbers: tuple[int, ...] | None = None
+    ) -> Generator[tuple[int, int], None, Frame]:
         """The same in parts: yields (done, total) after each program that had to be compiled; returns the frame."""
         try:
-            return (yield from self._begin(snapshot, settings))
+            frame = yield from self._begin(snapshot, settings)
+            frame.numbers = numbers
+            return frame
         except BaseException:
             self._frame_key = None  # what is half made, or made of half of a change, is not to be taken for it
             raise
@@ -456,24 +478,22 @@ class Renderer:
 
     def _parts_of_sample(self, frame: Frame) -> Iterator[None]:
         settings, profiler = frame.settings, frame.profiler
-        measured = settings.samples_to_draw if settings.whole else 0
+        measured = frame.samples_to_draw if settings.whole else 0
         if frame.samples_done == 0:
             with profiler.once(measured):
                 yield from self._begin_samples(frame)
-                if settings.sample_offset:
+                if frame.number_of(0):
                     # What is learned from the first sample (receivers, guides, depth) is the same in all slices of a
                     # picture; its light is that of another slice.
                     yield from _stage(frame, "sample")
-                    self._clear_sums(frame)
-                    for name in frame.shown.values():
-                        frame.target(name).clear()
-        if frame.samples_done or settings.sample_offset:
-            frame.sample = settings.sample_offset + frame.samples_done
+                    self._clear_all_sums(frame)
+        if frame.samples_done or frame.number_of(0):
+            frame.sample = frame.number_of(frame.samples_done)
             frame.look()
             frame.shown.clear()
         with profiler.measured(frame.samples_done, measured):
             yield from _stage(frame, "sample")
-        if frame.samples_done + 1 == settings.samples:
+        if frame.samples_done + 1 == settings.samples and frame.numbers is None:
             with profiler.once(measured):
                 yield from _stage(frame, "end")
         frame.samples_done += 1
@@ -484,6 +504,27 @@ class Renderer:
         frame.settings = replace(frame.settings, samples=frame.samples_done)
         for _ in _stage(frame, "end"):
             pass
+
+    def draw_surfaces(self, frame: Frame, number: int) -> None:
+        """Draw what the picture's first sample and sample `number` see, without light, in a frame without samples."""
+        for _ in self._begin_samples(frame):
+            pass
+        for drawn in (0, number):
+            frame.sample = drawn
+            frame.look()
+            for _ in _stage(frame, "sample"):
+                pass
+        self._clear_all_sums(frame)
+
+    def end_with(self, frame: Frame, done: int, samples: int | None) -> None:
+        """End a picture of whose samples `done` are in the frame's sums, most of them drawn in other frames (see
+        time_steps.py). `samples`: how many it is made of; None where those of other slices are missing."""
+        frame.samples_done = done
+        if samples is not None:
+            frame.settings = replace(frame.settings, samples=samples)
+            for _ in _stage(frame, "end"):
+                pass
+        frame.ledger.rows = []
 
     def _begin_samples(self, frame: Frame) -> Iterator[None]:
         frame.sample = 0
@@ -652,12 +693,19 @@ class Renderer:
             volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
             settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
-            settings.whole and (settings.sample_offset, settings.samples_to_draw, settings.time_limit),
+            settings.whole and (settings.sample_offset, settings.samples_to_draw),
+            settings.whole and (settings.time_limit, settings.noise_threshold),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),
             tuple(t.name for t in plan.techniques),
+            tuple(one.links for one in snapshot.instances if one.links is not NO_LINKS),
             snapshot.own_values,
             snapshot.motion and snapshot.motion.key,
         )  # fmt: skip
+
+    def _clear_all_sums(self, frame: Frame) -> None:
+        self._clear_sums(frame)
+        for name in frame.shown.values():
+            frame.target(name).clear()
 
     def _clear_sums(self, frame: Frame) -> None:
         for write in frame.writes:
@@ -695,6 +743,6 @@ def lights_key(snapshot: Snapshot) -> tuple:
         (light.key, light.kind, light.matrix.tobytes(), np.asarray(light.strength).tobytes(), light.normalize,
          light.radius, light.soft_falloff, light.angle, light.shape, light.size, light.spread, light.spot_angle,
          light.spot_blend, light.cast_shadow, light.caustics, light.bounces, light.visibility, light.own,
-         *(() if light.graph is None else (light.graph, light.random, light.pass_index, light.color)))
+         *(() if light.graph is None else (light.graph, light.random, light.pass_index, light.color)), light.links)
         for light in snapshot.lights
     )  # fmt: skip

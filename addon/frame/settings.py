@@ -35,7 +35,16 @@ TIME_LIMIT = Param(
     "Seconds after which a final render ends with the samples rendered so far; 0: no limit",
     0.0, 1e6,
 )  # fmt: skip
-SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT)
+NOISE_THRESHOLD = Param(
+    "noise_threshold", "Noise Threshold", 0.0,
+    "Relative error, before denoising, at which a final render ends, as its own samples tell it; 0: all are drawn",
+    0.0, 1.0,
+)  # fmt: skip
+MOTION_STEPS = Param(
+    "motion_steps", "Time Steps", 16,
+    "Moments at which a final render with motion blur looks at the scene, at most one for each sample", 1, 256,
+)  # fmt: skip
+SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD, MOTION_STEPS)
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 
@@ -55,6 +64,8 @@ class Settings:
     sample_offset: int = SAMPLE_OFFSET.default  # `samples` stays the number of the whole picture, for all techniques
     sample_count: int = SAMPLE_COUNT.default
     time_limit: float = TIME_LIMIT.default  # s; the picture may end with fewer samples than it asks for
+    noise_threshold: float = NOISE_THRESHOLD.default  # the same
+    motion_steps: int = MOTION_STEPS.default  # asked of by the engine alone, where motion blur is on
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):
@@ -74,6 +85,11 @@ class Settings:
         """Samples of this slice of the picture, at least 0: those from `sample_offset` on."""
         left = max(self.samples - self.sample_offset, 0)
         return min(self.sample_count, left) if self.sample_count else left
+
+    @property
+    def may_end_early(self) -> bool:
+        """Whether nobody knows beforehand how many samples there will be."""
+        return self.time_limit > 0.0 or self.noise_threshold > 0.0
 
     @property
     def is_slice(self) -> bool:

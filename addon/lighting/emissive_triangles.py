@@ -20,6 +20,8 @@ class EmissiveTriangles:
 
     def __init__(self, frame: Frame, paths: Sequence[str]):
         corners, radiance, normals, sided, flags = [], [], [], [], []
+        self.unlit: list[int] = []  # by triangle, see lights.unlit_bits
+        self.passing: list[frozenset[int]] = []  # by triangle: groups of blockers that let its light pass
         front, behind = (
             np.array([_emission(m, side) for m in frame.measured_materials]).reshape(-1, 3) for side in (0, 1)
         )
@@ -48,6 +50,8 @@ class EmissiveTriangles:
                 normals.append(np.full(len(shining), sign * np.sign(np.linalg.det(matrix[:3, :3])) or 1.0))
                 sided.append(np.full(len(shining), chosen is not alike))
                 flags.append(np.full(len(shining), seen))
+                self.passing += [instance.links.passing] * len(shining)
+                self.unlit += [lights.unlit_bits(instance.links)] * len(shining)
         self.corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
         self.radiance = np.concatenate(radiance) if radiance else np.zeros((0, 3))
         self.sided = np.concatenate(sided) if sided else np.zeros(0, bool)
@@ -70,7 +74,9 @@ class EmissiveTriangles:
         k, point, density = self.draw(*numbers)
         flags += int(self.flags[k]) + lights.SIDED_FLAG * bool(self.sided[k])
         normal, radiance = self.normal[k], self.radiance[k]
-        return lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
+        row = lights.surface_row(point, normal, radiance, density * share, flags, 0, views, samples)
+        row[0, 0] += self.unlit[k]
+        return row
 
     def draw(self, x: float, y: float, z: float) -> tuple[int, np.ndarray, float]:
         """From three uniform numbers: a triangle, a point on it, and the density per m2."""

@@ -34,7 +34,7 @@ from ..scene import acceleration
 from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
-from . import repeated_light, shared_visibility
+from . import linked, repeated_light, shared_visibility
 from .grass import GrassTable, grown
 from .media import MediaService, attenuated
 from .repeated_light import Lit
@@ -116,11 +116,16 @@ def shade(
     if media is not None:
         program = attenuated(program)
         bindings["textures"] |= media.bindings
+    has_links = linked.has_links(rows)
+    if has_links:
+        program = linked.linked(program)
+        bindings["textures"] |= frame.shared(linked.Groups).bindings(frame, technique)
     lit = Lit(program, ANY_SURFACE, bindings, rows, maps.views)
     if maps.sparse:
         between = lighting(shared_visibility.BETWEEN, frame.materials.soft, kinds)
         between = grown(between) if grass is not None else between
         between = attenuated(between) if media is not None else between
+        between = linked.linked(between) if has_links else between
         yield from shared_visibility.add(frame, technique, sources, lit, kinds, maps, between)
     else:
         yield from repeated_light.add(frame, technique, sources, lit)

@@ -183,9 +183,11 @@ def source_of(lookup: Lookup) -> tuple[tuple[str, str], ...]:
     return (("generated/visibility", lookup.text or f'#include "{lookup.file}"\n'),)
 
 
-def ray_bindings(frame: Frame) -> tuple[dict[str, images.Image], dict[str, object]]:
-    """Textures and RAY_CONSTANTS: what casts shadows, for rays."""
-    hierarchy = frame.hierarchy("shadow")
+def ray_bindings(
+    frame: Frame, passing: frozenset[int] = frozenset()
+) -> tuple[dict[str, images.Image], dict[str, object]]:
+    """Textures and RAY_CONSTANTS: what casts shadows, for rays; without objects of groups that let light pass."""
+    hierarchy = frame.hierarchy("shadow", passing)
     textures = hierarchy.textures
     return textures, {"offset_size": frame.offset_size}
 
@@ -314,6 +316,32 @@ class Rays(VisibilityProvider):
     def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
         for first in range(0, len(points), lights.MOST_LIGHTS):
             yield points[first : first + lights.MOST_LIGHTS], traced_shadows(frame)
+
+
+class LinkedRays(Rays):
+    """The same among the blockers of lights with shadow linking. It takes the place of whatever technique the shadow
+    slot has: maps hold all casters."""
+
+    def __init__(self, passing: frozenset[int]):
+        self._passing = passing
+
+    def batches(self, frame: Frame, technique: Technique, points: list[LightPoint]) -> Iterator[Batch]:
+        maps = Maps(None, NO_VIEWS, RAYS, *ray_bindings(frame, self._passing))
+        for first in range(0, len(points), lights.MOST_LIGHTS):
+            yield points[first : first + lights.MOST_LIGHTS], maps
+
+
+class ShadowLinks:
+    """Providers by groups of blockers that let light pass (frame.shared)."""
+
+    def __init__(self):
+        self._made: dict[frozenset[int], LinkedRays] = {}
+
+    def of(self, frame: Frame, passing: frozenset[int]) -> LinkedRays | None:
+        """None where all block, and where rays cannot be traced."""
+        if not passing or acceleration.too_many(frame.snapshot):
+            return None
+        return self._made.setdefault(passing, LinkedRays(passing))
 
 
 class PlainMaps(VisibilityProvider):

@@ -339,8 +339,9 @@ class HierarchyCache:
         self._kinds: tuple[object, dict] = (None, {})  # of instances: one for each visibility among them
         self._looks: tuple[object, tuple] = (None, ())  # of materials: what decides about rays, and what they emit
 
-    def get(self, frame, path: str) -> Hierarchy | None:
+    def get(self, frame, path: str, passing: frozenset[int] = frozenset()) -> Hierarchy | None:
         """The hierarchy of what rays of `path` can meet; None where there are too many triangles (see `too_many`).
+        Objects of the groups of blockers `passing` are left out.
 
         For a draft, of which the next may follow at once, triangles that moved keep their places in the tree.
         """
@@ -354,6 +355,8 @@ class HierarchyCache:
             self._looks = materials, tuple((_mean_code(m), _emission(m)) for m in materials)
         alike = all(_met(i, path) and _rays(i, path) == ALL_RAYS for i in self._kinds[1].values())
         shown = snapshot.instances if alike else tuple(i for i in snapshot.instances if _met(i, path))
+        if passing:
+            shown = tuple(i for i in shown if i.links.blocker not in passing)
         key = shown, (
             None if alike else tuple(_rays(i, path) for i in shown),
             tuple((mesh.key, mesh.version) for mesh in snapshot.meshes.values()),
@@ -369,7 +372,8 @@ class HierarchyCache:
                 tree.boxes = tree.place = tree.leaves = tree.low = tree.high = tree.tiles = tree.nodes = None
         if self._kept.get(key) is not tree:
             # At most one for each path; the oldest one, of another scene, goes.
-            self._kept = dict([*self._kept.items()][-3:]) | {key: tree}
+            most = 3 + len(frame.blocker_sets)
+            self._kept = dict([*self._kept.items()][-most:]) | {key: tree}
         if tree.hierarchy.instances != shown:  # else the same object: what was made of it still stands
             tree.hierarchy = replace(tree.hierarchy, instances=shown)
         return tree.hierarchy

@@ -254,6 +254,7 @@ class SceneGeometry:
         new = [k for k, (instance, written) in enumerate(zip(instances, self._written)) if instance is not written]
         if new:
             rows[new, 3:7] = instance_facts([instances[k] for k in new])
+            rows[new, 7, 0] = [instances[k].links.receiver for k in new]
         self._written = instances
         if len(instances):
             users = Counter(instance.mesh for instance in instances)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .errors import UnsupportedScene
-from .scene import Aperture, Camera, Note
+from .scene import Aperture, Camera
 
 
 def camera_of_scene(
@@ -47,14 +47,6 @@ def camera_of_scene(
         name=camera.name,
         aperture=_aperture(camera),
     )
-
-
-def camera_notes(camera, render) -> tuple[Note, ...]:
-    """What the camera object asks for that no technique draws; `render` is scene.render."""
-    subject, notes = f"Camera '{camera.name}'", []
-    if render.use_motion_blur:
-        notes.append(Note(subject, "motion blur is not drawn; the picture shows the frame's own moment."))
-    return tuple(notes)
 
 
 def camera_of_view(region_data, space=None, camera=None) -> Camera:

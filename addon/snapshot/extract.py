@@ -20,15 +20,18 @@ from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
 from .instances import Place, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
+from .linking import LinkTable, read_links
 from .meshes import Wanted, build_mesh, read_mesh
 from .motion import with_motion
 from .scene import (
     CRYPTOMATTES,
+    NO_LINKS,
     Aov,
     Camera,
     Film,
     Instance,
     Light,
+    Links,
     Mesh,
     Mist,
     Moment,
@@ -82,16 +85,17 @@ def take(
     if view is None:
         camera = camera or scene.camera
         view = cameras.camera_of_scene(scene, depsgraph, width, height, camera)
-        notes += cameras.camera_notes(camera.evaluated_get(depsgraph), scene.render)
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)
     shading = ShadingTable(cache, images, aovs_of(depsgraph.view_layer_eval))
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
-    meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph)
+    links = _links(places, light_places)
+    notes += links.notes
+    meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph, links)
     notes += mesh_notes
-    lights = _lights(*_at_a_place(light_places, notes), shading)
+    lights = _lights(*_at_a_place(light_places, notes), shading, links)
     volumes = read_volumes(depsgraph, shading, cache, notes, shown)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
@@ -129,7 +133,18 @@ def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np
     return [place for place, good in zip(places, finite, strict=True) if good], placed[finite]
 
 
-def _meshes(places: list[Place], transforms: np.ndarray, shading: ShadingTable, cache: SnapshotCache, depsgraph):
+def _links(places: list[Place], light_places: list[Place]) -> LinkTable:
+    """Light linking, which objects have that give light, or what instances them."""
+    sources = {id(place.source): place.source for place in (*places, *light_places)}
+    owners = [one.owner for one in sources.values() if one.facts.linked]
+    owners += [one.parent for one in sources.values() if one.facts.linked and one.parent is not None]
+    return read_links(owners)
+
+
+def _meshes(
+    places: list[Place], transforms: np.ndarray, shading: ShadingTable, cache: SnapshotCache, depsgraph,
+    links: LinkTable,
+):  # fmt: skip
     """(meshes by key, instances, notes, counts). Instances stand in order of their mesh's first appearance."""
     override = depsgraph.view_layer_eval.material_override
     shown_with: dict[int, set[int]] = {}  # materials, by address of the mesh
@@ -160,12 +175,13 @@ def _meshes(places: list[Place], transforms: np.ndarray, shading: ShadingTable, 
         notes += entry.notes
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
 
-    resolved: dict[int, tuple[str, tuple[int, ...]]] = {}
+    resolved: dict[int, tuple[str, tuple[int, ...], Links]] = {}
     for place in places:
         source = place.source
         if id(source) not in resolved:
             mesh = by_pointer[source.pointer]
-            resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots)
+            own_links = links.of(source.facts.uid, source.facts.parent_uid)
+            resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots), own_links
     instances = _instances(places, transforms, resolved, list(meshes), cache)
     stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
     return meshes, instances, notes, stats
@@ -173,7 +189,7 @@ def _meshes(places: list[Place], transforms: np.ndarray, shading: ShadingTable, 
 
 def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, order: list[str], cache: SnapshotCache):
     """The instances, by mesh in `order`; those of the last sync where nothing has changed. `resolved`: key of the mesh
-    and materials, by identity of the source."""
+    materials and links, by identity of the source."""
     keys = [place.key for place in places]
     before = cache.placed
     known = before is not None and before.keys == keys
@@ -181,11 +197,11 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     made, facts = [], [place.source.facts for place in places]
     like: dict[int, dict[str, object]] = {}  # fields of an instance of each source
     for k, place in enumerate(places):
-        mesh, chosen = resolved[id(place.source)]
+        mesh, chosen, links = resolved[id(place.source)]
         if known and same[k] and before.facts[k] is facts[k]:
             old = before.made[k]
             if (
-                old.mesh == mesh and old.materials == chosen
+                old.mesh == mesh and old.materials == chosen and old.links == links
                 and old.random == place.random and old.generated == place.generated and old.uv == place.uv
             ):  # fmt: skip
                 made.append(old)
@@ -198,7 +214,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
                     of_object.name, mesh, transforms[k], chosen, of_object.visibility, place.random,
                     of_object.pass_index, of_object.holdout, of_object.color, place.generated, place.uv, place.key,
                     of_object.terminator, of_object.own, of_object.caustics_caster, of_object.asset,
-                    of_object.group,
+                    of_object.group, links, of_object.shadow_catcher,
                 )
             )  # fmt: skip
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
@@ -271,7 +287,7 @@ def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> 
     return entry, True
 
 
-def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable) -> tuple[Light, ...]:
+def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable, links: LinkTable) -> tuple[Light, ...]:
     made = []
     for place, matrix in zip(places, transforms, strict=True):
         facts, block = place.source.facts, place.source.data
@@ -287,7 +303,10 @@ def _lights(places: list[Place], transforms: np.ndarray, shading: ShadingTable) 
                 }  # fmt: skip
         light = read_light(block, place.key, facts.name, matrix, facts.visibility, tint, **of_tree)
         if light is not None:
-            made.append(replace(light, group=facts.group) if facts.group else light)
+            own_links = links.of(facts.uid, facts.parent_uid)
+            if facts.group or own_links is not NO_LINKS:
+                light = replace(light, group=facts.group, links=own_links)
+            made.append(light)
     return tuple(made)
 
 

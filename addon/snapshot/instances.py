@@ -47,6 +47,7 @@ class Source:
     pointer: int  # its address
     owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
     materials: tuple  # evaluated bpy materials (or None), one per slot
+    parent: object = None  # evaluated instancer
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,8 @@ class ObjectFacts:
     terminator: float
     own: Own
     caustics_caster: bool
+    shadow_catcher: bool
+    linked: bool  # it, or its instancer, has collections of light linking
     asset: str
     group: str
     notes: tuple[Note, ...]
@@ -134,9 +137,11 @@ def walk(
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
+                        shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
+                        linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
                         asset=_topmost(owner),
                         group=owner.lightgroup,
-                        notes=_object_notes(owner, kind, original.name),
+                        notes=_object_notes(owner, kind, original.name, final),
                     )
                     if made != facts:
                         facts = made
@@ -144,7 +149,7 @@ def walk(
                 materials = tuple([slot.material for slot in found.material_slots])
                 if hair and materials:
                     materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
-                source = known[identity] = Source(facts, data, pointer, owner, materials)
+                source = known[identity] = Source(facts, data, pointer, owner, materials, parent)
                 for note in facts.notes:
                     notes[note] = None
             facts = source.facts
@@ -240,15 +245,19 @@ def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
     return Visibility(*flags)
 
 
-def _object_notes(owner, kind: str, name: str) -> tuple[Note, ...]:
+def _is_linked(owner) -> bool:
+    linking = getattr(owner, "light_linking", None)
+    return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
+
+
+def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
     """What of the object is not drawn as Cycles draws it."""
     said = []
-    linking = getattr(owner, "light_linking", None)
-    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-        said.append("light linking is not followed: its light reaches and is blocked by every object.")
+    if _is_linked(owner):
+        said.append("light linking counts for light that reaches surfaces straight; bounced light follows none.")
     if kind in _DRAWN:
-        if owner.is_shadow_catcher:
-            said.append("is a shadow catcher, which is drawn as an ordinary surface.")
+        if owner.is_shadow_catcher and not final:
+            said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
         for modifier in owner.modifiers:
             domain = getattr(modifier, "domain_settings", None)
             if domain is not None and modifier.fluid_type == "DOMAIN" and domain.domain_type == "GAS":

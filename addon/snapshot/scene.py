@@ -80,6 +80,19 @@ class Visibility:
     shadow: bool = True
 
 
+@dataclass(frozen=True)
+class Links:
+    """Light and shadow linking of an object, by groups of objects that all lights treat alike (linking.py)."""
+
+    receiver: int = 0  # the group of receivers that it belongs to
+    blocker: int = 0  # and of blockers
+    unlit: tuple[int, ...] = ()  # of what gives light: groups of receivers that it does not light
+    passing: frozenset[int] = frozenset()  # and of blockers that let its light pass
+
+
+NO_LINKS = Links()
+
+
 @dataclass(frozen=True, eq=False)
 class Instance:
     """One placement of a mesh. Instances of the same mesh and materials stand next to each other.
@@ -104,6 +117,8 @@ class Instance:
     caustics_caster: bool = False  # set to cast shadow caustics
     asset: str = ""  # name of the topmost parent, if it has one
     group: str = ""  # light group of the object
+    links: Links = NO_LINKS
+    shadow_catcher: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +210,7 @@ class Light:
     random: float = 0.0  # what the tree may ask of the object
     pass_index: int = 0
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    links: Links = NO_LINKS
 
 
 @dataclass(frozen=True)

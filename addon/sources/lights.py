@@ -14,7 +14,7 @@ import numpy as np
 from ..gfx import images
 from ..gfx.context import to_hold
 from ..gfx.struct import Block, Struct
-from ..snapshot.scene import Light, Snapshot
+from ..snapshot.scene import Light, Links, Snapshot
 from .lamp_maps import LampMaps
 
 TEXELS = 8
@@ -36,6 +36,9 @@ TRANSMISSION_FLAG = 256
 SIDED_FLAG = 512  # of a point on a surface: it shines only to where its normal points
 EVEN_FLAG = 1024  # of a world of one colour
 GLASS_BLOCKS_FLAG = 2048  # what passes glass arrives as photons of caustics
+KIND_STEPS = (
+    16  # a row's kind stands in the bits below; above, groups of receivers that a light does not light, 12 bits
+)
 MAPPED_FLAG, MAP_SHIFT = 4096, 13  # its node tree varies; the bits above are the number of its map (lamp_maps.py)
 
 
@@ -133,8 +136,9 @@ class Emitter:
         """(TEXELS, 4) float64 for the light list. `weight` is 1 / probability of having been chosen, `rate` how many
         points of this light a sample of the picture has on average, and `points` how many the whole picture has."""
         flags = self.flags if view_count else self.flags & ~SHADOW_FLAG
+        kind = self.kind + (unlit_bits(self.light.links) if self.light is not None else 0)
         rows = self._fixed.copy()
-        rows[0] = self.kind, flags, first_view, view_count
+        rows[0] = kind, flags, first_view, view_count
         rows[2, :3], rows[2, 3] = sample, rate
         rows[3, :3] = self.radiance * weight / rate
         rows[7, 3] = footprint(self.area, points) if self.kind != SUN else 0.0
@@ -238,6 +242,11 @@ def emitter(light: Light, origin: np.ndarray) -> Emitter | None:
             inverse[2],
         ]
     return Emitter(light, kind, flags, centre, radius, radiance, max(disc, 0.0), axis, 0.0, *rows)
+
+
+def unlit_bits(links: Links) -> int:
+    """What is added to a row's kind for the groups of receivers that are not lit (snapshot/linking.py)."""
+    return sum(KIND_STEPS << group for group in links.unlit)
 
 
 def footprint(area: float, points: float) -> float:

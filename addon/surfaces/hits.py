@@ -9,25 +9,25 @@ pass tests for EQUAL, so a driver skips blocks of other pixels. Whatever reads s
 The first picture flags the materials that were met and compiles those programs alone. Reading flags stops the queue, so
 where rays can meet no more than MOST_UNASKED materials, later pictures compile the rest (in a viewport one each) and
 draw all of them without asking; of many programs the vertices of one that was not met leave the screen by the same
-flags. Scenes of more materials read the flags in each round.
+flags. Scenes of more materials read the flags in each round. Materials that differ in values alone are one pass, in
+which a pixel finds its own values in their block (scene/materials.py).
 
-Materials that differ in values alone are one pass, under the first one's depth (scene/materials.py).
-
-`owners` gives for each triangle its instance and its number within its material, and each material has a list of corner
-attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
+`owners` gives for each triangle of the hierarchy its instance and its number within its material, and each material has
+a list of corner attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
 
     rays (origin, direction)  --trace-->  Records  --shade-->  closures
 
 | cost | per round of rays |
 |---|---|
 | passes | 1 trace, 1 for each program; of many programs those met, and 1 that flags them |
-| draws that end at their vertices | of many programs those not met |
 | readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |
 
-Bias: alpha is as fine as opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray. Footprints filter
-bumps, not textures. Relief goes on over edges of its mesh; grass is its ground. More than MOST_IMAGES images: the mean.
+Bias: alpha is as fine as the tiles of opacity maps (scene/opacity_maps.py). The Light Path node sees a glossy ray.
+Images have no mip levels: footprints filter bumps, not textures. Normals of corners have 12 bits. Relief goes on over
+the edges of its mesh (shaders/hits/relief.glsl); grass is its ground. A material with more than MOST_IMAGES images is
+its mean reflectance instead.
 """
 
 from __future__ import annotations

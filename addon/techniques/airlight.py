@@ -171,7 +171,7 @@ class Airlight(Technique):
             return
         rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
         kinds = lights.kinds_of(emitters) | sum(
-            1 << kind for kind in {int(row[0, 0]) for row in rows} if kind >= lights.DIRECTION
+            1 << kind for kind in {int(row[0, 0]) % lights.KIND_STEPS for row in rows} if kind >= lights.DIRECTION
         )
         coarse = frame.settings.samples < FEW
         stride = COARSE if coarse else 1

@@ -145,7 +145,7 @@ class Denoise(Technique):
 
     def sample(self, frame: Frame) -> None:
         done = frame.sample + 1
-        if frame.settings.time_limit:
+        if frame.settings.may_end_early:
             self._keep_doubles(frame, done)
         elif done == frame.settings.samples // 2:
             for path in self._paths(frame):
@@ -165,13 +165,15 @@ class Denoise(Technique):
 
     def _half(self, frame: Frame, path: str, count: int) -> tuple[int, str]:
         """Samples of the first part of all, and the image of their sum."""
-        if not frame.settings.time_limit:
+        if frame.first_part is not None:
+            return frame.first_part, f"denoise.{path}_half"
+        if not frame.settings.may_end_early:
             return count // 2, f"denoise.{path}_half"
         last = 1 << (count.bit_length() - 1)
         return (last // 2, f"denoise.{path}_before") if 2 * count < 3 * last else (last, f"denoise.{path}_half")
 
     def end(self, frame: Frame) -> Iterator[None]:
-        if frame.settings.samples < FEWEST:
+        if frame.settings.samples < FEWEST or frame.first_part == 0:
             return
         for path in self._paths(frame):
             yield from self._filter(frame, path, frame.settings.samples)

@@ -35,8 +35,9 @@ from ..frame.technique import Param, Technique
 from ..lighting import shared_visibility
 from ..lighting.caustic_casters import answered
 from ..lighting.light_rates import LightRates, PointsDrawn, rate_of
+from ..lighting.linked import linked
 from ..lighting.loop import DIRECT_WRITES, NEAR, RAYS_WHERE_NEAR, light_surfaces, lighting
-from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, VisibilityProvider
+from ..lighting.visibility import EDGES, HARD, RAYS, LightPoint, PlainMaps, Rays, ShadowLinks, VisibilityProvider
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -48,6 +49,7 @@ LIGHTING = tuple(
     for lookup in (HARD, EDGES, RAYS_WHERE_NEAR, RAYS, shared_visibility.BETWEEN)
     for soft_lobes in (False, True)
 )
+LINKED_LIGHTING = tuple(linked(lighting(lookup, True)) for lookup in (HARD, EDGES, RAYS))
 
 
 class DirectLight(Technique):
@@ -101,7 +103,10 @@ class DirectLight(Technique):
             provider = service.serving(emitter) if service else self._unshadowed
             rate = self._rate(frame, emitter, weight, provider)
             points = rate.per_sample * frame.settings.samples / weight
-            if service and self._has_rays(frame, emitter, provider):
+            among = self._blockers(frame, emitter) if service else None
+            if among is not None:
+                provider = among
+            elif service and self._has_rays(frame, emitter, provider):
                 provider = self._rays
             flags = lights.TRACED_FLAG * (emitter.light.key in self._traced)
             flags += lights.GLASS_BLOCKS_FLAG * answered(frame, emitter)
@@ -118,6 +123,19 @@ class DirectLight(Technique):
                 row = shown.row(sample, 0, asked, weight, rate.per_sample * share, points * share)
                 row[0, 1] += lights.WHOLE_FLAG * whole + flags + lights.NEAR_FLAG * near
                 found.append(LightPoint(row, provider, views))
+        return found
+
+    def _blockers(self, frame: Frame, emitter: lights.Emitter) -> VisibilityProvider | None:
+        """What tells the visibility of a lamp with shadow linking, if it has any."""
+        passing = emitter.light.links.passing
+        if not passing or not emitter.light.cast_shadow:
+            return None
+        found = frame.shared(ShadowLinks).of(frame, passing)
+        of = f"blockers of {emitter.light.name}"
+        if found is None:
+            frame.chose(self, of, f"all objects, since {acceleration.too_many(frame.snapshot)}")
+        else:
+            frame.chose(self, of, "rays among its own, whatever technique draws shadows")
         return found
 
     def _has_rays(self, frame: Frame, emitter: lights.Emitter, shadow: VisibilityProvider) -> bool:

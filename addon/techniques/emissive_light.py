@@ -32,7 +32,16 @@ from ..lighting import depth_maps
 from ..lighting.emissive_triangles import EmissiveTriangles
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import DIRECT_WRITES, light_surfaces
-from ..lighting.visibility import RESOLUTION, LightPoint, PlainMaps, Rays, VisibilityProvider, by_rays, map_resolution
+from ..lighting.visibility import (
+    RESOLUTION,
+    LightPoint,
+    PlainMaps,
+    Rays,
+    ShadowLinks,
+    VisibilityProvider,
+    by_rays,
+    map_resolution,
+)
 from ..materials.compiler import may_emit
 from ..snapshot.scene import Snapshot
 from ..sources import lights
@@ -85,7 +94,12 @@ class EmissiveLight(Technique):
         for k in range(count):
             number = frame.sample * count + k
             numbers = frame.random_volume_at(number, "emissive")
-            point = self._triangles.draw(*numbers)[1]
+            triangle, point, _ = self._triangles.draw(*numbers)
+            linked = frame.shared(ShadowLinks).of(frame, self._triangles.passing[triangle])
+            if linked:
+                row = self._triangles.row(numbers, count, flags, True, frame.settings.samples)
+                points.append(LightPoint(row, linked))
+                continue
             if patches:
                 points.append(self._patch(frame, provider, numbers, number, count, flags))
                 continue

@@ -32,7 +32,7 @@ from ..frame.run import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import passes
-from ..lighting import repeated_light
+from ..lighting import linked, repeated_light
 from ..lighting.light_rates import EmissivePoints, PointsDrawn, rate_of
 from ..lighting.loop import DIRECT_WRITES, TRACED_DEFINES
 from ..lighting.media import MediaService, attenuated
@@ -65,6 +65,7 @@ TRACED = passes.fullscreen_program(
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
 )  # fmt: skip
+LINKED_TRACED = linked.linked(TRACED)
 
 
 class TracedGlossy(Technique):
@@ -136,6 +137,9 @@ class TracedGlossy(Technique):
         if media is not None:
             program = attenuated(program)
             bindings["textures"] |= media.bindings
+        if linked.has_links(self._rows):
+            program = linked.linked(program)
+            bindings["textures"] |= frame.shared(linked.Groups).bindings(frame, self)
         yield from repeated_light.add(frame, self, self._sources, Lit(program, NARROW_LOBE, bindings, self._rows))
         frame.count(self, "passes")
 

@@ -68,6 +68,7 @@ class CANDELA_RENDER_PT_sampling(_CandelaPanel, bpy.types.Panel):
         settings = context.scene.candela
         column = _columns(self)
         column.prop(settings, "samples", text="Render Samples")
+        column.prop(settings, "noise_threshold")
         column.prop(settings, "time_limit")
         column.prop(settings, "viewport_samples", text="Viewport Samples")
         column.prop(settings, "seed")
@@ -173,6 +174,35 @@ class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
             column.prop(cycles, "film_exposure", text="Exposure")
         column.prop(context.scene.candela, "film_points")
         column.prop(context.scene.candela, "film_edges")
+
+
+class CANDELA_RENDER_PT_motion_blur(_CandelaPanel, bpy.types.Panel):
+    """Of final renders"""
+
+    bl_label = "Motion Blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context):
+        render = context.scene.render
+        column = _columns(self)
+        column.active = render.use_motion_blur
+        column.prop(render, "motion_blur_position", text="Position")
+        column.prop(render, "motion_blur_shutter")
+        column.prop(context.scene.candela, "motion_steps")
+
+
+class CANDELA_RENDER_PT_motion_blur_curve(_CandelaPanel, bpy.types.Panel):
+    bl_label = "Shutter Curve"
+    bl_parent_id = "CANDELA_RENDER_PT_motion_blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        render = context.scene.render
+        self.layout.active = render.use_motion_blur
+        self.layout.template_curve_mapping(render, "motion_blur_shutter_curve")
 
 
 class CANDELA_RENDER_PT_frame(_CandelaPanel, bpy.types.Panel):
@@ -336,6 +366,8 @@ class CANDELA_OBJECT_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
             "shadow",
         ):  # visible_camera and so on
             column.prop(context.object, f"visible_{name}", text=name.replace("_", " ").title())
+        if context.object.type != "LIGHT":
+            column.prop(context.object, "is_shadow_catcher")
 
 
 class CANDELA_WORLD_PT_ray_visibility(_CandelaPanel, bpy.types.Panel):
@@ -489,6 +521,8 @@ _CLASSES = (
         if technique.params_of(SCENE) and technique.name not in _WITH_OTHERS
     ),
     CANDELA_RENDER_PT_film,
+    CANDELA_RENDER_PT_motion_blur,
+    CANDELA_RENDER_PT_motion_blur_curve,
     CANDELA_RENDER_PT_simplify,
     CANDELA_RENDER_PT_frame,
     CANDELA_RENDER_PT_frame_skipped,

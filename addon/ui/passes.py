@@ -89,6 +89,9 @@ PASSES = tuple(
 
 
 CAMERA_AXES = "camera axes"  # (3, 3) beside the images that passes are made from: right, up, forward
+# What things change of the light on shadow catchers: 1 where nothing (film/catcher.py).
+CATCHER = RenderPass("cycles.use_pass_shadow_catcher", "Shadow Catcher", "RGB", "COLOR", "film.catcher")
+PASSES = (*PASSES, CATCHER)
 
 # The picture as an eye sees it, beside a Combined that stays as it is; written where glare is on.
 GLARE = RenderPass("", "Glare", "RGBA", "COLOR", "film.lens")
@@ -201,7 +204,6 @@ _OTHERS = (
     ("use_pass_shadow", "Shadow"), ("use_pass_ambient_occlusion", "Ambient Occlusion"),
     ("use_pass_subsurface_direct", "Subsurface Direct"), ("use_pass_subsurface_indirect", "Subsurface Indirect"),
     ("use_pass_subsurface_color", "Subsurface Color"),
-    ("cycles.use_pass_shadow_catcher", "Shadow Catcher"),
 )  # fmt: skip
 
 

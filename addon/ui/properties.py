@@ -7,7 +7,19 @@ from math import floor, log10
 
 import bpy
 
-from ..frame.settings import AUTO, BOUNCES, OFF, SAMPLE_COUNT, SAMPLE_OFFSET, SAMPLES, SEED, TIME_LIMIT, Settings
+from ..frame.settings import (
+    AUTO,
+    BOUNCES,
+    MOTION_STEPS,
+    NOISE_THRESHOLD,
+    OFF,
+    SAMPLE_COUNT,
+    SAMPLE_OFFSET,
+    SAMPLES,
+    SEED,
+    TIME_LIMIT,
+    Settings,
+)
 from ..frame.technique import (
     CAMERA,
     DIRECTION,
@@ -91,7 +103,8 @@ def _property(param: Param, **changes):
     make = bpy.props.IntProperty if isinstance(param.default, int) else bpy.props.FloatProperty
     if param.unit:
         limits["subtype"] = param.unit
-    if isinstance(param.default, float) and param.unit != "DISTANCE":  # lengths are shown in the scene's units
+    # Lengths are shown in the scene's units.
+    if isinstance(param.default, float) and param.unit != "DISTANCE" and "precision" not in common:
         limits["precision"] = precision_of(param.default)
     return make(**common, **limits)
 
@@ -118,6 +131,8 @@ def _annotations() -> dict:
         "sample_offset": _property(SAMPLE_OFFSET),
         "sample_count": _property(SAMPLE_COUNT),
         "time_limit": _property(TIME_LIMIT, subtype="TIME_ABSOLUTE"),
+        "noise_threshold": _property(NOISE_THRESHOLD, precision=3),
+        "motion_steps": _property(MOTION_STEPS),
         "split_light_groups": bpy.props.BoolProperty(
             name="Direct and Indirect", update=_redraw,
             description="Write two more passes for each light group: its direct light with what is seen of it, and its "
@@ -248,6 +263,7 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
         values[Denoise.name, "strength"] = 0.0
     final = (layer.samples if layer is not None else 0) or group.samples
     samples = PREVIEW_SAMPLES if preview else (group.viewport_samples if viewport else final)
+    alone = not (viewport or preview or group.sample_offset or group.sample_count)  # a whole picture, by one machine
     settings = Settings(
         samples=samples,
         whole=not viewport,
@@ -255,7 +271,9 @@ def settings_of(scene, viewport: bool, preview: bool = False, layer=None, depsgr
         bounces=group.bounces,
         sample_offset=0 if viewport or preview else group.sample_offset,
         sample_count=0 if viewport or preview else group.sample_count,
-        time_limit=0.0 if viewport or preview or group.sample_offset or group.sample_count else group.time_limit,
+        time_limit=group.time_limit if alone else 0.0,
+        noise_threshold=group.noise_threshold if alone else 0.0,
+        motion_steps=group.motion_steps,
         passes=None if tree is None else order_of(tree),
         slots={slot: getattr(group, f"slot_{slot}") for slot in slots()},
         values=values,

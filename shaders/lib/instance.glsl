@@ -1,6 +1,6 @@
 // Instances from the instance image, eight texels each: three rows of the matrix; random number, pass index, flags,
 // orientation; the object's colour; place on the instancer (generated, first of UV), second of UV, the object's offset
-// against the shadow terminator, and whether others share its mesh; one is free.
+// against the shadow terminator, and whether others share its mesh; its group of receivers of light.
 
 #define FLAG_CAMERA 1
 #define FLAG_SHADOW 2
@@ -82,6 +82,11 @@ float instance_terminator(int id)
 bool instance_shares_mesh(int id)
 {
   return instances_fetch(instance_place(id) + ivec2(6, 0)).z > 0.5;
+}
+
+float instance_receiver_group(int id)
+{
+  return instances_fetch(instance_place(id) + ivec2(7, 0)).x;
 }
 
 bool instance_seen(Instance instance)

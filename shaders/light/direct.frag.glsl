@@ -85,6 +85,9 @@ void main()
     has_glossy = !lobe_is_mirror(lobe);
   }
   bool traced = s.glossy_roughness <= traced_roughness;
+#ifdef LIGHT_LINKS
+  int group = receiver_group(pixel);
+#endif
   vec3 diffuse = vec3(0.0);
   vec3 glossy = vec3(0.0);
 #ifdef KNOWN_IRRADIANCE
@@ -94,6 +97,11 @@ void main()
 #endif
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
+#ifdef LIGHT_LINKS
+    if (((light.unlit >> group) & 1) != 0) {
+      continue;
+    }
+#endif
 #ifdef OWN_POINTS
     light = own_point(light, i);
 #endif

@@ -20,7 +20,7 @@ float lobe_share(float lobe_density, float light_density, float light_samples)
 
 // Light that arrives along `direction` if nothing nearer than `limit` blocks it, with the shares applied. `span` is how
 // far the nearest and the farthest of its sources are.
-vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, float limit, out vec2 span)
+vec3 arriving(ivec2 pixel, vec3 origin, vec3 direction, float lobe_density, bool mirror, float limit, out vec2 span)
 {
   vec3 sum = vec3(0.0);
   span = vec2(1e29, 0.0);
@@ -37,6 +37,11 @@ vec3 arriving(vec3 origin, vec3 direction, float lobe_density, bool mirror, floa
     if ((light.flags & LIGHT_GLOSSY) == 0) {
       continue;
     }
+#ifdef LIGHT_LINKS
+    if (((light.unlit >> receiver_group(pixel)) & 1) != 0) {
+      continue;
+    }
+#endif
     float hit_distance;
     float density;
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
@@ -87,7 +92,7 @@ void main()
       lobe_reflection(lobe, direction, density);
     }
     vec2 span;
-    vec3 light = arriving(s.position, direction, density, mirror, 1e29, span);
+    vec3 light = arriving(pixel, s.position, direction, density, mirror, 1e29, span);
     float importance = dot(abs(weight * light), vec3(1.0));
     if (importance > 0.0 && reservoir_takes(importance, total, choice)) {
       kept_importance = importance;
@@ -107,7 +112,7 @@ void main()
     if (blocked >= kept_span.x) {
       vec2 ignored;
       float limit = (blocked < kept_span.y) ? blocked : 1e29;
-      vec3 light = arriving(s.position, kept_direction, kept_density, mirror, limit, ignored);
+      vec3 light = arriving(pixel, s.position, kept_direction, kept_density, mirror, limit, ignored);
       out_glossy.rgb = kept_weight * light * (total / (kept_importance * float(count)));
 #ifdef MEDIA
       float reach = (kept_span.x < 1e28) ? kept_span.x : FARTHEST_MEDIUM;

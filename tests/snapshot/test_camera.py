@@ -141,11 +141,6 @@ def test_an_orthographic_aperture_has_no_focal_length(stage):
     assert stage.take().camera.aperture.radius == pytest.approx(1 / 8)
 
 
-def test_motion_blur_is_named(stage):
-    stage.scene.render.use_motion_blur = True
-    assert any("motion blur" in note.text for note in stage.take().notes)
-
-
 def view_of(view, window, perspective):
     return SimpleNamespace(view_matrix=Matrix(view), window_matrix=Matrix(window), is_perspective=perspective)
 

@@ -175,11 +175,13 @@ READ = {
     "material": ("pass_index", "Volume", "Displacement", "Surface", "use_transparent_shadow"),
     "object": (
         *("pass_index", "color", "is_holdout", "shadow_terminator_geometry_offset", "visible_transmission"),
-        *("visible_volume_scatter", "visible_camera", "lightgroup"),
+        *("visible_volume_scatter", "visible_camera", "receiver_collection", "blocker_collection", "lightgroup"),
+        "is_shadow_catcher",
     ),
     "render": (
         *("filter_size", "film_transparent", "film_transparent_glass", "film_transparent_roughness", "film_exposure"),
-        "use_simplify",
+        *("use_simplify", "use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
+        "motion_blur_shutter_curve",
     ),
     "output": ("resolution_x", "use_border", "pixel_aspect_x"),
     "view_layer": (

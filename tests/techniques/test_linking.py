@@ -1,0 +1,165 @@
+"""Light linking and shadow linking, beside Cycles."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.compare.metrics import relative_squared_error
+from addon.lighting import linked
+from addon.snapshot import SnapshotCache, take
+from addon.snapshot.linking import MOST_GROUPS
+from addon.sources import lights
+
+SIZE = (64, 48)
+
+
+def collection(objects, state="INCLUDE"):
+    made = bpy.data.collections.new("Links")
+    for one in objects:
+        made.objects.link(one)
+    for item in made.collection_objects:
+        item.light_linking.link_state = state
+    return made
+
+
+def box(stage, x, albedo=0.7):
+    corners = [(a + x, b, c) for a in (-0.4, 0.4) for b in (-0.4, 0.4) for c in (0.0, 1.0)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (1, 5, 7, 3), (0, 2, 6, 4)]
+    return stage.mesh(corners, faces, material=stage.diffuse(albedo))
+
+
+@pytest.fixture
+def room(stage):
+    stage.scene.render.filter_size = 1.5
+    stage.ground = stage.floor(6.0, material=stage.diffuse(0.6))
+    stage.boxes = [box(stage, x) for x in (-1.2, 0.0, 1.2)]
+    stage.lamp = stage.light("AREA", (-2.0, -2.0, 3.0), turn=(0.7, -0.5, 0), size=0.6, energy=150)
+    stage.light("SUN", (0, 0, 5), turn=(-0.4, 0.6, 0), energy=0.4, angle=0.05)
+    stage.camera((0, -6, 4), (0.97, 0, 0))
+    yield stage
+    for one in (*bpy.data.collections,):
+        bpy.data.collections.remove(one)
+
+
+def lit_alone(stage, giver):
+    giver.light_linking.receiver_collection = collection([stage.boxes[0], stage.ground])
+
+
+def all_but_one(stage, giver):
+    giver.light_linking.receiver_collection = collection([stage.boxes[1]], "EXCLUDE")
+
+
+def blocked_by_one(stage, giver):
+    giver.light_linking.blocker_collection = collection([stage.boxes[2], stage.boxes[1]])
+
+
+def blocked_by_others(stage, giver):
+    giver.light_linking.blocker_collection = collection([stage.boxes[0]], "EXCLUDE")
+
+
+def both(stage, giver):
+    lit_alone(stage, giver)
+    blocked_by_others(stage, giver)
+
+
+LINKS = (lit_alone, all_but_one, blocked_by_one, blocked_by_others, both)
+
+
+def beside_cycles(stage, bounces=0):
+    own = stage.render(64, SIZE, bounces=bounces)["combined"][..., :3]
+    truth = stage.render(512, SIZE, engine="CYCLES", bounces=bounces)["combined"][..., :3]
+    return own, truth, relative_squared_error(own, truth).mean()
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_lamps_beside_cycles(room, link):
+    plain = room.render(64, SIZE)["combined"][..., :3]
+    link(room, room.lamp)
+    _, truth, error = beside_cycles(room)
+    without = relative_squared_error(plain, truth).mean()
+    print(f"relMSE {error:.5f}, without links {without:.5f}")
+    assert error <= 0.01 and without > 3 * error
+
+
+def shining(stage):
+    bpy.data.objects.remove(stage.lamp)
+    glow = stage.material("ShaderNodeEmission", Strength=30.0)
+    return stage.rectangle((-0.3, -0.3), (0.3, 0.3), material=glow, location=(-2, -2, 3), turn=(0.7, -0.5, 0))
+
+
+@pytest.mark.parametrize("link", (all_but_one, both))
+def test_shining_meshes_beside_cycles(room, link):
+    link(room, shining(room))
+    _, _, error = beside_cycles(room)
+    print(f"relMSE {error:.5f}")
+    assert error <= 0.01
+
+
+def test_glossy_receivers_beside_cycles(room):
+    room.boxes[1].data.materials[0] = room.principled(Metallic=1.0, Roughness=0.3)
+    all_but_one(room, room.lamp)
+    _, _, error = beside_cycles(room)
+    print(f"relMSE {error:.5f}")
+    assert error <= 0.01
+
+
+@pytest.mark.parametrize("shadow", ["accumulated_maps", "vssm", "cssm", "penumbra_wedges", "depth_complexity"])
+def test_every_shadow_technique_follows_links(room, shadow):
+    both(room, room.lamp)
+    room.scene.candela.slot_shadow = shadow
+    own = room.render(16, SIZE)["diffuse_direct"]
+    room.scene.candela.slot_shadow = "AUTO"
+    auto = room.render(16, SIZE)["diffuse_direct"]
+    room.lamp.light_linking.blocker_collection = None
+    blocked = room.render(16, SIZE)["diffuse_direct"]
+    assert np.abs(own - auto).mean() < 0.25 * np.abs(own - blocked).mean()
+
+
+def test_the_ledger_says_by_what_blockers_are_found(room):
+    blocked_by_one(room, room.lamp)
+    room.render(1, SIZE)
+    assert "whatever technique" in " ".join(room.ledger.row("direct_light").choices)
+
+
+def test_children_follow_the_mark_of_their_collection(room):
+    outer, inner = collection([]), collection([room.boxes[1]])
+    outer.children.link(inner)
+    outer.collection_children[0].light_linking.link_state = "EXCLUDE"
+    room.lamp.light_linking.receiver_collection = outer
+    own = room.render(4, SIZE)["combined"]
+    room.lamp.light_linking.receiver_collection = collection([room.boxes[1]], "EXCLUDE")
+    np.testing.assert_array_equal(own, room.render(4, SIZE)["combined"])
+
+
+def test_a_collection_without_members_changes_nothing(room):
+    plain = room.render(4, SIZE)
+    room.lamp.light_linking.receiver_collection = collection([])
+    room.lamp.light_linking.blocker_collection = collection([])
+    linked_to_nothing = room.render(4, SIZE)
+    for name in plain:
+        np.testing.assert_array_equal(linked_to_nothing[name], plain[name])
+
+
+def snapshot_of(stage):
+    return take(bpy.context.evaluated_depsgraph_get(), SnapshotCache(), *SIZE)
+
+
+def test_scenes_without_links_have_no_bits(room):
+    found = snapshot_of(room)
+    rows = [e.row(e.centre, 0, 1) for e in (lights.emitter(one, np.zeros(3)) for one in found.lights)]
+    assert not linked.has_links(rows)
+    assert all(one.links is found.instances[0].links for one in found.instances)
+
+
+def test_more_groups_than_there_are_bits_are_named(room):
+    for number in range(MOST_GROUPS + 1):
+        lamp = room.light("POINT", (number, 0, 3))
+        lamp.light_linking.receiver_collection = collection([box(room, 3.0 + number)])
+    found = snapshot_of(room)
+    assert any(f"more than {MOST_GROUPS}" in note.text for note in found.notes)
+    assert all(group < MOST_GROUPS for light in found.lights for group in light.links.unlit)
+
+
+def test_what_is_not_followed_is_said(room):
+    lit_alone(room, room.lamp)
+    assert any("bounced light follows none" in note.text for note in snapshot_of(room).notes)
