@@ -67,7 +67,7 @@ MET, ANY_RAY = "LESS", "LESS_EQUAL"
 TRACE = passes.fullscreen_program(
     "trace hits",
     "hits/trace.frag.glsl",
-    textures=(*acceleration.HIERARCHY_TEXTURES, *RAYS, ("RG32F", "trace_owners"), ("RGBA32F", "absorption")),
+    textures=(*acceleration.HIERARCHY_TEXTURES, *RAYS, ("RG32F", "trace_owners"), ("RGBA32F", "inside_of_materials")),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("INT", "first_leaf"), ("FLOAT", "spread")),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
@@ -80,7 +80,7 @@ MATERIALS_MET = Program(
         ("RGBA32F", "hit_place"),
         ("R32F", "hit_material"),
         ("RGBA32F", "rays"),
-        ("RGBA32F", "absorption"),
+        ("RGBA32F", "inside_of_materials"),
     ),
     images=(("met", "R32UI", "UINT_2D", "WRITE"),),
 )
@@ -93,7 +93,7 @@ PLACE = passes.fullscreen_program(
     "hits/place.frag.glsl",
     textures=(
         *(("RGBA32F", f"point_{name}") for name in ("place", "triangle", "normals", "material")),
-        ("RGBA32F", "absorption"),
+        ("RGBA32F", "inside_of_materials"),
     ),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
     writes_depth=True,
@@ -154,7 +154,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
             *relief, *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
-            *((("R32F", "hit_material"), ("RGBA32F", "absorption")) if shared else ()),
+            *((("R32F", "hit_material"), ("RGBA32F", "inside_of_materials")) if shared else ()),
         ),
         blocks=(
             (VIEW, "film_view"), (shared_struct() if shared else values_struct(compiled), "material_values"),
@@ -276,7 +276,7 @@ class Hits:
             records.target,
             textures={
                 **hierarchy.textures, "ray_origin": rays[0], "ray_direction": rays[1],
-                "trace_owners": owners, "absorption": self._absorption_of(frame),
+                "trace_owners": owners, "inside_of_materials": self._absorption_of(frame),
             },
             blocks={"film_view": frame.view_block},
             constants={
@@ -294,7 +294,9 @@ class Hits:
         """Take points that are known as hits: images as the first three of RECORDS, and one of the number of the
         material (x; y: 0 where there is no point), as `numbers` tells those of triangles."""
         textures = {name: image for (_, name), image in zip(PLACE.textures, points)}
-        passes.fullscreen(PLACE, records.target, textures={**textures, "absorption": self._absorption_of(frame)})
+        passes.fullscreen(
+            PLACE, records.target, textures={**textures, "inside_of_materials": self._absorption_of(frame)}
+        )
         frame.count(technique, "passes")
         self._rays = records.images["hit_place"]
         self._flag_met(frame, records)
@@ -315,7 +317,7 @@ class Hits:
         found = records.images
         shared = {f"hit_{name}": found[f"hit_{name}"] for name in RECORDS[:3]}
         shared |= {"ray_direction": ray_direction, "instances": frame.geometry.instances}
-        lists = {"hit_material": found["hit_material"], "absorption": self._absorption_of(frame)}
+        lists = {"hit_material": found["hit_material"], "inside_of_materials": self._absorption_of(frame)}
         view, shader = {"film_view": frame.view_block}, None
         leaders = {frame.materials.leaders[k] for k in materials}
         with passes.drawing(closures, depth_test="EQUAL", depth_write=False):
@@ -389,7 +391,7 @@ class Hits:
         self._flagged = True
         records.met.texture.clear(format="UINT", value=(0,))
         textures = {name: records.images[name] for name in ("hit_place", "hit_material")}
-        textures |= {"rays": self._rays, "absorption": self._absorption_of(frame)}
+        textures |= {"rays": self._rays, "inside_of_materials": self._absorption_of(frame)}
         passes.compute(MATERIALS_MET, records.target.size, textures=textures, images={"met": records.met})
 
     def _possible_of(self, frame: Frame, hierarchy: Hierarchy, path: str) -> set[int]:

@@ -1,8 +1,8 @@
-// Materials that share a program and its block of values (addon/surfaces/hits.py): w of `absorption` holds which of them
+// Materials that share a program and its block of values (addon/surfaces/hits.py): w of `inside_of_materials` holds which of them
 // leads, and in the bits above where a material's values begin.
 int shared_number(int material_index)
 {
-  return int(absorption_fetch(ivec2(material_index & 255, material_index >> 8)).w + 0.5);
+  return int(inside_of_materials_fetch(ivec2(material_index & 255, material_index >> 8)).w + 0.5);
 }
 
 int shared_leader(int material_index)

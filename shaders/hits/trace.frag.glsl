@@ -58,7 +58,7 @@ void main()
   out_passed.w = luminance(abs(emission)) * t * t / max(abs(dot(normal, direction)), 1e-6);
   vec3 outwards = (dot(normal, shading) < 0.0) ? -normal : normal;
   if (dot(outwards, direction) > 0.0) {
-    out_passed.rgb = exp(-absorption_fetch(ivec2(material_index & 255, material_index >> 8)).rgb * t);
+    out_passed.rgb = exp(-inside_of_materials_fetch(ivec2(material_index & 255, material_index >> 8)).rgb * t);
   }
   out_material = float(material_index);
   gl_FragDepth = shared_depth(material_index);
