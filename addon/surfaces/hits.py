@@ -9,8 +9,8 @@ pass tests for EQUAL, so a driver skips blocks of other pixels. Whatever reads s
 The first picture flags the materials that were met and compiles those programs alone. Reading flags stops the queue, so
 where rays can meet no more than MOST_UNASKED materials, later pictures compile the rest (in a viewport one each) and
 draw all of them without asking; of many programs the vertices of one that was not met leave the screen by the same
-flags. Scenes of more materials read the flags in each round. Materials that differ in values alone are one pass, in
-which a pixel finds its own values in their block (scene/materials.py).
+flags. Scenes of more materials read the flags in each round. Materials that differ in values alone are one pass: the
+trace writes the first one's depth for all, and a pixel finds its own values in their block (scene/materials.py).
 
 `owners` gives for each triangle of the hierarchy its instance and its number within its material, and each material has
 a list of corner attributes by that number, made when it is first met. Bumps use the derivatives of the ray's footprint.
@@ -19,7 +19,7 @@ a list of corner attributes by that number, made when it is first met. Bumps use
 
 | cost | per round of rays |
 |---|---|
-| passes | 1 trace, 1 for each program; of many programs those met, and 1 that flags them |
+| passes | 1 trace, 1 for each program; of many, 1 that flags those met, and the others end at their vertices |
 | readback | none; with many materials, and in the first pictures, one flag for each material of the scene |
 | bytes per pixel | 4 x 16 + 4 + 4 for records, 6 x 16 for closures |
 | per material met, once | a program; 48 bytes a triangle and attribute, and 48 more where it has any |

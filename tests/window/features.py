@@ -94,7 +94,7 @@ def stage(camera_at=(0.0, -6.0, 2.2), look_at=(0.0, 0.0, 0.8)):
     camera.rotation_euler = (Vector(look_at) - Vector(camera_at)).to_track_quat("-Z", "Y").to_euler()
     scene.camera = camera
     lamp = new("Area", bpy.data.lights.new("Area", "AREA"), (2.0, -2.0, 4.0))
-    lamp.data.energy, lamp.data.size = 300.0, 1.0
+    lamp.data.energy, lamp.data.size = 100.0, 1.0
     lamp.rotation_euler = (-lamp.location).to_track_quat("-Z", "Y").to_euler()
     return scene
 

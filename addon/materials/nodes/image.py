@@ -249,5 +249,7 @@ ENTRIES = (
         (("Fac", "FLOAT"),),
         PROFILE_SOURCE,
         image=True,
+        # Whoever reads the file says so where it is of those types.
+        setting_approximations=(("mode", (), "Light profiles of the types A and B may be turned."),),
     ),
 )
