@@ -3,7 +3,7 @@
     light = sum / colour            of diffuse direct, diffuse indirect and glossy indirect light, each by itself
     out   = light(p) + sum over pixels q  w(p, q) (light(q) - light(p))
     w     = binomial * same surface * exp(-(light(p) - light(q))^2 / s^2)
-    s^2   = k^2 (var(p) + var(q)) / 2 + light(p) light(q) / 100^2
+    s^2   = k^2 sqrt(var(p) var(q)) + light(p) light(q) / 100^2
 
 An edge-avoiding wavelet of three or five levels (Dammertz, Sewtz, Hanika and Lensch 2010), steered by variance as in
 Schied et al. 2017 (SVGF). The variance comes from the picture itself: the sums are copied half-way through the samples,
@@ -12,8 +12,9 @@ That includes noise shared by all pixels (one set of virtual lights or light poi
 diffuse indirect light, whose edges are softer, and 5 for glossy light.
 
 w is symmetric and the centre keeps what the weights lack to one: pixels exchange light and none is lost, however skewed
-the noise. Pixels exchange glossy light only if what their lobes show reflects alike (shaded_reflections.py). Where both
-halves agree nothing changes, so the result still converges; textures are divided out before and stay.
+the noise. Its variance is the geometric mean, so that a bright rim does not spread into its dark surroundings. Pixels
+exchange glossy light only if what their lobes show reflects alike (shaded_reflections.py). Where both halves agree
+nothing changes, so the result still converges; textures are divided out before and stay.
 
 | cost | after the last sample |
 |---|---|

@@ -63,7 +63,7 @@ void main()
         continue;
       }
       float other = luminance(light.rgb);
-      float allowed = 0.5 * tolerance * tolerance * (own.a + light.a) + EQUAL * EQUAL * abs(bright * other);
+      float allowed = tolerance * tolerance * sqrt(own.a * light.a) + EQUAL * EQUAL * abs(bright * other);
       float weight = binomial(abs(x)) * binomial(abs(y)) * alike(here, there, max(abs(x), abs(y)) * stride)
                      * exp(-(other - bright) * (other - bright) / max(allowed, 1e-37));
 #ifdef REFLECTIONS

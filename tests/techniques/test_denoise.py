@@ -12,6 +12,7 @@ from addon.gfx.struct import Block
 from addon.scene.view import VIEW, View
 from addon.snapshot.scene import Camera, Film
 from addon.techniques.denoise import LEVEL, Denoise
+from tests.techniques.conftest import places
 
 SIZE = (64, 48)
 
@@ -176,8 +177,31 @@ def test_noise_goes_from_pixel_to_pixel_of_one_surface_alone(gpu_context, apart)
 @pytest.mark.parametrize("count", range(2, 34))
 def test_of_an_unknown_number_of_samples_about_half_are_kept(count):
     """From a third to two thirds of them, and never all."""
-    settings = SimpleNamespace(settings=SimpleNamespace(time_limit=5.0))
-    half, name = Denoise()._half(settings, "diffuse_direct", count)
+    frame = SimpleNamespace(settings=SimpleNamespace(may_end_early=True), first_part=None)
+    half, name = Denoise()._half(frame, "diffuse_direct", count)
     kept = [1 << k for k in range(8) if 1 << k <= count][-2:]
     assert half == kept[-1 if name.endswith("_half") else -2]
     assert count / 3 <= half <= 2 * count / 3 + 1e-9 or count == 2
+
+
+def test_dark_surroundings_of_a_bright_rim_stay_dark(stage):
+    """A lamp of .4 m, 4 cm above the floor: light falls by a thousand within some pixels, and so does its noise."""
+    stage.floor()
+    glow = stage.material("ShaderNodeEmission", Strength=10.0)
+    lamp = stage.rectangle((-0.2, -0.2), (0.2, 0.2), material=glow, turn=(np.pi, 0, 0), location=(0, 0, 0.04))
+    lamp.visible_camera = False
+    stage.camera_above(1.6)
+    stage.scene.candela.slot_indirect = "OFF"
+
+    def picture(samples, strength):
+        stage.scene.candela.denoise_strength = strength
+        return stage.render(samples, (64, 64))["combined"][..., 0].astype(float)
+
+    truth = picture(256, 0.0)
+    x, y = places((64, 64), 1.6)
+    dark = (np.maximum(np.abs(x), np.abs(y)) > 0.3) & (np.maximum(np.abs(x), np.abs(y)) < 0.5)
+    denoised = picture(64, 1.0)
+    assert denoised[dark].mean() == pytest.approx(truth[dark].mean(), rel=0.2)
+    near = np.maximum(np.abs(x), np.abs(y)) < 0.15
+    noise = [np.square(one - truth)[near].mean() for one in (denoised, picture(64, 0.0))]
+    assert noise[0] < 0.4 * noise[1]
