@@ -18,6 +18,7 @@ from addon.materials.compiler import compile_material, default_graph
 from addon.materials.graph import Graph, Input, Node
 from addon.materials.volume_program import CompiledVolume, compile_volume
 from addon.scene import displacement, materials, media
+from addon.scene.lamp_trees import bake_program as lamp_program
 from addon.scene.world_tree import background_program, bake_program
 from addon.surfaces.hits import hit_program
 from addon.techniques.grass import grass_program
@@ -77,6 +78,8 @@ def programs() -> list[Program]:
     made += [hit_program(replace(plain, attributes=(Attribute("COLOR", "Color"),), program_key="with attributes"))]
     made += [grass_program(materials._surface_program(plain)), grown(lighting(HARD, False))]
     made += relief_programs()
+    layouts = ((("UV", "VECTOR"),), (("", "COLOR"), ("", "VALUE")))
+    made += [lamp_program(plain), *(materials._aov_program(plain, (held,)) for held in layouts)]
     for length, file in enumerate(files, len(plain.values)):  # blocks of several lengths among the structs
         values = np.zeros((length, 4), np.float32)
         with_file = replace(plain, glsl=f'#include "{file}"\n{plain.glsl}', values=values)
