@@ -3,7 +3,7 @@
 #include "lib/closure.glsl"
 #include "lib/instance.glsl"
 #include "generated/material"
-#include "surface/point.glsl"
+#include "surface/fragment.glsl"
 #include "subsurface/image.glsl"
 
 // Three numbers in 0..1 in one float, as in lib/gbuffer.glsl.
@@ -16,18 +16,10 @@ float pack_albedo(vec3 albedo)
 void main()
 {
   vec4 hit = surface_position_fetch(ivec2(gl_FragCoord.xy));
-  vec3 eye = film_view.eye.xyz;
-  vec3 incoming = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(eye - world_position);
-  Instance instance = instance_read(instance_flat.x);
-  SurfacePoint point = surface_point(incoming, instance);
-#ifdef OWN_SURFACE
-  if (!own_surface(point, instance)) {
-    discard;
-  }
-  gl_FragDepth = projected_depth(point.position, PROJECTION);
-#endif
+  Instance instance;
+  SurfacePoint point = fragment_point(instance);
   // Interpolated positions of one point differ by some units of the last place between two programs.
-  float tolerance = 2e-6 * (length(hit.xyz - eye) + length(hit.xyz));
+  float tolerance = 2e-6 * (length(hit.xyz - film_view.eye.xyz) + length(hit.xyz));
   if (hit.w == 0.0 || distance(hit.xyz, point.position) > tolerance) {
     discard;
   }
