@@ -43,15 +43,14 @@ MOST = 1024  # boxes: each map of a light is fitted to all of them, on the proce
 
 
 def merged(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Bounds of tiles, (rows, columns, 4) each, as bounds of squares of so many tiles a side that MOST are left at most;
-    and that number. A tile in which nothing is seen has low above high."""
+    """Bounds of tiles, (rows, columns, 4) each, as bounds of squares of so many tiles a side that MOST are left at
+    most; and that number. A tile in which nothing is seen has low above high."""
     rows, columns = low.shape[:2]
     side = 1
     while -(-rows // side) * -(-columns // side) > MOST:
         side += 1
     if side > 1:
-        low = np.minimum.reduceat(np.minimum.reduceat(low, range(0, rows, side), axis=0), range(0, columns, side), axis=1)
-        high = np.maximum.reduceat(
-            np.maximum.reduceat(high, range(0, rows, side), axis=0), range(0, columns, side), axis=1
-        )
+        for axis, extent in enumerate((rows, columns)):
+            low = np.minimum.reduceat(low, range(0, extent, side), axis=axis)
+            high = np.maximum.reduceat(high, range(0, extent, side), axis=axis)
     return low, high, side

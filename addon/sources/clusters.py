@@ -79,7 +79,7 @@ def cluster(points: np.ndarray, normals: np.ndarray, weights: np.ndarray, count:
 
 
 def _nearest(points, normals, centres, turns, scale: float) -> np.ndarray:
-    # As |p|^2 + |c|^2 - 2 p c, a matrix product; about the centres' mean, since the difference loses digits far from it.
+    # |p|^2 + |c|^2 - 2 p c, a matrix product; about the centres' mean, since the difference loses digits far from it.
     middle = centres.mean(axis=0)
     points, centres = points - middle, centres - middle
     squared = (points**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1) - 2.0 * (points @ centres.T)
