@@ -30,12 +30,14 @@ from bench import (
     points_motion,
     profile,
     random_scenes,
+    reflection_costs,
     reflections,
     relief,
     run,
     soft_sources,
     strips,
     subsurface,
+    subsurface_costs,
 )
 
 VERBS = {
@@ -57,11 +59,13 @@ VERBS = {
     "grass": grass,
     "edges": edges,
     "random": random_scenes,
+    "reflection_costs": reflection_costs,
     "reflections": reflections,
     "relief": relief,
     "strips": strips,
     "soft_sources": soft_sources,
     "subsurface": subsurface,
+    "subsurface_costs": subsurface_costs,
     "page": page,
     "points_motion": points_motion,
     "ages": ages,
