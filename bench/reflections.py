@@ -24,7 +24,7 @@ from . import markdown
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
 SIZE = (96, 64)
-PATHS = ("glossy", "transmission")
+PATHS = ("glossy", "transmission")  # that a scene is measured by, unless it names others
 
 
 @dataclass(frozen=True)
@@ -173,16 +173,19 @@ def _render(scene, entrant: Entrant, seed: int) -> tuple[dict[str, np.ndarray], 
         settings.shaded_reflections_bounces = 0
     scene.eevee.use_raytracing = True
     extra = [(scene.cycles, "use_denoising", True)] if entrant.denoised else []
+    if "glossy_bounces" in scene:
+        extra.append((scene.cycles, "glossy_bounces", scene["glossy_bounces"]))
     start = time.perf_counter()
     images = render_passes(scene, entrant.engine, entrant.samples, seed, size=SIZE, extra=extra).images
     seconds = time.perf_counter() - start
     found = {"picture": images["combined"][..., :3]}
-    for path in PATHS:
-        parts = [images.get(f"{path}_{order}") for order in ("direct", "indirect")]
-        color = images.get(f"{path}_color")
+    for path in str(scene.get("paths", ",".join(PATHS))).split(","):
+        kind, _, order = path.partition(" ")
+        parts = [images.get(f"{kind}_{one}") for one in ([order] if order else ["direct", "indirect"])]
+        color = images.get(f"{kind}_color")
         comparable = entrant.engine != "BLENDER_EEVEE" and not entrant.denoised  # only Combined is denoised
         if comparable and color is not None and all(part is not None for part in parts):
-            found[path] = (parts[0] + parts[1])[..., :3] * color[..., :3]
+            found[path] = sum(parts)[..., :3] * color[..., :3]
     return found, seconds
 
 

@@ -56,7 +56,7 @@ def _seconds(size=SIZE, samples=SAMPLES) -> tuple[float, np.ndarray, dict]:
     taken = []
     for k in range(REPEATS + 1):
         start = time.perf_counter()
-        images = render_passes(bpy.context.scene, "CANDELA", samples, 1, size=size, bounces=2).images
+        images = render_passes(bpy.context.scene, "CANDELA", samples, k, size=size, bounces=2).images
         if k:
             taken.append(time.perf_counter() - start)
     rows = [row for row in ledger.latest().rows if row.name == "image_space_subsurface"]

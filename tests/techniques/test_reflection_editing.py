@@ -377,8 +377,11 @@ def test_an_edited_mirror_shows_what_cycles_does_off_one_that_leans(stage):
     mirror.data.normals_split_custom_set([tuple(about((1, 0, 0), 8) @ UP)] * 4)
     expected = stage.render(32, (48, 48), engine="CYCLES", bounces=2)["combined"][..., :3]
     difference = np.abs(found - expected).max(axis=-1)
+    steps = [np.abs(expected - np.roll(expected, shift, axis)).max(axis=-1) for axis in (0, 1) for shift in (-1, 1)]
+    even = np.max(steps, axis=0) < 0.1  # beside edges, one of the two may see the one colour and one the other
+    print(f"median {np.median(difference):.5f}, {(difference[even] > 0.05).mean():.4f} of {even.mean():.2f} differ")
     assert np.median(difference) < 2e-3
-    assert (difference > 0.05).mean() < 0.04  # edges between colours, and noise of the floor
+    assert even.mean() > 0.8 and (difference[even] > 0.05).mean() < 0.01
 
 
 def world_of_directions(stage, turn=None):
@@ -435,7 +438,7 @@ def test_a_sphere_under_a_world_shows_what_cycles_does_under_the_turned_world(st
     inside = np.hypot(x, y) < 0.8
     ball.candela.reflection_editing_constraints.clear()
     world_of_directions(stage, about(axis, 30))
-    expected = stage.render(64, (64, 64), engine="CYCLES", bounces=2)["combined"][..., :3]
+    expected = stage.render(16, (64, 64), engine="CYCLES", bounces=2)["combined"][..., :3]
     wrong = np.sqrt(np.mean((found - expected)[inside] ** 2))
     print(f"RMS {wrong:.5f}")
     assert wrong < 0.01
@@ -455,6 +458,7 @@ def test_a_ring_with_a_fading_region_stays_continuous(stage, roughness):
     positions = np.stack([wide * np.cos(u), wide * np.sin(u), 0.35 * np.sin(v)], axis=-1).reshape(-1, 3)
     ring = stage.mesh(positions.tolist(), faces.tolist(), material=metal)
     ring.data.shade_smooth()
+    ring.visible_glossy = False  # edges of itself in itself are no steps of the edit
     world_of_directions(stage)
     stage.camera((0, -2.5, 6), (np.radians(22), 0, 0), 0.5)
     stage.scene.candela.denoise_strength = 0.0
