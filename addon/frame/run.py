@@ -71,6 +71,7 @@ class Frame:
     lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
+    film_points: int = 1  # that a sample shows; the surface technique says it before it looks
     samples_done: int = 0
     numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
     first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
@@ -157,9 +158,17 @@ class Frame:
         number = self.sample if film is None else film
         if lens is None:
             lens = point_of(aperture, *self.random(LENS)) if aperture else (0.0, 0.0)
-        values = self.view.values(number, settings.seed, self.film_offset(number), self.geometry.size, lens)
+        values = self.view.values(
+            number, settings.seed, self.film_offset(number), self.geometry.size, lens, self._footprints()
+        )
         self.view_block.update(**values)
         self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
+
+    def _footprints(self) -> tuple[float, float]:
+        """Sides in pixels of the squares over which lookups of textures average (materials/averages.py): sample n has
+        the n-th of a pixel's area, as if n samples shared it; its points of the film share that."""
+        side = (self.film_points * (self.sample + 1.0)) ** -0.5
+        return side, side if self.is_first else 0.0
 
     def film_offset(self, number: int) -> tuple[float, float]:
         """Where point `number` of the film lies, in pixels from a pixel's middle."""

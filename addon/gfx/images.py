@@ -20,6 +20,7 @@ from .context import on_picture, on_release
 _BYTES = {
     "RGBA32F": 16,
     "RGBA16F": 8,
+    "RGBA8": 4,
     "RG32F": 8,
     "R32F": 4,
     "R16F": 2,
@@ -30,6 +31,7 @@ _BYTES = {
 _CHANNELS = {
     "RGBA32F": 4,
     "RGBA16F": 4,
+    "RGBA8": 4,
     "RG32F": 2,
     "R32F": 1,
     "R16F": 1,
