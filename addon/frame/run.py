@@ -44,6 +44,7 @@ from .technique import Service, Technique, Write
 ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
 
+FOOTPRINT = 0.96  # side of a square that deviates as much as a pixel filter of half width 1
 MOST_TEXELS = 16  # counters that are kept in an image
 FAR_BEYOND = 300.0  # by the typical distance of what is seen
 ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
@@ -165,9 +166,11 @@ class Frame:
         self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
 
     def _footprints(self) -> tuple[float, float]:
-        """Sides in pixels of the squares over which lookups of textures average (materials/averages.py): sample n has
-        the n-th of a pixel's area, as if n samples shared it; its points of the film share that."""
-        side = (self.film_points * (self.sample + 1.0)) ** -0.5
+        """Sides in pixels of the squares over which lookups of textures average (materials/averages.py). All samples
+        of a picture, and their points of the film, share what the pixel filter covers; where any number of samples may
+        be shown, sample n takes the n-th of it."""
+        samples = self.settings.samples if self.settings.whole else self.sample + 1
+        side = FOOTPRINT * self.snapshot.film.filter_width * (self.film_points * samples) ** -0.5
         return side, side if self.is_first else 0.0
 
     def film_offset(self, number: int) -> tuple[float, float]:

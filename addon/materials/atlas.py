@@ -1,5 +1,5 @@
-"""Places in a texture: of the levels of an image, and of several images in one, which are what a material reads beyond the
-samplers that a program has, and the tiles of a UDIM image.
+"""Places in a texture: of the levels of an image, and of several images in one, which are what a material reads
+beyond the samplers that a program has, and the tiles of a UDIM image.
 
 Parts stand side by side on shelves, the highest first, so that equal sets of sizes always lie alike. The generated
 lookups of a part wrap and filter within it (materials/nodes/image.py). Each part has its levels above it

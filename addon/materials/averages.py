@@ -1,19 +1,26 @@
-"""Which image lookups of a tree may be averaged over what a pixel sees, so that a sample shows what many would on average.
+"""Which image lookups of a tree may be averaged over what a pixel sees, so that one sample shows the mean of many.
 
 The mean of what a surface shows is that of a lookup only where the way from the image to the picture is affine: through
-nodes that add, scale and blend, to a colour or a weight of a shader. EXACT lookups are such, in trees that read no second
-image whose product with the first would have another mean than the product of both means. Of n samples, each averages
-over its n-th of the pixel's area, so that many samples show the same as without. Where alpha covers, colour counts as far
-as it does: mean of alpha times colour is exact, a crown of leaves keeps its density.
+nodes that add, scale and blend, to a colour or a weight of a shader. EXACT lookups are such, in trees that read no
+second image, since the mean of a product is not the product of means. All samples of a picture share what the pixel
+filter covers (Frame.look), so that many show the same as without.
+
+What decides whether a surface is passed stays that of the point: a layer is drawn with the probability of its opacity,
+and a mean of alpha has as much noise as alpha itself, or more, since samples are spread evenly over the pixel but not
+over pixel and probability at once (three layers of leaves, 64 samples: ten times the error). Colour then counts as far
+as alpha covers: alpha at the point times that mean is exact, and a crown of leaves keeps its density.
 
 FIRST lookups come to shaders through such nodes, too, but as roughness, as a normal, or beside other images. Their mean
-is close, not exact: the first sample alone averages, so that drafts are smooth; in a picture of n samples that is 1/n.
+is close, not exact: the first sample alone averages, so that drafts are smooth; of n samples the bias is 1/n of that.
 
-All others (through ramps, thresholds, curves, as heights, with coordinates that jump, by Closest or Cubic, by rays of
-shadows, in views of lights, of the world and of lamps) show what they did.
+All others (through ramps, thresholds, curves, as heights, at coordinates that jump, by Closest or Cubic, on boxes,
+spheres and tubes) show what stands at the point. So do all for shadows, in views of lights, of worlds and of lamps.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from . import nodes
 from .graph import Graph, Node
@@ -24,6 +31,7 @@ MOST_COORDINATE_NODES = 8  # that are evaluated at two points beside
 COLOR_SINKS = {"Color", "Base Color", "Emission Color"}
 WEIGHT_SINKS = {"Alpha", "Fac"}
 
+_TRANSPARENT = "ShaderNodeBsdfTransparent"
 _BLENDS = ("MIX", "ADD", "SUBTRACT", "MULTIPLY")
 _SUMS = ("ADD", "SUBTRACT", "MULTIPLY", "MULTIPLY_ADD", "SCALE")
 _APART = {
@@ -38,11 +46,34 @@ _SMOOTH = {
 _ELSEWHERE = {"ShaderNodeDisplacement", "ShaderNodeVectorDisplacement", "ShaderNodeOutputAOV"}  # never averaged
 
 
-def averaged_lookups(graph: Graph, opaque) -> dict[str, str]:
-    """By image node: EXACT or FIRST; nodes that are not in it show what stands at the point. `opaque` of a node: whether
-    its image has no alpha below 1, or none that covers."""
+@dataclass(frozen=True)
+class Averaged:
+    """How a lookup may be averaged."""
+
+    kind: str  # EXACT or FIRST
+    alpha: bool  # alpha, too; else that is the point's
+
+
+@dataclass(frozen=True)
+class _Sink:
+    """A socket of a shader that an output of an image reaches through affine nodes."""
+
+    output: str
+    shader: str
+    socket: str
+    product: bool  # multiplied by the image once more on the way
+
+    def lets_pass(self, dithered: bool) -> bool:
+        """Whether it decides if a surface is passed; `dithered`: some surface of the tree may be."""
+        return self.socket == "Alpha" or self.shader == _TRANSPARENT or (dithered and self.socket == "Fac")
+
+
+def averaged_lookups(graph: Graph, opaque: Callable[[Node], bool]) -> dict[str, Averaged]:
+    """By image node; those that are not in it show what stands at the point. `opaque` of a node: whether its image has
+    no alpha below 1, or none that covers."""
     shown = _before(graph, graph.surface)
     read = [graph.nodes[key] for key in shown if graph.nodes[key].image]
+    dithered = any(_may_be_passed(graph.nodes[key]) for key in shown)
     uses: dict[str, list[tuple[str, str, str]]] = {}  # by node: its output, and who reads that
     for key in shown:
         for socket, given in graph.nodes[key].inputs.items():
@@ -50,26 +81,31 @@ def averaged_lookups(graph: Graph, opaque) -> dict[str, str]:
                 uses.setdefault(given.link[0], []).append((given.link[1], key, socket))
     found = {}
     for node in read:
-        if not _may_average(graph, node):
+        sinks = _sinks(graph, node, uses) if _may_average(graph, node) else None
+        if not sinks:
             continue
-        sinks = _sinks(graph, node, uses)
-        if sinks is None or not sinks:
+        colors, alphas = ({one for one in sinks if one.output == output} for output in ("Color", "Alpha"))
+        # Where nobody reads alpha, stored colours are multiplied by it before they are decoded, which no mean allows for.
+        if any(one.lets_pass(dithered) for one in colors) or (not alphas and not opaque(node)):
             continue
-        if any(output == "Color" for output, *_ in sinks) and not any(output == "Alpha" for output, *_ in sinks):
-            if not opaque(node):
-                continue  # stored colours are multiplied by alpha before they are decoded: no mean is that of others
-        found[node.key] = EXACT if len(read) == 1 and _exact(sinks) else FIRST
+        alpha = not any(one.lets_pass(dithered) for one in alphas)
+        if colors or alpha:
+            found[node.key] = Averaged(EXACT if len(read) == 1 and _exact(colors, alphas) else FIRST, alpha)
     return found
 
 
-def _exact(sinks: set[tuple[str, str, bool]]) -> bool:
-    colors = {socket for output, socket, _ in sinks if output == "Color"}
-    alphas = {socket for output, socket, _ in sinks if output == "Alpha"}
-    if any(product for *_, product in sinks):
+def _exact(colors: set[_Sink], alphas: set[_Sink]) -> bool:
+    if any(one.product for one in colors | alphas):
         return False
-    if colors <= COLOR_SINKS and alphas <= WEIGHT_SINKS:
+    color_sockets, alpha_sockets = {one.socket for one in colors}, {one.socket for one in alphas}
+    if color_sockets <= COLOR_SINKS and alpha_sockets <= WEIGHT_SINKS:
         return True
-    return colors <= WEIGHT_SINKS and not alphas
+    return color_sockets <= WEIGHT_SINKS and not alphas
+
+
+def _may_be_passed(node: Node) -> bool:
+    alpha = node.inputs.get("Alpha") if node.type == "ShaderNodeBsdfPrincipled" else None
+    return node.type == _TRANSPARENT or (alpha is not None and (alpha.link is not None or alpha.value != 1.0))
 
 
 def _before(graph: Graph, link: tuple[str, str] | None) -> list[str]:
@@ -103,10 +139,9 @@ def _is_smooth(node: Node) -> bool:
     return node.type in _SMOOTH
 
 
-def _sinks(graph: Graph, image: Node, uses: dict) -> set[tuple[str, str, bool]] | None:
-    """Sockets of shaders that an image's outputs reach through affine nodes: output, socket, whether it is multiplied
-    by the image once more on the way. None where some way leads elsewhere."""
-    found: set[tuple[str, str, bool]] = set()
+def _sinks(graph: Graph, image: Node, uses: dict) -> set[_Sink] | None:
+    """Where an image's outputs are read; None where some way leads through what is not affine."""
+    found: set[_Sink] = set()
     for output in ("Color", "Alpha"):
         waiting, seen = [(image.key, output, False)], set()
         while waiting:
@@ -121,7 +156,7 @@ def _sinks(graph: Graph, image: Node, uses: dict) -> set[tuple[str, str, bool]] 
                 if entry is None:
                     return None
                 if entry.summary or entry.combine:
-                    found.add((output, socket, product))
+                    found.add(_Sink(output, node.type, socket, product))
                     continue
                 if not _is_affine(node, socket):
                     return None

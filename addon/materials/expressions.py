@@ -408,17 +408,16 @@ class Expressions:
         else:
             uv = self.attribute(node, "UV", "")
             steps = [uv.replace("attributes", f"attributes_{way}") for way in ("dx", "dy")]
-        pixels = "FOOTPRINT_OF_EXACT" if self._averaged[node.key] == EXACT else "FOOTPRINT_OF_FIRST"
+        how = self._averaged[node.key]
+        pixels = "FOOTPRINT_OF_EXACT" if how.kind == EXACT else "FOOTPRINT_OF_FIRST"
         along_x, along_y = (f"({step}).xy" for step in steps)
         footprint = f"image_footprint(point, {along_x}, {along_y}, {pixels})"
-        function = self._function(node, entry)
-        return [
-            f"#ifdef {pixels}",
-            f"{function}_mean({', '.join([*arguments, footprint, *outputs])});",
-            "#else",
-            f"{function}({', '.join([*arguments, *outputs])});",
-            "#endif",
-        ]
+        function, at_point = self._function(node, entry), ", ".join([*arguments, *outputs])
+        mean = [f"{function}_mean({', '.join([*arguments, footprint, *outputs])});"]
+        if not how.alpha:
+            alpha = outputs[1]
+            mean = [f"{function}({at_point});", f"float {alpha}_here = {alpha};", *mean, f"{alpha} = {alpha}_here;"]
+        return [f"#ifdef {pixels}", *mean, "#else", f"{function}({at_point});", "#endif"]
 
     def _is_opaque(self, node: Node) -> bool:
         image = self.images.get(node.image)

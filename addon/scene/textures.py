@@ -3,13 +3,13 @@
 Pixels of 8-bit files are kept in 8 bits, colours of others in 16-bit floats, data of others (heights, normals) and what
 is beyond such floats in 32 bits. Levels are mip levels of our own, since no Blender lets Python make or fill them: each
 texel of level n is the mean, in linear light, of 2^n by 2^n texels, weighed by alpha where that is coverage, so that
-a crown of leaves keeps its density. Level 1 averages what lookups give between texels (shaders/texture/first_level.frag.glsl),
-the others what is in the one before. They stand above the image in the same texture (shaders/texture/levels.glsl): a
-program has 16 textures, of which a material may take 12.
+a crown of leaves keeps its density. Level 1 averages what lookups give between texels (texture/first_level.frag.glsl),
+the others what is in the one before. They stand above the image in the same texture (texture/levels.glsl): a program
+has 16 textures, of which a material may take 12.
 
 | cost | |
 |---|---|
-| bytes | 4 per texel of 8-bit files, 8 of 16-bit floats; a third more where a lookup averages (4096^2: 89 MB, not 268) |
+| bytes | 4 a texel of 8-bit files, 8 of 16-bit floats; a third more where a lookup averages (4096^2: 89 MB, not 268) |
 | passes | once per image version: one per strip of 512 rows, and two per level |
 | peak | level 1 in 16-bit floats (33 MB of a 4096^2 image), and one strip in 32-bit floats |
 
