@@ -163,7 +163,7 @@ struct ImageProbes {
   float mip;
 };
 
-ImageProbes image_probes(mat2 footprint, ivec2 whole)
+ImageProbes image_probes(mat2 footprint, ivec2 whole, int flags)
 {
   vec2 a = footprint[0] * vec2(whole);
   vec2 b = footprint[1] * vec2(whole);
@@ -174,9 +174,13 @@ ImageProbes image_probes(mat2 footprint, ivec2 whole)
     probes.axis = vec2(0.0);
     longer = 1e9;
   }
-  float across = (longer < 1e9) ? max(abs(a.x * b.y - a.y * b.x) / max(longer, 1e-20), 1.0) : 1e9;
+  float across = (longer < 1e9) ? max(abs(a.x * b.y - a.y * b.x) / max(longer, 1.0), 1.0) : 1e9;
   float count = clamp(ceil(longer / across - 0.01), 1.0, MOST_PROBES);
   probes.count = int(count);
   probes.mip = clamp(log2(max(across, longer / count)), 0.0, float(image_last_level(whole)));
+  if ((flags & IMAGE_LEVELS) == 0) {
+    probes.count = 1;
+    probes.mip = 0.0;
+  }
   return probes;
 }
