@@ -85,7 +85,7 @@ def averaged_lookups(graph: Graph, opaque: Callable[[Node], bool]) -> dict[str, 
         if not sinks:
             continue
         colors, alphas = ({one for one in sinks if one.output == output} for output in ("Color", "Alpha"))
-        # Where nobody reads alpha, stored colours are multiplied by it before they are decoded, which no mean allows for.
+        # Where nobody reads alpha, stored colours are multiplied by it and then decoded, which no mean allows for.
         if any(one.lets_pass(dithered) for one in colors) or (not alphas and not opaque(node)):
             continue
         alpha = not any(one.lets_pass(dithered) for one in alphas)
