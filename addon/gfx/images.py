@@ -126,9 +126,9 @@ def upload_list(rows: np.ndarray) -> Image:
 def read(image: Image) -> np.ndarray:
     """Copy to the CPU: (H, W, channels) float32 (uint32 for R32UI). Waits for the GPU.
 
-    Blender cannot read RGBA32UI back: ValueError.
+    Blender cannot read RGBA32UI back, and RGBA8 as bytes alone: ValueError.
     """
-    if image.format == "RGBA32UI":
+    if image.format in ("RGBA32UI", "RGBA8"):
         raise ValueError("An image of four integers cannot be read back: copy what is needed into floats first.")
     buffer = image.texture.read()
     count = math.prod(buffer.dimensions)
