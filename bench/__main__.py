@@ -36,6 +36,7 @@ from bench import (
     soft_sources,
     strips,
     subsurface,
+    textures,
 )
 
 VERBS = {
@@ -62,6 +63,7 @@ VERBS = {
     "strips": strips,
     "soft_sources": soft_sources,
     "subsurface": subsurface,
+    "textures": textures,
     "page": page,
     "points_motion": points_motion,
     "ages": ages,
