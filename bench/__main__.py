@@ -38,6 +38,7 @@ from bench import (
     strips,
     subsurface,
     subsurface_costs,
+    textures,
 )
 
 VERBS = {
@@ -66,6 +67,7 @@ VERBS = {
     "soft_sources": soft_sources,
     "subsurface": subsurface,
     "subsurface_costs": subsurface_costs,
+    "textures": textures,
     "page": page,
     "points_motion": points_motion,
     "ages": ages,
