@@ -125,4 +125,4 @@ def test_light_behind_a_pane_is_found_once(stage, roughness):
     stage.world()
     stage.camera((0, 0, 1.5), (0, 0, 0), 0.5)
     found = reflected(stage.render(64, (12, 12), bounces=8))
-    assert found.mean() == pytest.approx(1.0, abs=0.06)
+    assert found.mean() == pytest.approx(1.0, abs=0.03)
