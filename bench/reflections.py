@@ -93,9 +93,11 @@ def _measure(scene, name: str, options: argparse.Namespace) -> tuple[dict[str, f
     shown = [key for key in truth if truth[key].mean() > 1e-3]
     noise = {key: error(*(one[key] for one in references)) / 4 for key in shown}
     _keep(options.pictures, name, "Cycles", truth["picture"])
-    results = {}
+    results, compiled = {}, set()
     for entrant in ENTRANTS:
-        _render(scene, replace(entrant, samples=1), 3)  # what compiles is not timed
+        if (entrant.engine, entrant.means) not in compiled:
+            _render(scene, replace(entrant, samples=1), 3)  # what compiles is not timed
+            compiled.add((entrant.engine, entrant.means))
         found, seconds = _render(scene, entrant, 7)
         there = [key for key in shown if key in found]
         results[entrant] = Result(
