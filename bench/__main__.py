@@ -30,6 +30,7 @@ from bench import (
     points_motion,
     profile,
     random_scenes,
+    reflection_costs,
     reflections,
     relief,
     run,
@@ -37,6 +38,7 @@ from bench import (
     strips,
     subsurface,
     textures,
+    subsurface_costs,
 )
 
 VERBS = {
@@ -58,12 +60,14 @@ VERBS = {
     "grass": grass,
     "edges": edges,
     "random": random_scenes,
+    "reflection_costs": reflection_costs,
     "reflections": reflections,
     "relief": relief,
     "strips": strips,
     "soft_sources": soft_sources,
     "subsurface": subsurface,
     "textures": textures,
+    "subsurface_costs": subsurface_costs,
     "page": page,
     "points_motion": points_motion,
     "ages": ages,
