@@ -1,7 +1,8 @@
 """What a device does, in one command of at most four minutes: `python -m bench gpu`, which writes docs/gpu.md.
 
 On four scenes at 1920x1080 with one sample: the first picture (which compiles), a picture after the camera has moved
-and one of an unchanged scene, both without Blender's own part, and a whole final render with it; the time of each
+and one of an unchanged scene, both without Blender's own part, and a whole final render with it, beside EEVEE's; which
+programs took the driver longest to compile; how fast fragment and compute programs run (gpu_speed.py); the time of each
 technique when it is waited for; and, counted at 16x12 pixels, where nothing but the floor is left: readbacks, waits,
 draws, dispatches, uploads, framebuffers and Python's own time. Then each technique that these pictures do not use, on
 the first scene on which it can run. What does not fit into the time is named. `--small` is the same for a software
@@ -21,7 +22,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from bench import markdown
+from bench import gpu_speed, markdown
 from bench.cells import ROOT, SCENES
 from bench.counted import counted
 
@@ -34,6 +35,7 @@ OTHERS = ("caustics_table", "hdri_product", "alpha_foliage", "emissive_lamp", "w
 SIZE, SMALL_SIZE, COUNTED_SIZE = (1920, 1080), (64, 36), (16, 12)
 MOVES, STEP = 5, 1e-3  # m
 STEPPED = 16  # samples of the picture that tells what one more sample costs
+SLOWEST = 5  # programs that are named
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -109,12 +111,12 @@ class View:
         self.renderer.finish(frame, ())
         return {row.name: row.milliseconds for row in frame.ledger.rows if row.state == "ran"}
 
-    def final(self) -> float:
+    def final(self, samples: int = 1, eevee: bool = False) -> float:
         """Milliseconds of a whole final render after a move, with all that Blender does."""
         import bpy
 
         self.move()
-        with self.rendering(self.size):
+        with self.rendering(self.size, samples, eevee):
             started = time.perf_counter()
             bpy.ops.render.render(scene=self.scene.name, layer=self.layer.name)
             return 1000 * (time.perf_counter() - started)
@@ -131,12 +133,17 @@ class View:
             return asdict(counted(lambda: bpy.ops.render.render(scene=self.scene.name, layer=self.layer.name)))
 
     @contextmanager
-    def rendering(self, size: tuple[int, int]) -> Iterator[None]:
+    def rendering(self, size: tuple[int, int], samples: int = 1, eevee: bool = False) -> Iterator[None]:
+        import bpy
+
         from addon.compare.reference import overridden
 
         render, own = self.scene.render, self.scene.candela
         changed = [(render, "resolution_x", size[0]), (render, "resolution_y", size[1])]
-        changed += [(render, "resolution_percentage", 100), (own, "samples", 1)]
+        changed += [(render, "resolution_percentage", 100), (own, "samples", samples)]
+        if eevee:
+            engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+            changed += [(render, "engine", engine), (self.scene.eevee, "taa_render_samples", samples)]
         with overridden(changed):
             yield
 
@@ -144,16 +151,39 @@ class View:
         self.renderer.release()
 
 
+@contextmanager
+def compiling() -> Iterator[dict[str, float]]:
+    """Seconds that programs compiled meanwhile took, by name."""
+    from addon.gfx import library
+
+    took: dict[str, float] = {}
+    original = library._compile
+
+    def timed(program):
+        started = time.perf_counter()
+        handle = original(program)
+        took[program.name] = took.get(program.name, 0.0) + time.perf_counter() - started
+        return handle
+
+    library._compile = timed
+    try:
+        yield took
+    finally:
+        library._compile = original
+
+
 def median(values: list[dict[str, float]]) -> dict[str, float]:
     """Of the run with the median total."""
     return sorted(values, key=lambda one: one["total"])[len(values) // 2]
 
 
-def of_scene(view: View, name: str, left: Callable[[], bool]) -> dict:
+def of_scene(view: View, name: str, left: Callable[[], bool], eevee: bool) -> dict:
     """Figures of one scene; those that there is no time for are missing."""
     found: dict = {"scene": name, "triangles": 0}
     one = view.settings(1)
-    found["first"] = view.draw(one)
+    with compiling() as took:
+        found["first"] = view.draw(one)
+    found["compiled"] = sorted(([1000 * s, program] for program, s in took.items()), reverse=True)[:SLOWEST]
     found["triangles"] = int(view.renderer.geometry.triangles)
     moved = []
     for _ in range(MOVES):
@@ -170,6 +200,12 @@ def of_scene(view: View, name: str, left: Callable[[], bool]) -> dict:
     if left():
         view.final()
         found["final"] = view.final()
+    if left():
+        view.final(STEPPED)
+        found["final_many"] = view.final(STEPPED)
+    if eevee and left():
+        view.final(STEPPED, eevee=True)
+        found["eevee_many"] = view.final(STEPPED, eevee=True)
     if left():
         many = view.settings(STEPPED)
         view.draw(many)  # what only pictures of several samples compile
@@ -220,6 +256,8 @@ def measure(names, size, minutes: float, others, note: Callable[[dict], None], s
     began = time.monotonic()
     found: dict = {"about": worker.about() | {"size": list(size), "load": load()}, "scenes": [], "by_hand": []}
     found["left_out"] = []
+    say("speed of programs")
+    found["speeds"] = gpu_speed.speeds()
     note(found)
     for name in names:
         if not left():
@@ -227,7 +265,7 @@ def measure(names, size, minutes: float, others, note: Callable[[dict], None], s
             continue
         say(name)
         view = View(name, size)
-        found["scenes"].append(of_scene(view, name, left))
+        found["scenes"].append(of_scene(view, name, left, eevee=bool(others)))
         view.close()
         note(found)
     ran = {technique for row in found["scenes"] for technique in row.get("techniques", ())}
@@ -259,7 +297,7 @@ PICTURES = (
     "Milliseconds. The first compiles; *moved* is the median of five pictures after a move of the camera, from reading"
     " the scene to the last texel, *of it asking* what Python and the driver took to ask for it, *at rest* a picture of"
     " an unchanged scene, *final* a final render with all that Blender does, *one more sample* the time of a sample of"
-    f" {STEPPED}."
+    f" {STEPPED}. Final renders are timed the second time, when everything is compiled, EEVEE's too."
 )
 COUNTED = (
     "A final render of 16x12 pixels and one sample after a move of the camera, under Python's profiler: the same on"
@@ -270,6 +308,11 @@ TIMED = (
     "Milliseconds of one sample, each technique waited for; what is skipped on a scene has no figure. Shadows are drawn"
     " in the time of the light that asks for them."
 )
+SPEEDS = (
+    "Picoseconds of one step of one thread in a fragment and in a compute program, all threads together: where the two"
+    " differ by much, the card has few units that draw, and most of Candela's passes run on those."
+)
+COMPILED = "Seconds that the driver took to compile for the first picture, and the programs that took longest of it:"
 BY_HAND = "Chosen by hand, on the first scene that can use it:"
 
 
@@ -281,6 +324,10 @@ def page(found: dict) -> str:
     took = f"{about.get('seconds', 0.0):.0f} s in all, load {about['load']:.1f}"
     parts = [f"{device}; {size} pixels, one sample; {took}."]
     parts.append(f"## Whole pictures\n\n{PICTURES}\n\n{markdown.table(pictures(found))}")
+    if found.get("speeds"):
+        parts.append(f"{SPEEDS}\n\n{markdown.table(speeds(found))}")
+    if any("compiled" in row for row in found["scenes"]):
+        parts.append(f"{COMPILED}\n\n{markdown.table(compiled(found))}")
     parts.append(f"## What a picture asks for\n\n{COUNTED}\n\n{markdown.table(counts(found))}")
     parts.append(f"## Each technique\n\n{TIMED}\n\n{markdown.table(techniques(found))}")
     if found["by_hand"]:
@@ -292,15 +339,32 @@ def page(found: dict) -> str:
 
 def pictures(found: dict) -> list[tuple[str, ...]]:
     rows = [("scene", "triangles", "first", "of it compiling", "moved", "of it asking", "at rest", "final",
-             "one more sample")]  # fmt: skip
+             "one more sample", f"final, {STEPPED} samples", f"EEVEE, {STEPPED} samples")]  # fmt: skip
     for row in found["scenes"]:
         moved = row["moved"]
         asking = sum(moved[part] for part in ("sync", "begin", "asking"))
         rows.append((
             row["scene"].replace("_", " "), f"{row['triangles']:,}", number(row["first"]["total"]),
             number(row["first"]["compile"]), number(moved["total"]), number(asking), number(row["rest"]["total"]),
-            number(row.get("final")), number(row.get("sample")),
+            number(row.get("final")), number(row.get("sample")), number(row.get("final_many")),
+            number(row.get("eevee_many")),
         ))  # fmt: skip
+    return rows
+
+
+def speeds(found: dict) -> list[tuple[str, ...]]:
+    rows = [("steps", "fragment, ps", "compute, ps", "ratio")]
+    for row in found["speeds"]:
+        ratio = row["fragment"] / row["compute"]
+        rows.append((row["steps"], number(row["fragment"]), number(row["compute"]), f"{ratio:.1f}"))
+    return rows
+
+
+def compiled(found: dict) -> list[tuple[str, ...]]:
+    rows = [("scene", "all", "programs")]
+    for row in found["scenes"]:
+        named = ", ".join(f"{name} {ms / 1000:.2f}" for ms, name in row.get("compiled", ()))
+        rows.append((row["scene"].replace("_", " "), f"{row['first']['compile'] / 1000:.2f}", named or "–"))
     return rows
 
 

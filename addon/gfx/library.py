@@ -10,6 +10,7 @@ import os
 import re
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -220,13 +221,17 @@ MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
 
 _shaders: dict[Program, Shader] = {}
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
+compile_seconds = 0.0  # what that took
 
 
 def get(program: Program) -> Shader:
     """The compiled program, from the cache if an equal declaration was compiled before."""
+    global compile_seconds
     shader = _shaders.get(program)
     if shader is None:
+        started = time.perf_counter()
         shader = _shaders[program] = Shader(program)
+        compile_seconds += time.perf_counter() - started
     shader.used = context.pictures
     return shader
 

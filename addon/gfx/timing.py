@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from . import library
 from .images import finish
 
 EVERY = 16  # samples, one of which is measured
@@ -18,7 +19,10 @@ FEWEST = 4  # samples: of a picture of fewer none is measured, unless each step 
 
 
 class Profiler:
-    """Adds up seconds by step name. With `wait` a one-pixel readback after each step forces the GPU to finish it."""
+    """Adds up seconds by step name, without those that programs took to compile.
+
+    With `wait` a one-pixel readback after each step forces the GPU to finish it.
+    """
 
     def __init__(self, wait: bool = False):
         self.seconds: dict[str, float] = {}
@@ -30,13 +34,14 @@ class Profiler:
 
     @contextmanager
     def step(self, name: str):
-        start = time.perf_counter()
+        start, compiled = time.perf_counter(), library.compile_seconds
         try:
             yield
         finally:
             if self.wait:
                 finish()
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            took = time.perf_counter() - start - (library.compile_seconds - compiled)
+            self.seconds[name] = self.seconds.get(name, 0.0) + took
             self.calls[name] = self.calls.get(name, 0) + 1
 
     def steps(self, name: str, parts: Iterator) -> Iterator:

@@ -92,8 +92,8 @@ class PointMaps(Technique, VisibilityProvider):
         least = frame.settings.get(self, "cutoff") * float(np.median(typical))
         for emitter, most in zip(emitters, largest):
             keep = most >= least
-            self._reached[emitter.light.key] = depth_maps.Receivers(
-                receivers.low[keep], receivers.high[keep], receivers.distance[keep]
+            self._reached[emitter.light.key] = replace(
+                receivers, low=receivers.low[keep], high=receivers.high[keep], distance=receivers.distance[keep]
             )
 
     def resolution(self, frame: Frame) -> int:

@@ -17,7 +17,6 @@ from ..gfx import images, passes
 from ..gfx.struct import Block, Struct
 from ..scene import acceleration
 from ..scene.geometry import Draw
-from ..scene.receivers import TILE
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps, repeated_light
@@ -254,7 +253,7 @@ def _far_off(frame: Frame) -> bool:
     in a way that the picture shows: in pixels with little of a huge scene."""
     receivers = frame.receivers
     sides = (receivers.high - receivers.low).max(axis=1)
-    return bool(len(sides)) and frame.offset_size > PIXEL_SHARE * float(np.percentile(sides, 10)) / TILE
+    return bool(len(sides)) and frame.offset_size > PIXEL_SHARE * float(np.percentile(sides, 10)) / receivers.side
 
 
 NO_VIEWS = np.zeros((0, lights.VIEW_TEXELS, 4))

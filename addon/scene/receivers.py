@@ -17,6 +17,7 @@ class Receivers:
     low: np.ndarray  # (T, 3)
     high: np.ndarray  # (T, 3)
     distance: np.ndarray  # (T,) from the camera, metres
+    side: int = 16  # pixels along each side of what a box is around
 
     @cached_property
     def typical_distance(self) -> float:
@@ -37,4 +38,19 @@ class Receivers:
         return [np.flatnonzero(level == k) for k in (3, 2, 1, 0) if (level == k).any()]
 
 
-TILE = 16
+TILE = 16  # pixels along each side of what a shader makes a box of
+MOST = 1024  # boxes: each map of a light is fitted to all of them, on the processor
+
+
+def merged(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Bounds of tiles, (rows, columns, 4) each, as bounds of squares of so many tiles a side that MOST are left at
+    most; and that number. A tile in which nothing is seen has low above high."""
+    rows, columns = low.shape[:2]
+    side = 1
+    while -(-rows // side) * -(-columns // side) > MOST:
+        side += 1
+    if side > 1:
+        for axis, extent in enumerate((rows, columns)):
+            low = np.minimum.reduceat(low, range(0, extent, side), axis=axis)
+            high = np.maximum.reduceat(high, range(0, extent, side), axis=axis)
+    return low, high, side

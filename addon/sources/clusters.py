@@ -60,8 +60,11 @@ def cluster(points: np.ndarray, normals: np.ndarray, weights: np.ndarray, count:
     scale = np.sqrt(12 * points.var(axis=0).sum()) or 1.0
     seeds = _start(points, normals, weights, count)
     centres, turns = points[seeds], normals[seeds]
+    label = None
     for _ in range(ROUNDS):
-        label = _nearest(points, normals, centres, turns, scale)
+        before, label = label, _nearest(points, normals, centres, turns, scale)
+        if before is not None and np.array_equal(label, before):
+            break  # nothing moves any more
         share = np.zeros((len(seeds), len(points)))
         share[label, np.arange(len(points))] = weights
         total = share.sum(axis=1)[:, None]
@@ -76,7 +79,11 @@ def cluster(points: np.ndarray, normals: np.ndarray, weights: np.ndarray, count:
 
 
 def _nearest(points, normals, centres, turns, scale: float) -> np.ndarray:
-    apart = np.linalg.norm(points[:, None] - centres[None], axis=2) / scale
+    # |p|^2 + |c|^2 - 2 p c, a matrix product; about the centres' mean, since the difference loses digits far from it.
+    middle = centres.mean(axis=0)
+    points, centres = points - middle, centres - middle
+    squared = (points**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1) - 2.0 * (points @ centres.T)
+    apart = np.sqrt(np.maximum(squared, 0.0)) / scale
     cosine = np.clip(normals @ turns.T, -1.0, 1.0)
     return np.argmin(PLACE * apart + TURN * np.arccos(cosine) / np.pi + (cosine < WIDEST), axis=1)
 

@@ -215,8 +215,8 @@ class ClusteredVisibility(MultiresRadiosity):
         areas = np.zeros((len(groups), AREA_ROWS, 4))
         areas[:, 0, :3] = points[middle]
         corners = frame.receivers.corners.reshape(-1, 3)
-        for area in areas:
-            area[0, 3] = np.linalg.norm(corners - area[0, :3], axis=1).max()
+        farthest = ((corners - areas[:, None, 0, :3]) ** 2).sum(axis=2).max(axis=1)
+        areas[:, 0, 3] = np.sqrt(farthest)
         areas[:, 1, :3], areas[:, 1, 3] = groups.across, part * groups.half[:, 0]
         areas[:, 2, :3], areas[:, 2, 3] = np.cross(groups.normal, groups.across), part * groups.half[:, 1]
         areas[:, 3, :3] = normals[middle]

@@ -40,7 +40,7 @@ from ..frame.technique import Technique, Write
 from ..gfx import images, passes
 from ..lighting.visibility import traced_roughness
 from ..sampling.lens import rim
-from ..scene.receivers import TILE, Receivers
+from ..scene.receivers import TILE, Receivers, merged
 from ..scene.view import VIEW
 from ..surfaces.draw import LEFT_OUT, MARKS, OPAQUE, STOCHASTIC, SURFACES, draw_sample, draw_surfaces, refracts
 
@@ -138,7 +138,7 @@ class Surfaces(Technique):
         def found() -> Receivers:
             low = np.min([low.pixels() for low, _ in bounds], axis=0)
             high = np.max([high.pixels() for _, high in bounds], axis=0)
-            known.receivers, known.key = _boxes(low.reshape(-1, 4), high.reshape(-1, 4)), key
+            known.receivers, known.key = _boxes(low, high), key
             return known.receivers
 
         return found
@@ -164,10 +164,13 @@ def _receivers_key(frame: Frame, modes: tuple[int, ...]) -> tuple:
 
 
 def _boxes(low: np.ndarray, high: np.ndarray) -> Receivers:
-    """From bounds of tiles, (T, 4), w: least and greatest depth."""
+    """From bounds of tiles, (rows, columns, 4) each, w: least and greatest depth."""
     low, high = low.astype(np.float64), high.astype(np.float64)
-    seen = (np.isfinite(low) & np.isfinite(high)).all(axis=1) & (low <= high).all(axis=1)
-    seen &= low[:, 3] < 1e29
+    seen = (np.isfinite(low) & np.isfinite(high)).all(axis=-1) & (low <= high).all(axis=-1)
+    seen &= low[..., 3] < 1e29
+    low, high, side = merged(np.where(seen[..., None], low, 1e30), np.where(seen[..., None], high, -1e30))
+    low, high = low.reshape(-1, 4), high.reshape(-1, 4)
+    seen = (low <= high).all(axis=1)
     order = np.argsort(low[seen, 3], kind="stable")
     low, high = low[seen][order], high[seen][order]
-    return Receivers(low[:, :3], high[:, :3], low[:, 3])
+    return Receivers(low[:, :3], high[:, :3], low[:, 3], side * TILE)

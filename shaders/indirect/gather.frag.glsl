@@ -21,55 +21,71 @@ void main()
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 31u));
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 7);
-  vec3 origin = ray_origin(s.position, s.geometric_normal);
-  if (max_component(s.diffuse) > 0.0) {
+  bool scatters = max_component(s.diffuse) > 0.0;
+  if (scatters) {
 #ifdef SHARED
     out_diffuse.rgb = s.diffuse / PI * shared_irradiance_fetch(pixel + grid_offset).rgb;
 #else
     float choice = scrambled(film_view.bits_w, salt.z);
-    out_diffuse.rgb = virtual_gather(s, to_viewer, true, origin, choice, salt.x + roll.x);
+    out_diffuse.rgb = virtual_gather(s, to_viewer, true, ray_origin(s.position, s.geometric_normal), choice, salt.x + roll.x);
 #endif
-    vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
-    vec3 direction = cosine_direction(s.normal, u);
-    if (dot(direction, s.geometric_normal) > 0.0) {
-      float cosine = max(dot(direction, s.normal), 1e-6);
-      vec3 weight = surface_diffuse_reflection(s, to_viewer, direction) * (PI / cosine);
-      out_diffuse.rgb += weight * near_radiance(origin, direction, false, roll);
-    }
   }
+  int lobe_count = 0;
 #ifdef GLOSSY
+  Lobe lobe = lobe_begin(s, to_viewer);
   if (s.kind <= FRESNEL_F82 && s.glossy_roughness > shaded_roughness && max_component(s.glossy_weight) > 0.0) {
-    Lobe lobe = lobe_begin(s, to_viewer);
     // Where the lobe is most of what is seen, on metal, it has the noise that is seen.
-    int count = (luminance(s.glossy_weight * s.glossy_tint) > luminance(s.diffuse)) ? lobe_rays : 1;
-    // bits_w chose which lobe is kept: of each pixel it would draw a part of the lobe only.
-    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), shuffled(film_view.sample_index, salt.xz));
-    for (int k = 0; k < count; k++) {
-      float part = float(k) / float(count);
-      vec3 weight;
-      roll = hash3(roll);
-      vec3 direction = lobe_sample(lobe, vec2(u.x / float(count) + part, fract(u.y + 2.5 * part)), weight);
-      if (max_component(weight) > 0.0 && may_mirror(s, direction)) {
-        origin = ray_origin(s.position, side_of_ray(s, direction));
-        out_glossy.rgb += weight * near_radiance(origin, direction, true, roll) / float(count);
-      }
-    }
+    lobe_count = (luminance(s.glossy_weight * s.glossy_tint) > luminance(s.diffuse)) ? lobe_rays : 1;
   }
 #endif
+  int count = 1 + lobe_count;
 #ifdef SOFT
   SoftLobe soft = soft_lobe_begin(s, to_viewer);
-  if (soft.exists) {
-    // Cloth shines at grazing angles, leaves are lit from behind: virtual lights, which stand for diffuse reflection on the
-    // viewer's side, do not serve them. One ray does, of the cosine's density.
-    float side = (soft.kind == LOBE_TRANSLUCENT) ? -1.0 : 1.0;
-    roll = hash3(roll);
-    vec2 u = vec2(scrambled(film_view.bits_z, salt.y), shuffled(film_view.sample_index, salt.xz));
-    vec3 direction = cosine_direction(side * soft.normal, u);
-    if (side * dot(direction, s.geometric_normal) > 0.0) {
-      vec3 weight = soft_reflection(soft, direction) * PI / max(side * dot(direction, soft.normal), 1e-6);
-      vec3 start = ray_origin(s.position, side * s.geometric_normal);
-      vec3 light = weight * near_radiance(start, direction, true, roll);
-      if (soft.glossy) {
+  count += soft.exists ? 1 : 0;
+#endif
+  // One call for the rays of all lobes: compilers hold the code of each call, and this one takes most of their time.
+  for (int k = scatters ? 0 : 1; k < count; k++) {
+    vec3 weight = vec3(0.0);
+    vec3 direction = s.normal;
+    vec3 side = s.geometric_normal;
+    bool glossy = false;
+    if (k == 0) {
+      vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
+      direction = cosine_direction(s.normal, u);
+      if (dot(direction, s.geometric_normal) > 0.0) {
+        weight = surface_diffuse_reflection(s, to_viewer, direction) * (PI / max(dot(direction, s.normal), 1e-6));
+      }
+    }
+    else {
+      roll = hash3(roll);
+      // bits_w chose which lobe is kept: of each pixel it would draw a part of the lobe only.
+      vec2 u = vec2(scrambled(film_view.bits_z, salt.y), shuffled(film_view.sample_index, salt.xz));
+#ifdef GLOSSY
+      if (k <= lobe_count) {
+        float part = float(k - 1) / float(lobe_count);
+        direction = lobe_sample(lobe, vec2(u.x / float(lobe_count) + part, fract(u.y + 2.5 * part)), weight);
+        weight = may_mirror(s, direction) ? weight / float(lobe_count) : vec3(0.0);
+        side = side_of_ray(s, direction);
+        glossy = true;
+      }
+#endif
+#ifdef SOFT
+      if (k > lobe_count) {
+        // Cloth shines at grazing angles, leaves are lit from behind: virtual lights, which stand for diffuse reflection on
+        // the viewer's side, do not serve them. One ray does, of the cosine's density.
+        float turn = (soft.kind == LOBE_TRANSLUCENT) ? -1.0 : 1.0;
+        direction = cosine_direction(turn * soft.normal, u);
+        side *= turn;
+        glossy = soft.glossy;
+        if (dot(direction, side) > 0.0) {
+          weight = soft_reflection(soft, direction) * PI / max(turn * dot(direction, soft.normal), 1e-6);
+        }
+      }
+#endif
+    }
+    if (max_component(weight) > 0.0) {
+      vec3 light = weight * near_radiance(ray_origin(s.position, side), direction, k > 0, roll);
+      if (glossy) {
         out_glossy.rgb += light;
       }
       else {
@@ -77,5 +93,4 @@ void main()
       }
     }
   }
-#endif
 }

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import gpu
+from bench import gpu, gpu_speed
 from bench.counted import of_stats
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +32,7 @@ def test_a_run_that_was_cut_off_still_makes_a_page():
     about = {"device": "a card", "cpu": "c", "blender": "5", "python": "3", "size": [8, 4], "load": 1.0}
     row = {"scene": "cornell_box", "triangles": 30, "first": stages, "moved": stages, "rest": stages}
     text = gpu.page({"about": about, "scenes": [row], "by_hand": [], "left_out": ["scene instances"]})
-    assert "| cornell box | 30 | 9.00 | 1.00 | 9.00 | 6.00 | 9.00 | – | – |" in text
+    assert "| cornell box | 30 | 9.00 | 1.00 | 9.00 | 6.00 | 9.00 | – | – | – | – |" in text
     assert "Not measured: scene instances." in text
 
 
@@ -48,4 +48,7 @@ def test_the_small_run_measures_everything_on_this_driver(tmp_path):
         assert row["rest"]["total"] < row["moved"]["total"] < row["first"]["total"]
         assert row["counts"]["draws"] > 0 and row["counts"]["own_ms"] > 0
         assert row["techniques"]["surfaces"] > 0
+        assert row["final_many"] > 0 and row["compiled"] and "eevee_many" not in row
+    assert {row["steps"] for row in found["speeds"]} == set(gpu_speed.STEPS)
+    assert all(row["fragment"] > 0 and row["compute"] > 0 for row in found["speeds"])
     assert found["about"]["device"] in page.read_text(encoding="utf-8")
