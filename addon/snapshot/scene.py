@@ -178,6 +178,7 @@ class Material:
     graph: Graph
     pass_index: int = 0
     own: tuple[tuple[str, object], ...] = ()  # Candela's settings of the material
+    own_images: tuple[tuple[str, str], ...] = ()  # Image.key of those of them that are images
 
 
 @dataclass(frozen=True)

@@ -25,34 +25,38 @@ vec4 quaternion_between(vec3 from, vec3 to)
   return normalize(q);
 }
 
-// One rotation of Jacobi's that takes away the element (i, j) of `a` and is carried along in `v`.
-void jacobi_turn(inout mat4 a, inout mat4 v, int i, int j)
+// Cosine and sine of the rotation of Jacobi's that takes away the element `off` of a symmetric matrix, between the
+// elements `first` and `second` of its diagonal.
+vec2 jacobi_angle(float first, float second, float off)
 {
-  float off = a[i][j];
   if (abs(off) < 1e-30) {
-    return;
+    return vec2(1.0, 0.0);
   }
-  float theta = (a[j][j] - a[i][i]) / (2.0 * off);
+  float theta = (second - first) / (2.0 * off);
   float t = ((theta < 0.0) ? -1.0 : 1.0) / (abs(theta) + sqrt(1.0 + theta * theta));
   float c = inversesqrt(1.0 + t * t);
-  float s = t * c;
-  for (int k = 0; k < 4; k++) {
-    float x = a[k][i];
-    float y = a[k][j];
-    a[k][i] = c * x - s * y;
-    a[k][j] = s * x + c * y;
-  }
-  for (int k = 0; k < 4; k++) {
-    float x = a[i][k];
-    float y = a[j][k];
-    a[i][k] = c * x - s * y;
-    a[j][k] = s * x + c * y;
-    x = v[i][k];
-    y = v[j][k];
-    v[i][k] = c * x - s * y;
-    v[j][k] = s * x + c * y;
-  }
+  return vec2(c, t * c);
 }
+
+// Columns i and j of `m` turned by `angle`.
+#define TURN_COLUMNS(m, i, j, angle) \
+  { \
+    vec4 one = m[i]; \
+    vec4 other = m[j]; \
+    m[i] = angle.x * one - angle.y * other; \
+    m[j] = angle.y * one + angle.x * other; \
+  }
+
+// The rotation of `a` that takes away (i, j), from both sides, carried along in `v`. A macro, so that all indices are
+// constants: a driver (NVIDIA, 580) made wrong turns of a function that was given them.
+#define JACOBI_TURN(a, v, i, j) \
+  { \
+    vec2 angle = jacobi_angle(a[i][i], a[j][j], a[i][j]); \
+    TURN_COLUMNS(a, i, j, angle) \
+    a = transpose(a); \
+    TURN_COLUMNS(a, i, j, angle) \
+    TURN_COLUMNS(v, i, j, angle) \
+  }
 
 // The rotation nearest to a matrix B (columns), in the sense of the largest trace(R^T B): the rotational factor of its
 // polar decomposition, of determinant 1.
@@ -75,20 +79,15 @@ vec4 rotation_nearest(mat3 b)
   a[3] = vec4(a[0].w, a[1].w, a[2].w, zz - xx - yy);
   mat4 v = mat4(1.0);
   for (int sweep = 0; sweep < 4; sweep++) {
-    jacobi_turn(a, v, 0, 1);
-    jacobi_turn(a, v, 0, 2);
-    jacobi_turn(a, v, 0, 3);
-    jacobi_turn(a, v, 1, 2);
-    jacobi_turn(a, v, 1, 3);
-    jacobi_turn(a, v, 2, 3);
+    JACOBI_TURN(a, v, 0, 1)
+    JACOBI_TURN(a, v, 0, 2)
+    JACOBI_TURN(a, v, 0, 3)
+    JACOBI_TURN(a, v, 1, 2)
+    JACOBI_TURN(a, v, 1, 3)
+    JACOBI_TURN(a, v, 2, 3)
   }
-  vec4 best = v[0];
-  float largest = a[0][0];
-  for (int k = 1; k < 4; k++) {
-    if (a[k][k] > largest) {
-      largest = a[k][k];
-      best = v[k];
-    }
-  }
+  vec4 values = vec4(a[0][0], a[1][1], a[2][2], a[3][3]);
+  float largest = max(max(values.x, values.y), max(values.z, values.w));
+  vec4 best = (values.x == largest) ? v[0] : (values.y == largest) ? v[1] : (values.z == largest) ? v[2] : v[3];
   return normalize(vec4(best.yzw, best.x));  // K's order is w, x, y, z
 }

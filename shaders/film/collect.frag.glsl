@@ -36,7 +36,8 @@ void main()
       vec3 away = film_view.eye.xyz - s.position;
       float far = (film_view.eye.w > 0.5) ? dot(away, film_view.backward.xyz) : length(away);
       float share = clamp((far - mist.x) * mist.y, 0.0, 1.0);
-      out_diffuse_color.a = pow(share, mist.z);
+      // Exact for the powers that Blender has: that of a card is good to five digits.
+      out_diffuse_color.a = (mist.z == 2.0) ? share * share : (mist.z == 0.5) ? sqrt(share) : pow(share, mist.z);
     }
     bool microfacets = max_component(s.glossy_weight) > 0.0;
 #ifdef SOFT_LOBES

@@ -28,51 +28,64 @@ void main()
   Vertex met;
   float t;
   uvec3 roll = hash3(uvec3(salt, uint(film_view.sample_index), uint(film_view.seed)));
-  if (!trace_vertex(ray_origin(probe.position, probe.geometric_normal), direction, 1e29, roll.z, met, t)) {
-    return;
-  }
-  out_point = vec4(met.position, (dot(met.lit, met.normal) > 0.0) ? 1.0 : -1.0);  // 1: lit on the side that it lights
-  out_normal = vec4(met.normal, 0.0);
-  out_albedo = vec4(met.reflection.diffuse, 0.0);
-  vec3 radiance = direct_reflected(met, -direction, 4, roll.x);
-  vec3 shorter = (bounces > 1) ? radiance : vec3(0.0);
+  vec3 origin = ray_origin(probe.position, probe.geometric_normal);
+  vec3 radiance = vec3(0.0);
+  vec3 shorter = vec3(0.0);
   vec3 lobe = vec3(0.0);
   vec3 later = vec3(0.0);
   vec3 later_shorter = vec3(0.0);
   vec3 throughput = vec3(1.0);
-  for (int bounce = 2; bounce <= bounces && max_component(throughput) > 1e-4; bounce++) {
-    roll = hash3(roll);
-    vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
-    vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
-    if (bounce == 2) {
-      // What neighbours share is the part below albedo: rough surfaces reflect less than that to most directions.
-      lobe = max(reflected - met.reflection.diffuse, vec3(0.0));
-      out_albedo.rgb = min(reflected, met.reflection.diffuse);
-    }
-    else {
-      // From here on paths end at random: what they bring is a mean over many, shared by many.
-      throughput *= reflected;
-      float chance = min(max_component(throughput), 1.0);
-      if (to_unit(roll.z) >= chance) {
-        break;
+  // The first surface and the next ones by the same calls: compilers hold the code of each.
+  for (int bounce = 1; bounce <= max(bounces, 1) && max_component(throughput) > 1e-4; bounce++) {
+    if (bounce > 1) {
+      roll = hash3(roll);
+      vec3 onward = cosine_direction(met.lit, vec2(to_unit(roll.x), to_unit(roll.y)));
+      vec3 reflected = PI * reflection_of(met.reflection, met.lit, onward, -direction);
+      if (bounce == 2) {
+        // What neighbours share is the part below albedo: rough surfaces reflect less than that to most directions.
+        lobe = max(reflected - met.reflection.diffuse, vec3(0.0));
+        out_albedo.rgb = min(reflected, met.reflection.diffuse);
       }
-      throughput /= chance;
+      else {
+        // From here on paths end at random: what they bring is a mean over many, shared by many.
+        throughput *= reflected;
+        float chance = min(max_component(throughput), 1.0);
+        if (to_unit(roll.z) >= chance) {
+          break;
+        }
+        throughput /= chance;
+      }
+      direction = onward;
+      origin = ray_origin(met.position, met.lit);
     }
-    direction = onward;
-    if (!trace_vertex(ray_origin(met.position, met.lit), direction, 1e29, roll.z, met, t)) {
+    if (!trace_vertex(origin, direction, 1e29, roll.z, met, t)) {
       break;
     }
-    if (bounce == 2) {
-      out_next_point = vec4(met.position, (met.normal.z < 0.0) ? -1.0 : 1.0);
-      out_normal.w = met.normal.x;
-      out_next_radiance.w = met.normal.y;
+    if (bounce == 1) {
+      out_point = vec4(met.position, (dot(met.lit, met.normal) > 0.0) ? 1.0 : -1.0);  // 1: lit on the side that it lights
+      out_normal = vec4(met.normal, 0.0);
+      out_albedo = vec4(met.reflection.diffuse, 0.0);
     }
-    roll = hash3(roll);
+    else {
+      if (bounce == 2) {
+        out_next_point = vec4(met.position, (met.normal.z < 0.0) ? -1.0 : 1.0);
+        out_normal.w = met.normal.x;
+        out_next_radiance.w = met.normal.y;
+      }
+      roll = hash3(roll);
 #ifdef MIRRORS_OWNED
-    met.photons = false;  // they bring what a mirror sends to the picture, not to other surfaces
+      met.photons = false;  // they bring what a mirror sends to the picture, not to other surfaces
 #endif
-    later += throughput * direct_reflected(met, -direction, 1, roll.x);
-    later_shorter = (bounce < bounces) ? later : later_shorter;
+    }
+    vec3 sent = direct_reflected(met, -direction, (bounce == 1) ? 4 : 1, roll.x);
+    if (bounce == 1) {
+      radiance = sent;
+      shorter = (bounces > 1) ? sent : vec3(0.0);
+    }
+    else {
+      later += throughput * sent;
+      later_shorter = (bounce < bounces) ? later : later_shorter;
+    }
   }
   out_radiance = vec4(radiance + lobe * later, luminance(abs(shorter + lobe * later_shorter)));
   out_albedo.w = luminance(abs(later_shorter));

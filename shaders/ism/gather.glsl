@@ -88,6 +88,7 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
     lit.index = ivec3(-1);
     lit.side = vec3(0.0);
     Pick dark = lit;
+    vec3 of_group = vec3(0.0);
     uvec3 roll = hash3(uvec3(salt, uint(group), 77u));
     for (int i = group * virtual_count / groups; i < (group + 1) * virtual_count / groups; i++) {
       VirtualLight light = virtual_light(i);
@@ -97,14 +98,17 @@ vec3 virtual_gather(Surface s, vec3 to_viewer, bool reflected, vec3 origin, floa
         continue;
       }
       float seen = map_visibility(i, light, s.position, s.geometric_normal);
-      sum += light.intensity * (bounded * seen);
+      of_group += light.intensity * (bounded * seen);
       if (rays > 0) {
         roll = hash3(roll);
         pick(lit, i, light.intensity * (bounded * seen), to_unit(roll.x));
         pick(dark, i, light.intensity * (bounded * (1.0 - seen)), to_unit(roll.y));
       }
     }
-    sum += traced(dark, origin, false, roll.z) - traced(lit, origin, true, roll.z + 1u);
+    of_group -= traced(lit, origin, true, roll.z + 1u);
+    // What is left of all taken away is rounding, of either sign.
+    of_group = mix(of_group, vec3(0.0), lessThan(abs(of_group), 1e-6 * lit.total));
+    sum += of_group + traced(dark, origin, false, roll.z);
   }
   return reflected ? sum * s.diffuse / PI : sum;
 }
