@@ -37,8 +37,8 @@ from bench import (
     soft_sources,
     strips,
     subsurface,
-    textures,
     subsurface_costs,
+    textures,
 )
 
 VERBS = {
