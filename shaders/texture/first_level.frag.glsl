@@ -19,17 +19,19 @@ vec4 stored(ivec2 texel)
   return image_associate(good ? found : vec4(0.0), level_flags);
 }
 
+// At the point left (`side` -1) or right (1) of a texel's centre, in its row or a next one.
+vec4 beside(ivec2 texel, int side, int row)
+{
+  return mix(stored(texel + ivec2(0, row)), stored(texel + ivec2(side, row)), GAUSS);
+}
+
 vec4 finer_texel(ivec2 texel)
 {
-  vec4 rows[3];
   vec4 sum = vec4(0.0);
-  for (int i = 0; i < 2; i++) {
-    // Three texels of each row, at the point left or right of the centre.
-    for (int j = 0; j < 3; j++) {
-      rows[j] = mix(stored(texel + ivec2(0, j - 1)), stored(texel + ivec2(2 * i - 1, j - 1)), GAUSS);
-    }
-    for (int j = 0; j < 2; j++) {
-      vec4 found = image_finish(mix(rows[1], rows[2 * j], GAUSS), level_flags, true);
+  for (int side = -1; side < 2; side += 2) {
+    vec4 middle = beside(texel, side, 0);
+    for (int row = -1; row < 2; row += 2) {
+      vec4 found = image_finish(mix(middle, beside(texel, side, row), GAUSS), level_flags, true);
       sum += 0.25 * image_covered(found, level_flags, true);
     }
   }
