@@ -85,7 +85,7 @@ void main()
   vec3 sum = vec3(0.0);
   for (int i = 0; i < ROWS_ASKED; i++) {
 #ifdef AT_HITS
-    uvec3 salt = hash3(roll + uint(i));  // rays of other samples go elsewhere: nothing to be stratified over them
+    uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i + 8192 * (1 + ray_number))));
 #else
     uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i)));
 #endif

@@ -178,6 +178,11 @@ def airlight_of_cube(down=True, density=0.5):
     return airlight(start, np.array([0, 0, -side]), 2.0, LAMP, np.pi, density, density)
 
 
+def of_corners(seen):
+    """Mean of the four pixels that are as far from the lamp as each other."""
+    return seen[[2, 2, 5, 5], [2, 5, 2, 5], 0].mean()
+
+
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
 def test_airlight_is_the_same_at_any_size(stage, scale):
     lit_cube(stage, scale)
@@ -190,7 +195,7 @@ def test_a_mirror_shows_the_fog_before_it(stage):
     mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
     stage.rectangle((-2, -2), (2, 2), z=-1.01, material=mirror)
     seen = stage.render(64, size=(8, 8), bounces=1)
-    assert seen["glossy_indirect"][5, 5, 0] == pytest.approx(airlight_of_cube(down=False), rel=0.03)
+    assert of_corners(seen["glossy_indirect"]) == pytest.approx(airlight_of_cube(down=False), rel=0.03)
     assert seen["volume_direct"][5, 5, 0] == pytest.approx(airlight_of_cube(), rel=0.03)
 
 
@@ -199,7 +204,7 @@ def test_glass_shows_the_fog_behind_it(stage):
     box(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.0001, Roughness=0.0), (-2, -2, 1.2), (2, 2, 1.4))
     stage.scene.candela.slot_caustics = "OFF"
     seen = stage.render(64, size=(8, 8), bounces=1)
-    assert seen["transmission_indirect"][5, 5, 0] == pytest.approx(airlight_of_cube(), rel=0.03)
+    assert of_corners(seen["transmission_indirect"]) == pytest.approx(airlight_of_cube(), rel=0.03)
 
 
 def test_fog_fades_what_a_mirror_shows(stage):
