@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bench import indirect, markdown
+from bench.quick import size_of
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "implicit_visibility.md"
 COMMAND = "python -m bench implicit_visibility --page"
@@ -35,6 +36,11 @@ STEPS = {  # programs by what they are for
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", default=indirect.ROOMS, metavar="NAME", help="rooms to measure")
     parser.add_argument("--parts", nargs="+", default=("error", "time"), choices=("error", "time"))
+    parser.add_argument("--samples", nargs="+", type=int, default=(*SAMPLES, MOST_SAMPLES), metavar="N")
+    parser.add_argument("--size", type=size_of, default=SIZE, metavar="WxH", help="default 96x64")
+    parser.add_argument(
+        "--reference", type=int, default=REFERENCE, metavar="N", help="samples of each of two references"
+    )
     parser.add_argument("--page", action="store_true", help="write the tables into docs/implicit_visibility.md")
 
 
@@ -42,16 +48,19 @@ def command(options: argparse.Namespace) -> int:
     import addon
 
     addon.register()
-    made = {
-        "error": lambda: "\n\n".join(f"**{name}**\n\n{errors(name)}" for name in options.scenes),
-        "time": times,
-    }
-    for part in options.parts:
-        text = made[part]()
-        print(f"\n{text}", flush=True)
-        if options.page:
-            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
+    done: list[str] = []
+    for name in options.scenes if "error" in options.parts else ():
+        done.append(f"**{name}**\n\n{errors(name, options)}")
+        written("error", "\n\n".join(done), options)  # what is measured stays when the run is ended
+    if "time" in options.parts:
+        written("time", times(), options)
     return 0
+
+
+def written(part: str, text: str, options: argparse.Namespace) -> None:
+    print(f"\n{text}", flush=True)
+    if options.page:
+        markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
 
 
 def opened(name: str):
@@ -61,19 +70,20 @@ def opened(name: str):
     return bpy.context.scene
 
 
-def errors(name: str) -> str:
+def errors(name: str, options: argparse.Namespace) -> str:
     """Technique, samples, relMSE, bias, seconds of the whole render, from Blender's call to the pixels."""
     scene = opened(name)
-    truth = indirect.reference(scene, REFERENCE, SIZE)
+    truth = indirect.reference(scene, options.reference, options.size)
     rows = [("technique", "samples", "relMSE", "bias", "seconds")]
     for technique in (NAME, *OTHERS):
-        more = (MOST_SAMPLES,) if technique in (NAME, OTHERS[0]) else ()
-        indirect.measured(scene, technique, 1, SIZE, truth)  # compiles
-        for samples in (*SAMPLES, *more):
+        indirect.measured(scene, technique, 1, options.size, truth)  # compiles
+        for samples in options.samples:
+            if samples == MOST_SAMPLES and technique not in (NAME, OTHERS[0]):
+                continue
             if technique != NAME or samples != MOST_SAMPLES:
                 anew()
             started = time.perf_counter()
-            found = indirect.measured(scene, technique, samples, SIZE, truth)
+            found = indirect.measured(scene, technique, samples, options.size, truth)
             rows.append((*found[:4], f"{time.perf_counter() - started:.2f}"))
             print(name, *rows[-1], flush=True)
     return markdown.table(rows)

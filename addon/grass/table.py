@@ -14,23 +14,27 @@ import numpy as np
 from .patch import MOST_LUMA, MOST_RINGS, Patch
 
 WIDTH = 2048  # texels a row
-ENTRY, PICTURE, PLACE = 16, 5, 4  # texels
-VIEW_RINGS, LIGHT_RINGS = 3, 11
+ENTRY, PICTURE, PLACE = 17, 5, 4  # texels
+VIEW_RINGS, LIGHT_RINGS, MAP = 3, 11, 16
+MOST_MAP = 256  # texels along a side of a density map
 ALIGNED = 16  # rows: the number of the first one is exact in a half float
 
 
 @dataclass(frozen=True)
 class Field:
-    """How a material shows a patch. `size` of the tile and `height` of the blades in metres, `density` 0..1."""
+    """How a material shows a patch. `size` of the tile and `height` of the blades in metres, `density` 0..1, and what
+    it is multiplied by: `density_map` (H, W), row 0 at the lowest y, over a square of `map_size` metres; None for 1."""
 
     patch: Patch
     size: float
     height: float
     density: float
+    density_map: np.ndarray | None = None
+    map_size: float = 0.0
 
 
 def table_of(fields: Sequence[Field]) -> np.ndarray:
-    """(rows, WIDTH, 4) float32; entry i is that of fields[i]. Fields may share a patch."""
+    """(rows, WIDTH, 4) float32; entry i is that of fields[i]. Fields may share a patch; each has its own map."""
     first = _aligned(-(-ENTRY * len(fields) // WIDTH))
     parts, rows, begins = [], first, {}
     for field in fields:
@@ -44,7 +48,25 @@ def table_of(fields: Sequence[Field]) -> np.ndarray:
     head = np.zeros((first * WIDTH, 4), np.float32)
     for k, field in enumerate(fields):
         head[k * ENTRY : (k + 1) * ENTRY] = _entry(field, begins[id(field.patch)])
+        if field.density_map is not None:
+            shown = reduced(field.density_map)
+            taken = _aligned(-(-shown.size // WIDTH))
+            parts.append(np.zeros((taken * WIDTH, 4), np.float32))
+            parts[-1][: shown.size, 0] = shown.ravel()
+            head[k * ENTRY + MAP] = rows, shown.shape[1], shown.shape[0], field.map_size
+            rows += taken
     return np.concatenate([head, *parts]).reshape(-1, WIDTH, 4)
+
+
+def reduced(values: np.ndarray) -> np.ndarray:
+    """The map with at most MOST_MAP texels a side, means of whole blocks of it, within 0..1 and finite."""
+    values = np.clip(np.nan_to_num(values, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    for axis in (0, 1):
+        step = -(-values.shape[axis] // MOST_MAP)
+        edges = np.arange(0, values.shape[axis], step)
+        counts = np.diff([*edges, values.shape[axis]])
+        values = np.add.reduceat(values, edges, axis=axis) / np.expand_dims(counts, 1 - axis)
+    return values
 
 
 def _aligned(rows: int) -> int:

@@ -4,7 +4,8 @@ Each mesh is covered by an even cloud of points in proportion to area, CLOUD for
 sampling picks centres out of it (distance in place and, so that thin sheets keep both faces, in normal); a cell is what
 is nearest to a centre, its surfel stands at the point nearest to the cell's middle, and its disc covers all points of
 the cell; where the mesh ends, or bends sharply, it ends too. So discs leave no holes wider than a seventh of a cell,
-whatever the tessellation: a mesh of two triangles has as many surfels as one of a million with the same area.
+whatever the tessellation: a mesh of two triangles has as many surfels as one of a million with the same area. A disc
+that reaches beyond its thing all the same (leaves, folds, legs) is met by the share of it that is surface: `filled`.
 
 Meshes are sampled in their own space after stretching (M = rotation * stretch): what moves rigidly keeps its surfels,
 instances share them, and the result does not depend on what was there before. Objects that would have fewer than FEWEST
@@ -18,7 +19,7 @@ up to PURE leaves are split by normal first, so that most small nodes are flat a
 
 | cost | |
 |---|---|
-| CPU, once for a mesh | about 50 us a surfel |
+| CPU, once for a mesh | about 100 us a surfel, half of it for how much of its disc is surface |
 | CPU, when something moves | about 10 us a surfel: tree and upload |
 | bytes | 80 a node, two nodes a surfel; 32 for each side that light reaches; 256 for points in a surfel's cell |
 
@@ -52,6 +53,8 @@ NODE_TEXELS, RECEIVER_TEXELS = 5, 2
 CLIPS = 2  # edges at which a disc ends
 CREASE = 0.5  # cosine between the triangles at an edge, below which surfaces end there
 MOST_EDGES, MOST_TRIANGLES = 4000, 30_000  # of a mesh whose discs end at its edges
+FULL, BELOW = 0.75, 0.5  # share of a disc from which on it counts as filled; radii that surface may lie off its plane
+ON_DISC = 48
 NONE = 1e30
 MOST_PIECES, ROUNDS = 100_000, 64  # of triangles that are halved, and how often
 
@@ -337,8 +340,57 @@ def sampled(
         for block in _blocks(place, number)
     ]
     *out, members, turned = (np.concatenate(values) for values in zip(*parts))
+    clips = _clips(*out[:3], *edges_of_mesh)
+    out[4] = out[4] * filled(*out[:3], clips, place, normal, area)
     kinds = np.full(len(members), closed), np.zeros(len(members), bool)
-    return Cells(*out, _clips(*out[:3], *edges_of_mesh), members, turned, *kinds)
+    return Cells(*out, clips, members, turned, *kinds)
+
+
+def filled(place, normal, radius, clips, cloud, cloud_normal, cloud_area) -> np.ndarray:
+    """The share of each disc that has surface below it, (N,): the cloud's area within it beside the disc's own, up to
+    where clips (N, CLIPS, 4) end it. 1 where that is more than FULL, as on all that is wide and smooth."""
+    cell = max(float(radius.max(initial=0.0)), 1e-30)
+    low = np.minimum(cloud.min(axis=0), place.min(axis=0)) - cell
+    size = np.ceil((np.maximum(cloud.max(axis=0), place.max(axis=0)) - low) / cell).astype(np.int64) + 2
+    strides = np.array([size[1] * size[2], size[2], 1])
+    number = lambda points: np.floor((points - low) / cell).astype(np.int64) @ strides  # noqa: E731
+    keys = number(cloud)
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    steps = np.stack(np.meshgrid(*[np.arange(-1, 2)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) @ strides
+    found = np.zeros(len(place))
+    for start in range(0, len(place), 1024):
+        some = slice(start, start + 1024)
+        wanted = (number(place[some])[:, None] + steps).reshape(-1)
+        first, last = np.searchsorted(keys, wanted, "left"), np.searchsorted(keys, wanted, "right")
+        count = last - first
+        disc = np.repeat(np.repeat(np.arange(len(place))[some], len(steps)), count)
+        entry = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)
+        point = order[entry]
+        off = cloud[point] - place[disc]
+        height = (off * normal[disc]).sum(axis=1)
+        cosine = (cloud_normal[point] * normal[disc]).sum(axis=1)
+        flat = (off * off).sum(axis=1) - height * height
+        kept = (flat < radius[disc] ** 2) & (np.abs(height) < BELOW * radius[disc]) & (cosine > 0.0)
+        for k in range(CLIPS):
+            kept &= (off * clips[disc, k, :3]).sum(axis=1) <= clips[disc, k, 3]
+        found += np.bincount(disc[kept], (cloud_area[point] * cosine)[kept], minlength=len(place))
+    share = found / (np.pi * radius**2 * _left(normal, radius, clips))
+    return np.where(share > FULL, 1.0, share)
+
+
+def _left(normal, radius, clips) -> np.ndarray:
+    """The share of each disc that its clips leave, (N,), by points on it."""
+    turn, far = 2.399963 * np.arange(ON_DISC), np.sqrt((np.arange(ON_DISC) + 0.5) / ON_DISC)
+    first = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-30)[:, None]
+    second = np.cross(normal, first)
+    u, v = far * np.cos(turn), far * np.sin(turn)
+    off = (first[:, None] * u[:, None] + second[:, None] * v[:, None]) * radius[:, None, None]
+    inside = np.ones(off.shape[:2], bool)
+    for k in range(CLIPS):
+        inside &= (off * clips[:, None, k, :3]).sum(axis=2) <= clips[:, None, k, 3]
+    return np.maximum(inside.mean(axis=1), 1.0 / ON_DISC)
 
 
 def borders(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

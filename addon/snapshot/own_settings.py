@@ -6,6 +6,7 @@ whatever has been set, by the property's identifier; what was never touched has 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from weakref import WeakKeyDictionary
 
 import bpy
@@ -18,6 +19,15 @@ def own_settings(block) -> Own:
     data-blocks, and for lists a tuple of such tuples, one for each entry."""
     group = getattr(block, "candela", None)
     return () if group is None else _values(group, False, getattr(block, "library", None))
+
+
+def own_images(block) -> Iterator[tuple[str, bpy.types.Image]]:
+    """What has been set on an evaluated data-block that is an image, by identifier."""
+    group = getattr(block, "candela", None)
+    for name, kind, *_ in () if group is None else _properties(type(group)):
+        image = getattr(group, name) if kind == "POINTER" else None
+        if isinstance(image, bpy.types.Image):
+            yield name, image
 
 
 def _values(group, every: bool, library=None) -> Own:

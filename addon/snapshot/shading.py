@@ -16,7 +16,7 @@ from ..materials.translucency import names_of, with_maps
 from .cache import GraphEntry, SnapshotCache
 from .images import ImageTable
 from .meshes import Wanted
-from .own_settings import own_settings
+from .own_settings import own_images, own_settings
 from .scene import Aov, Material, Note
 
 GREY = (0.8, 0.8, 0.8)
@@ -77,7 +77,9 @@ class ShadingTable:
     def _add(self, material) -> int:
         key = f"material {(material.original or material).session_uid}"
         graph = self.graph_of(material, key, f"Material '{material.name}'")
-        self.materials.append(Material(key, material.name, graph, material.pass_index, own_settings(material)))
+        images = tuple((name, self._images.key_of(image)) for name, image in own_images(material))
+        own = own_settings(material)
+        self.materials.append(Material(key, material.name, graph, material.pass_index, own, images))
         self.wanted.append(wanted_by(graph))
         return len(self.materials) - 1
 

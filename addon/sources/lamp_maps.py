@@ -110,6 +110,10 @@ class LampMaps:
             return np.ones(3), -1
         return self._factors[light.key][1].scale, self._numbers.get(light.key, -1)
 
+    def textured(self, light: Light) -> bool:
+        """Whether places on the lamp shine differently."""
+        return light.key in self._factors and self._factors[light.key][1].places is not None
+
     @property
     def notes(self) -> tuple[Note, ...]:
         """What of lamps is drawn otherwise than Cycles would."""

@@ -64,7 +64,12 @@ COUNTS = (
 )
 AUTO, SHARE, POINTS = "AUTO", "SHARE", "POINTS"
 MODES = (
-    (AUTO, "By Samples", 0, "The share of the light in pictures of few samples, else point by point"),
+    (
+        AUTO,
+        "By Samples",
+        0,
+        "The share of the light in pictures of few samples without textured lamps; else by point",
+    ),
     (SHARE, "Share of the Light", 1, "The whole light, as much of it as is seen: smooth at once"),
     (POINTS, "Point by Point", 2, "The light of each point that is seen: exact over many samples"),
 )
@@ -151,7 +156,9 @@ class DepthComplexity(EdgeShadows):
 
     def points(self, frame: Frame) -> int:
         mode = frame.settings.get(self, "mode")
-        if mode == SHARE or (mode == AUTO and (frame.settings.samples < FEW_SAMPLES or frame.settings.draft)):
+        few = frame.settings.samples < FEW_SAMPLES or frame.settings.draft
+        # A share of what a textured lamp gives says nothing of which part of it is hidden.
+        if mode == SHARE or (mode == AUTO and few and not any(map(frame.lamp_maps.textured, frame.snapshot.lights))):
             return 0
         return int(frame.settings.get(self, "points"))
 

@@ -29,6 +29,8 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from ..film.points import OwnPoint
 from ..frame.run import Frame
 from ..frame.settings import Settings
@@ -38,6 +40,7 @@ from ..gfx.library import Program
 from ..grass.patch import Patch, PatchError, kept
 from ..grass.table import Field, table_of
 from ..lighting.grass import TABLE, GrassTable
+from ..materials.estimate import srgb_decode
 from ..snapshot.scene import Material, Snapshot
 from ..surfaces.draw import StandIns
 
@@ -86,6 +89,17 @@ class Grass(Technique):
             "Share of the ground that is covered by grass",
             0.0, 1.0, "FACTOR", scope=MATERIAL,
         ),
+        Param(
+            "density_map", "Density Map", "",
+            "Image that the density is multiplied by, seen from above",
+            scope=MATERIAL, image=True,
+        ),
+        Param(
+            "map_size", "Map Size", 10.0,
+            "Side length of the density map's square, around the object's origin along its X and Y axes; beyond it "
+            "the image's rim goes on",
+            0.001, 100000.0, "DISTANCE", scope=MATERIAL,
+        ),
     )  # fmt: skip
     provides = (GrassTable,)
 
@@ -105,17 +119,26 @@ class Grass(Technique):
         return "; ".join(dict.fromkeys(why)) if len(why) == len(wanted) else None
 
     def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
-        return tuple(_field_key(snapshot.materials[material]) for material in _wanted(snapshot))
+        return tuple(_field_key(snapshot, snapshot.materials[material]) for material in _wanted(snapshot))
 
     def begin(self, frame: Frame) -> None:
         fields, entries = [], {}
         for material in _wanted(frame.snapshot):
             try:
-                fields.append(_field(frame.snapshot.materials[material]))
+                fields.append(_field(frame.snapshot, frame.snapshot.materials[material]))
             except PatchError:
                 continue
             entries[material] = len(fields) - 1
-        key = tuple(id(one.patch) for one in fields), tuple((one.size, one.height, one.density) for one in fields)
+        key = (
+            tuple(id(one.patch) for one in fields),
+            tuple(
+                (
+                    one.size, one.height, one.density, one.map_size,
+                    _map_key(frame.snapshot, frame.snapshot.materials[material]),
+                )
+                for one, material in zip(fields, entries)
+            ),
+        )  # fmt: skip
         if self._table is None or self._table[0] != key:
             self._table = (key, images.upload(table_of(fields), TABLE[0]))
             self._patches = [one.patch for one in fields]  # their ids stay theirs
@@ -152,18 +175,35 @@ def _file(material: Material) -> Path:
     return Path(name)
 
 
-def _field(material: Material) -> Field:
+def _map_key(snapshot: Snapshot, material: Material) -> Hashable:
+    """Of the density map; None without one."""
+    image = snapshot.images.get(dict(material.own_images).get(f"{Grass.name}_density_map"))
+    return None if image is None or image.missing else (image.key, image.version)
+
+
+def _density_map(snapshot: Snapshot, material: Material) -> np.ndarray | None:
+    """(H, W) means of the channels, scene-linear for images that are sRGB."""
+    key = _map_key(snapshot, material)
+    if key is None:
+        return None
+    image = snapshot.images[key[0]]
+    colors = image.pixels[..., :3]
+    return (srgb_decode(colors) if image.encoding == "SRGB" else colors).mean(axis=2)
+
+
+def _field(snapshot: Snapshot, material: Material) -> Field:
     """Raises PatchError."""
     patch: Patch = kept(_file(material))
     size = own_value(material.own, Grass, "size") or patch.size
     height = own_value(material.own, Grass, "height") or patch.height * size / patch.size
-    return Field(patch, size, height, own_value(material.own, Grass, "density"))
+    density, reach = (own_value(material.own, Grass, name) for name in ("density", "map_size"))
+    return Field(patch, size, height, density, _density_map(snapshot, material), reach)
 
 
-def _field_key(material: Material) -> Hashable:
+def _field_key(snapshot: Snapshot, material: Material) -> Hashable:
     try:
         file = _file(material)
         changed = file.stat().st_mtime_ns
     except (PatchError, OSError):
         return None
-    return str(file), changed, material.own
+    return str(file), changed, material.own, _map_key(snapshot, material)

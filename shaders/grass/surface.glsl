@@ -112,7 +112,8 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   // In a hollow the ground rises ahead, and the ray meets what stands there sooner than on flat ground.
   float bend_down = max(-curvature, 0.0) * level;
   vec2 root = uv - grass_length(below, rise, bend_down) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
-  hit.bare = g.density < 1.0 && grass_clumps(root * 6.0) >= g.density;
+  float density = grass_density(g, root * g.size);
+  hit.bare = density < 1.0 && grass_clumps(root * 6.0) >= density;
   float depth = grass_length(hit.bare ? g.height : below, rise, bend_down);
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.

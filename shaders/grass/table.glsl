@@ -3,18 +3,20 @@
 // ENTRY texels for each material that shows a patch: 0: first row of the patch, texels along its side, views, lights;
 // 1: side of the tile and height of the blades, m; how much taller they are than the patch's own tile is; density;
 // 2: F_max, height over side of the patch's own tile, rings of views, rings of lights; from 3 on eight rings of views
-// (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights.
+// (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights;
+// 16: first row of a map of the density, its width and height in texels, and the side in metres of the square it covers, 0: none.
 // A patch: PICTURE texels for each view and light, and one light more, the uniform sky (coefficients of luma, of chroma, mean
 // colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many that begin
 // with the correlation of its pictures with those of neighbouring views, and among neighbouring lights; then PLACE texels for
 // each view and place. How they are decoded: addon/grass/compression.py.
 #include "lib/math.glsl"
 
-#define GRASS_ENTRY 16
+#define GRASS_ENTRY 17
 #define GRASS_PICTURE 5
 #define GRASS_PLACE 4
 #define GRASS_VIEW_RINGS 3
 #define GRASS_LIGHT_RINGS 11
+#define GRASS_MAP 16
 #define GRASS_MOST_RINGS 8
 #define GRASS_GAMMA 2.2
 
@@ -59,6 +61,29 @@ Grass grass_of(int entry)
   g.view_rings = int(c.z + 0.5);
   g.light_rings = int(c.w + 0.5);
   return g;
+}
+
+float grass_map_texel(int base, ivec2 size, ivec2 texel)
+{
+  ivec2 at = clamp(texel, ivec2(0), size - 1);
+  return grass_texel(base + at.y * size.x + at.x).x;
+}
+
+// Share of the ground that is covered at a place in the object's plane, m from its origin. Beyond the map its rim goes on.
+float grass_density(Grass g, vec2 place)
+{
+  vec4 map = grass_texel(g.entry + GRASS_MAP);
+  if (map.w <= 0.0) {
+    return g.density;
+  }
+  int base = int(map.x + 0.5) * 2048;
+  ivec2 size = ivec2(map.yz + 0.5);
+  vec2 texel = clamp(place / map.w + 0.5, vec2(0.0), vec2(1.0)) * vec2(size) - 0.5;
+  ivec2 low = ivec2(floor(texel));
+  vec2 f = texel - floor(texel);
+  float below = mix(grass_map_texel(base, size, low), grass_map_texel(base, size, low + ivec2(1, 0)), f.x);
+  float above = mix(grass_map_texel(base, size, low + ivec2(0, 1)), grass_map_texel(base, size, low + ivec2(1, 1)), f.x);
+  return g.density * mix(below, above, f.y);
 }
 
 // The two rings around a direction in the tile's frame, and how far it is from the first to the second.

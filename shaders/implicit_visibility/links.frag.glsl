@@ -111,6 +111,9 @@ void main()
       continue;
     }
     if (leaves.w < 1.0) {
+      if (!front && leaves.z > 0.5) {
+        continue;  // a ray that passed beside a thing smaller than its discs meets no back of it
+      }
       uvec3 chance = hash3(uvec3(uint(here), uint(bin), roll.x + uint(solution)));
       if (to_unit(chance.x) >= leaves.w) {
         continue;

@@ -136,58 +136,73 @@ int node_after(int node)
   return (node + 1) >> findLSB(node + 1);
 }
 
-// Draw what lies below node `part.y` + `part.x` of a level that has `part.y` nodes.
+// Draw what lies below node `part.y` + `part.x` of a level that has `part.y` nodes. Threads that run together look for their
+// next node first and draw it then, all at once: drawn where each one finds it, most of them would wait for one that draws.
 void micro_fill(MicroFrame f, ivec2 corner)
 {
   float side = float(micro_side);
   int k = part.x + part.y;
   int end = node_after(k);
-  for (int steps = 0; steps < 4 * leaf_count; steps++) {
-    vec4 ball = node_texel(3 * k);
-    vec3 to_node = ball.xyz - f.place;
-    bool down = false;
-    if (dot(to_node, f.normal) + ball.w > 0.0 && dot(to_node, f.plane) + ball.w > 0.0) {
-      float squared = dot(to_node, to_node);
-      float sine = ball.w * ball.w / max(squared, 1e-30);
-      ivec2 low = ivec2(0);
-      ivec2 high = ivec2(micro_side - 1);
-      float reach = side;
-      vec2 middle = vec2(0.0);
-      if (sine < 1.0) {
-        float chord = sqrt(2.0 * sine / (1.0 + sqrt(1.0 - sine)));
-        vec3 direction = to_node * inversesqrt(squared);
+  int steps = 0;
+  while (steps < 4 * leaf_count) {
+    int drawn = 0;  // node, 0 for none: the root is node 1
+    ivec2 drawn_low = ivec2(0);
+    ivec2 drawn_high = ivec2(0);
+    vec3 drawn_to = vec3(0.0);
+    vec4 drawn_shape = vec4(0.0);
+    while (steps < 4 * leaf_count && drawn == 0) {
+      steps += 1;
+      vec4 ball = node_texel(3 * k);
+      vec3 to_node = ball.xyz - f.place;
+      bool down = false;
+      if (dot(to_node, f.normal) + ball.w > 0.0 && dot(to_node, f.plane) + ball.w > 0.0) {
+        float squared = dot(to_node, to_node);
+        float sine = ball.w * ball.w / max(squared, 1e-30);
+        ivec2 low = ivec2(0);
+        ivec2 high = ivec2(micro_side - 1);
+        float reach = side;
+        vec2 middle = vec2(0.0);
+        if (sine < 1.0) {
+          float chord = sqrt(2.0 * sine / (1.0 + sqrt(1.0 - sine)));
+          vec3 direction = to_node * inversesqrt(squared);
 #ifdef GLOSSY
-        reach = 0.5 * STRETCH * chord * side / max(2.0 * f.angle, 1e-6);
-        float apart = acos(clamp(dot(direction, f.axis), -1.0, 1.0));
-        high = (apart > f.angle + asin(sqrt(sine))) ? ivec2(-1) : high;
+          reach = 0.5 * STRETCH * chord * side / max(2.0 * f.angle, 1e-6);
+          float apart = acos(clamp(dot(direction, f.axis), -1.0, 1.0));
+          high = (apart > f.angle + asin(sqrt(sine))) ? ivec2(-1) : high;
 #else
-        reach = 0.5 * STRETCH * chord * side;
-        vec2 disc = vec2(dot(direction, f.tangent), dot(direction, f.bitangent));
-        middle = (square_of_disc(disc) * 0.5 + 0.5) * side - f.shift;
-        vec2 half_size = square_reach(disc, chord) * (0.5 * side);
-        low = max(low, ivec2(ceil(middle - half_size)));
-        high = min(high, ivec2(floor(middle + half_size)));
+          reach = 0.5 * STRETCH * chord * side;
+          vec2 disc = vec2(dot(direction, f.tangent), dot(direction, f.bitangent));
+          middle = (square_of_disc(disc) * 0.5 + 0.5) * side - f.shift;
+          vec2 half_size = square_reach(disc, chord) * (0.5 * side);
+          low = max(low, ivec2(ceil(middle - half_size)));
+          high = min(high, ivec2(floor(middle + half_size)));
 #endif
-      }
-      bool small_enough = reach <= detail;
-      bool seen = low.x <= high.x && low.y <= high.y;
-      if (centre_test == 0 && small_enough && dot(to_node, f.normal) > 0.0) {
-        ivec2 pixel = clamp(ivec2(floor(middle + f.shift)), ivec2(0), ivec2(micro_side - 1));
-        vec4 shape = node_texel(3 * k + 1);
-        micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
-      }
-      else if (seen || centre_test == 0) {
-        // A ball in place of an edge between walls lets light pass beside it.
-        vec4 shape = node_texel(3 * k + 1);
-        down = k < leaf_count && (!small_enough || (shape.w < 0.0 && reach > ROUND * detail));
-        if (!down) {
-          micro_draw(f, corner, low, high, to_node, shape, k);
+        }
+        bool small_enough = reach <= detail;
+        bool seen = low.x <= high.x && low.y <= high.y;
+        if (centre_test == 0 && small_enough && dot(to_node, f.normal) > 0.0) {
+          ivec2 pixel = clamp(ivec2(floor(middle + f.shift)), ivec2(0), ivec2(micro_side - 1));
+          vec4 shape = node_texel(3 * k + 1);
+          micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
+        }
+        else if (seen || centre_test == 0) {
+          // A ball in place of an edge between walls lets light pass beside it.
+          vec4 shape = node_texel(3 * k + 1);
+          down = k < leaf_count && (!small_enough || (shape.w < 0.0 && reach > ROUND * detail));
+          if (!down) {
+            drawn = k;
+            drawn_low = low;
+            drawn_high = high;
+            drawn_to = to_node;
+            drawn_shape = shape;
+          }
         }
       }
+      k = down ? 2 * k : node_after(k);
+      steps = (k == end) ? 4 * leaf_count : steps;
     }
-    k = down ? 2 * k : node_after(k);
-    if (k == end) {
-      break;
+    if (drawn != 0) {
+      micro_draw(f, corner, drawn_low, drawn_high, drawn_to, drawn_shape, drawn);
     }
   }
 }

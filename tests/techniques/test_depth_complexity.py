@@ -299,6 +299,36 @@ def test_thousands_of_edges_before_a_pixel_are_all_asked(by_edges):
     assert (counts != layers).sum() == 0 and (bits != seen).mean() <= 5e-4
 
 
+def test_shadows_of_a_textured_lamp_have_its_colours(by_edges):
+    """A lamp whose left and right halves differ in colour, behind the edge of a plate: one sample as many rays."""
+    stage = by_edges
+    stage.floor()
+    stage.blocker((0, -9), (9, 9), 1.0)
+    light = stage.light("AREA", (0, 0, 3), size=2.0, shape="SQUARE").data
+    if bpy.app.version < (5, 2):
+        light.use_nodes = True
+    tree = light.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    place, split = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeSeparateXYZ")
+    ramp = tree.nodes.new("ShaderNodeMix")
+    ramp.data_type = "RGBA"
+    ramp.inputs["A"].default_value, ramp.inputs["B"].default_value = (1, 0.05, 0, 1), (0, 0.05, 1, 1)
+    tree.links.new(place.outputs["Parametric"], split.inputs[0])
+    tree.links.new(split.outputs["X"], ramp.inputs["Factor"])
+    tree.links.new(ramp.outputs["Result"], emission.inputs["Color"])
+    stage.camera_above(span=2.0)
+    found = stage.render(samples=1, size=(24, 24))["diffuse_direct"][..., :3]
+    assert stage.ledger.row(NAME).counters["lights by edges"] == 1
+    stage.scene.candela.depth_complexity_mode = "SHARE"
+    share_of_all = stage.render(samples=1, size=(24, 24))["diffuse_direct"][..., :3]
+    stage.scene.candela.slot_shadow = "accumulated_maps"
+    truth = stage.render(samples=256, size=(24, 24))["diffuse_direct"][..., :3]
+    lit = truth.mean(axis=2) > 0.05 * truth.mean(axis=2).max()
+    assert np.ptp(truth[lit][:, 0] / truth[lit].sum(axis=1)) > 0.15
+    errors = [np.sqrt(((picture - truth) ** 2).mean()) for picture in (found, share_of_all)]
+    assert errors[0] < 0.03 * truth.mean(axis=2).max() and errors[0] < 0.5 * errors[1]
+
+
 def test_a_light_without_extent_has_maps(by_edges):
     stage = by_edges
     stage.floor()

@@ -164,6 +164,20 @@ def test_without_density_the_ground_is_seen_where_it_is(stage):
     assert shown["depth"] == pytest.approx(expected["depth"], abs=1e-4)
 
 
+def test_a_map_says_where_grass_grows(stage, tmp_path):
+    """Over the square of 2 m around the origin: bare where x < 0, and so is all beyond. The picture's right is -x."""
+    image = bpy.data.images.new("Where", 2, 4, float_buffer=True, is_data=True)
+    image.pixels.foreach_set(np.tile(np.array([0, 0, 0, 1, 1, 1, 1, 1], np.float32), 4))
+    image.pack()
+    patch = flat_patch(tmp_path / "flat.grass", 1.0)
+    ground(stage, patch, density_map=image, map_size=2.0)
+    stage.world((1, 1, 1), 1.0)
+    towards(stage, 0, 0, 6.0)
+    shown = stage.render(16, (24, 24))["combined"][..., :3]
+    assert shown[:, 15:] == pytest.approx(np.full((24, 9, 3), 0.5), rel=0.03)
+    assert shown[:, :9] == pytest.approx(np.broadcast_to(ALBEDO, (24, 9, 3)), rel=0.03)
+
+
 def test_density_is_the_share_that_is_covered(stage, tmp_path):
     ground(stage, flat_patch(tmp_path / "flat.grass", 1.0), density=0.5)
     sun(stage, 0, 0)

@@ -373,9 +373,7 @@ def beams_of_a_ball(density, ior=1.5, pixels=96, span=6.0, rays=400_000, bounces
     bent, mirrored, share = meet(direction, place, 1 / ior)
     leaving = [(place, mirrored, flux * share)]
     direction, flux = bent, flux * (1 - share)
-    within = np.exp(
-        2 * density * (bent * place).sum(axis=1)
-    )  # fog fills the ball; chords are all as long
+    within = np.exp(2 * density * (bent * place).sum(axis=1))  # fog fills the ball; chords are all as long
     for _ in range(bounces + 1):
         flux = flux * within
         place = place - 2 * (direction * place).sum(axis=1)[:, None] * direction
