@@ -9,6 +9,8 @@
 | car paint | a coat over coloured metal under lamps of three sizes |
 | window pane | glass that shows a room behind it and what stands before it |
 | water | a wavy surface that mirrors a picture and bends the view of the ground |
+| patterned floor | diffuse light that a floor of large tiles sends to a wall: what indirect rays meet |
+| picture off screen | the same of a picture on a wall behind the camera |
 
 Light comes from areas and a dim world, so that a reference of a thousand samples is one: no caustics of small lamps.
 """
@@ -194,6 +196,30 @@ def water() -> None:
     _look((0, -4, 1.2), (0, 2, 0.2), 35)
 
 
+def patterned_floor() -> None:
+    _world((0.0, 0.0, 0.0))
+    _plane(_material("Tiles", (0.9, 0.1, 0.05, 1), 4, (0.05, 0.2, 0.9, 1), Roughness=1.0), (0, 0, 0), scale=(2, 2, 1))
+    _plane(_white(), (0, 2, 1), (TURNED, 0, 0), (2, 1, 1))
+    _area((0, 0.5, 3.5), 150, 0.5, (0, 0.5, 0))
+    _look((0, -3.5, 1.6), (0, 2, 0.6), 40)
+
+
+def picture_off_screen() -> None:
+    _world((0.0, 0.0, 0.0))
+    picture = _material("Picture", (0.9, 0.8, 0.1, 1), 2, (0.02, 0.05, 0.6, 1), Roughness=1.0)
+    _plane(picture, (-2.5, 1.2, 1), (0, TURNED, 0), (1, 1, 1))
+    _plane(_white(), (0, 0, 0), scale=(2.6, 4, 1))
+    _plane(_white(), (0, 2.2, 1), (TURNED, 0, 0), (2.6, 1, 1))
+    _area((1.5, 0.5, 1.5), 100, 0.5, (-2.5, 1.2, 1))
+    _look((0.9, -3.0, 1.2), (0.2, 2.2, 0.6), 45)
+
+
+def _white():
+    return _material("White", (0.8, 0.8, 0.8, 1), Roughness=1.0, Specular_IOR_Level=0.0)
+
+
+PATHS = {"patterned floor": ("diffuse indirect",), "picture off screen": ("diffuse indirect",)}  # of the others: all
+BOUNCES = {"two mirrors": 8}  # that Cycles' glossy rays may have, as many as Candela shades
 SCENES: dict[str, Callable[[], None]] = {
     "corridor": corridor,
     "roughness map": roughness_map,
@@ -202,11 +228,18 @@ SCENES: dict[str, Callable[[], None]] = {
     "car paint": car_paint,
     "window pane": window_pane,
     "water": water,
+    "patterned floor": patterned_floor,
+    "picture off screen": picture_off_screen,
 }
 
 
 def make(name: str) -> bpy.types.Scene:
-    """The scene of this name in an empty file."""
+    """The scene of this name in an empty file; what it is measured by and Cycles' bounces stand in its properties."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     SCENES[name]()
-    return bpy.context.scene
+    scene = bpy.context.scene
+    if name in PATHS:
+        scene["paths"] = ",".join(PATHS[name])
+    if name in BOUNCES:
+        scene["glossy_bounces"] = BOUNCES[name]
+    return scene

@@ -2,9 +2,10 @@
 
 Each scene of `bench/reflection_scenes.py` is rendered by Cycles with --reference samples (twice, with two seeds, whose
 difference tells the reference's own noise), by Candela with 1, 16 and 64 samples, by Candela with mean colours in
-reflections, by EEVEE with ray tracing and by Cycles with few samples, denoised. The error is relMSE of the picture
-and of what its glossy and transmission passes bring; the mean is Candela's over the reference's. Times are those of
-whole renders, one after the other on the same machine: on a software GPU they say little about a real one.
+reflections, by EEVEE with ray tracing and by Cycles with few samples, raw and denoised. The error is relMSE of the
+picture and of what its glossy and transmission passes bring, net of the reference's noise; the mean is the entrant's
+over the reference's. Times are those of whole renders after one that compiled, one after the other on the same machine:
+on a software GPU they say little about a real one.
 
 `--page` writes docs/reflections.md's tables, `--only NAME` takes scenes by name, `--pictures FOLDER` keeps PNG files.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from . import markdown
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
 SIZE = (96, 64)
-PATHS = ("glossy", "transmission")
+PATHS = ("glossy", "transmission")  # that a scene is measured by, unless it names others
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,14 @@ class Entrant:
 
 ENTRANTS = (
     Entrant("Candela, 1", "CANDELA", 1),
+    Entrant("Candela, 4", "CANDELA", 4),
     Entrant("Candela, 16", "CANDELA", 16),
     Entrant("Candela, 64", "CANDELA", 64),
     Entrant("Candela, 64, means", "CANDELA", 64, means=True),
     Entrant("EEVEE, 16, ray traced", "BLENDER_EEVEE", 16),
+    Entrant("Cycles, 4", "CYCLES", 4),
     Entrant("Cycles, 4, denoised", "CYCLES", 4, denoised=True),
+    Entrant("Cycles, 16", "CYCLES", 16),
     Entrant("Cycles, 16, denoised", "CYCLES", 16, denoised=True),
 )
 
@@ -55,41 +59,101 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pictures", type=Path, help="folder for PNG files")
 
 
+@dataclass(frozen=True)
+class Result:
+    """What an entrant made of a scene: relMSE net of the reference's noise and mean, by path, and seconds."""
+
+    seconds: float
+    errors: dict[str, float]
+    means: dict[str, float]
+
+
 def command(options: argparse.Namespace) -> int:
     import addon
 
     from . import reflection_scenes
 
     addon.register()
-    names = options.only or list(reflection_scenes.SCENES)
-    tables = []
-    for name in names:
+    tables, summary = [], [SUMMARY_HEAD]
+    for name in options.only or list(reflection_scenes.SCENES):
         scene = reflection_scenes.make(name)
-        tables.append(f"### {name[:1].upper()}{name[1:]}\n\n{_measure(scene, name, options)}")
-        print(tables[-1], flush=True)
+        noise, results = _measure(scene, name, options)
+        tables.append(f"### {name[:1].upper()}{name[1:]}\n\n{_table(noise, results)}")
+        summary.append(_summary(name, results))
+        print(tables[-1], markdown.table([SUMMARY_HEAD, summary[-1]]), sep="\n\n", flush=True)
     if options.page:
-        markdown.put_between(PAGE, COMMAND, "\n\n".join(tables))
+        markdown.put_between(PAGE, COMMAND, "\n\n".join([markdown.table(summary), *tables]))
     return 0
 
 
-def _measure(scene, name: str, options: argparse.Namespace) -> str:
+def _measure(scene, name: str, options: argparse.Namespace) -> tuple[dict[str, float], dict[Entrant, Result]]:
+    """The reference's noise by path, and what each entrant made."""
     references = [_render(scene, Entrant("", "CYCLES", options.reference), seed)[0] for seed in (0, 1)]
     truth = {key: (references[0][key] + references[1][key]) / 2 for key in references[0]}
     shown = [key for key in truth if truth[key].mean() > 1e-3]
     noise = {key: error(*(one[key] for one in references)) / 4 for key in shown}
-    rows = [["", "seconds", *(title for key in shown for title in (f"{key}: relMSE", "mean"))]]
-    rows.append(["reference's noise", "", *(text for key in shown for text in (f"{noise[key]:.4f}", ""))])
     _keep(options.pictures, name, "Cycles", truth["picture"])
+    results = {}
     for entrant in ENTRANTS:
+        _render(scene, replace(entrant, samples=1), 3)  # what compiles is not timed
         found, seconds = _render(scene, entrant, 7)
-        cells = []
-        for key in shown:
-            there = key in found
-            cells.append(f"{max(error(found[key], truth[key]) - noise[key], 0.0):.4f}" if there else "–")
-            cells.append(f"{found[key].mean() / truth[key].mean():.3f}" if there else "–")
-        rows.append([entrant.label, f"{seconds:.1f}", *cells])
+        there = [key for key in shown if key in found]
+        results[entrant] = Result(
+            seconds,
+            {key: max(error(found[key], truth[key]) - noise[key], 0.0) for key in there},
+            {key: float(found[key].mean() / truth[key].mean()) for key in there},
+        )
         _keep(options.pictures, name, entrant.label, found["picture"])
+    return noise, results
+
+
+def _table(noise: dict[str, float], results: dict[Entrant, Result]) -> str:
+    rows = [["", "seconds", *(title for key in noise for title in (f"{key}: relMSE", "mean"))]]
+    rows.append(["reference's noise", "", *(text for key in noise for text in (f"{noise[key]:.4f}", ""))])
+    for entrant, one in results.items():
+        cells = []
+        for key in noise:
+            cells += [f"{one.errors[key]:.4f}", f"{one.means[key]:.3f}"] if key in one.errors else ["–", "–"]
+        rows.append([entrant.label, f"{one.seconds:.1f}", *cells])
     return markdown.table(rows)
+
+
+SUMMARY_HEAD = [
+    "scene",
+    "picture, 1 sample",
+    "picture, 64",
+    "worst path, 64",
+    "mean of it",
+    "EEVEE",
+    "least error in EEVEE's time / 10",
+    "Cycles 16 denoised",
+    "least error in its time",
+]
+
+
+def _summary(name: str, results: dict[Entrant, Result]) -> list[str]:
+    """The aims in one row: errors at 1 and 64 samples, and the least error in the time of others."""
+    by_label = {entrant.label: one for entrant, one in results.items()}
+    at_most = by_label["Candela, 64"]
+    worst = max((key for key in at_most.errors if key != "picture"), key=at_most.errors.get, default="picture")
+    eevee, denoised = by_label["EEVEE, 16, ray traced"], by_label["Cycles, 16, denoised"]
+
+    def least(seconds: float) -> str:
+        candela = [(one.errors["picture"], entrant.samples) for entrant, one in results.items()
+                   if entrant.engine == "CANDELA" and not entrant.means and one.seconds <= seconds]  # fmt: skip
+        return "{:.4f} ({} samples)".format(*min(candela)) if candela else "none as fast"
+
+    return [
+        name,
+        f"{by_label['Candela, 1'].errors['picture']:.4f}",
+        f"{at_most.errors['picture']:.4f}",
+        f"{at_most.errors[worst]:.4f} ({worst})",
+        f"{at_most.means[worst]:.3f}",
+        f"{eevee.errors['picture']:.4f} in {eevee.seconds:.1f} s",
+        least(eevee.seconds / 10),
+        f"{denoised.errors['picture']:.4f} in {denoised.seconds:.1f} s",
+        least(denoised.seconds),
+    ]
 
 
 def error(found: np.ndarray, truth: np.ndarray) -> float:
@@ -108,48 +172,21 @@ def _render(scene, entrant: Entrant, seed: int) -> tuple[dict[str, np.ndarray], 
     if entrant.means:
         settings.shaded_reflections_bounces = 0
     scene.eevee.use_raytracing = True
+    extra = [(scene.cycles, "use_denoising", True)] if entrant.denoised else []
+    if "glossy_bounces" in scene:
+        extra.append((scene.cycles, "glossy_bounces", scene["glossy_bounces"]))
     start = time.perf_counter()
-    images = render_passes(scene, entrant.engine, entrant.samples, seed, size=SIZE).images
+    images = render_passes(scene, entrant.engine, entrant.samples, seed, size=SIZE, extra=extra).images
     seconds = time.perf_counter() - start
-    if entrant.denoised:
-        images["combined"], seconds = _denoised(scene, entrant, seed)
-        return {"picture": images["combined"]}, seconds
     found = {"picture": images["combined"][..., :3]}
-    for path in PATHS:
-        parts = [images.get(f"{path}_{order}") for order in ("direct", "indirect")]
-        color = images.get(f"{path}_color")
-        if entrant.engine != "BLENDER_EEVEE" and color is not None and all(part is not None for part in parts):
-            found[path] = (parts[0] + parts[1])[..., :3] * color[..., :3]
+    for path in str(scene.get("paths", ",".join(PATHS))).split(","):
+        kind, _, order = path.partition(" ")
+        parts = [images.get(f"{kind}_{one}") for one in ([order] if order else ["direct", "indirect"])]
+        color = images.get(f"{kind}_color")
+        comparable = entrant.engine != "BLENDER_EEVEE" and not entrant.denoised  # only Combined is denoised
+        if comparable and color is not None and all(part is not None for part in parts):
+            found[path] = sum(parts)[..., :3] * color[..., :3]
     return found, seconds
-
-
-def _denoised(scene, entrant: Entrant, seed: int) -> tuple[np.ndarray, float]:
-    """Combined as Cycles' denoiser leaves it, and the time of that render."""
-    import tempfile
-
-    import bpy
-
-    from addon.compare.exr import read_exr
-
-    render, cycles = scene.render, scene.cycles
-    kept = render.engine, cycles.samples, cycles.use_denoising, cycles.seed, render.resolution_x, render.resolution_y
-    render.engine, cycles.samples, cycles.use_denoising, cycles.seed = "CYCLES", entrant.samples, True, seed
-    render.resolution_x, render.resolution_y = SIZE
-    try:
-        start = time.perf_counter()
-        bpy.ops.render.render(scene=scene.name)
-        seconds = time.perf_counter() - start
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "denoised.exr"
-            image_settings = render.image_settings
-            image_settings.file_format, image_settings.color_depth = "OPEN_EXR", "32"
-            bpy.data.images["Render Result"].save_render(str(path), scene=scene)
-            pixels = read_exr(path)
-    finally:
-        (
-            render.engine, cycles.samples, cycles.use_denoising, cycles.seed, render.resolution_x, render.resolution_y,
-        ) = kept  # fmt: skip
-    return next(layer[..., :3] for layer in pixels.values() if layer.shape[-1] >= 3), seconds
 
 
 def _keep(folder: Path | None, name: str, label: str, pixels: np.ndarray) -> None:

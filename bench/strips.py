@@ -72,7 +72,7 @@ STRIPS = {
     ),
     "reflections": Strip(
         (128, 96),
-        ("mirror corridor", "roughness map", "glass ball", "car paint", "window pane", "water"),
+        ("corridor", "roughness map", "glass ball", "car paint", "window pane", "water"),
         _reflection,
         (Entrant("CANDELA", 1), Entrant("CANDELA", 16), CYCLES),
     ),

@@ -44,6 +44,7 @@ from .technique import Service, Technique, Write
 ServiceT = TypeVar("ServiceT", bound=Service)
 SharedT = TypeVar("SharedT")
 
+FOOTPRINT = 0.96  # side of a square that deviates as much as a pixel filter of half width 1
 MOST_TEXELS = 16  # counters that are kept in an image
 FAR_BEYOND = 300.0  # by the typical distance of what is seen
 ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
@@ -71,6 +72,7 @@ class Frame:
     lamp_maps: LampMaps
     view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
     sample: int = 0  # the sample that is running
+    film_points: int = 1  # that a sample shows; the surface technique says it before it looks
     samples_done: int = 0
     numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
     first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
@@ -157,9 +159,19 @@ class Frame:
         number = self.sample if film is None else film
         if lens is None:
             lens = point_of(aperture, *self.random(LENS)) if aperture else (0.0, 0.0)
-        values = self.view.values(number, settings.seed, self.film_offset(number), self.geometry.size, lens)
+        values = self.view.values(
+            number, settings.seed, self.film_offset(number), self.geometry.size, lens, self._footprints()
+        )
         self.view_block.update(**values)
         self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
+
+    def _footprints(self) -> tuple[float, float]:
+        """Sides in pixels of the squares over which lookups of textures average (materials/averages.py). All samples
+        of a picture, and their points of the film, share what the pixel filter covers; where any number of samples may
+        be shown, sample n takes the n-th of it."""
+        samples = self.settings.samples if self.settings.whole else self.sample + 1
+        side = FOOTPRINT * self.snapshot.film.filter_width * (self.film_points * samples) ** -0.5
+        return side, side if self.is_first else 0.0
 
     def film_offset(self, number: int) -> tuple[float, float]:
         """Where point `number` of the film lies, in pixels from a pixel's middle."""

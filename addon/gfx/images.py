@@ -20,6 +20,7 @@ from .context import on_picture, on_release
 _BYTES = {
     "RGBA32F": 16,
     "RGBA16F": 8,
+    "RGBA8": 4,
     "RG32F": 8,
     "R32F": 4,
     "R16F": 2,
@@ -30,6 +31,7 @@ _BYTES = {
 _CHANNELS = {
     "RGBA32F": 4,
     "RGBA16F": 4,
+    "RGBA8": 4,
     "RG32F": 2,
     "R32F": 1,
     "R16F": 1,
@@ -124,9 +126,9 @@ def upload_list(rows: np.ndarray) -> Image:
 def read(image: Image) -> np.ndarray:
     """Copy to the CPU: (H, W, channels) float32 (uint32 for R32UI). Waits for the GPU.
 
-    Blender cannot read RGBA32UI back: ValueError.
+    Blender cannot read RGBA32UI back, and RGBA8 as bytes alone: ValueError.
     """
-    if image.format == "RGBA32UI":
+    if image.format in ("RGBA32UI", "RGBA8"):
         raise ValueError("An image of four integers cannot be read back: copy what is needed into floats first.")
     buffer = image.texture.read()
     count = math.prod(buffer.dimensions)

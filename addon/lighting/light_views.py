@@ -232,6 +232,7 @@ def _view(orthographic: bool, eye, u, v, backward, window, side: int, far: float
         "eye": (*eye, float(orthographic)), "right": (*u, 0.0), "up": (*v, 0.0), "backward": (*backward, near),
         "frame": window, "film": (side, side, 0.0, 1e30), "sample_index": 0, "seed": 0,
         "bits_x": 0, "bits_y": 0, "bits_z": 0, "bits_w": 0, "visibility": DIFFUSE_FLAG,
+        "footprint_exact": 0.0, "footprint_first": 0.0,
     }  # fmt: skip
     return LightView(values, rows, low, high)
 

@@ -1,7 +1,9 @@
-"""Several images in one: what a material reads beyond the samplers that a program has, and the tiles of a UDIM image.
+"""Places in a texture: of the levels of an image, and of several images in one, which are what a material reads
+beyond the samplers that a program has, and the tiles of a UDIM image.
 
 Parts stand side by side on shelves, the highest first, so that equal sets of sizes always lie alike. The generated
-lookups of a part wrap and filter within it (materials/nodes/image.py).
+lookups of a part wrap and filter within it (materials/nodes/image.py). Each part has its levels above it
+(shaders/texture/levels.glsl).
 """
 
 from __future__ import annotations
@@ -37,6 +39,24 @@ def layout(sizes: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tup
         x, shelf = x + width, max(shelf, height)
         widest = max(widest, x)
     return corners, (max(widest, 1), max(y + shelf, 1))
+
+
+def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
+    """Width and height of the levels of an image from 1 on."""
+    return [(width >> n, height >> n) for n in range(1, min(width, height).bit_length())]
+
+
+def rows_with_levels(width: int, height: int) -> int:
+    """Rows of a texture that hold an image and, above it, its levels: of level n 2^n rows stand side by side."""
+    return height + sum(-(-rows >> n) for n, (_, rows) in enumerate(level_sizes(width, height), 1))
+
+
+def texture_layout(sizes: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int], bool]:
+    """Lower left corners of images of these sizes in one texture, its size, and whether there is room for levels."""
+    corners, whole = layout([(width, rows_with_levels(width, height)) for width, height in sizes])
+    if max(whole) <= WIDEST:
+        return corners, whole, True
+    return *layout(sizes), False
 
 
 def packed(parts: Sequence[np.ndarray]) -> np.ndarray:

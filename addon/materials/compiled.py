@@ -80,6 +80,7 @@ class CompiledMaterial:
         tuple[str, str], ...
     ] = ()  # name, kind: of the k-th one `glsl` has `material_aov{k}(SurfacePoint point)`
     along_normal: bool = False  # by a height: what it lifts, it lifts along the normal
+    averaging: frozenset[str] = frozenset()  # those of `images` of which some lookup averages (averages.py)
     own_surface: OwnSurface | None = None  # None: the surface is where the mesh is
 
     @property

@@ -103,6 +103,7 @@ class _Compilation:
             aovs=tuple((name, kind) for name, kind, _ in self.graph.aovs),
             displaces=code.exists(self.graph.displacement),
             along_normal=self._lifts_along_normal(),
+            averaging=frozenset(code.averaging),
         )
 
     def _unused_slots(self, medium: Medium | None, glass: bool) -> None:

@@ -9,13 +9,15 @@ and called for both neighbours; at the point itself the height is an ordinary va
 from __future__ import annotations
 
 from . import nodes
-from .atlas import PREFIX, atlas_key, keys_of, layout
+from .atlas import PREFIX, atlas_key, keys_of, texture_layout
 from .attributes import asked_for
+from .averages import EXACT, averaged_lookups
 from .compiled import Attribute
+from .estimate import image_estimate
 from .graph import Graph, Node
 from .nodes import entry as words
 from .nodes.entry import Entry
-from .nodes.image import FUNCTIONS, MISSING_COLOR, part_functions, tiled_functions
+from .nodes.image import FUNCTIONS, MISSING_COLOR, image_functions, tiled_functions
 from .nodes.image import SOURCE as IMAGE_SOURCE
 from .values import ValueBlock, glsl_number, to_kind
 from .working_space import current
@@ -26,7 +28,8 @@ MAX_IMAGES = 12  # of 16 samplers that every backend has; the rest is for the pr
 
 # The Texture Mapping panel of a node as the reader hands it on, where nobody has touched it.
 PLAIN_MAPPING = ("POINT", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in material/image.glsl
+IMAGE_FLAGS = {"STRAIGHT": 2, "PREMUL": 8, "CHANNEL_PACKED": 0, "NONE": 4}  # IMAGE_* in texture/levels.glsl
+LEVELS = 16
 
 SURFACE_HEAD = "void evaluate_material(SurfacePoint point, inout Closures closures)"
 GLSL_TYPES = {"FLOAT": "float", "VECTOR": "vec3", "COLOR": "vec3"}
@@ -74,6 +77,8 @@ class Expressions:
         self.attributes: list[Attribute] = []
         # In sampler order, with the files that their functions call: of one, unless nodes of two kinds read an image.
         self.image_keys: dict[str, dict[str, None]] = {}
+        self.averaging: set[str] = set()  # those of which some lookup averages
+        self._sizes: dict[str, str] = {}  # GLSL that reads width and height, of those that are one image
         self.includes: dict[str, None] = {
             "material/values.glsl": None,
             "lib/closure.glsl": None,
@@ -86,6 +91,7 @@ class Expressions:
         self._function_depths: dict[str, int] = {}
         self._constants: dict[tuple[str, words.Argument], str] = {}
         self._read_outputs = graph.read
+        self._averaged = averaged_lookups(graph, self._is_opaque) if images is not None else {}
 
     @property
     def lines(self) -> list[str]:
@@ -109,15 +115,22 @@ class Expressions:
 
     def _image_functions(self, key: str, k: int, source: str) -> str:
         """The lookups of sampler `k`: of an image, of each image of an atlas, or of a UDIM image's tiles."""
-        text = FUNCTIONS[source]
+        if source != IMAGE_SOURCE:
+            return FUNCTIONS[source].format(k=k)
+        averages = key in self.averaging
         if key.startswith(PREFIX):
-            corners, _ = layout([self._size(one) for one in keys_of(key)])
-            parts = zip(corners, (self._size(one) for one in keys_of(key)))
-            return "\n".join(part_functions(k, n, (*corner, *size)) for n, (corner, size) in enumerate(parts))
+            sizes = [self._size(one) for one in keys_of(key)]
+            return "\n".join(
+                image_functions(f"{k}_{n}", f"ivec2({size[0]}, {size[1]})", corner, averages)
+                for n, (corner, size) in enumerate(zip(texture_layout(sizes)[0], sizes))
+            )
         tiles = self.images[key].tiles if self.images and key in self.images else ()
-        if tiles and source == IMAGE_SOURCE:
-            return tiled_functions(k, tiles)
-        return text.format(k=k)
+        if tiles:
+            sizes = [tile[3:] for tile in tiles]
+            places = [(*corner, *size) for corner, size in zip(texture_layout(sizes)[0], sizes)]
+            return tiled_functions(k, [tile[0] for tile in tiles], places, averages)
+        size = f"ivec2({self._sizes[key]} + vec2(0.5))" if key in self._sizes else f"material_image{k}_size()"
+        return image_functions(k, size, None, averages)
 
     def _size(self, key: str) -> tuple[int, int]:
         height, width = self.images[key].pixels.shape[:2]
@@ -221,7 +234,8 @@ class Expressions:
         for identifier, kind in entry.outputs:
             self.lines.append(f"{GLSL_TYPES[kind]} {names[identifier]};")
             self.outputs[node.key, identifier] = names[identifier], kind
-        self.lines.append(f"{self._function(node, entry)}({', '.join([*arguments, *names.values()])});")
+        call = f"{self._function(node, entry)}({', '.join([*arguments, *names.values()])});"
+        self.lines.extend(self._averaging(node, entry, arguments, list(names.values())) or [call])
         if node.properties.get(entry.clamp_result):
             for identifier, kind in entry.outputs:
                 zero, one = glsl_number(0.0, kind), glsl_number(1.0, kind)
@@ -250,6 +264,8 @@ class Expressions:
                 self.note(node, f"The material reads more than {MAX_IMAGES} images; '{node.label}' is drawn pink.")
                 return False
             self.image_keys[key] = {}
+            if self.images is not None and entry.include == IMAGE_SOURCE and not key.startswith(PREFIX):
+                self._sizes[key] = f"{self.values.add((*self._size(key), 0.0), 'VECTOR')}.xy"
         self.image_keys[key].setdefault(entry.include)
         return True
 
@@ -376,8 +392,52 @@ class Expressions:
             self.attributes.append(attribute)
         return f"point.attributes[{self.attributes.index(attribute)}]"
 
+    def _averaging(self, node: Node, entry: Entry, arguments: list[str], outputs: list[str]) -> list[str]:
+        """The call of a lookup that averages where a program knows what its pixels see. Functions of heights do not."""
+        if node.key not in self._averaged or len(self._scopes) > 1:
+            return []
+        own = self._atlas.get(node.image, node.image)
+        self.averaging.add(own)
+        given = node.inputs.get("Vector")
+        if given is not None and self.exists(given.link):
+            name = self.function(given.link, "VECTOR")
+            steps = [
+                f"{name}(surface_point_moved(point, vec2({step}))) - {arguments[0]}"
+                for step in ("1.0, 0.0", "0.0, 1.0")
+            ]
+        else:
+            uv = self.attribute(node, "UV", "")
+            steps = [uv.replace("attributes", f"attributes_{way}") for way in ("dx", "dy")]
+        how = self._averaged[node.key]
+        pixels = "FOOTPRINT_OF_EXACT" if how.kind == EXACT else "FOOTPRINT_OF_FIRST"
+        along_x, along_y = (f"({step}).xy" for step in steps)
+        footprint = f"image_footprint(point, {along_x}, {along_y}, {pixels})"
+        function, at_point = self._function(node, entry), ", ".join([*arguments, *outputs])
+        mean = [f"{function}_mean({', '.join([*arguments, footprint, *outputs])});"]
+        if not how.alpha:
+            alpha = outputs[1]
+            mean = [f"{function}({at_point});", f"float {alpha}_here = {alpha};", *mean, f"{alpha} = {alpha}_here;"]
+        return [f"#ifdef {pixels}", *mean, "#else", f"{function}({at_point});", "#endif"]
+
+    def _is_opaque(self, node: Node) -> bool:
+        image = self.images.get(node.image)
+        if image is None or image.alpha_mode in ("NONE", "CHANNEL_PACKED") or image.encoding != "SRGB":
+            return True
+        return bool(image_estimate(image, False, "Alpha").low[0] >= 1.0)
+
     def _image_flags(self, key: str) -> int:
         image = (self.images or {}).get(key)
-        if image is None:
-            return IMAGE_FLAGS["NONE"]
-        return IMAGE_FLAGS.get(image.alpha_mode, 0) + (1 if image.encoding == "SRGB" else 0)
+        return IMAGE_FLAGS["NONE"] if image is None else image_flags(image) + LEVELS * self._has_levels(key)
+
+    def _has_levels(self, key: str) -> bool:
+        """Whether an image, or the atlas that holds it, leaves room for levels in its texture."""
+        sizes: list[tuple[int, int]] = []
+        for one in keys_of(self._atlas.get(key, key)):
+            tiles = self.images[one].tiles
+            sizes += [tile[3:] for tile in tiles] if tiles else [self._size(one)]
+        return texture_layout(sizes)[2]
+
+
+def image_flags(image) -> int:
+    """How an image's pixels are stored, see IMAGE_* in shaders/texture/levels.glsl."""
+    return IMAGE_FLAGS.get(image.alpha_mode, 0) + (1 if image.encoding == "SRGB" else 0)

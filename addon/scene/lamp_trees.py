@@ -27,7 +27,8 @@ from ..materials.compiler import compile_material
 from ..materials.graph import Graph
 from ..materials.nodes.inputs import NO_PARAMETRIC, ONLY_TWO_RAYS
 from ..snapshot.scene import Image, Light, Note
-from .materials import MATERIAL_SCENE, image_of, upload_image, values_block, values_struct
+from .materials import MATERIAL_SCENE, values_block, values_struct
+from .textures import upload_texture
 
 LAMP = Struct(
     "Lamp",
@@ -77,7 +78,7 @@ class LampTree:
         self._values = values_block(self.compiled)
         self._textures = {"energy_table": energy_table}
         for slot, key in enumerate(self.compiled.images):
-            self._textures[f"material_image{slot}"] = upload_image(image_of(named, key))
+            self._textures[f"material_image{slot}"] = upload_texture(named, key)
 
     def bake(self, what: int, side: int, at: Asked, lamp: dict, edge: float, scene: Block) -> np.ndarray:
         """Radiance factors, (side + 2, side + 2, 3) with a border of one texel, or, of PATHS, (DISTANCES, 3).
@@ -111,11 +112,11 @@ def bake_program(compiled: CompiledMaterial) -> Program:
         if attribute.kind in ATTRIBUTES
     )
     head = "void fill_attributes(inout SurfacePoint point)"
-    own = ("energy_table", *(f"material_image{slot}" for slot in range(len(compiled.images))))
+    own = tuple(("FLOAT_2D", f"material_image{slot}") for slot in range(len(compiled.images)))
     return passes.fullscreen_program(
         f"lamp {compiled.program_key[:8]}",
         "lamp/bake.frag.glsl",
-        textures=tuple(("RGBA32F", name) for name in own),
+        textures=(("RGBA32F", "energy_table"), *own),
         blocks=((values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene"), (LAMP, "lamp")),
         outputs=(("VEC4", "out_radiance"),),
         snippets=(("generated/material", f"{compiled.glsl}\n{head}\n{{\n{fill}}}\n"),),

@@ -12,16 +12,17 @@ from ..gfx import images, library
 from ..gfx.context import to_hold
 from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
-from ..materials.atlas import keys_of, packed
+from ..materials.atlas import keys_of
 from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
 from ..materials.reader import FINE_LAYERS
 from ..materials.working_space import current
-from ..snapshot.scene import Image, Note, Snapshot
+from ..snapshot.scene import Note, Snapshot
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
+from .textures import upload_texture
 from .view import VIEW, View
 
 # The camera as node trees see it. Positions are relative to the render origin.
@@ -38,6 +39,11 @@ MATERIAL_SCENE = Struct(
 CAMERA_DEFINES = (
     ("PROJECTION", "film_view.row_x, film_view.row_y, film_view.row_w, film_view.row_q, film_view.backward.w"),
     ("VISIBILITY_FLAG", "film_view.visibility"),
+)
+# Where lookups of textures average over what a pixel of the view sees (materials/averages.py).
+AVERAGING_DEFINES = (
+    ("FOOTPRINT_OF_EXACT", "film_view.footprint_exact"),
+    ("FOOTPRINT_OF_FIRST", "film_view.footprint_first"),
 )
 SHARED_ROWS = 1024  # of values in a block that materials of one program share: 16 KiB, what every GPU allows
 FIRST_VALUE = "first_value"  # constant of programs of such materials: where in the block those of a draw begin
@@ -56,7 +62,7 @@ class MaterialSet:
         self._view: tuple = ()
         self._cache: dict[str, tuple[object, CompiledMaterial]] = {}
         self._blocks: dict[str, Block] = {}
-        self._images: dict[tuple[str, int], images.Image] = {}
+        self._images: dict[tuple[str, int, bool], images.Image] = {}  # by key, version, and whether it has levels
         self._used: list[str] = []
         # By material: the first one of those that share its program and block, and where in that its values begin.
         self.leaders: list[int] = []
@@ -88,12 +94,15 @@ class MaterialSet:
             ]
         self._cache = cache
         self.notes = tuple(notes)
-        needed = {key for compiled in self.compiled for key in compiled.images}
+        levels: dict[str, bool] = {}
+        for compiled in self.compiled:
+            for name in compiled.images:
+                levels[name] = levels.get(name, False) or name in compiled.averaging
+        self._keys_of_images = {name: (name, _version(snapshot, name), levels[name]) for name in levels}
         self._images = {
-            key: self._images.get(key) or upload_image(image_of(snapshot.images, key[0]))
-            for key in ((name, _version(snapshot, name)) for name in needed)
+            key: self._images.get(key) or upload_texture(snapshot.images, key[0], key[2])
+            for key in self._keys_of_images.values()
         }
-        self._versions = dict(self._images.keys())  # the keys are pairs of name and version
         self._blocks = {key: block for key, block in self._blocks.items() if key in cache}
         self._keys = [material.key for material in snapshot.materials]
         for key, compiled in zip(self._keys, self.compiled):
@@ -229,7 +238,7 @@ class MaterialSet:
         compiled = self.compiled[index]
         textures = {"instances": instances, "energy_table": self.energy_table}
         for slot, name in enumerate(compiled.images):
-            textures[f"material_image{slot}"] = self._images[name, self._versions[name]]
+            textures[f"material_image{slot}"] = self._images[self._keys_of_images[name]]
         if compiled.own_surface and own:
             textures |= self.own_images[index]
         values = self._shared[self.leaders[index]] if shared else self._blocks[self._keys[index]]
@@ -253,20 +262,6 @@ class MaterialSet:
 def _version(snapshot: Snapshot, name: str) -> int | tuple[int, ...]:
     versions = tuple(snapshot.images[key].version if key in snapshot.images else 0 for key in keys_of(name))
     return versions if len(versions) > 1 else versions[0]
-
-
-def image_of(known: dict[str, Image], key: str) -> Image:
-    """The image of a key that a compiled material names: one of `known`, or several in one (materials/atlas.py)."""
-    keys = keys_of(key)
-    if len(keys) == 1 and keys[0] == key:
-        return known[key]
-    return Image(key, 0, packed([known[one].pixels for one in keys]))
-
-
-def upload_image(image: Image) -> images.Image:
-    """The pixels of an image as materials sample them."""
-    # Eight-bit content fits a half float exactly enough only when it stays encoded; floats keep full precision.
-    return images.upload(image.pixels, "RGBA32F")
 
 
 def may_share(compiled: CompiledMaterial) -> bool:
@@ -322,7 +317,7 @@ def _shared(compiled: CompiledMaterial) -> dict:
         ),
         "textures": (
             ("RGBA32F", "instances"), ("RGBA32F", "energy_table"),
-            *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *(("FLOAT_2D", f"material_image{k}") for k in range(len(compiled.images))),
             *(own.textures if own else ()),
         ),
         "writes_depth": own is not None,
@@ -373,7 +368,7 @@ def _surface_program(compiled: CompiledMaterial) -> Program:
             *((("INT", FIRST_VALUE),) if shares else ()),
         ),
         defines=(
-            *CAMERA_DEFINES, *_layer_defines(compiled),
+            *CAMERA_DEFINES, *AVERAGING_DEFINES, *_layer_defines(compiled),
             *((("MATERIAL_BASE", "(instance_flat.y >> 1)"),) if shares else ()),
         ),
         **_shared(compiled),
@@ -418,7 +413,7 @@ def _tint_program(compiled: CompiledMaterial) -> Program:
             (MATERIAL_SCENE, "material_scene"),
         ),
         constants=(("INT", "first_instance"), ("INT", "glass_bends")),
-        defines=(*CAMERA_DEFINES, *_layer_defines(compiled)),
+        defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, *_layer_defines(compiled)),
         **{**shared, "textures": (*shared["textures"], ("RGBA32F", "surface_position"))},
     )
 
@@ -435,7 +430,7 @@ def _scatter_program(compiled: CompiledMaterial) -> Program:
         fragment="surface/scatter.frag.glsl",
         outputs=tuple(("VEC4", f"out_{name}") for name in SCATTER_IMAGES),
         textures=(*like.textures, ("RGBA32F", "scatter_objects")),
-        defines=(*CAMERA_DEFINES, ("SUBSURFACE", "1"), *_own_defines(compiled)),
+        defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, ("SUBSURFACE", "1"), *_own_defines(compiled)),
     )
 
 
@@ -506,7 +501,7 @@ def _glow_program(compiled: CompiledMaterial) -> Program:
         name=f"glow {compiled.program_key[:8]}",
         fragment="surface/glow.frag.glsl",
         outputs=(("VEC4", "out_emission"),),
-        defines=(*CAMERA_DEFINES, *_own_defines(compiled)),
+        defines=(*CAMERA_DEFINES, *AVERAGING_DEFINES, *_own_defines(compiled)),
     )
 
 

@@ -31,7 +31,8 @@ from ..materials.volume import PHASES, Medium
 from ..materials.volume_program import CompiledVolume, compile_volume
 from ..snapshot.scene import Instance, Note, Snapshot, Volume
 from . import acceleration
-from .materials import MATERIAL_SCENE, upload_image, values_block, values_struct
+from .materials import MATERIAL_SCENE, values_block, values_struct
+from .textures import upload_texture
 
 MOST_MEDIA = 30
 MEDIUM_TEXELS = 10  # layout in shaders/media/media.glsl
@@ -235,7 +236,7 @@ def bake_program(compiled: CompiledVolume, grids: tuple[str, ...]) -> Program:
         f"volume bake {compiled.program_key[:8]}",
         "media/bake.frag.glsl",
         textures=(
-            *(("RGBA32F", f"material_image{slot}") for slot in range(len(compiled.images))),
+            *(("FLOAT_2D", f"material_image{slot}") for slot in range(len(compiled.images))),
             *(("RGBA32F", f"volume_grid{slot}") for slot in range(len(grids))),
         ),
         blocks=(
@@ -354,7 +355,7 @@ class Media:
             read = {attribute.name for attribute in compiled.attributes}
             grids = tuple(name for name in grids if name in read)
             textures = {
-                f"material_image{k}": upload_image(snapshot.images[key]) for k, key in enumerate(compiled.images)
+                f"material_image{k}": upload_texture(snapshot.images, key) for k, key in enumerate(compiled.images)
             }
             textures |= {f"volume_grid{k}": _upload_grid(one.volume.grids[name]) for k, name in enumerate(grids)}
             cell = one.to_world.copy()

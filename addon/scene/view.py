@@ -33,6 +33,9 @@ VIEW = Struct(
     ("int", "bits_z"),
     ("int", "bits_w"),
     ("int", "visibility"),  # flag of the instances that this view shows (addon/scene/geometry.py)
+    # Pixels over which lookups of textures average (materials/averages.py); 0: what stands at the point.
+    ("float", "footprint_exact"),
+    ("float", "footprint_first"),
 )
 
 
@@ -61,9 +64,16 @@ class View:
         )
 
     def values(
-        self, sample: int, seed: int, jitter: tuple[float, float], scene_size: float, lens: tuple[float, float] = (0, 0)
+        self,
+        sample: int,
+        seed: int,
+        jitter: tuple[float, float],
+        scene_size: float,
+        lens: tuple[float, float] = (0, 0),
+        footprints: tuple[float, float] = (0.0, 0.0),
     ) -> dict:
-        """Fields of VIEW for one sample. `jitter` in pixels; `scene_size` in metres bounds the near plane below.
+        """Fields of VIEW for one sample. `jitter` in pixels; `scene_size` in metres bounds the near plane below;
+        `footprints`: as the last fields of VIEW.
 
         `lens`: the point of the aperture that is looked through, metres to the right and up. The frustum is sheared
         so that the plane in focus stays where it is.
@@ -108,7 +118,7 @@ class View:
             "eye": (*eye, float(orthographic)), "right": (*right_axis, jitter[0]), "up": (*up, jitter[1]),
             "backward": (*backward, near), "frame": frame, "film": (width, height, start, end),
             "sample_index": sample, "seed": seed,
-            "visibility": CAMERA_FLAG,
+            "visibility": CAMERA_FLAG, "footprint_exact": footprints[0], "footprint_first": footprints[1],
             **dict(zip(("bits_x", "bits_y", "bits_z", "bits_w"), pixel_bits(sample))),
         }  # fmt: skip
 

@@ -27,7 +27,8 @@ from ..gfx.struct import Block
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..snapshot.scene import Image, Note, World
-from .materials import MATERIAL_SCENE, image_of, upload_image, values_block, values_struct
+from .materials import MATERIAL_SCENE, values_block, values_struct
+from .textures import upload_texture
 from .view import VIEW, View
 
 PLAIN, SKY, LARGEST = (1024, 512), (2048, 1024), (4096, 2048)
@@ -48,7 +49,7 @@ class WorldTree:
         self._values = values_block(self.compiled)
         self._textures = {"energy_table": energy_table}
         for slot, key in enumerate(self.compiled.images):
-            self._textures[f"material_image{slot}"] = upload_image(image_of(named, key))
+            self._textures[f"material_image{slot}"] = upload_texture(named, key)
 
     def bake(self) -> np.ndarray:
         """Radiance that arrives from all directions, (H, W, 3) float64, equirectangular, bottom row first."""
@@ -108,11 +109,11 @@ def _program(
         if attribute.kind == "GENERATED"
     )
     head = "void fill_attributes(inout SurfacePoint point)"
-    own = ("energy_table", *(f"material_image{slot}" for slot in range(len(compiled.images))))
+    own = tuple(("FLOAT_2D", f"material_image{slot}") for slot in range(len(compiled.images)))
     return passes.fullscreen_program(
         f"{name} {compiled.program_key[:8]}",
         fragment,
-        textures=tuple(("RGBA32F", name) for name in (*textures, *own)),
+        textures=(*(("RGBA32F", name) for name in (*textures, "energy_table")), *own),
         blocks=(*blocks, (values_struct(compiled), "material_values"), (MATERIAL_SCENE, "material_scene")),
         outputs=(("VEC4", "out_radiance"),),
         snippets=(("generated/material", f"{compiled.glsl}\n{head}\n{{\n{fill}}}\n"),),

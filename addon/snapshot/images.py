@@ -92,20 +92,25 @@ class ImageTable:
         elif alpha in ("STRAIGHT", "PREMUL"):
             kept = original.source != "GENERATED" and not BYTES_ARE_STRAIGHT
             alpha = "PREMUL" if is_float else alpha if kept else "STRAIGHT"
-        if not missing and not isinstance(part, Layer) and _is_rec709(original):
+        turned = not missing and not isinstance(part, Layer) and _is_rec709(original)
+        if turned:
             pixels, encoding = _turned(pixels, encoding), "LINEAR"
         if encoding == "" and not missing:
+            turned = True
             pixels, encoding = to_scene_linear(pixels, original.colorspace_settings.name), "LINEAR"
+        as_stored = not is_float and not turned
+        bits = 8 if as_stored else 32 if original.colorspace_settings.is_data else 16
         same = (
             old is not None
-            and (old.image.encoding, old.image.alpha_mode, old.image.tiles) == (encoding, alpha, tiles)
+            and (old.image.encoding, old.image.alpha_mode, old.image.tiles, old.image.bits)
+            == (encoding, alpha, tiles, bits)
             and np.array_equal(old.image.pixels, pixels)
         )
         if same:
             self.reused += 1
             return ImageEntry(old.image, state, notes)
         self.read += 1
-        made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles)
+        made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles, bits)
         return ImageEntry(made, state, notes)
 
 

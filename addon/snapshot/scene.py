@@ -166,6 +166,7 @@ class Image:
     missing: bool = False  # it could not be read: the pixels stand in for it, wherever it is asked
     # Of a UDIM image: number of each tile, where it stands in `pixels` (x, y from the lower left) and its size.
     tiles: tuple[tuple[int, int, int, int, int], ...] = ()
+    bits: int = 32  # a channel of the GPU's copy needs: 8 of bytes, 16 of colours, 32 of other numbers
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,15 @@ from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..scene.acceleration import Hierarchy
 from ..scene.geometry import corner_attribute
-from ..scene.materials import CAMERA_DEFINES, MATERIAL_SCENE, SURFACE_IMAGES, may_share, shared_struct, values_struct
+from ..scene.materials import (
+    AVERAGING_DEFINES,
+    CAMERA_DEFINES,
+    MATERIAL_SCENE,
+    SURFACE_IMAGES,
+    may_share,
+    shared_struct,
+    values_struct,
+)
 from ..scene.view import VIEW
 from ..snapshot.scene import Instance, Mesh
 from .draw import refracts
@@ -152,7 +160,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
         fragment="hits/surface.frag.glsl",
         textures=(
             *RECORD_TEXTURES, RAYS[1], ("RGBA32F", "instances"), ("RGBA32F", "energy_table"), *listed,
-            *relief, *(("RGBA32F", f"material_image{k}") for k in range(len(compiled.images))),
+            *relief, *(("FLOAT_2D", f"material_image{k}") for k in range(len(compiled.images))),
             *((("UINT_2D", "materials_met"),) if room else ()),
             *((("R32F", "hit_material"), ("RGBA32F", "hit_materials")) if shared else ()),
         ),
@@ -167,7 +175,7 @@ def _hit_program(compiled: CompiledMaterial) -> Program:
         **{
             **MASKED,
             "defines": (
-                *MASKED["defines"], *((("ASKS_IF_MET", str(MET_ROWS)),) if room else ()),
+                *MASKED["defines"], *AVERAGING_DEFINES, *((("ASKS_IF_MET", str(MET_ROWS)),) if room else ()),
                 *((("SHARED_VALUES", "1"), ("MATERIAL_BASE", "MET_MATERIAL_BASE")) if shared else ()),
                 *((("OWN_SURFACE", ""),) if relief else ()),
             ),

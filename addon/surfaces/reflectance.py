@@ -133,4 +133,5 @@ def _values(view: dict) -> dict:
     return {
         **view, "film": (SIDE, SIDE, 0.0, 4 * view["frame"][1]), "sample_index": 0, "seed": 0,
         **dict.fromkeys(("bits_x", "bits_y", "bits_z", "bits_w"), 0), "visibility": EVERY_FLAG,
+        "footprint_exact": 0.0, "footprint_first": 0.0,
     }  # fmt: skip

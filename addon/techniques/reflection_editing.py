@@ -11,7 +11,7 @@ never change, and pixels outside of all regions are what they are without this t
 | draws | 1 per object |
 | arithmetic per pixel | 4 Jacobi sweeps of a 4x4 matrix per region, once more where it fades; 2 distances each |
 | bytes per pixel | 16 |
-| geodesic distances, once per change | a shortest-path search per region and constraint |
+| geodesic distances, once per change | a shortest-path search per region and constraint, as far as regions reach |
 
 Bias: directions are exact for the view in which a constraint was made; in other views they turn along with what the
 surface mirrors there. Surfaces that are seen in a mirror or through glass are shown without their edits. An edited
@@ -21,6 +21,7 @@ largest one. Drafts show glass without its edits.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -137,6 +138,7 @@ class ReflectionEditing(Technique):
     def __init__(self):
         self._edited: list[_Edited] = []
         self._kept: dict[object, _Edited] = {}
+        self._surfaces: dict[object, geodesic.Surface] = {}
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not any(_edits(instance)[0] for instance in snapshot.instances if instance.own):
@@ -146,6 +148,7 @@ class ReflectionEditing(Technique):
     def begin(self, frame: Frame) -> None:
         rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}
         kept: dict[object, _Edited] = {}
+        surfaces: dict[object, geodesic.Surface] = {}
         for instance in frame.snapshot.instances:
             constraints, regions = _edits(instance)
             mesh = frame.snapshot.meshes[instance.mesh]
@@ -153,9 +156,11 @@ class ReflectionEditing(Technique):
                 continue
             row = rows[id(instance)]
             origin = tuple(frame.geometry.origin)
-            key = (instance.mesh, mesh.version, instance.matrix.tobytes(), instance.own, row, origin)
-            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row)
-        self._kept, self._edited = kept, list(kept.values())
+            where = (instance.mesh, mesh.version, instance.matrix.tobytes(), row, origin)
+            surfaces[where] = self._surfaces.get(where) or _surface(frame, instance, mesh)
+            key = (*where, instance.own)
+            kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where])
+        self._kept, self._edited, self._surfaces = kept, list(kept.values()), surfaces
         frame.shared(SurfaceStages).apply.append(self._at_film_point)
 
     def sample(self, frame: Frame) -> None:
@@ -190,7 +195,7 @@ class ReflectionEditing(Technique):
         passes.draw(shader, one.batch)
 
     def release(self) -> None:
-        self._edited, self._kept = [], {}
+        self._edited, self._kept, self._surfaces = [], {}, {}
 
 
 def _edits(instance: Instance) -> tuple[list[dict], list[dict]]:
@@ -202,42 +207,51 @@ def _edits(instance: Instance) -> tuple[list[dict], list[dict]]:
     return constraints[:MOST_CONSTRAINTS], regions[:MOST_REGIONS]
 
 
-def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int) -> _Edited:
+def _surface(frame: Frame, instance: Instance, mesh: Mesh) -> geodesic.Surface:
+    matrix = _placed(frame, instance)
+    return geodesic.Surface(
+        mesh.positions @ matrix[:3, :3].T + matrix[:3, 3], mesh.corner_vertices[mesh.triangle_corners]
+    )
+
+
+def _placed(frame: Frame, instance: Instance) -> np.ndarray:
+    """Its matrix, relative to the render origin."""
     matrix = instance.matrix.copy()
     matrix[:3, 3] -= frame.geometry.origin
-    corners = mesh.corner_vertices[mesh.triangle_corners]
-    world = mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+    return matrix
+
+
+def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geodesic.Surface) -> _Edited:
+    matrix, world, corners = _placed(frame, instance), surface.positions, surface.triangles
+    surface.begin()
     wanted_constraints, wanted_regions = _edits(instance)
     layers: list[np.ndarray] = []
-    graph: list[geodesic.Neighbours] = []
 
-    def along(point: np.ndarray) -> int:
+    def along(point: np.ndarray, reach: float) -> int:
         """A layer with distances from a point; -1 where there is no room for it."""
         if len(layers) >= MOST_LAYERS:
             return -1
-        if not graph:
-            graph.append(geodesic.neighbours(world, corners))
-        triangle, _ = geodesic.nearest(world, corners, point)
-        seeds = corners[triangle]
-        layers.append(geodesic.distances(graph[0], seeds, np.linalg.norm(world[seeds] - point, axis=1)))
+        layers.append(surface.along(point, reach))
         return len(layers) - 1
 
-    found = [_constraint(frame, instance, mesh, matrix, world, corners, one) for one in wanted_constraints]
-    if any(one["kind"] == "GEODESIC" for one in wanted_regions):
-        found = [Constraint(one.place, one.before, one.after, one.normal, one.bent, along(one.place)) for one in found]
     scale = abs(np.linalg.det(matrix[:3, :3])) ** (1 / 3)
+    found = [_constraint(frame, instance, mesh, matrix, surface, one) for one in wanted_constraints]
+    widest = max((scale * one["radius"] for one in wanted_regions if one["kind"] == "GEODESIC"), default=0.0)
+    if widest > 0.0:  # places of a region are within two radii of its constraints, and edges that paths begin with
+        reach = 2.0 * (widest + surface.longest)
+        found = [replace(one, layer=along(one.place, reach)) for one in found]
     regions, members = [], []
     for one in wanted_regions:
         kind, centre, layer = KINDS[one["kind"]], _moved(matrix, one["centre"]), -1
         if kind == reflection_edits.GEODESIC:
-            layer = along(centre)
+            layer = along(centre, scale * one["radius"])
             kind = kind if layer >= 0 else reflection_edits.EUCLIDEAN
         elif kind == reflection_edits.PAINTED and len(layers) < MOST_LAYERS:
             layer = len(layers)
             layers.append(_painted(mesh))
         region = Region(kind, centre, scale * one["radius"], scale * one["border"], layer)
         regions.append(region)
-        members.append(sum(1 << n for n, c in enumerate(found) if _inside(region, c, layers, world, corners)))
+        members.append(sum(1 << n for n, c in enumerate(found) if _inside(region, c, layers, surface)))
     frozen = None
     if own_value(instance.own, ReflectionEditing, "freeze"):
         frozen = _moved(matrix, wanted_constraints[0]["viewer"])
@@ -258,13 +272,13 @@ def _moved(matrix: np.ndarray, point) -> np.ndarray:
     return matrix[:3, :3] @ np.asarray(point, float) + matrix[:3, 3]
 
 
-def _constraint(frame: Frame, instance, mesh: Mesh, matrix, world, corners, one: dict) -> Constraint:
+def _constraint(frame: Frame, instance, mesh: Mesh, matrix, surface: geodesic.Surface, one: dict) -> Constraint:
     point = _moved(matrix, one["point"])
     triangle, weights = one["triangle"], np.asarray(one["weights"], float)
-    if 0 <= triangle < len(corners):
-        point = weights @ world[corners[triangle]]
+    if 0 <= triangle < len(surface.triangles):
+        point = weights @ surface.positions[surface.triangles[triangle]]
     else:
-        triangle, weights = geodesic.nearest(world, corners, point)
+        triangle, weights = surface.nearest(point)
     cofactors = np.linalg.det(matrix[:3, :3]) * np.linalg.pinv(matrix[:3, :3]).T
     normal = reflection_edits.unit(cofactors @ (weights @ mesh.corner_normals[mesh.triangle_corners[triangle]]))
     view = reflection_edits.unit(_moved(matrix, one["viewer"]) - point)
@@ -289,10 +303,10 @@ def _painted(mesh: Mesh) -> np.ndarray:
     return weights
 
 
-def _inside(region: Region, one: Constraint, layers, world, corners) -> bool:
+def _inside(region: Region, one: Constraint, layers, surface: geodesic.Surface) -> bool:
     if region.layer >= 0:
-        triangle, weights = geodesic.nearest(world, corners, one.place)
-        value = weights @ layers[region.layer][corners[triangle]]
+        triangle, weights = surface.nearest(one.place)
+        value = weights @ layers[region.layer][surface.triangles[triangle]]
     else:
         value = np.linalg.norm(one.place - region.centre)
     return bool(reflection_edits.influence(region, value) > 0.0)

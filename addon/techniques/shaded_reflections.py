@@ -21,8 +21,8 @@ sample, so a pane shows both its reflection and the view.
 Rougher lobes than `roughness` see means (instant_radiosity.py), and so do drafts, pictures whose indirect light is not
 by virtual lights of that technique, and scenes above 4 million triangles.
 
-Bias: that of hits.py and of virtual lights; light behind the last bounce is left out. Textures are not filtered by the
-width of a lobe, but by the samples that a picture takes of it.
+Bias: that of hits.py and of virtual lights; light behind the last bounce is left out. Textures are averaged over
+the footprint of the pixel, not over the width of a lobe.
 """
 
 from __future__ import annotations

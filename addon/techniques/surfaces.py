@@ -35,6 +35,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..film import points as film_points
 from ..frame.run import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
@@ -86,6 +87,9 @@ class Surfaces(Technique):
 
     def begin(self, frame: Frame) -> None:
         modes = (OPAQUE, LEFT_OUT) if any(m.transparent for m in frame.materials.compiled) else (STOCHASTIC,)
+        film = next((one for one in frame.plan.techniques if film_points.POINTS in one.params), None)
+        if film is not None:
+            frame.film_points = film_points.points_of_sample(frame, frame.settings.get(film, film_points.POINTS.name))
         known = frame.kept(_KnownReceivers)
         key = _receivers_key(frame, modes)
         if known.key == key:

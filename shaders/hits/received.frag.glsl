@@ -15,6 +15,7 @@ struct Receiver {
   bool shines;     // has a lobe of microfacets that light samples can find
   bool bends;
   bool followed;   // by a ray
+  bool ended;      // would be, but for the number of bounces: shows nothing
   int mirrored;    // by so many surfaces on the way to the camera
   Lobe lobe;
   Interface glass;
@@ -94,7 +95,7 @@ vec3 indirect_light(Receiver r, uvec3 roll)
 {
   vec3 sum = vec3(0.0);
   Reflection reflection = surface_reflection(r.surface, max(dot(r.surface.geometric_normal, r.viewer), 0.0));
-  if (r.followed || r.bends) {
+  if (r.followed || r.bends || r.ended) {
     reflection.straight = reflection.grazing = vec3(0.0);
   }
   vec3 lit = r.surface.normal;
@@ -142,9 +143,10 @@ void main()
   r.bends = has_lobe && r.surface.kind == LOBE_REFRACTION;
   r.shines = has_lobe && r.surface.kind <= FRESNEL_F82;
   r.mirrored = path_mirrors(code);
-  r.followed = has_lobe && ray_number + 1 < rays
-               && (r.bends ? ray_number < interfaces :
-                             r.surface.glossy_roughness <= shaded_roughness && r.mirrored < mirrors);
+  bool goes_on = r.bends || r.surface.glossy_roughness <= shaded_roughness;
+  r.followed = has_lobe && goes_on && ray_number + 1 < rays
+               && (r.bends ? ray_number < interfaces : r.mirrored < mirrors);
+  r.ended = has_lobe && goes_on && !r.followed;
   r.lobe = lobe_begin(r.surface, r.viewer);
   r.shines = r.shines && !lobe_is_mirror(r.lobe);
   r.glass = interface_begin(r.surface.glossy_normal, r.viewer, r.surface.glossy_roughness, r.surface.glossy_ior,

@@ -7,6 +7,8 @@
 #include "lib/color.glsl"
 #include "lib/math.glsl"
 #include "lib/surface_point.glsl"
+#include "material/associate.glsl"
+#include "texture/levels.glsl"
 
 #define EXTENSION_REPEAT 0
 #define EXTENSION_EXTEND 1
@@ -16,11 +18,6 @@
 #define INTERPOLATION_LINEAR 0
 #define INTERPOLATION_CLOSEST 1
 #define INTERPOLATION_CUBIC 2
-
-#define IMAGE_SRGB 1       // stored with the sRGB curve
-#define IMAGE_ASSOCIATE 2  // alpha is coverage and colour is stored without it
-#define IMAGE_OPAQUE 4     // alpha is ignored
-#define IMAGE_COVERAGE 8   // alpha is coverage, colour is stored with it
 
 // Index of the texel that stands at `index` beyond the image's borders; negative where there is none.
 int image_wrap(int index, int size, int extension)
@@ -49,32 +46,6 @@ vec2 image_position(vec2 coordinate, ivec2 size, int extension)
     uv -= 2.0 * floor(uv * 0.5);
   }
   return clamp(uv, vec2(-8.0), vec2(8.0)) * vec2(size);
-}
-
-// A stored texel as it enters the interpolation.
-vec4 image_associate(vec4 texel, int flags)
-{
-  if ((flags & IMAGE_OPAQUE) != 0) {
-    return vec4(texel.rgb, 1.0);
-  }
-  if ((flags & IMAGE_ASSOCIATE) != 0) {
-    return vec4(texel.rgb * texel.a, texel.a);
-  }
-  return texel;
-}
-
-// The interpolated value as the node's outputs; colour stays multiplied by alpha unless alpha is used on its own.
-vec4 image_finish(vec4 filtered, int flags, bool alpha_used)
-{
-  vec3 color = filtered.rgb;
-  bool coverage = (flags & (IMAGE_ASSOCIATE | IMAGE_COVERAGE)) != 0;
-  if (coverage && alpha_used && filtered.a > 0.0 && filtered.a < 1.0) {
-    color /= filtered.a;
-  }
-  if ((flags & IMAGE_SRGB) != 0) {
-    color = srgb_decode(color);
-  }
-  return vec4(color, filtered.a);
 }
 
 // Uniform cubic B-spline over four texels: smooth, and a little blurred.
@@ -168,4 +139,48 @@ vec2 image_on_box(vec3 coordinate, vec3 normal, int side)
     return vec2((normal.y > 0.0) ? 1.0 - coordinate.x : coordinate.x, coordinate.z);
   }
   return vec2((normal.z > 0.0) ? 1.0 - coordinate.y : coordinate.y, coordinate.x);
+}
+
+// What a pixel sees of a surface: two axes, as changes of a coordinate that changes by `along_x` and `along_y` with the
+// point's position_dx and position_dy. The pixel's square meets the surface stretched along the direction in which it is seen.
+mat2 image_footprint(SurfacePoint point, vec2 along_x, vec2 along_y, float pixels)
+{
+  vec3 beside = safe_normalize(point.position_dx);
+  vec2 lean = vec2(dot(point.incoming, beside), dot(point.incoming, cross(point.geometric_normal, beside)));
+  float slope = length(lean);
+  vec2 way = (slope > 1e-4) ? lean / slope : vec2(1.0, 0.0);
+  float cosine = max(abs(dot(point.incoming, point.geometric_normal)), 1e-3);
+  return mat2((pixels / cosine) * (way.x * along_x + way.y * along_y), pixels * (way.x * along_y - way.y * along_x));
+}
+
+#define MOST_PROBES 16.0
+
+// The lookups that average a footprint: `count` of them along an axis, at a level whose texels are as wide as the footprint
+// is across it, or as they lie apart.
+struct ImageProbes {
+  vec2 axis;
+  int count;
+  float mip;
+};
+
+ImageProbes image_probes(mat2 footprint, ivec2 whole, int flags)
+{
+  vec2 a = footprint[0] * vec2(whole);
+  vec2 b = footprint[1] * vec2(whole);
+  ImageProbes probes;
+  probes.axis = (dot(a, a) >= dot(b, b)) ? footprint[0] : footprint[1];
+  float longer = sqrt(max(dot(a, a), dot(b, b)));
+  if (!is_finite(longer) || longer > 1e9) {
+    probes.axis = vec2(0.0);
+    longer = 1e9;
+  }
+  float across = (longer < 1e9) ? max(abs(a.x * b.y - a.y * b.x) / max(longer, 1.0), 1.0) : 1e9;
+  float count = clamp(ceil(longer / across - 0.01), 1.0, MOST_PROBES);
+  probes.count = int(count);
+  probes.mip = clamp(log2(max(across, longer / count)), 0.0, float(image_last_level(whole)));
+  if ((flags & IMAGE_LEVELS) == 0) {
+    probes.count = 1;
+    probes.mip = 0.0;
+  }
+  return probes;
 }

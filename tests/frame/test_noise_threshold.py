@@ -61,8 +61,8 @@ SCENES = {
     "cornell_box": 0.05,
     "door_ajar": 0.15,
     "hdri_product": 0.1,
-    "soft_shadow_garden": 0.05,
-    "window_interior": 0.1,
+    "soft_shadow_garden": 0.1,
+    "window_interior": 0.15,
 }  # asked errors, each that of some ten to a hundred samples
 
 

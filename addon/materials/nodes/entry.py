@@ -81,7 +81,7 @@ class Used:
 
 @dataclass(frozen=True)
 class ImageFlags:
-    """How the pixels of the node's image are stored, see IMAGE_* in material/image.glsl; a constant of the material."""
+    """How the pixels of the node's image are stored, see IMAGE_* in texture/levels.glsl; a constant of the material."""
 
 
 @dataclass(frozen=True)
