@@ -184,7 +184,7 @@ def sources() -> str:
 
 def auto() -> dict:
     """What Auto chooses by."""
-    return json.loads((ROOT / "addon" / "frame" / "costs.json").read_text(encoding="utf-8"))["slots"]
+    return json.loads((ROOT / "addon" / "frame" / "technique_costs.json").read_text(encoding="utf-8"))["slots"]
 
 
 def in_turns(cells: Iterable[Cell]) -> list[Cell]:

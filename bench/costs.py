@@ -43,7 +43,7 @@ def measured(
 
 
 def costs(results: Results, slots: dict[str, list[str]]) -> dict[str, dict[str, dict[str, list[float]]]]:
-    """The table, as costs.json holds it: slot -> technique -> samples -> [error, seconds]."""
+    """The table, as technique_costs.json holds it: slot -> technique -> samples -> [error, seconds]."""
     table = {}
     for slot, names in slots.items():
         found = measured(results, slot, slots)
@@ -66,7 +66,7 @@ def costs(results: Results, slots: dict[str, list[str]]) -> dict[str, dict[str, 
 
 
 def text(results: Results, table: dict) -> str:
-    """costs.json: a technique's row per line."""
+    """technique_costs.json: a technique's row per line."""
     about = {name: results.about[name] for name in ("date", "size", "blender", "device", "cpu")}
     about["scenes"] = results.scenes
     lines = []
@@ -86,7 +86,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> int:
     import bpy  # noqa: F401
 
-    from addon.frame import costs as auto
+    from addon.frame import technique_costs as auto
     from addon.techniques import REGISTRY
 
     results = load(options.results)

@@ -15,8 +15,8 @@ import bpy
 
 from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
+from ..frame import device_probe
 from ..frame import ledger as ledgers
-from ..frame import probe
 from ..frame.plan import PlanError, make_plan
 from ..frame.settings import SCENE_PARAMS
 from ..gfx import context
@@ -339,7 +339,7 @@ def _figures(verbose: bool) -> Device | None:
     try:
         with quiet(verbose):
             context.ensure()
-            figures = probe.ensure()
+            figures = device_probe.ensure()
     except RuntimeError:
         return None
     except ValueError as error:

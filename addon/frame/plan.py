@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..snapshot.scene import Snapshot
-from . import costs
+from . import technique_costs
 from .ledger import SKIPPED, Row
 from .light_paths import TRANSPORTS
 from .settings import AUTO, OFF, Settings
@@ -121,7 +121,9 @@ def _wishes(reasons: dict[Technique, str | None], snapshot: Snapshot, settings: 
     for slot, techniques in able.items():
         names = [technique.name for technique in techniques]
         claimed = [technique.name for technique in techniques if technique.claims(snapshot, settings)]
-        found[slot] = claimed[0] if claimed else costs.preferred(costs.known(), slot, names, settings.samples)
+        found[slot] = (
+            claimed[0] if claimed else technique_costs.preferred(technique_costs.known(), slot, names, settings.samples)
+        )
     return found | {slot: wish for slot, wish in settings.slots.items() if wish != AUTO}
 
 

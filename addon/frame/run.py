@@ -33,8 +33,8 @@ from ..snapshot.scene import NO_LINKS, RANKED, Snapshot
 from ..sources.environment import Environment
 from ..sources.lamp_maps import LampMaps
 from ..sources.lights import Emitter, emitters
+from . import device_probe
 from . import ledger as ledger_module
-from . import probe
 from .bands import Bands
 from .ledger import RAN, REUSED, SKIPPED, Ledger, Row
 from .plan import Plan, make_plan
@@ -412,7 +412,7 @@ class Renderer:
         started, compiled = time.perf_counter(), library.compile_seconds
         context.ensure()
         context.begin_picture()
-        probe.ensure()
+        device_probe.ensure()
         ledger = Ledger(samples=0)
         self.materials.update(snapshot)
         snapshot = self.displacement.apply(snapshot, self.materials)

@@ -1,5 +1,5 @@
 """Whether a point of a light is seen from a surface: what tells it (depth maps, rays, or edges: edge_shadows.py), and
-drawing the maps. Which of maps and rays costs less: ray_costs.py.
+drawing the maps. Which of maps and rays costs less: maps_or_rays.py.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..scene.geometry import Draw
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps, repeated_light
-from .ray_costs import Compared, compared, maps_ns, rays_ns
+from .maps_or_rays import Compared, compared, maps_ns, rays_ns
 
 RESOLUTION = Param(
     "texels_per_pixel", "Map resolution", 2.0,

@@ -8,7 +8,7 @@ Maps are fitted to what the camera sees (addon/lighting/depth_maps.py) and compa
 stored per texel (shaders/lib/shadow.glsl). Casters with alpha are drawn stochastically, texel by texel. Edge rays
 (shaders/lib/edge_visibility.glsl; Lauterbach, Mo, Manocha 2009) settle pixels whose four texels disagree, which removes
 the map's resolution from sharp edges and contacts. Where a ray of each pixel costs less than the maps of a light, of
-the world's directions or of points on emissive surfaces, rays replace maps (addon/lighting/ray_costs.py): the same
+the world's directions or of points on emissive surfaces, rays replace maps (addon/lighting/maps_or_rays.py): the same
 points of the light, without texels.
 
 | cost | per sample |

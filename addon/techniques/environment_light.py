@@ -44,7 +44,7 @@ from ..gfx import images, passes
 from ..lighting import depth_maps
 from ..lighting.light_rates import LightRates, world_rate
 from ..lighting.loop import DIRECT_WRITES, light_surfaces, lighting
-from ..lighting.ray_costs import compared
+from ..lighting.maps_or_rays import compared
 from ..lighting.visibility import (
     HARD,
     NO_VIEWS,

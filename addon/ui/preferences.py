@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..frame import probe
+from ..frame import device_probe
 from ..gfx import context, device
 
 
@@ -18,8 +18,8 @@ class CANDELA_OT_measure_device(bpy.types.Operator):
         try:
             context.ensure()
             with context.turn:
-                device.forget(probe.folder())
-                probe.ensure()
+                device.forget(device_probe.folder())
+                device_probe.ensure()
         except (RuntimeError, ValueError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

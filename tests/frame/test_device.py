@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from addon.frame import probe
+from addon.frame import device_probe
 from addon.gfx import context, device
 from addon.lighting import visibility
 from addon.snapshot import SnapshotCache, take
@@ -69,13 +69,13 @@ def test_the_plan_foresees_the_same_choice(room):
 
 
 def test_figures_are_measured_once_and_kept_for_this_driver(unknown):
-    first = probe.ensure()
+    first = device_probe.ensure()
     assert device.known()
     (kept,) = json.loads((unknown / "devices.json").read_text(encoding="utf-8")).items()
     assert kept == (device.key(), asdict(first))
     device.use(None)
     device.measured_s = -1.0
-    assert probe.ensure() == first
+    assert device_probe.ensure() == first
     assert device.measured_s == -1.0, "what is kept is not measured again"
 
 
@@ -87,17 +87,17 @@ def test_figures_that_cannot_be_read_are_measured(unknown, content):
 
 def test_a_made_up_device_is_taken_as_it_is(unknown, monkeypatch, tmp_path):
     monkeypatch.setenv(device.VARIABLE, "card")
-    assert probe.ensure() == device.MADE_UP["card"]
+    assert device_probe.ensure() == device.MADE_UP["card"]
     assert not (unknown / "devices.json").exists()
     device.use(None)
     path = tmp_path / "own.json"
     path.write_text(json.dumps(asdict(TRACER)), encoding="utf-8")
     monkeypatch.setenv(device.VARIABLE, str(path))
-    assert probe.ensure() == TRACER
+    assert device_probe.ensure() == TRACER
     device.use(None)
     monkeypatch.setenv(device.VARIABLE, "toaster")
     with pytest.raises(ValueError, match=r"toaster.*neither one of software, card"):
-        probe.ensure()
+        device_probe.ensure()
     monkeypatch.delenv(device.VARIABLE)
 
 
@@ -110,6 +110,6 @@ def test_the_preferences_tell_the_figures(unknown):
 
 @pytest.mark.timing
 def test_measuring_takes_a_fifth_of_a_second_once_its_programs_are_compiled(unknown):
-    probe.measure()
-    probe.measure()
+    device_probe.measure()
+    device_probe.measure()
     assert device.measured_s < 0.2

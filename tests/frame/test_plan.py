@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.frame import costs
-from addon.frame.costs import Cost
+from addon.frame import technique_costs as costs
 from addon.frame.ledger import SKIPPED
 from addon.frame.plan import PlanError, make_plan
 from addon.frame.settings import Settings
 from addon.frame.technique import Technique, Write
+from addon.frame.technique_costs import Cost
 from addon.materials.compiler import default_graph
 from addon.snapshot.scene import Camera, Film, Instance, Light, Material, Mesh, Snapshot, Visibility, World
 from addon.techniques import make_registry

@@ -1,10 +1,11 @@
 """What Auto knows about the techniques of a slot: their error and time by sample count, as the benchmark measured them.
 
-costs.json is written by `python -m bench costs` and holds, for each slot with a choice, each technique's error (relMSE
-of the whole picture) and time (of a whole render) relative to the slot's first technique at the same samples, as
-geometric means over the scenes that it names (one, as yet). Auto takes the technique with the least error x time: the
-variance of an unbiased method falls as its time grows, so that the product does not depend on the samples; of a biased
-one it rises with them. Another technique than the first must win by more than the figures scatter from run to run.
+technique_costs.json is written by `python -m bench costs` and holds, for each slot with a choice, each technique's
+error (relMSE of the whole picture) and time (of a whole render) relative to the slot's first technique at the same
+samples, as geometric means over the scenes that it names (one, as yet). Auto takes the technique with the least error x
+time: the variance of an unbiased method falls as its time grows, so that the product does not depend on the samples; of
+a biased one it rises with them. Another technique than the first must win by more than the figures scatter from run to
+run.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-PATH = Path(__file__).with_name("costs.json")
+PATH = Path(__file__).with_name("technique_costs.json")
 SCATTER = 0.15  # of ratios between two runs of the benchmark
 
 

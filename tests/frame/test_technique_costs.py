@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from addon.frame import costs
-from addon.frame.costs import Cost
+from addon.frame import technique_costs as costs
+from addon.frame.technique_costs import Cost
 from addon.techniques import REGISTRY
 
 TABLE = {
@@ -59,7 +59,7 @@ def test_what_the_benchmark_writes_is_what_auto_reads(tmp_path):
     ]  # fmt: skip
     results = Results(about, {}, cells, [])
     table = written.costs(results, {"shadow": ["maps", "moments"], "indirect": ["one", "other"]})
-    path = tmp_path / "costs.json"
+    path = tmp_path / "technique_costs.json"
     path.write_text(written.text(results, table), encoding="utf-8")
     read = costs.read(path)
     assert read["shadow"]["maps"][4] == Cost(1, 1)
