@@ -7,7 +7,8 @@ picture and of what its glossy and transmission passes bring, net of the referen
 over the reference's. Times are those of whole renders after one that compiled, one after the other on the same machine:
 on a software GPU they say little about a real one.
 
-`--page` writes docs/reflections.md's tables, `--only NAME` takes scenes by name, `--pictures FOLDER` keeps PNG files.
+`--page` writes docs/reflections.md's tables, of the scenes that `--only` names or of all; `--pictures FOLDER` keeps PNG
+files.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import markdown
+from . import ages, markdown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reflections.md"
 COMMAND = "python -m bench reflections --page"
@@ -74,16 +75,31 @@ def command(options: argparse.Namespace) -> int:
     from . import reflection_scenes
 
     addon.register()
-    tables, summary = [], [SUMMARY_HEAD]
     for name in options.only or list(reflection_scenes.SCENES):
-        scene = reflection_scenes.make(name)
-        noise, results = _measure(scene, name, options)
-        tables.append(f"### {name[:1].upper()}{name[1:]}\n\n{_table(noise, results)}")
-        summary.append(_summary(name, results))
-        print(tables[-1], markdown.table([SUMMARY_HEAD, summary[-1]]), sep="\n\n", flush=True)
-    if options.page:
-        markdown.put_between(PAGE, COMMAND, "\n\n".join([markdown.table(summary), *tables]))
+        noise, results = _measure(reflection_scenes.make(name), name, options)
+        table, row = _table(noise, results), _summary(name, results)
+        print(f"### {name}", table, markdown.table([SUMMARY_HEAD, row]), sep="\n\n", flush=True)
+        if options.page:
+            _put(name, row, table, list(reflection_scenes.SCENES))
     return 0
+
+
+def _put(name: str, row: list[str], table: str, order: list[str]) -> None:
+    """Write a scene's row and table to the page; those of other scenes stay, each with when it was made."""
+    text = PAGE.read_text(encoding="utf-8").partition(markdown.begin(COMMAND))[2].partition(markdown.END)[0]
+    head, *sections = text.split("\n### ")
+    rows = {cells[0]: cells for cells in map(_cells, head.splitlines()) if cells and cells[0] in order}
+    tables = {section.partition("\n")[0].lower(): section.partition("\n")[2].strip() for section in sections}
+    made = ages.now()
+    rows[name], tables[name.lower()] = row, f"{made}\n\n{table}"
+    shown = [one for one in order if one in rows]
+    parts = [markdown.table([SUMMARY_HEAD, *(rows[one] for one in shown)])]
+    parts += [f"### {one[:1].upper()}{one[1:]}\n\n{tables[one]}" for one in shown]
+    markdown.put_between(PAGE, COMMAND, "\n\n".join(parts), stamped=False)
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip() for cell in line.strip().strip("|").split("|")] if line.startswith("|") else []
 
 
 def _measure(scene, name: str, options: argparse.Namespace) -> tuple[dict[str, float], dict[Entrant, Result]]:
@@ -93,9 +109,11 @@ def _measure(scene, name: str, options: argparse.Namespace) -> tuple[dict[str, f
     shown = [key for key in truth if truth[key].mean() > 1e-3]
     noise = {key: error(*(one[key] for one in references)) / 4 for key in shown}
     _keep(options.pictures, name, "Cycles", truth["picture"])
-    results = {}
+    results, compiled = {}, set()
     for entrant in ENTRANTS:
-        _render(scene, replace(entrant, samples=1), 3)  # what compiles is not timed
+        if (entrant.engine, entrant.means) not in compiled:
+            _render(scene, replace(entrant, samples=1), 3)  # what compiles is not timed
+            compiled.add((entrant.engine, entrant.means))
         found, seconds = _render(scene, entrant, 7)
         there = [key for key in shown if key in found]
         results[entrant] = Result(

@@ -39,6 +39,7 @@ from ..lighting import caustic_maps
 from ..lighting.caustic_maps import CausticMaps
 from ..lighting.interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
+from ..lighting.loop import CANDIDATES
 from ..lighting.media import LightOfMedia, MediaService, Rays, attenuated
 from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
@@ -60,6 +61,7 @@ from ..surfaces.draw import (
     surface_bindings,
 )
 from ..surfaces.hits import ANY_RAY, MET, Hits, Records, closure_bindings, take_closures
+from .environment_light import directions_rate
 from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 
 WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
@@ -91,6 +93,7 @@ def scatter_program(onward: bool) -> Program:
             ("FLOAT", "traced_roughness"),
             ("FLOAT", "offset_size"),
             ("FLOAT", "clear_roughness"),
+            ("FLOAT", "first_rays"),
         ),
         defines=(("ONWARD", "1"),) if onward else (),
         outputs=(("VEC4", "out_origin"), ("VEC4", "out_direction"), ("VEC4", "out_path")),
@@ -186,6 +189,7 @@ class ShadedReflections(Technique):
             ("glossy", "transmission", "diffuse"), "hits", WORLD_DIRECTIONS, EMISSIVE_POINTS
         )  # fmt: skip
         self._active = False
+        self._first_rays = 0.0
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         if not snapshot.instances:
@@ -206,6 +210,9 @@ class ShadedReflections(Technique):
         if self._active:
             frame.provide(ShadedLobes(frame.settings.get(self, "roughness")))
             self._sources.begin(frame)
+            sampled = frame.plan.runs("environment_light")  # of its directions rays of the first lobe leave a share
+            of_first = directions_rate(frame).per_sample if sampled else 0.0
+            self._first_rays = CANDIDATES * WORLD_DIRECTIONS / of_first if of_first else 0.0
 
     def sample(self, frame: Frame) -> Iterator[None]:
         if not self._active or frame.receivers is None or not len(frame.receivers.distance):
@@ -276,6 +283,7 @@ class ShadedReflections(Technique):
             constants={
                 **reach, "ray_number": number, "offset_size": frame.offset_size,
                 "traced_roughness": traced_roughness(frame), "clear_roughness": clear_roughness(frame),
+                "first_rays": self._first_rays,
             },
         )  # fmt: skip
         frame.count(self, "passes")

@@ -46,7 +46,7 @@ from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..sources.environment import WORLD
-from ..surfaces.draw import LIT_SURFACES, NARROW_LOBE, SURFACE_TEXTURES
+from ..surfaces.draw import LIT_SURFACES, NARROW_LOBE, SURFACE_TEXTURES, refracts
 from .environment_light import directions_rate
 
 TRACED = passes.fullscreen_program(
@@ -61,6 +61,7 @@ TRACED = passes.fullscreen_program(
         ("INT", "light_count"), ("FLOAT", "traced_roughness"), ("FLOAT", "offset_size"),
         ("INT", "world_glossy"), ("FLOAT", "world_samples"), ("FLOAT", "emissive_power"), ("FLOAT", "emissive_points"),
         ("FLOAT", "shaded_roughness"),
+        ("INT", "glass_bends"),
     ),
     defines=TRACED_DEFINES,
     outputs=(("VEC4", "out_diffuse"), ("VEC4", "out_glossy")),
@@ -131,6 +132,7 @@ class TracedGlossy(Technique):
                 "world_samples": self._world_samples,
                 "emissive_power": emissive.power, "emissive_points": emissive.count,
                 "shaded_roughness": shaded_roughness(frame),
+                "glass_bends": int(refracts(frame)),
             },
         }  # fmt: skip
         program, media = TRACED, frame.service(MediaService)

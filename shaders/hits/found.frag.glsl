@@ -5,16 +5,23 @@
 #include "light/sources.glsl"
 #include "hits/path.glsl"
 
-// What a ray finds before `limit` in lights and the world. `lobe_density` 0: only rays can find it.
-vec3 light_found(vec3 origin, vec3 direction, bool bent, float lobe_density, float limit, bool with_world)
+// Of what a ray finds. `lobe_density` 0: only rays can find it; FOUND_ELSEWHERE: light samples have all of it.
+float share_of_ray(float lobe_density, float light_density)
+{
+  if (lobe_density == 0.0) {
+    return 1.0;
+  }
+  return (lobe_density > 0.0) ? power_share(lobe_density, light_density) : 0.0;
+}
+
+// What a ray finds before `limit` in lights and the world. `beyond`: behind glass that a lobe's ray has met, where samples
+// of lamps do not reach that glass blocks.
+vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe_density, float limit, bool with_world)
 {
   vec3 sum = vec3(0.0);
   if (with_world && limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
     vec3 radiance = environment_radiance(direction);
-    if (lobe_density > 0.0) {
-      radiance *= power_share(lobe_density, world_samples * environment_density(direction));
-    }
-    sum += radiance;
+    sum += radiance * share_of_ray(lobe_density, world_samples * environment_density(direction));
   }
   for (int i = 0; i < light_count; i++) {
     Light light = light_read(i);
@@ -22,7 +29,8 @@ vec3 light_found(vec3 origin, vec3 direction, bool bent, float lobe_density, flo
     float density;
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && (light.flags & (bent ? LIGHT_TRANSMISSION : LIGHT_GLOSSY)) != 0) {
-      sum += radiance * ((lobe_density > 0.0) ? power_share(lobe_density, light.rate * density) : 1.0);
+      bool asked = !beyond || (light.flags & LIGHT_GLASS_BLOCKS) == 0;
+      sum += radiance * (asked ? share_of_ray(lobe_density, light.rate * density) : 1.0);
     }
   }
   return sum;
@@ -52,7 +60,8 @@ void main()
   // A transparent film has a hole where clear glass shows the world: in alpha, how large.
   bool hole = ray_number > 0 && met.w == 0.0 && path_is_clear(code);
   if (ray_number > 0) {
-    sum += light_found(start, along.xyz, path_is_bent(code), along.w, limit, !hole);
+    bool beyond = path_is_bent(code) && path_mirrors(code) > 0;
+    sum += light_found(start, along.xyz, path_is_bent(code), beyond, along.w, limit, !hole);
   }
   if (met.w != 0.0 && along.w >= 0.0) {
     vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample

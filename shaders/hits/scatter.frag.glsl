@@ -50,6 +50,13 @@ void main()
     surface = interface_edited(surface, s);
     direction = interface_sample(surface, u, 1.0, weight);
     interface_value(surface, direction, density);
+#ifdef ONWARD
+    // Samples of lights for the last lobe that mirrored pass glass on straight lines, and share what is behind it; those of
+    // the surface that the camera sees are of another number, and its lobe counts as several rays (light/direct.frag.glsl).
+    if (mirrored > 0 && density == 0.0 && dot(direction, surface.normal) < 0.0) {
+      density = met_direction_fetch(pixel).w * ((ray_number == 1) ? first_rays : 1.0);
+    }
+#endif
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;
     code += PATH_BENT + ((clear && s.glossy_roughness <= clear_roughness) ? PATH_CLEAR : 0);
   }

@@ -108,7 +108,9 @@ void main()
   if (kept_importance > 0.0) {
     origin = ray_origin(s.position, side_of_ray(s, kept_direction));
     // Whatever stands before the nearest source blocks all of them.
-    float blocked = trace_until(origin, kept_direction, kept_span.y, kept_span.x, layers, hit);
+    // What is behind glass that bends is left to the rays of hits/, where these follow the lobe.
+    bool glass_stops = glass_bends != 0 && s.glossy_roughness <= shaded_roughness;
+    float blocked = trace_layers(origin, kept_direction, kept_span.y, kept_span.x, layers, glass_stops, false, hit);
     if (blocked >= kept_span.x) {
       vec2 ignored;
       float limit = (blocked < kept_span.y) ? blocked : 1e29;

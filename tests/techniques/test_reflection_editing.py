@@ -372,16 +372,20 @@ def test_an_edited_mirror_shows_what_cycles_does_off_one_that_leans(stage):
     viewer = np.array([0.0, -6.0, 3.0])
     after = about((1, 0, 0), 16) @ mirrored(unit(*viewer), UP)
     constrain(mirror, (0, 0, 0), tuple(10 * after), tuple(viewer))
-    found = stage.render(4, (48, 48), bounces=2)["combined"][..., :3]
+    found = stage.render(4, (48, 48), bounces=2)
     mirror.candela.reflection_editing_constraints.clear()
     mirror.data.normals_split_custom_set([tuple(about((1, 0, 0), 8) @ UP)] * 4)
-    expected = stage.render(32, (48, 48), engine="CYCLES", bounces=2)["combined"][..., :3]
+    expected = stage.render(32, (48, 48), engine="CYCLES", bounces=2)
+    seen = (found["glossy_color"][..., 0] > 0.99) & (expected["glossy_color"][..., 0] > 0.99)  # the mirror alone
+    found, expected = (one["combined"][..., :3] for one in (found, expected))
     difference = np.abs(found - expected).max(axis=-1)
     steps = [np.abs(expected - np.roll(expected, shift, axis)).max(axis=-1) for axis in (0, 1) for shift in (-1, 1)]
-    even = np.max(steps, axis=0) < 0.1  # beside edges, one of the two may see the one colour and one the other
-    print(f"median {np.median(difference):.5f}, {(difference[even] > 0.05).mean():.4f} of {even.mean():.2f} differ")
-    assert np.median(difference) < 2e-3
-    assert even.mean() > 0.8 and (difference[even] > 0.05).mean() < 0.01
+    even = seen & (np.max(steps, axis=0) < 0.1)  # beside edges, one of the two may see the one colour and one the other
+    print(
+        f"median {np.median(difference[seen]):.5f}, {(difference[even] > 0.02).mean():.4f} of {even.mean():.2f} differ"
+    )
+    assert even.mean() > 0.2 and np.median(difference[seen]) < 2e-3
+    assert (difference[even] > 0.02).mean() < 0.01
 
 
 def world_of_directions(stage, turn=None):

@@ -108,3 +108,21 @@ def test_a_draft_shows_means(stage):
     snapshot = stage.renderer.frame.snapshot
     assert ShadedReflections().skip(snapshot, Settings()) is None
     assert "drafts" in ShadedReflections().skip(snapshot, Settings().as_draft())
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.05, 0.15, 0.5])
+def test_light_behind_a_pane_is_found_once(stage, roughness):
+    """Samples of the world pass a pane on straight lines, and rays of lobes go through it: in a furnace of white gloss
+    and clear glass both together are 1."""
+    stage.rectangle((-30, -30), (30, 30), material=stage.principled(
+        Metallic=1.0, Roughness=roughness, Base_Color=(1, 1, 1, 1)
+    ))  # fmt: skip
+    glass = stage.principled(Roughness=0.0, IOR=1.5, Transmission_Weight=1.0, Base_Color=(1, 1, 1, 1))
+    low, high = 2.0, 2.1
+    corners = [(x, y, z) for z in (low, high) for y in (-40, 40) for x in (-40, 40)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    stage.mesh(corners, faces, material=glass)
+    stage.world()
+    stage.camera((0, 0, 1.5), (0, 0, 0), 0.5)
+    found = reflected(stage.render(64, (12, 12), bounces=8))
+    assert found.mean() == pytest.approx(1.0, abs=0.03)
