@@ -29,6 +29,7 @@ import numpy as np
 
 from . import caustic_scenes, markdown
 from .caustic_scenes import ALBEDO, SCENES
+from .moving import new_in_it, of_frame, shifted
 
 ROOT = Path(__file__).resolve().parent.parent
 TRUTH = ROOT / "bench" / "results" / "caustics_truth.npz"
@@ -302,9 +303,7 @@ def motion(count: int) -> str:
         one = Entrant("", "CANDELA", 1, technique)
         configure(scene, one)
         errors, sums = [], []
-        for number in range(count):
-            for thing in moving:
-                thing.location.x += STEP * (number > 0)
+        for _ in shifted(moving, count, STEP):
             seen = [
                 render_passes(scene, "CANDELA", samples, 1, size=(64, 64), bounces=1).images["diffuse_indirect"][
                     ..., :3
@@ -316,7 +315,7 @@ def motion(count: int) -> str:
             sums.append(seen[0].sum() / seen[1].sum())
         row = [technique]
         for found in (np.array(errors), np.array([blurred(error) for error in errors])):
-            row += [f"{np.square(found).mean():.4f}", f"{np.square(np.diff(found, axis=0)).mean() / 2:.4f}"]
+            row += [f"{of_frame(found):.4f}", f"{new_in_it(found):.4f}"]
         rows.append([*row, f"{100 * np.std(sums):.2f} %"])
     return (
         f"Square of irradiance, (W/m²)²; {count} frames, against {TRUTH_SAMPLES} samples of each; blurred by {BLUR:g}"

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.moving import new_in_it, of_frame, scale_of
+
 SCENES = Path(__file__).resolve().parent.parent / "sample_blends"
 ROOMS = ("cornell_box", "window_interior", "colonnade_hall", "door_ajar", "sky_courtyard", "emissive_lamp")
 PATH = "diffuse_indirect"
@@ -78,19 +80,16 @@ def frames(scene, count: int) -> Iterator[None]:
 def moving(scene, names: list[str], count: int, samples: int, size: tuple[int, int]) -> Iterator[tuple[str, ...]]:
     """Lines of the table of motion: technique, what is new in the error of a frame, error of a frame."""
     errors: dict[str, list[np.ndarray]] = {name: [] for name in names}
-    scales = []
+    truths = []
     for _ in frames(scene, count):
         truth, _ = reference(scene, samples, size)
-        luminance = truth.mean(axis=2)
-        scales.append(luminance**2 + (0.1 * luminance.mean()) ** 2)
+        truths.append(truth)
         for name in names:
             scene.candela.slot_indirect = name
             errors[name].append(render(scene, "CANDELA", 1, 1, size) - truth)
-    scale = np.mean(scales, axis=0)[..., None]
+    scale = scale_of(truths)
     for name, error in errors.items():
-        of_frame = (np.square(error) / scale).mean()
-        change = np.square(np.diff(error, axis=0)).mean(axis=0) / 2
-        yield name, f"{(change / scale).mean():.4f}", f"{of_frame:.4f}"
+        yield name, f"{new_in_it(error, scale):.4f}", f"{of_frame(error, scale):.4f}"
 
 
 def table(rows: list[tuple[str, ...]]) -> str:

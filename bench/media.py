@@ -3,8 +3,8 @@
 Scenes are those of media_scenes.py. The reference is the mean of two renders by Cycles with as many bounces as Candela
 has; errors (relMSE) have its noise taken off. EEVEE's and Cycles' own pictures of few samples stand in the same table,
 those of Cycles denoised. Seconds are of a second render, with another seed, so that nothing is compiled in them.
-Caustics: the profile of light in the medium across the picture below (behind) the caster, averaged over rows, its root
-mean squared difference over the reference's peak.
+With `--shafts`, volume caustics instead (shafts.py); with `--motion`, a spot in fog that moves 2 cm a frame, one sample
+each, against more samples of each frame: error of a frame, and what is new in it (moving.py).
 """
 
 from __future__ import annotations
@@ -15,22 +15,27 @@ from pathlib import Path
 import numpy as np
 
 from bench import markdown
+from bench.moving import new_in_it, of_frame, scale_of, shifted
 from bench.quick import size_of, table
 
 HEAD = ("scene", "engine", "samples", "seconds", "relMSE", "bias", "volume direct", "bias", "volume indirect", "bias")
 SEED = 5
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "media.md"
 COMMAND = "python -m bench media --page"
+MOTION = "python -m bench media --motion 24 --page"
+STEP, TRUTH_SAMPLES = 0.02, 32  # metres a frame; of the truth of each frame
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="+", default=None, metavar="NAME", help="default: all")
+    parser.add_argument("--scenes", nargs="+", default=None, metavar="NAME", help="default: those without casters")
     parser.add_argument("--size", type=size_of, default=(64, 64), metavar="WxH", help="default 64x64")
     parser.add_argument("--reference", type=int, default=1024, metavar="N", help="samples of each of two references")
     parser.add_argument("--bounces", type=int, default=4, metavar="N", help="default 4")
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write PNGs of each scene beside Cycles")
     parser.add_argument("--page", action="store_true", help="write the tables into docs/media.md, scene by scene")
+    parser.add_argument("--motion", type=int, default=0, metavar="FRAMES", help="frames of a moving lamp instead")
+    parser.add_argument("--shafts", action="store_true", help="volume caustics beside light tracing instead")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -40,28 +45,30 @@ def command(options: argparse.Namespace) -> int:
     from bench import media_scenes
 
     addon.register()
+    if options.motion or options.shafts:
+        from bench import shafts
+
+        mark = MOTION if options.motion else shafts.COMMAND
+        text = motion(options.motion) if options.motion else shafts.page(options.pictures)
+        print(text)
+        if options.page:
+            markdown.put_between(PAGE, mark, text)
+        return 0
     scenes = media_scenes.MEDIA | media_scenes.CAUSTICS
     rows: list[tuple[str, ...]] = []
-    profiles: list[tuple[str, ...]] = []
-    for name in options.scenes or scenes:
+    for name in options.scenes or media_scenes.MEDIA:
         media_scenes.begin()
         scenes[name]()
-        added, profile = measured(bpy.context.scene, name, options, name in media_scenes.CAUSTICS)
+        added = measured(bpy.context.scene, name, options)
         print(table([HEAD, *added]), flush=True)
         rows += added
-        profiles += profile
-        if profile:
-            print(table([PROFILE_HEAD, *profile]), flush=True)
         if options.page:  # after each scene: what is measured stays when the run is ended
-            markdown.put_between(PAGE, COMMAND, page(rows, profiles, options))
+            markdown.put_between(PAGE, COMMAND, page(rows, options))
     return 0
 
 
-PROFILE_HEAD = ("scene", "rays", "profile, % of peak", "energy", "seconds of beams")
-
-
-def measured(scene, name: str, options, caustics: bool):
-    """Rows of both tables for the open scene."""
+def measured(scene, name: str, options) -> list[tuple[str, ...]]:
+    """Rows of the table for the open scene."""
     from addon.compare.reference import render_passes
 
     def render(engine: str, samples: int, seed: int, denoised: bool = False):
@@ -81,7 +88,7 @@ def measured(scene, name: str, options, caustics: bool):
     picture = None
     for label, engine, samples, denoised in entrants:
         if engine != "CYCLES":
-            render(engine, samples, SEED + 1)  # what compiles
+            render(engine, 1 if "EEVEE" in engine else samples, SEED + 1)  # what compiles
         seen = render(engine, samples, SEED, denoised)
         if (engine, samples) == ("CANDELA", 16):
             picture = seen.images
@@ -90,10 +97,9 @@ def measured(scene, name: str, options, caustics: bool):
             alone = engine == "BLENDER_EEVEE" or denoised
             figures += _figures(seen.images, mean, half, path) if path == "combined" or not alone else ("", "")
         rows.append((name if not rows else "", label, str(samples), *figures))
-    profiles = _profiles(scene, name, mean, options, render) if caustics else []
     if options.pictures:
         _save(options.pictures / f"{name.replace(' ', '_')}.png", picture["combined"], mean["combined"])
-    return rows, profiles
+    return rows
 
 
 def _figures(seen: dict, mean: dict, half: dict, path: str) -> tuple[str, str]:
@@ -135,35 +141,6 @@ def _denoised(scene, samples: int, seed: int, options):
         del bpy
 
 
-def _profiles(scene, name: str, mean: dict, options, render) -> list[tuple[str, ...]]:
-    from addon.frame import ledger
-
-    def light(images: dict) -> np.ndarray:
-        return (images["volume_direct"] + images["volume_indirect"])[..., :3].mean(axis=2)
-
-    height = options.size[1]
-    rows = slice(height // 8, height * 2 // 5)  # below the caster
-    truth = light(mean)[rows].mean(axis=0)
-    found = []
-    for rays in (96, 192, 384):
-        scene.candela.volume_caustics_rays = rays
-        render("CANDELA", 16, SEED + 2)
-        seen = light(render("CANDELA", 16, SEED).images)[rows].mean(axis=0)
-        row = ledger.latest().row("volume_caustics")
-        error = np.sqrt(((seen - truth) ** 2).mean()) / truth.max()
-        found.append(
-            (
-                name,
-                f"{rays}²",
-                f"{100 * error:.1f}",
-                f"{seen.mean() / truth.mean():.3f}",
-                f"{row.milliseconds / 16e3:.4f}",
-            )
-        )
-    scene.candela.property_unset("volume_caustics_rays")
-    return found
-
-
 def _save(path: Path, ours: np.ndarray, theirs: np.ndarray) -> None:
     from addon.compare.metrics import display
     from addon.compare.png import png
@@ -175,16 +152,48 @@ def _save(path: Path, ours: np.ndarray, theirs: np.ndarray) -> None:
     path.write_bytes(png((np.clip(shown, 0, 1) * 255 + 0.5).astype(np.uint8)))
 
 
-def page(rows: list[tuple[str, ...]], profiles: list[tuple[str, ...]], options) -> str:
-    """Both tables, and what they are of."""
+def motion(count: int, size: tuple[int, int] = (48, 48)) -> str:
+    """The table of a lamp that moves in fog."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+    from bench import media_scenes
+
+    media_scenes.begin()
+    media_scenes.MEDIA["spot in fog"]()
+    scene = bpy.context.scene
+    lamps = [one for one in scene.objects if one.type == "LIGHT"]
+    paths = "volume_direct", "volume_indirect", "combined"
+    errors: dict[str, list[np.ndarray]] = {path: [] for path in paths}
+    truths: dict[str, list[np.ndarray]] = {path: [] for path in paths}
+    for _ in shifted(lamps, count, STEP):
+        one, many = (
+            render_passes(scene, "CANDELA", samples, 1, size=size, bounces=4).images for samples in (1, TRUTH_SAMPLES)
+        )
+        for path in paths:
+            truths[path].append(many[path][..., :3].astype(np.float64))
+            errors[path].append(one[path][..., :3] - truths[path][-1])
+    rows = [["", "of a frame", "new in it", "of a frame, but the worst pixels", "new in it"]]
+    for path in paths:
+        scale, found = scale_of(truths[path]), np.array(errors[path])
+        worst = (np.square(found) / scale).mean(axis=(0, 3))
+        kept = worst <= np.quantile(worst, 0.99)
+        row = [of_frame(found, scale), new_in_it(found, scale)]
+        row += [of_frame(found[:, kept], scale[kept]), new_in_it(found[:, kept], scale[kept])]
+        rows.append([path.replace("_", " "), *(f"{value:.4f}" for value in row)])
+    return (
+        f"A spot in fog that moves {100 * STEP:.0f} cm a frame, {count} frames of {size[0]} x {size[1]} pixels, one"
+        f" sample each, against {TRUTH_SAMPLES} samples of each; relMSE, of all pixels and without the worst hundredth."
+        f"\n\n{markdown.table(rows)}"
+    )
+
+
+def page(rows: list[tuple[str, ...]], options) -> str:
+    """The table, and what it is of."""
     width, height = options.size
     text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two
 renders of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw
 on a software GPU. EEVEE has no such bounces: its bias is partly that.
 
 """
-    text += markdown.table([HEAD, *rows])
-    if profiles:
-        text += "\n\n**Volume caustics**: profile of the light in the medium below the caster, 16 samples.\n\n"
-        text += markdown.table([PROFILE_HEAD, *profiles])
-    return text
+    return text + markdown.table([HEAD, *rows])

@@ -238,11 +238,52 @@ def metal_ring() -> None:
     lamp("SPOT", (2.6, 0, 1.3), 300, (0, 1.1, 0), spot_size=0.7, shadow_soft_size=0.05)
 
 
+POOL_HALF, POOL_TOP, POOL_BOTTOM = 1.2, 1.6, 1.3  # of a pane with waves, above a box of fog, m
+POOL_FOG = (-1.8, -1.8, -1.8), (1.8, 1.8, 1.25)
+WAVES = (
+    (0.03, 3.0, 1.0, 0.3),
+    (0.02, -1.5, 4.0, 1.7),
+    (0.012, 7.0, 2.5, 0.9),
+)  # height; per metre of x, y; phase
+
+
+def wave_height(x, y):
+    return POOL_TOP + sum(height * np.sin(a * x + b * y + phase) for height, a, b, phase in WAVES)
+
+
+def wave_slope(x, y):
+    """Of the height along x and along y."""
+    slopes = [(height * np.cos(a * x + b * y + phase), a, b) for height, a, b, phase in WAVES]
+    return sum(s * a for s, a, _ in slopes), sum(s * b for s, _, b in slopes)
+
+
+def waves(side: int = 96) -> None:
+    """W4: the sun straight down through a pane whose top has waves."""
+    camera("Side", (0, -7, 0), SIDE_VIEW, 0.55)
+    made = volume("ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0.02,) * 3, Scatter_Coefficients=(0.15,) * 3)
+    box(*POOL_FOG, made)
+    line = np.linspace(-POOL_HALF, POOL_HALF, side)
+    x, y = (values.ravel() for values in np.meshgrid(line, line))
+    corners = [*zip(x, y, wave_height(x, y))]
+    top = [(r * side + c, r * side + c + 1, (r + 1) * side + c + 1, (r + 1) * side + c)
+           for r in range(side - 1) for c in range(side - 1)]  # fmt: skip
+    rim = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    first = len(corners)
+    corners += [(a * POOL_HALF, b * POOL_HALF, POOL_BOTTOM) for a, b in rim]
+    mesh = bpy.data.meshes.new("Waves")
+    mesh.from_pydata(corners, [], [*top, (first + 3, first + 2, first + 1, first)])
+    for face in mesh.polygons[: len(top)]:
+        face.use_smooth = True
+    mesh.materials.append(material("ShaderNodeBsdfGlass", IOR=1.33, Roughness=0.0))
+    link("Waves", mesh)
+    lamp("SUN", (0, 0, 5), 2.0, angle=0.0)
+
+
 MEDIA = {
     "spot in fog": spot_in_fog, "window in haze": window_in_haze, "procedural smoke": procedural_smoke,
     "VDB cloud": vdb_cloud, "nested boxes": nested_boxes, "fire": fire, "foggy world": foggy_world,
 }  # fmt: skip
 CAUSTICS = {
     "W1 glass ball": glass_ball, "W2 metal ring": metal_ring, "W3 g = .7": glass_ball_forward,
-    "W3 g = -.7": glass_ball_backward,
+    "W3 g = -.7": glass_ball_backward, "W4 waves": waves,
 }  # fmt: skip

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from bench import indirect, markdown
+from bench.moving import new_in_it, of_frame, scale_of
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 COMMAND = "python -m bench points_motion --page"
@@ -94,29 +95,22 @@ def of_motion(label: str, options: argparse.Namespace) -> dict[str, tuple[str, .
     techniques, move = options.techniques, MOVES[label]
     errors: dict[str, list[np.ndarray]] = {name: [] for name in (*techniques, *options.others)}
     counters: dict[str, list[dict]] = {name: [] for name in techniques}
-    scales = []
+    truths = []
     for pictures, counted, truth in frames(move, techniques, options.others, options.frames):
         for name, picture in pictures.items():
             errors[name].append(picture - truth)
         for name in techniques:
             counters[name].append(counted[name])
-        luminance = truth.mean(axis=2)
-        scales.append(luminance**2 + (0.1 * luminance.mean()) ** 2)
-    scale = np.mean(scales, axis=0)[..., None]
-    figures = {name: (of_frame(found, scale), of_change(found, scale)) for name, found in errors.items()}
+        truths.append(truth)
+    scale = scale_of(truths)
+    figures = {
+        name: (f"{of_frame(found, scale):.4f}", f"{new_in_it(found, scale):.4f}") for name, found in errors.items()
+    }
     others = [figure for other in options.others for figure in figures[other]]
     return {
         name: (label, told(counters[name][1:], REDONE), told(counters[name][1:], KEPT), *figures[name], *others)
         for name in techniques
     }
-
-
-def of_frame(errors: list[np.ndarray], scale: np.ndarray) -> str:
-    return f"{(np.square(errors) / scale).mean():.4f}"
-
-
-def of_change(errors: list[np.ndarray], scale: np.ndarray) -> str:
-    return f"{(np.square(np.diff(errors, axis=0)).mean(axis=0) / 2 / scale).mean():.4f}"
 
 
 def told(counted: list[dict], words: tuple[str, ...]) -> str:

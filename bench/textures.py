@@ -12,13 +12,15 @@ from unittest.mock import patch
 import numpy as np
 
 SIZE = (128, 96)
-REFERENCE = 2048  # samples
 SIDE = 256  # texels of the floor's image
 LARGE = 4096
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=int, nargs="*", default=[1, 4, 16, 64])
+    parser.add_argument(
+        "--reference", type=int, default=2048, help="Cycles' samples for what errors are measured against"
+    )
 
 
 def command(options: argparse.Namespace) -> int:
@@ -41,7 +43,7 @@ def command(options: argparse.Namespace) -> int:
 
         for name, pixels in (("colours", _colours()), ("checker", _checker())):
             scene = _floor(bpy, pixels)
-            reference = picture("CYCLES", REFERENCE, 1)
+            reference = picture("CYCLES", options.reference, 1)
 
             def error(found: np.ndarray, reference=reference) -> float:
                 return float(relative_squared_error(found, reference).mean())

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
 from ..frame.run import Frame
-from ..materials.compiler import may_refract
+from ..materials.compiler import may_emit, may_refract
 from ..materials.graph import Graph, Node
 from ..snapshot.scene import Instance, Light, Mesh, Snapshot
 from ..sources import lights
@@ -35,6 +35,7 @@ SMOOTH = 0.25  # roughness
 METALLIC = 0.5
 WIDEST = 0.6  # tangent of half the angle of a light, seen from the casters
 FLAT = 0.999  # cosine between normals of a pane's faces
+_CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHoldout", "ShaderNodeBsdfRayPortal")
 _MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
 
 
@@ -135,6 +136,29 @@ def answered(frame: Frame, emitter: lights.Emitter) -> bool:
     """Whether light of this lamp that passes casters arrives by the slot: to its shadows glass is opaque."""
     found = of(frame)
     return found is not None and emitter.light is not None and emitter.light.key in found.lights
+
+
+def glass_alone(frame: Frame) -> frozenset[int]:
+    """Casters that let light pass as glass and in no other way: opaque to shadows of lamps that are answered for."""
+    found, graphs = of(frame), frame.snapshot.materials
+    return frozenset(k for k in found.refracting if not _may_be_clear(graphs[k].graph)) if found else frozenset()
+
+
+def stopped_by_all(frame: Frame) -> frozenset[int]:
+    """The same where all light is answered for; nothing where some lamp, mesh or the world shines through glass."""
+    materials = frame.snapshot.materials
+    if frame.environment.power > 0 or any(may_emit(materials[k].graph) for k in frame.snapshot.used_materials):
+        return frozenset()
+    lamps = [one for one in frame.emitters if one.light.cast_shadow]
+    return glass_alone(frame) if all(answered(frame, one) for one in lamps) else frozenset()
+
+
+def _may_be_clear(graph: Graph) -> bool:
+    """Whether something besides glass may let light pass."""
+    return any(
+        node.type in _CLEAR or (node.type == "ShaderNodeBsdfPrincipled" and _value(node, "Alpha", unknown=0.0) < 1.0)
+        for node in graph.nodes.values()
+    )
 
 
 def _box(instance: Instance, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -35,6 +35,7 @@ from ..scene.view import VIEW
 from ..sources import lights
 from ..surfaces.draw import ANY_SURFACE, SOFT_DEFINES, SURFACE_TEXTURES
 from . import linked, repeated_light, shared_visibility
+from .caustic_casters import glass_alone
 from .grass import GrassTable, grown
 from .media import MediaService, attenuated
 from .repeated_light import Lit
@@ -144,7 +145,8 @@ def light_surfaces(
     """Add the light of these points, of light sources of these `kinds`, to the radiance images, in parts. `adjust`:
     changes what tells the visibility of a batch of so many points."""
     by_provider: dict[VisibilityProvider, list[LightPoint]] = {}
-    for point in _by_channel(points) if tinted_casters(frame) else points:
+    glass_tints = not tinted_casters(frame, glass_alone(frame))
+    for point in _by_channel(points, glass_tints) if tinted_casters(frame) else points:
         by_provider.setdefault(point.provider, []).append(point)
         kinds |= bool(point.flags & lights.WHOLE_FLAG) << lights.WHOLE
     for provider, own in sorted(by_provider.items(), key=lambda group: group[0].asks_views):
@@ -160,9 +162,9 @@ def light_surfaces(
                 yield from shade(frame, technique, near, kinds, sources, _with_rays(frame, maps))
 
 
-def tinted_casters(frame: Frame) -> bool:
-    """Whether something that is drawn colours the light that it lets pass."""
-    return any(frame.materials.compiled[draw.material].tinted for draw in drawn_by_lot(frame))
+def tinted_casters(frame: Frame, stopped: frozenset[int] = frozenset()) -> bool:
+    """Whether something that is drawn colours the light that it lets pass, besides the materials `stopped`."""
+    return any(frame.materials.compiled[draw.material].tinted for draw in drawn_by_lot(frame, stopped))
 
 
 def _share(point: LightPoint) -> float:
@@ -170,11 +172,13 @@ def _share(point: LightPoint) -> float:
     return 1 / 3 if any(getattr(view, "channel", 0) for view in point.views) else 1.0
 
 
-def _by_channel(points: list[LightPoint]) -> Iterator[LightPoint]:
+def _by_channel(points: list[LightPoint], glass_tints: bool) -> Iterator[LightPoint]:
     """The same light as points of red, green and blue alone, each with maps of what passes casters of that channel: a
-    lookup says how much arrives, not in which colour. Three times the maps, where casters are coloured."""
+    lookup says how much arrives, not in which colour. Three times the maps, where casters are coloured. `glass_tints`:
+    they are all glass, which lets nothing pass to maps that hold it as opaque."""
     for point in points:
-        if not any(hasattr(view, "channel") for view in point.views):
+        stopped = glass_tints and all(getattr(view, "glass_blocks", False) for view in point.views)
+        if stopped or not any(hasattr(view, "channel") for view in point.views):
             yield replace(point, row=point.row.copy())
             continue
         for channel in range(3):

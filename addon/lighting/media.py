@@ -6,13 +6,13 @@ MEDIA to it, and binds `MediaService.bindings`. Without a medium nothing of this
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 
 from ..frame.run import Frame
-from ..frame.technique import Service
+from ..frame.technique import Service, Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
@@ -28,6 +28,29 @@ VIEW_PROGRAM = passes.fullscreen_program(
     constants=(("INT", "light_count"),),
     outputs=(("VEC4", "out_through"),),
 )
+
+
+RAY_TEXTURES = tuple(("RGBA32F", name) for name in ("lobe_start", "lobe_way", "surface_position"))
+ON_RAYS = passes.fullscreen_program(
+    "media on rays of lobes",
+    "media/at_hits.frag.glsl",
+    textures=(*RAY_TEXTURES, *ATTENUATION_TEXTURES),
+    blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+    constants=(("INT", "light_count"), ("INT", "ray_number")),
+    outputs=(("VEC4", "out_passed"),),
+)
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Rays that mirrors and glass send on, and what they have met, as textures: lobe_start, lobe_way, met_path,
+    surface_position. `number`: how many have gone before; `where`: of passes.fullscreen, which pixels have one;
+    `transmission`: whether some may have been bent."""
+
+    textures: dict[str, images.Image]
+    number: int
+    where: str
+    transmission: bool
 
 
 @dataclass
@@ -51,6 +74,19 @@ class MediaService(Service):
             )  # fmt: skip
             yield target.colors[0]
 
+    def fade(
+        self, frame: Frame, technique: Technique, rays: Rays, target: images.Target, seen: Block, count: int
+    ) -> None:
+        """Multiply what passes on `rays` (rgb of the target's image) by what media let pass of it. `seen`: lamps that
+        the rays may end at, `count` of them."""
+        passes.fullscreen(
+            ON_RAYS, target, blend="MULTIPLY", where=rays.where,
+            textures={**{name: rays.textures[name] for _, name in RAY_TEXTURES}, **self.media.attenuation()},
+            blocks={"film_view": frame.view_block, "sources": seen},
+            constants={"light_count": count, "ray_number": rays.number},
+        )  # fmt: skip
+        frame.count(technique, "passes")
+
     @property
     def bindings(self) -> dict[str, images.Image]:
         """Textures of passes made by `attenuated`."""
@@ -65,10 +101,19 @@ class MediaEmission(Service):
     image: str  # name of the frame's image
 
 
+@dataclass(frozen=True)
+class LightOfMedia(Service):
+    """Light that media send back along rays of lobes: `add(frame, technique, rays, target)` adds it to the images of
+    direct and indirect light that glossy surfaces, and where `rays.transmission` glass, receive."""
+
+    name = "light of media"
+    add: Callable[[Frame, Technique, Rays, images.Target], None]
+
+
 @cache
 def attenuated(program: Program) -> Program:
     """The same pass for a scene with media."""
     return replace(
-        program, name=f"{program.name}, media", textures=(*program.textures, *ATTENUATION_TEXTURES),
+        program, name=f"{program.name} with media", textures=(*program.textures, *ATTENUATION_TEXTURES),
         defines=(*program.defines, ("MEDIA", "1")),
     )  # fmt: skip

@@ -10,7 +10,7 @@ Jacobi iteration).
 
 | cost | for n points, G groups, K x K pixels |
 |---|---|
-| micro-buffers of groups | 2 G trees walked, 4 K^2 bytes each, of the pool |
+| micro-buffers of groups | up to 2 G trees walked (sides that see a surface), 4 K^2 bytes each, of the pool |
 | who takes light from which group | 2 n rays, up to eight times as many where walls part groups |
 | each bounce | 2 G K^2 fetches, 2 passes and, for each 7 levels of the tree, one more; 8 fetches a node |
 | radiance | 64 bytes a point, twice |
@@ -46,7 +46,7 @@ BUFFER_CONSTANTS = (
 OF_GROUPS = Program(
     name="micro-buffers of groups",
     compute="micro/nodes.comp.glsl",
-    textures=(*BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
+    textures=(*BUFFER_TEXTURES, ("RGBA32F", "node_radiance"), ("RGBA32F", "gathering")),
     images=(BUFFER_IMAGE,),
     constants=(*BUFFER_CONSTANTS, ("INT", "group_count")),
     defines=(*BUFFER_DEFINES, ("NODE_ROW", str(NODE_ROW))),
@@ -97,6 +97,18 @@ def parts(leaves: int, side: int) -> list[tuple[int, int]]:
     return [(number, count) for number in range(count)]
 
 
+def _gathering(seen: np.ndarray, groups: int, choice: float) -> tuple[images.Image, int]:
+    """The list of all sides of groups as 2 group + side + 1, those whose gathering point sees a surface from there
+    first, negative for the others, so that threads that walk the tree do so together; and how many walk."""
+    size = len(seen) // groups
+    leaf = np.arange(groups) * size + min(int(np.float32(choice) * np.float32(size)), size - 1)
+    walks = seen[leaf].reshape(-1)
+    order = np.argsort(~walks, kind="stable")
+    listed = np.zeros((2 * groups, 4), np.float32)
+    listed[:, 0] = np.where(walks[order], order + 1, -(order + 1))
+    return images.upload(listed.reshape(-1, min(NODE_ROW, 2 * groups), 4)), int(walks.sum())
+
+
 def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_test: bool, use: str) -> dict:
     """Constants of shaders/micro/buffer.glsl for micro-buffers of `side` pixels a side, in which nodes are drawn up to
     `threshold` pixels of solid angle."""
@@ -138,10 +150,14 @@ class NodeRadiance:
                 shares = images.pool.take(*run.size, "R32F")
                 held += [micro, arriving, shares]
                 constants = buffer_bindings(frame, run, GROUP_SIDE, threshold, centre_test, "micro groups")
+                gathering, active = _gathering(run.seen, groups, constants["buffer_choice"][0])
                 for part in parts(leaves, GROUP_SIDE):
                     passes.compute(
                         OF_GROUPS, size,
-                        textures={"tree_nodes": run.nodes, "piece_clips": run.clips, "node_radiance": self.image},
+                        textures={
+                            "tree_nodes": run.nodes, "piece_clips": run.clips, "node_radiance": self.image,
+                            "gathering": gathering,
+                        },
                         images={"micro": micro}, constants={**constants, "group_count": groups, "part": part},
                     )  # fmt: skip
                     yield
@@ -154,7 +170,7 @@ class NodeRadiance:
                     },
                 )  # fmt: skip
                 frame.count(technique, "passes")
-                frame.count(technique, "gathers of points", 2 * groups)
+                frame.count(technique, "gathers of points", active)
                 for _ in range(bounces):
                     passes.fullscreen(
                         ARRIVING, images.Target((arriving,)), textures={"micro": micro, "node_radiance": self.image},

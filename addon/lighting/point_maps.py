@@ -14,7 +14,7 @@ from ..scene import acceleration
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps
-from .caustic_casters import answered
+from .caustic_casters import answered, stopped_by_all
 from .visibility import (
     ATLAS_TEXELS,
     EDGES,
@@ -97,7 +97,8 @@ class PointMaps(Technique, VisibilityProvider):
             )
 
     def resolution(self, frame: Frame) -> int:
-        finer = FINER_BY_LOT if frame.settings.samples >= FINER_FROM and drawn_by_lot(frame) else 1.0
+        by_lot = frame.settings.samples >= FINER_FROM and drawn_by_lot(frame, stopped_by_all(frame))
+        finer = FINER_BY_LOT if by_lot else 1.0
         return map_resolution(frame, finer * frame.settings.get(self, "texels_per_pixel"))
 
     def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:

@@ -65,6 +65,7 @@ class Run:
     facing: images.Image
     clips: images.Image
     materials: frozenset[int]
+    seen: np.ndarray  # (leaves, 2) bool: whether front and back of each point see any surface
     shaded: images.Target | None = None
 
     @property
@@ -81,6 +82,7 @@ class PointRuns:
         self._lit = LitPoints(use, few=LIGHTS, others=OTHERS, sharpness=SHARPNESS)
         self._runs: dict[int, Run] = {}
         self._surfaces: Surfaces | None = None
+        self._seen: np.ndarray | None = None  # (T, 2), by triangle
         self._key: object = None
         self._moved = False  # points have followed a motion, and lie elsewhere than they would be spread now
         self.count = 0
@@ -97,8 +99,10 @@ class PointRuns:
             self._give()
             self._surfaces, self._key, self._moved = Surfaces.of(frame), key, follows
             if not follows:
-                seen = seen_triangles(frame, self._surfaces).any(axis=1)
-                self._surfaces = replace(self._surfaces, rate=np.where(seen, 1.0, UNSEEN))
+                self._seen = seen_triangles(frame, self._surfaces)
+                self._surfaces = replace(self._surfaces, rate=np.where(self._seen.any(axis=1), 1.0, UNSEEN))
+            else:  # what has moved may see something by now
+                self._seen = np.ones((len(self._surfaces.owner), 2), bool)
             for number, run in before.items():
                 self._runs[number] = self._placed(frame, run.points, run.tree.order)
             frame.count(technique, "trees refitted", len(before))
@@ -173,7 +177,7 @@ class PointRuns:
             constants={"leaf_count": tree.leaves, "offset_size": frame.offset_size},
         )  # fmt: skip
         materials = frozenset(material[np.isfinite(position).all(axis=1)].astype(int).tolist())
-        return Run(points, tree, nodes, own, facing, clips, materials)
+        return Run(points, tree, nodes, own, facing, clips, materials, self._seen[points.triangle][order])
 
     def _shade(self, frame: Frame, technique: Technique, run: Run) -> None:
         def place(hits: Hits, records: Records) -> frozenset[int]:
@@ -198,7 +202,7 @@ class PointRuns:
         """Drop GPU resources."""
         self._give()
         self._lit.release()
-        self._surfaces = self._key = None
+        self._surfaces = self._seen = self._key = None
         self._moved = False
 
 

@@ -191,10 +191,10 @@ def ray_bindings(
     return textures, {"offset_size": frame.offset_size}
 
 
-def drawn_by_lot(frame: Frame) -> list[Draw]:
-    """Casters that let some light pass."""
+def drawn_by_lot(frame: Frame, stopped: frozenset[int] = frozenset()) -> list[Draw]:
+    """Casters that let some light pass, without the materials `stopped`."""
     compiled = frame.materials.compiled
-    casting = {k for k, one in enumerate(compiled) if one.casts_by_lot and not one.bounds_alone}
+    casting = {k for k, one in enumerate(compiled) if one.casts_by_lot and not one.bounds_alone} - stopped
     return [draw for draw in frame.geometry.draws if draw.material in casting]
 
 

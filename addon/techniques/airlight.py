@@ -5,12 +5,12 @@
 A row of lights is a point of this sample on each of them, shared by all pixels; each row takes some places x on each
 pixel's ray. Half of the places are drawn around the point, in equal steps of the angle under which it sees the ray
 (equiangular sampling, Kulla & Fajardo 2012), half in proportion to transmittance times scattering, both weighted by the
-balance heuristic: the first ends the singularity at a lamp in fog, the second serves dense media. V are rays of the
-hierarchy, T is that of media.py. What media emit is integrated in closed form over the same bins.
+balance heuristic: the first ends the singularity at a lamp in fog and keeps to a spot's cone, the second serves dense
+media. V are rays of the hierarchy, T is that of media.py. What media emit is integrated in closed form.
 
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
 spread their light over opacity to pixels whose rays end equally far away. Others take a quarter as many at every pixel,
-and converge.
+and converge. Light of several bounces, one walk a pixel and sample, is smooth, and spread below MANY samples.
 
 | cost | per sample |
 |---|---|
@@ -21,13 +21,18 @@ and converge.
 Sources: Kulla & Fajardo, "Importance sampling techniques for path tracing in participating media", EGSR 2012; Veach &
 Guibas 1995 (balance heuristic).
 
-Bias: in pictures below FEW samples shafts are as wide as four pixels at least. Phase functions of several shaders mixed
-at one place are one of their mean anisotropy. Mirrors and glass show no airlight.
+In mirrors and behind glass (shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass
+more for each round of them.
+
+Bias: in pictures below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is.
+Phase functions of several shaders mixed at one place are one of their mean anisotropy. Mirrors and glass show single
+scattering alone, none in drafts and rough lobes, and no beams.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -39,7 +44,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.emissive_triangles import EmissiveTriangles
-from ..lighting.media import MediaEmission, MediaService
+from ..lighting.media import RAY_TEXTURES, LightOfMedia, MediaEmission, MediaService, Rays
 from ..materials.compiler import may_emit
 from ..materials.graph import Graph
 from ..scene import acceleration
@@ -52,6 +57,7 @@ from ..surfaces.draw import SURFACE_TEXTURES, SURFACES, surface_bindings
 from ..surfaces.reflectance import Reflectance
 
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
+MANY = 64  # and that of several bounces, which is smoother and noisier, below these
 COARSE = 2  # pixels of one known pixel's side then
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
@@ -103,6 +109,21 @@ def indirect_program(stride: int, kinds: int, world: bool) -> Program:
     )  # fmt: skip
 
 
+@cache
+def at_hits_program(kinds: int, world: bool, transmission: bool) -> Program:
+    """The same on rays that mirrors and glass send on."""
+    seen = airlight_program(1, kinds, world)
+    paths = ("glossy", "transmission") if transmission else ("glossy",)
+    return replace(
+        seen,
+        name="airlight on rays of lobes",
+        textures=tuple(dict.fromkeys((*seen.textures, *RAY_TEXTURES, ("RGBA32F", "met_path")))),
+        constants=(*seen.constants, ("INT", "ray_number")),
+        defines=(*seen.defines, ("AT_HITS", "1"), *((("TRANSMISSION", "1"),) if transmission else ())),
+        outputs=tuple(("VEC4", f"out_{path}_{order}") for path in paths for order in ("direct", "indirect")),
+    )
+
+
 def _defines(stride: int, kinds: int, world: bool) -> tuple[tuple[str, str], ...]:
     return ("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
 
@@ -124,6 +145,17 @@ SPREAD, SPREAD_ON_SURFACES = (
     for on_surfaces in (False, True)
 )  # fmt: skip
 PROGRAMS = tuple(made(stride, -1, True) for made in (airlight_program, indirect_program) for stride in (1, COARSE))
+PROGRAMS = (*PROGRAMS, at_hits_program(-1, True, True))
+
+
+@dataclass(frozen=True)
+class _Lit:
+    """What shines into media in a sample: lights' kinds as bits, how many rows, and what programs bind for them."""
+
+    kinds: int
+    rows: int
+    textures: dict[str, images.Image]
+    blocks: dict[str, object]
 
 
 class Airlight(Technique):
@@ -144,7 +176,7 @@ class Airlight(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
-    provides = (MediaEmission,)
+    provides = (MediaEmission, LightOfMedia)
     requests = (MediaService,)
     writes = (
         Write("radiance.volume_direct", "RGBA32F", "Light that media scatter once towards the eye", True),
@@ -169,45 +201,69 @@ class Airlight(Technique):
         media = frame.service(MediaService)
         if media is None:
             return
-        rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
-        kinds = lights.kinds_of(emitters) | sum(
-            1 << kind for kind in {int(row[0, 0]) % lights.KIND_STEPS for row in rows} if kind >= lights.DIRECTION
-        )
-        coarse = frame.settings.samples < FEW
+        lit, world = self._lit_by(frame, media), self._lit_by_world
+        coarse, coarse_after = (frame.settings.samples < count for count in (FEW, MANY))
         stride = COARSE if coarse else 1
-        world = self._lit_by_world
-        asked = {
-            "light_count": len(rows), "shown_pixel": (frame.sample % 2, frame.sample // 2 % 2) if coarse else (0, 0),
-            "offset_size": frame.offset_size, "world_rows": float(WORLD_DIRECTIONS),
-            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)),
-        }  # fmt: skip
-        textures = {**frame.hierarchy("volume").textures, **media.media.textures}
-        blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
-        if world:
-            textures |= {
-                "environment_map": frame.environment.map,
-                "environment_density_map": frame.environment.density_map,
-            }
-            blocks["world_light"] = frame.environment.block
+        asked = self._asked(frame, lit)
+        turn = (frame.sample % COARSE, frame.sample // COARSE % COARSE)
+        textures, blocks, kinds = lit.textures, lit.blocks, lit.kinds
         frame.target("radiance.volume_emission").clear()
         rays = frame.settings.get(self, "rays") * stride * stride
-        places = places_of(rays, len(rows) + world)
+        places = places_of(rays, lit.rows + world)
         yield from self._add(
             frame, airlight_program(stride, kinds, world), ("radiance.volume_direct", "radiance.volume_emission"),
             SPREAD if coarse else None, textures=textures | {"surface_position": frame.images["surface.position"]},
-            blocks=blocks, constants=asked | {"places": places},
+            blocks=blocks, constants=asked | {"places": places, "shown_pixel": turn if coarse else (0, 0)},
         )  # fmt: skip
-        frame.count(self, "light samples", len(rows))
+        frame.count(self, "light samples", lit.rows)
         bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
         if bounces and media.media.scatters:
             self._reflectance.update(frame)
             names = "radiance.volume_indirect", "radiance.diffuse_indirect"
             yield from self._add(
-                frame, indirect_program(stride, kinds, world), names,
-                SPREAD_ON_SURFACES if coarse else None,
+                frame, indirect_program(COARSE if coarse_after else 1, kinds, world), names,
+                SPREAD_ON_SURFACES if coarse_after else None,
                 textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
-                blocks=blocks, constants=asked | {"bounces": bounces},
+                blocks=blocks,
+                constants=asked | {"bounces": bounces, "shown_pixel": turn if coarse_after else (0, 0)},
             )  # fmt: skip
+
+    def _lit_by(self, frame: Frame, media: MediaService) -> _Lit:
+        """What shines into media in this sample."""
+        rows, emitters = self._rows(frame) if media.media.scatters else ([], [])
+        kinds = lights.kinds_of(emitters) | sum(
+            1 << kind for kind in {int(row[0, 0]) % lights.KIND_STEPS for row in rows} if kind >= lights.DIRECTION
+        )
+        textures = {**frame.hierarchy("volume").textures, **media.media.textures}
+        blocks = {"film_view": frame.view_block, "sources": self._sources.set(rows)}
+        if self._lit_by_world:
+            textures |= {
+                "environment_map": frame.environment.map,
+                "environment_density_map": frame.environment.density_map,
+            }
+            blocks["world_light"] = frame.environment.block
+        self._lit = _Lit(kinds, len(rows), textures, blocks)
+        return self._lit
+
+    @staticmethod
+    def _asked(frame: Frame, lit: _Lit) -> dict[str, object]:
+        """CONSTANTS but for the pixel."""
+        return {
+            "light_count": lit.rows, "offset_size": frame.offset_size, "world_rows": float(WORLD_DIRECTIONS),
+            "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)),
+        }  # fmt: skip
+
+    def _add_on_rays(self, frame: Frame, technique: Technique, rays: Rays, target: images.Target) -> None:
+        """LightOfMedia.add, by the lights of the sample's own pass, which has run before."""
+        lit, world = self._lit, self._lit_by_world
+        program = at_hits_program(lit.kinds, world, rays.transmission)
+        places = places_of(frame.settings.get(self, "rays"), lit.rows + world)
+        passes.fullscreen(
+            program, target, blend="ADDITIVE_PREMULT", where=rays.where, textures=lit.textures | rays.textures,
+            blocks=lit.blocks,
+            constants=self._asked(frame, lit) | {"shown_pixel": (0, 0), "places": places, "ray_number": rays.number},
+        )  # fmt: skip
+        frame.count(technique, "passes")
 
     def _add(self, frame: Frame, program: Program, names: tuple[str, str], spread: Program | None, **bindings):
         """Draw a program's two outputs into sums, where it is asked at few pixels spread over all."""
@@ -250,6 +306,7 @@ class Airlight(Technique):
         self._lit_by_world = self._world and not self._endless and any(one.scatters for one in found)
         if media is not None:
             frame.provide(MediaEmission("radiance.volume_emission"))
+            frame.provide(LightOfMedia(self._add_on_rays))
 
     def _rows(self, frame: Frame) -> tuple[list[np.ndarray], list[lights.Emitter]]:
         """Points of this sample on lamps, shining meshes and the world, and the lamps among them."""

@@ -10,7 +10,7 @@ and has its own outline. Where the whole of it is less than a pixel high it fade
 
 | cost | per fragment of the shell |
 |---|---|
-| heights evaluated | a step for each two pixels on the mesh, 3 to `steps`, + `refinements` + 3 for the slope |
+| heights evaluated | a step for each two pixels on the mesh, 8 to `steps`, + `refinements` + 3 for the slope |
 | heights, safe | up to 8 times the steps, each as long as the steepest slope allows |
 | fetches beside those of heights | 6 + 3 per attribute |
 | draws | 8 triangles for each of the mesh; early depth tests are lost |

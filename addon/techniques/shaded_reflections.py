@@ -40,6 +40,7 @@ from ..lighting.caustic_maps import CausticMaps
 from ..lighting.interfaces import clear_roughness
 from ..lighting.light_rates import EmissivePoints
 from ..lighting.loop import CANDIDATES
+from ..lighting.media import LightOfMedia, MediaService, Rays, attenuated
 from ..lighting.path_sources import SHOWN, PathSources, ShadedLobes, shaded_roughness
 from ..lighting.virtual_lights import PATH_TEXTURES
 from ..lighting.visibility import TracedLobes, traced_roughness
@@ -181,7 +182,7 @@ class ShadedReflections(Technique):
         ),
     )
     provides = (ShadedLobes,)
-    requests = (GatherBindings, EmissivePoints, TracedLobes)
+    requests = (GatherBindings, EmissivePoints, TracedLobes, MediaService, LightOfMedia)
 
     def __init__(self):
         self._sources = PathSources(
@@ -242,6 +243,7 @@ class ShadedReflections(Technique):
                 yield
                 hits.shade(frame, self, rays.colors[1], records, met, closures, number, masked=True)
                 yield
+                self._pass_media(frame, rays, records, closures, sources, len(rows), number, transmission)
                 self._add_found(frame, rays, records, closures, sources, len(rows), round_, transmission)
                 if not met:
                     break
@@ -285,6 +287,20 @@ class ShadedReflections(Technique):
             },
         )  # fmt: skip
         frame.count(self, "passes")
+
+    def _pass_media(self, frame, rays, records, closures, sources, count, number, transmission) -> None:
+        """Let media on the way to what was met take what passes there, and show their own light."""
+        media, light = frame.service(MediaService), frame.service(LightOfMedia)
+        if media is None:
+            return
+        textures = dict(zip(("lobe_start", "lobe_way", "met_path"), rays.colors))
+        textures["surface_position"] = closure_bindings(closures)["surface_position"]
+        passing = Rays(textures, number, ANY_RAY, transmission)
+        depth = records.target.depth
+        target = images.Target((records.images["hit_passed"],), depth)
+        media.fade(frame, self, passing, target, sources, count if number else 0)  # the first ray finds no lamps here
+        if light is not None:
+            light.add(frame, self, passing, _target(frame, transmission, ORDERS, depth))
 
     def _add_found(self, frame, rays, records, closures, sources, count, reach, transmission) -> None:
         world = self._sources.world_flags
@@ -339,8 +355,12 @@ class ShadedReflections(Technique):
         if provided is not None:
             near = {name: provided.bindings["constants"][name] for name in near}
             textures = {name: provided.bindings["textures"][name] for name in textures}
+        program, media = received_program(transmission, frame.materials.soft), frame.service(MediaService)
+        if media is not None:
+            program = attenuated(program)
+            textures |= media.bindings
         passes.fullscreen(
-            received_program(transmission, frame.materials.soft),
+            program,
             _target(frame, transmission, ("indirect",), records.target.depth),
             blend="ADDITIVE_PREMULT",
             where=MET,

@@ -41,6 +41,7 @@ from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..lighting.interfaces import clear_roughness, interface_table
+from ..lighting.media import MediaService, attenuated
 from ..lighting.path_sources import PathSources, ShadedLobes
 from ..materials.compiler import may_refract
 from ..scene import acceleration
@@ -103,7 +104,7 @@ class TracedRefraction(Technique):
         ),
     )  # fmt: skip
     reads = SURFACES
-    requests = (GatherBindings,)
+    requests = (GatherBindings, MediaService)
     writes = (
         Write("radiance.transmission_direct", "RGBA32F", "Light that arrives through one interface of glass", True),
         Write("radiance.transmission_indirect", "RGBA32F", "Light that arrives through glass from elsewhere", True),
@@ -155,7 +156,11 @@ class TracedRefraction(Technique):
         if frame.service(ShadedLobes) is None:
             self._walk(frame, bindings)
         else:
-            self._draw(frame, FIRST_ALONE, bindings)
+            program, media = FIRST_ALONE, frame.service(MediaService)
+            if media is not None:
+                program = attenuated(program)
+                bindings["textures"] |= media.bindings
+            self._draw(frame, program, bindings)
         frame.count(self, "passes")
         frame.count(self, "light samples", len(rows))
 

@@ -2,6 +2,7 @@
 // for their place. Of the four texels around it those count whose surface lies on the hit's plane.
 #include "lib/gbuffer.glsl"
 #include "hits/path.glsl"
+#include "caustics/map_texels.glsl"
 
 // Place that a texel of the map shows, `depth` along the view's axis.
 vec3 place_of(vec2 texel, vec2 size, float depth)
@@ -14,11 +15,9 @@ vec3 place_of(vec2 texel, vec2 size, float depth)
 
 vec3 irradiance_at(vec3 position, vec3 normal)
 {
-  vec4 p = vec4(position, 1.0);
-  float w = dot(map_view.row_w, p);
-  vec2 size = vec2(kept_map_size());
-  vec2 at = (vec2(dot(map_view.row_x, p), dot(map_view.row_y, p)) / max(w, 1e-30) * 0.5 + 0.5) * size - 0.5;
-  if (w <= 0.0 || any(lessThan(at, vec2(-1.0))) || any(greaterThanEqual(at, size))) {
+  ivec2 size = kept_map_size();
+  MapPlace at = map_place(position, size);
+  if (!at.inside) {
     return vec3(0.0);
   }
   // The light is on the side that the hit faces.
@@ -26,18 +25,13 @@ vec3 irradiance_at(vec3 position, vec3 normal)
   if (dot(normal, to_light) <= 0.0) {
     return vec3(0.0);
   }
-  float texel = (map_view.frame.y - map_view.frame.x) / map_view.film.x * ((map_view.eye.w > 0.5) ? 1.0 : w);
-  vec2 corner = floor(at);
-  vec2 share = at - corner;
   vec3 sum = vec3(0.0);
   float weights = 0.0;
   for (int k = 0; k < 4; k++) {
-    vec2 step = vec2(float(k & 1), float(k >> 1));
-    ivec2 other = clamp(ivec2(corner + step), ivec2(0), ivec2(size) - 1);
+    ivec2 other = map_texel(at, k, size);
     vec4 kept = kept_map_fetch(other);
-    vec3 offset = place_of(vec2(other), size, kept.w) - position;
-    vec2 tent = mix(vec2(1.0) - share, share, step);
-    float weight = (kept.w > 0.0 && abs(dot(offset, normal)) < 1.5 * texel) ? max(tent.x * tent.y, 1e-4) : 0.0;
+    vec3 offset = place_of(vec2(other), vec2(size), kept.w) - position;
+    float weight = (kept.w > 0.0) ? map_weight(at, k, offset, normal) : 0.0;
     sum += weight * kept.rgb;
     weights += weight;
   }

@@ -9,6 +9,9 @@
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
+#ifdef MEDIA
+#include "media/media.glsl"
+#endif
 #ifndef FIRST_ALONE
 #define PART 256  // virtual lights that a surface behind glass looks at: no filter spreads their noise
 #include "indirect/near.glsl"
@@ -65,13 +68,18 @@ vec3 light_through(Interface surface, vec3 position, vec3 geometric_normal, floa
   ivec2 hit;
   bool blocked = (light.flags & LIGHT_SHADOW) != 0 && reach > 0.0
                  && trace_layers(origin, kept_direction, reach, reach, salt, true, true, hit) < reach;
+#ifdef MEDIA
+  float through = min(light_distance(light, origin, kept_direction), FARTHEST_MEDIUM);
+  kept_light *= blocked ? vec3(0.0) : media_transmittance(origin, kept_direction, through, salt);
+#endif
   return blocked ? vec3(0.0) : kept_light * (total / kept_importance);
 }
 
 // What a ray of the walk finds before `limit` in lights and world. `lobe_density` 0: only the walk can find it.
-vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, bool with_world)
+vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, bool with_world, uint salt)
 {
   vec3 sum = vec3(0.0);
+  float nearest = 1e29;  // of the lamps that are seen, which outshine what is behind them
   if (limit >= 1e29 && with_world) {
     vec3 radiance = environment_radiance(direction);
     if (lobe_density > 0.0) {
@@ -86,8 +94,14 @@ vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, b
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && (light.flags & LIGHT_TRANSMISSION) != 0) {
       sum += radiance * ((lobe_density > 0.0) ? power_share(lobe_density, light.rate * density) : 1.0);
+      nearest = (max_component(radiance) > 0.0) ? min(nearest, hit_distance) : nearest;
     }
   }
+#ifdef MEDIA
+  if (max_component(sum) > 0.0) {
+    sum *= media_transmittance(origin, direction, min(nearest, FARTHEST_MEDIUM), salt);
+  }
+#endif
   return sum;
 }
 
@@ -154,7 +168,7 @@ void main()
     vec3 normal = vec3(0.0);
     if (goes_on) {
       t = trace_layers(origin, direction, 1e29, 0.0, roll.y, true, false, hit);
-      gained += throughput * light_found(origin, direction, lobe_density, t, world_transmission != 0 && !clear);
+      gained += throughput * light_found(origin, direction, lobe_density, t, world_transmission != 0 && !clear, roll.z);
       hole = (clear && t >= 1e29) ? dot(throughput, vec3(1.0 / 3.0)) : 0.0;
       goes_on = t < 1e29;
     }

@@ -3,26 +3,79 @@
 // Places are drawn half around the light's point, in equal steps of the angle under which it sees the ray (Kulla & Fajardo
 // 2012), half in proportion to what the medium sends back (media/bins.glsl), both weighted by the balance heuristic. One
 // row of `sources` after the other takes `places` of them, stratified; STRIDE pixels of the picture share one of this.
+// AT_HITS: of rays that mirrors and glass send on, up to what those have met, instead of the camera's.
 #include "media/arriving.glsl"
+#ifdef AT_HITS
+#include "hits/path.glsl"
+#else
 #include "media/view_ray.glsl"
+#endif
 #include "media/dither.glsl"
+
+#ifdef AT_HITS
+struct ViewRay {
+  vec3 origin;
+  vec3 direction;
+  float limit;
+};
+
+// What media send back along a ray counts as light that the first surface mirrors or lets pass: what they emit, direct on
+// the first ray; all else indirect, as in Cycles.
+void show(ivec2 pixel, vec3 scattered, vec3 emitted)
+{
+  vec4 path = met_path_fetch(pixel);
+  vec3 direct = (ray_number == 0) ? path.rgb * emitted : vec3(0.0);
+  vec3 indirect = path.rgb * scattered + ((ray_number == 0) ? vec3(0.0) : path.rgb * emitted);
+  if (path_is_glossy(int(path.w + 0.5))) {
+    out_glossy_direct = vec4(direct, 0.0);
+    out_glossy_indirect = vec4(indirect, 0.0);
+  }
+#ifdef TRANSMISSION
+  else {
+    out_transmission_direct = vec4(direct, 0.0);
+    out_transmission_indirect = vec4(indirect, 0.0);
+  }
+#endif
+}
+#endif
 
 void main()
 {
+#ifdef AT_HITS
+  out_glossy_direct = vec4(0.0);
+  out_glossy_indirect = vec4(0.0);
+#ifdef TRANSMISSION
+  out_transmission_direct = vec4(0.0);
+  out_transmission_indirect = vec4(0.0);
+#endif
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  if (met_path_fetch(pixel).w < 0.5) {
+    return;
+  }
+  ViewRay ray;
+  ray.origin = lobe_start_fetch(pixel).xyz;
+  ray.direction = lobe_way_fetch(pixel).xyz;
+  vec4 met = surface_position_fetch(pixel);
+  ray.limit = (met.w != 0.0) ? max(dot(met.xyz - ray.origin, ray.direction), 0.0) : FARTHEST_MEDIUM;
+  uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 181 + ray_number);
+#else
   out_direct = vec4(0.0);
   out_emission = vec4(0.0);
   ivec2 size = surface_position_size();
   ivec2 pixel = min(ivec2(gl_FragCoord.xy) * STRIDE + shown_pixel, size - 1);
   ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 43);
+#endif
   uint seed = roll.x;
   Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
 #if STRIDE > 1
   out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around
-#endif
-  out_emission.rgb = bins.emitted;
-#if STRIDE > 1
   out_emission.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
+#endif
+#ifdef AT_HITS
+  show(pixel, vec3(0.0), bins.emitted);
+#else
+  out_emission.rgb = bins.emitted;
 #endif
   if (!(bins.total > 0.0) || bins.count == 0) {
     return;
@@ -31,38 +84,29 @@ void main()
   float end = bins.to[bins.count - 1];
   vec3 sum = vec3(0.0);
   for (int i = 0; i < ROWS_ASKED; i++) {
+#ifdef AT_HITS
+    uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i + 8192 * (1 + ray_number))));
+#else
     uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i)));
+#endif
 #if STRIDE > 1
     float own = fract(dither(ivec2(gl_FragCoord.xy)) + 0.618034 * float(film_view.sample_index) + 0.7548777 * float(i));
 #else
     float own = shuffled(film_view.sample_index, salt.xy);
 #endif
-    bool far = true;
-    vec3 point = ray.origin;
-    if (i < light_count) {
-      Light light = light_read(i);
-      far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
-      point = (LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE)) ? light.centre : light.point;
-    }
-    float middle = dot(point - ray.origin, ray.direction);
-    vec3 missed = ray.origin + middle * ray.direction - point;
-    float apart = max(length(missed), 1e-6 * max(abs(middle), 1e-3));
-    float low = atan((begin - middle) / apart);
-    float high = atan((min(end, 1e15) - middle) / apart);
-    float opening = high - low;
-    bool around = !far && opening > 1e-7;
+    Around around = around_row(i, ray.origin, ray.direction, begin, end);
     vec3 own_sum = vec3(0.0);
     for (int n = 0; n < places; n++) {
       // Both ways to draw take turns, each stratified by itself; a single place draws which.
-      bool by_angle = around && ((places > 1) ? (n & 1) == 0 : own < 0.5);
+      bool by_angle = around.exists && ((places > 1) ? (n & 1) == 0 : own < 0.5);
       float v = (float(n) + own) / float(places);
-      if (around) {
+      if (around.exists) {
         v = (places > 1) ? (float(n / 2) + fract(own + (by_angle ? 0.0 : 0.5))) / float(places / 2) : fract(2.0 * own);
       }
       float t;
       int k;
       if (by_angle) {
-        t = clamp(middle + apart * tan(mix(low, high, v)), begin, end);
+        t = around_draw(around, v);
         k = bins_find(bins, t);
         if (k < 0) {
           continue;
@@ -72,9 +116,8 @@ void main()
         t = bins_draw(bins, v, k);
       }
       float density = bins_density(bins, k, t);
-      if (around) {
-        float off = t - middle;
-        density = 0.5 * density + 0.5 * apart / (opening * (off * off + apart * apart));
+      if (around.exists) {
+        density = 0.5 * (density + around_density(around, t));
       }
       vec3 position = ray.origin + t * ray.direction;
       vec3 weight = bin_passing(bins, k, t) / max(density, 1e-30);
@@ -87,5 +130,9 @@ void main()
     sum += own_sum / float(places);
   }
   bool finite_sum = is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z);
+#ifdef AT_HITS
+  show(pixel, finite_sum ? sum : vec3(0.0), bins.emitted);
+#else
   out_direct.rgb = finite_sum ? sum : vec3(0.0);
+#endif
 }

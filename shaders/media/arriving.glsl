@@ -12,6 +12,104 @@
 #define ROWS_ASKED light_count
 #endif
 
+// How far inside a spot's cone, in its own space, a place of the ray is: negative outside.
+float in_cone(vec3 start, vec3 way, float cosine, float t)
+{
+  vec3 place = start + t * way;
+  return -place.z - cosine * length(place);
+}
+
+// The part of a ray that is in a spot's cone, of `apex`; it is one, as cones are convex.
+void clip_to_cone(Light light, vec3 apex, vec3 origin, vec3 direction, inout float begin, inout float end)
+{
+  vec4 r0 = sources.light[light.base + 5];
+  vec4 r1 = sources.light[light.base + 6];
+  vec4 r2 = sources.light[light.base + 7];
+  vec3 offset = origin - apex;
+  vec3 start = vec3(dot(r0.xyz, offset), dot(r1.xyz, offset), dot(r2.xyz, offset));
+  vec3 way = vec3(dot(r0.xyz, direction), dot(r1.xyz, direction), dot(r2.xyz, direction));
+  float squared = r0.w * r0.w;
+  float a = way.z * way.z - squared * dot(way, way);
+  if (r0.w <= 0.0 || abs(a) < 1e-6 * dot(way, way)) {
+    return;
+  }
+  float b = start.z * way.z - squared * dot(start, way);
+  float root = b * b - a * (start.z * start.z - squared * dot(start, start));
+  float low = (-b - sign(a) * sqrt(max(root, 0.0))) / a;
+  float high = (-b + sign(a) * sqrt(max(root, 0.0))) / a;
+  float apart = max(high - low, 1e-6 * max(abs(high), abs(low)));
+  if (root > 0.0 && in_cone(start, way, r0.w, 0.5 * (low + high)) > 0.0) {
+    begin = max(begin, low);
+    end = min(end, high);
+  }
+  else if (root > 0.0 && in_cone(start, way, r0.w, high + apart) > 0.0) {
+    begin = max(begin, high);
+  }
+  else if (root > 0.0 && in_cone(start, way, r0.w, low - apart) > 0.0) {
+    end = min(end, low);
+  }
+  else {
+    end = begin;
+  }
+}
+
+// Places on a ray, in equal steps of the angle under which the point of a row sees it (Kulla & Fajardo 2012): between
+// `begin` and `end`, where a spot shines, and before an area lamp. Those of rows at infinity do not exist.
+struct Around {
+  bool exists;
+  float begin;
+  float end;
+  float middle;  // distance of the place nearest to the point
+  float apart;   // its distance to the point
+  float low;     // angles of begin and end
+  float opening;
+};
+
+Around around_row(int number, vec3 origin, vec3 direction, float begin, float end)
+{
+  Around around;
+  bool far = true;
+  vec3 point = origin;
+  if (number < light_count) {
+    Light light = light_read(number);
+    far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
+    point = (LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE)) ? light.centre : light.point;
+    if ((light.flags & LIGHT_SPOT) != 0) {
+      clip_to_cone(light, point, origin, direction, begin, end);
+    }
+    if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
+      float along = dot(direction, light.axis);
+      float plane = dot(point - origin, light.axis) / ((abs(along) > 1e-12) ? along : 1e-12);
+      begin = (along > 0.0) ? max(begin, plane) : begin;
+      end = (along > 0.0) ? end : min(end, plane);
+    }
+  }
+  around.begin = begin;
+  around.end = end;
+  around.middle = dot(point - origin, direction);
+  vec3 missed = origin + around.middle * direction - point;
+  around.apart = max(length(missed), 1e-6 * max(abs(around.middle), 1e-3));
+  around.low = atan((begin - around.middle) / around.apart);
+  around.opening = atan((min(end, 1e15) - around.middle) / around.apart) - around.low;
+  around.exists = !far && end > begin && around.opening > 1e-7;
+  return around;
+}
+
+float around_draw(Around around, float u)
+{
+  return clamp(around.middle + around.apart * tan(around.low + u * around.opening), around.begin, around.end);
+}
+
+// Per metre.
+float around_density(Around around, float t)
+{
+  if (t < around.begin || t > around.end) {
+    return 0.0;
+  }
+  float off = t - around.middle;
+  return around.apart / (around.opening * (off * off + around.apart * around.apart));
+}
+
 struct Asked {
   vec3 direction;
   float reach;

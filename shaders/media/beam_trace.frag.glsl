@@ -121,9 +121,7 @@ void main()
     if (missed) {
       return;
     }
-    if (!inside_glass) {
-      flux *= media_transmittance(position, direction, t, seed + uint(i));
-    }
+    flux *= media_transmittance(position, direction, t, seed + uint(i));  // in glass, too: fog fills what stands in it
     travelled += t;
     position += t * direction;
     int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);

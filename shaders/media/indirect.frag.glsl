@@ -2,7 +2,8 @@
 //
 // The first walk starts at a place on the view ray, the second at the surface, whose irradiance it finds (of what media
 // scatter; light of other surfaces is not its matter). At each step a ray goes on by the phase function or the cosine, to a
-// place in media or to a surface, drawn by what media let pass; there one row of lights, drawn evenly, is asked.
+// place in media or to a surface, drawn by what media let pass; there one row of lights, drawn evenly, is asked. As on the
+// view ray, half of the places in media are drawn around that row's point: near a lamp others would be fireflies.
 #include "lib/gbuffer.glsl"
 #include "media/arriving.glsl"
 #include "media/view_ray.glsl"
@@ -69,8 +70,22 @@ vec3 walk(vec3 position, vec3 direction, vec3 weight, bool media_only, inout uin
     vec3 onwards = -direction;
     if (scattered) {
       int k;
-      float t = bins_draw(bins, media_random(seed), k);
-      weight *= bin_passing(bins, k, t) / max(bins_density(bins, k, t) * chance, 1e-30);
+      float t;
+      Around around = around_row(number, position, direction, bins.from[0], bins.to[bins.count - 1]);
+      float v = media_random(seed);
+      if (around.exists && v < 0.5) {
+        t = around_draw(around, 2.0 * v);
+        k = bins_find(bins, t);
+        if (k < 0) {
+          break;  // between media
+        }
+      }
+      else {
+        t = bins_draw(bins, around.exists ? 2.0 * v - 1.0 : v, k);
+      }
+      float density = bins_density(bins, k, t);
+      density = around.exists ? 0.5 * (density + around_density(around, t)) : density;
+      weight *= bin_passing(bins, k, t) / max(density * chance, 1e-30);
       position += t * direction;
       uint inside = bins.media[k];
       if (number >= 0) {

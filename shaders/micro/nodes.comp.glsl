@@ -1,5 +1,6 @@
 // Micro-buffers at points of the tree, both sides of each: entry 2 i + side of the list of those that gather, whose leaf
-// numbers are their group's first and `chosen` more.
+// numbers are their group's first and `chosen` more. `gathering` says which thread draws which entry, and negative for sides
+// from which nothing is seen: their buffers stay empty.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "micro/buffer.glsl"
@@ -7,10 +8,12 @@
 void main()
 {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  int entry = place.y * NODE_ROW + place.x;
-  if (place.x >= NODE_ROW || entry >= 2 * group_count) {
+  if (place.x >= NODE_ROW || place.y * NODE_ROW + place.x >= 2 * group_count) {
     return;
   }
+  int listed = int(gathering_fetch(place).x);
+  int entry = abs(listed) - 1;
+  place = ivec2(entry % NODE_ROW, entry / NODE_ROW);
   int group_size = leaf_count / group_count;
   int leaf = leaf_count + (entry >> 1) * group_size + min(int(buffer_choice.x * float(group_size)), group_size - 1);
   vec3 axis = octahedral_decode(node_texel(3 * leaf + 1).xy);
@@ -25,5 +28,7 @@ void main()
   if (part.x == 0) {
     micro_clear(place * micro_side);
   }
-  micro_fill(f, place * micro_side);
+  if (listed > 0) {
+    micro_fill(f, place * micro_side);
+  }
 }

@@ -13,7 +13,8 @@
 #define SEARCH_INTERVAL 1        // plain false position
 #define SEARCH_BISECTION 2
 #define PIXELS_A_STEP 2.0  // that a step of the linear search covers on the mesh
-#define FEWEST_STEPS 3.0
+#define FEWEST_STEPS 8.0  // fewer miss rims that a ray of light grazes, and light leaks past them
+#define FLAT_STEPS 3.0    // where all of the relief is a plane
 #define OVERLAP 0.02  // pixels
 
 // Height of the relief, m, over a place of the triangle whose first corner `corner` is.
@@ -93,8 +94,8 @@ bool own_surface(inout SurfacePoint point, Instance instance)
   float middle = 0.5 * (levels.x + levels.y);
   float share = clamp(2.0 * (range / width - 0.5), 0.0, 1.0);
   vec3 along = direction - dot(direction, corner.geometric_normal) * corner.geometric_normal;
-  float count = clamp(ceil(reach * length(along) / (PIXELS_A_STEP * width)), FEWEST_STEPS, max(levels.z, FEWEST_STEPS));
-  count = (share > 0.0) ? count : FEWEST_STEPS;
+  float count = clamp(ceil(reach * length(along) / (PIXELS_A_STEP * width)), min(FEWEST_STEPS, levels.z), levels.z);
+  count = (share > 0.0) ? count : FLAT_STEPS;
   float step_m = reach / count;
   int search = int(levels.w + 0.5);
 

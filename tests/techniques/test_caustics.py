@@ -350,6 +350,24 @@ def test_glass_casts_a_full_shadow_where_its_light_arrives_as_photons(stage):
     assert "the caustics slot is off" in stage.ledger.row(PHOTONS).reason
 
 
+def test_maps_of_glass_that_stops_light_are_no_finer_and_not_drawn_by_colour(stage):
+    """Coloured glass takes three maps, twice as fine from 64 samples on, only where light passes it straight."""
+    stage.floor()
+    ball(stage, glass(stage, Color=(0.9, 0.5, 0.2, 1)))
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(0.6)
+
+    def maps_of(technique):
+        irradiance(stage, technique, samples=64, size=(16, 16), path="diffuse_direct")
+        frame = stage.renderer.frame
+        provider = next(one for one in frame.plan.techniques if one.name == "accumulated_maps")
+        return provider.resolution(frame), stage.ledger.row("accumulated_maps").counters["maps"]
+
+    coarse, fine = maps_of(PHOTONS), maps_of("OFF")
+    assert fine[0] == 2 * coarse[0]
+    assert fine[1] == 3 * coarse[1]
+
+
 def test_larger_lamps_make_softer_caustics(stage):
     """A mirror shows the floor a disc of .2 m from 2 m away: edges are .2 m wide, in the mean of samples and in one."""
     stage.floor()

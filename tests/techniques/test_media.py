@@ -94,6 +94,15 @@ def test_a_camera_inside_a_medium_sees_what_is_left_from_there(stage):
     assert stage.render(size=(8, 8))["combined"][4, 4, 0] == pytest.approx(2 * np.exp(-0.8 * 0.75), rel=1e-3)
 
 
+def test_a_camera_on_a_boundary_sees_a_slab_or_none(stage):
+    stage.camera((0, 0, 0.5), (0, 0, 0), angle=0.1)
+    glowing_floor(stage)
+    box(stage, absorber(stage, (0.8, 0.8, 0.8)))
+    seen = stage.render(size=(8, 8))["combined"][..., 0]
+    assert (2 * np.exp(-0.81) < seen).all() and (seen < 2.01).all()
+    assert seen.std() < 1e-3  # all pixels alike
+
+
 @pytest.mark.parametrize("scale", [1e-4, 1e5])
 def test_size_changes_nothing_where_densities_follow(stage, scale):
     stage.camera_above(span=4 * scale, height=10 * scale)
@@ -148,6 +157,65 @@ def test_airlight_of_a_point_light_is_its_integral(stage):
     # Volume Scatter absorbs nothing: extinction is scattering.
     assert fog_light.mean() == pytest.approx(expected.mean(), rel=0.01)
     assert np.abs(fog_light / expected - 1).mean() < 0.05
+
+
+LAMP = np.zeros(3)
+CORNER = 0.75  # of pixel 5 of 8 over a span of 4, along x and y
+
+
+def lit_cube(stage, scale=1.0, density=0.5):
+    """A cube of fog of 2 m, times scale, below a camera, with a lamp of pi W/sr, times scale squared, in its middle."""
+    stage.camera_above(span=4 * scale, height=10 * scale)
+    stage.scene.camera.data.clip_start, stage.scene.camera.data.clip_end = 0.01 * scale, 100 * scale
+    stage.light("POINT", energy=4 * np.pi**2 * scale**2, location=(0, 0, 0), shadow_soft_size=0.0)
+    fog_in_it = volume(stage, Color=(1, 1, 1, 1), Density=density / scale)
+    return box(stage, fog_in_it, (-1, -1, -1), (1, 1, 1), scale=(scale,) * 3)
+
+
+def airlight_of_cube(down=True, density=0.5):
+    side = 1.0 if down else -1.0
+    start = np.array([CORNER, CORNER, side])
+    return airlight(start, np.array([0, 0, -side]), 2.0, LAMP, np.pi, density, density)
+
+
+def of_corners(seen):
+    """Mean of the four pixels that are as far from the lamp as each other."""
+    return seen[[2, 2, 5, 5], [2, 5, 2, 5], 0].mean()
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
+def test_airlight_is_the_same_at_any_size(stage, scale):
+    lit_cube(stage, scale)
+    seen = stage.render(64, size=(8, 8))["volume_direct"][5, 5, 0]
+    assert seen == pytest.approx(airlight_of_cube(), rel=0.03)
+
+
+def test_a_mirror_shows_the_fog_before_it(stage):
+    lit_cube(stage)
+    mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    stage.rectangle((-2, -2), (2, 2), z=-1.01, material=mirror)
+    seen = stage.render(64, size=(8, 8), bounces=1)
+    assert of_corners(seen["glossy_indirect"]) == pytest.approx(airlight_of_cube(down=False), rel=0.03)
+    assert seen["volume_direct"][5, 5, 0] == pytest.approx(airlight_of_cube(), rel=0.03)
+
+
+def test_glass_shows_the_fog_behind_it(stage):
+    lit_cube(stage)
+    box(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.0001, Roughness=0.0), (-2, -2, 1.2), (2, 2, 1.4))
+    stage.scene.candela.slot_caustics = "OFF"
+    seen = stage.render(64, size=(8, 8), bounces=1)
+    assert of_corners(seen["transmission_indirect"]) == pytest.approx(airlight_of_cube(), rel=0.03)
+
+
+def test_fog_fades_what_a_mirror_shows(stage):
+    stage.camera_above()
+    mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+    stage.rectangle((-2, -2), (2, 2), z=-1.0, material=mirror)
+    glowing_floor(stage, z=3.0).visible_camera = False
+    box(stage, absorber(stage, (0.8, 0.5, 0.1)))
+    seen = stage.render(4, size=(16, 16), bounces=1)["combined"]
+    assert seen[8, 8, :3] == pytest.approx(2 * np.exp(-2 * np.array([0.8, 0.5, 0.1])), rel=0.01)
+    assert seen[1, 1, :3] == pytest.approx(2.0, rel=0.01)
 
 
 PHASE = passes.fullscreen_program(
@@ -305,7 +373,9 @@ def beams_of_a_ball(density, ior=1.5, pixels=96, span=6.0, rays=400_000, bounces
     bent, mirrored, share = meet(direction, place, 1 / ior)
     leaving = [(place, mirrored, flux * share)]
     direction, flux = bent, flux * (1 - share)
+    within = np.exp(2 * density * (bent * place).sum(axis=1))  # fog fills the ball; chords are all as long
     for _ in range(bounces + 1):
+        flux = flux * within
         place = place - 2 * (direction * place).sum(axis=1)[:, None] * direction
         bent, mirrored, share = meet(direction, -place, ior)
         leaving.append((place, bent, flux * (1 - share)))

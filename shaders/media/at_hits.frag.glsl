@@ -1,0 +1,21 @@
+// What media let pass along rays of lobes, up to what each has met or, where it is nearer, a lamp that it sees.
+#include "media/media.glsl"
+#include "light/sources.glsl"
+
+void main()
+{
+  out_passed = vec4(1.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec3 start = lobe_start_fetch(pixel).xyz;
+  vec3 direction = lobe_way_fetch(pixel).xyz;
+  vec4 met = surface_position_fetch(pixel);
+  float limit = (met.w != 0.0) ? max(dot(met.xyz - start, direction), 0.0) : FARTHEST_MEDIUM;
+  for (int i = 0; i < light_count; i++) {
+    float hit_distance;
+    float density;
+    vec3 radiance = light_hit(light_read(i), start, direction, hit_distance, density);
+    limit = (max_component(radiance) > 0.0) ? min(limit, hit_distance) : limit;
+  }
+  uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 161 + ray_number).x;
+  out_passed.rgb = media_transmittance(start, direction, limit, salt);
+}
