@@ -28,6 +28,8 @@ void clip_to_cone(Light light, vec3 apex, vec3 origin, vec3 direction, inout flo
   vec3 offset = origin - apex;
   vec3 start = vec3(dot(r0.xyz, offset), dot(r1.xyz, offset), dot(r2.xyz, offset));
   vec3 way = vec3(dot(r0.xyz, direction), dot(r1.xyz, direction), dot(r2.xyz, direction));
+  // Light leaves all of a round lamp: the cone around all of their cones begins behind it.
+  start.z -= light.radius * length(r2.xyz) / sqrt(max(1.0 - r0.w * r0.w, 1e-6));
   float squared = r0.w * r0.w;
   float a = way.z * way.z - squared * dot(way, way);
   if (r0.w <= 0.0 || abs(a) < 1e-6 * dot(way, way)) {
