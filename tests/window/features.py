@@ -12,6 +12,7 @@ import traceback
 from pathlib import Path
 
 import bpy
+from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
@@ -22,6 +23,7 @@ from stage import ENGINE, FOLDER, main_region, picture, render, result, run, the
 SAMPLES = 1
 VIEW_SHARE = 0.4  # of the large area, for the viewport: few pixels are drawn soon, and wide panels are read easily
 WARNING_BUTTON = (29, 147)  # of the first warning, in pixels from the upper right corner of the properties
+HIGHLIGHT = (-0.8, 2.0, 1.7)  # on the mirror, where a highlight is moved to
 ONLY = sys.argv[sys.argv.index("--") + 1 : -1]  # names of steps; by default all
 result.update(done=[], failed={}, s={}, renders={})
 
@@ -374,6 +376,24 @@ def reflections(left, right):
     yield from f12("reflections_1")
     scene.frame_set(10)
     yield from f12("reflections_10")
+    # A second place, to which the lamp's highlight is moved; the first one keeps what it shows.
+    mirror.active_material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.15
+    yield from f12("reflections_without")
+    with there(right):
+        result["pick_second"] = list(bpy.ops.candela.pick_reflection("INVOKE_DEFAULT"))
+    yield 0.5
+    yield from click(*on_screen(left, HIGHLIGHT))
+    yield 0.5
+    result["picked_second"] = len(constraints())
+    lamp = next(one for one in scene.objects if one.type == "LIGHT")
+    mirror = window().view_layer.objects.active
+    constraints()[1].target = mirror.matrix_world.inverted() @ lamp.matrix_world.translation
+    yield from wait_for_rest()
+    yield 0.5
+    picture("reflections_highlight.png")
+    yield from f12("reflections_with")
+    spot = world_to_camera_view(scene, scene.camera, Vector(HIGHLIGHT))
+    result["highlight"] = [spot.x, spot.y]
     with there(right):
         result["return_to_view"] = list(bpy.ops.candela.return_to_view("INVOKE_DEFAULT"))
     yield from wait_for_rest()

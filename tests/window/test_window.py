@@ -394,7 +394,17 @@ def test_a_reflection_is_picked_dragged_keyframed_and_rendered(tried):
     first, tenth = (pixels(folder / f"reflections_{frame}_render.png") for frame in (1, 10))
     assert np.abs(first - tenth).max() > 30
     assert result["return_to_view"] == ["FINISHED"]
-    assert result["after_escape"] == 1
+    assert result["after_escape"] == 2
+
+
+def test_a_second_constraint_moves_a_highlight_and_keeps_the_first(tried):
+    folder, result = tried
+    assert result["pick_second"] == ["RUNNING_MODAL"] and result["picked_second"] == 2
+    before, after = (pixels(folder / f"reflections_{name}_render.png").astype(float) for name in ("without", "with"))
+    height, width = after.shape[:2]
+    column, row = int(result["highlight"][0] * width), int((1.0 - result["highlight"][1]) * height)
+    around = np.s_[max(row - 3, 0) : row + 4, max(column - 3, 0) : column + 4, :3]
+    assert after[around].mean() > before[around].mean() + 30
 
 
 def test_translucency_is_painted_undone_and_saved(tried):
