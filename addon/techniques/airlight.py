@@ -10,7 +10,8 @@ media. V are rays of the hierarchy, T is that of media.py. What media emit is in
 
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
 spread their light over opacity to pixels whose rays end equally far away. Others take a quarter as many at every pixel,
-and converge. Light of several bounces, one walk a pixel and sample, is smooth, and spread below MANY samples.
+and converge. Light of several bounces, one walk a pixel and sample, is smooth, and spread below MANY samples
+(in pictures of at least WIDE pixels a side).
 
 | cost | per sample |
 |---|---|
@@ -58,6 +59,7 @@ from ..surfaces.reflectance import Reflectance
 
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
 MANY = 64  # and that of several bounces, which is smoother and noisier, below these
+WIDE = 64  # pixels: in smaller pictures a mean over eight pixels is one over much of what is seen
 COARSE = 2  # pixels of one known pixel's side then
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
@@ -202,7 +204,8 @@ class Airlight(Technique):
         if media is None:
             return
         lit, world = self._lit_by(frame, media), self._lit_by_world
-        coarse, coarse_after = (frame.settings.samples < count for count in (FEW, MANY))
+        coarse = frame.settings.samples < FEW
+        coarse_after = coarse or (frame.settings.samples < MANY and min(frame.size) >= WIDE)
         stride = COARSE if coarse else 1
         asked = self._asked(frame, lit)
         turn = (frame.sample % COARSE, frame.sample // COARSE % COARSE)
