@@ -317,6 +317,7 @@ LIT_GLASS = [
 COLUMNS, CELL = 5, 16  # spheres in a row, pixels of each
 
 
+@pytest.mark.slow
 @SLOW
 @pytest.mark.parametrize(
     ("light", "sweep"), [("area", LIT_SWEEP), ("world", LIT_SWEEP), ("area", LIT_GLASS)], ids=["area", "world", "glass"]

@@ -190,6 +190,7 @@ def test_airlight_is_the_same_at_any_size(stage, scale):
     assert seen == pytest.approx(airlight_of_cube(), rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_mirror_shows_the_fog_before_it(stage):
     lit_cube(stage)
     mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
@@ -199,6 +200,7 @@ def test_a_mirror_shows_the_fog_before_it(stage):
     assert seen["volume_direct"][5, 5, 0] == pytest.approx(airlight_of_cube(), rel=0.03)
 
 
+@pytest.mark.slow
 def test_glass_shows_the_fog_behind_it(stage):
     lit_cube(stage)
     box(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.0001, Roughness=0.0), (-2, -2, 1.2), (2, 2, 1.4))
@@ -333,6 +335,7 @@ def lens_scene(stage, ior):
     return ball(stage, 0.5, ior)
 
 
+@pytest.mark.slow
 def test_a_lens_of_index_one_changes_no_fog_below_it(stage):
     made = lens_scene(stage, 1.0001)
     lens = media_light(stage.render(16, size=(32, 32), bounces=1))[:13]
@@ -392,6 +395,7 @@ def beams_of_a_ball(density, ior=1.5, pixels=96, span=6.0, rays=400_000, bounces
     return image * density / (4 * np.pi) * pixels / span
 
 
+@pytest.mark.slow
 def test_a_ball_lens_gathers_light_where_optics_say(stage):
     """Rays off the axis cross it before the paraxial focus, half a radius behind the ball: the waist is nearer."""
     stage.camera((0, -20, 0), (np.pi / 2, 0, 0))
@@ -441,6 +445,7 @@ def test_open_meshes_and_flat_ones_give_a_finite_picture(stage):
     stage.render(2, size=(8, 8))
 
 
+@pytest.mark.slow
 def test_a_grid_of_any_numbers_gives_a_finite_picture(stage, tmp_path):
     vdb = openvdb()
     rng = np.random.default_rng(1)
@@ -463,6 +468,7 @@ def test_a_grid_of_any_numbers_gives_a_finite_picture(stage, tmp_path):
     assert seen["volume_direct"].max() > 0
 
 
+@pytest.mark.slow
 def test_voxels_absorb_what_stands_in_them(stage, tmp_path):
     """An even grid of 8 voxels of 0.25 m, lifted by a voxel: two metres of extinction 0.4."""
     vdb = openvdb()

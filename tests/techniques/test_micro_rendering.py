@@ -99,6 +99,7 @@ def test_light_of_both_sides_of_a_sheet_is_told_apart(stage, render):
     assert np.abs(render(1)).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_error_falls_with_samples_and_with_pixels_of_the_micro_buffer(stage, render):
     lamp_in_a_corner(stage)
     shelf(stage, material=stage.diffuse(0.5))

@@ -52,6 +52,7 @@ def test_wires_at_a_shadows_edge_have_their_own_light(stage, light_of):
     assert repeated < 0.7 * guess
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.1, 0.4])
 def test_highlights_on_outlines_are_not_dimmed(stage, light_of, roughness):
     """Cylinders hardly thicker than a pixel: what mirrors the light is seen by few pixels' own points."""

@@ -6,6 +6,7 @@ import pytest
 from bench import shafts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shafts.TRUTHS)
 def test_the_profile_of_a_shaft_is_within_a_tenth_of_its_peak(registered, monkeypatch, name):
     monkeypatch.setattr(shafts, "TRACED", 4000)
