@@ -21,7 +21,10 @@ def begin() -> None:
 
 
 def _background():
-    return next(node for node in bpy.context.scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    world = bpy.context.scene.world
+    if world.node_tree is None:  # before Blender 5
+        world.use_nodes = True
+    return next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
 
 
 def link(name: str, data, location=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1)):
@@ -39,6 +42,8 @@ def camera(name: str, location, turn, angle: float = 0.8):
 
 def material(node: str, socket: str = "Surface", **inputs):
     made = bpy.data.materials.new(node)
+    if made.node_tree is None:  # before Blender 5
+        made.use_nodes = True
     nodes = made.node_tree.nodes
     nodes.clear()
     shader, output = nodes.new(node), nodes.new("ShaderNodeOutputMaterial")
