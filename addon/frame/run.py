@@ -10,10 +10,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..gfx import context, images, library, passes
+from ..gfx import context, images, passes
 from ..gfx.readback import Readback, Reading, put
 from ..gfx.struct import Block
-from ..gfx.timing import Profiler
+from ..gfx.timing import Profiler, Stopwatch
 from ..materials.compiled import CompiledMaterial
 from ..materials.working_space import current
 from ..sampling.lens import point_of
@@ -409,7 +409,7 @@ class Renderer:
             raise ValueError("The scene has no camera: add one, or make one active in the Scene properties.")
         if settings.samples_to_draw < 1:
             raise ValueError(f"Sample Offset {settings.sample_offset} leaves none of {settings.samples} samples.")
-        started, compiled = time.perf_counter(), library.compile_seconds
+        watch = Stopwatch()
         context.ensure()
         context.begin_picture()
         device_probe.ensure()
@@ -422,9 +422,9 @@ class Renderer:
         environment = self._update_environment(snapshot)
         self._lamp_maps.update(snapshot, self.geometry.origin, self.materials)
         plan = make_plan(self.techniques, snapshot, settings)
-        ledger.times["upload"] = time.perf_counter() - started - (library.compile_seconds - compiled)
+        ledger.times["upload"] = watch.working
         yield from compiling(self._programs(plan, snapshot, settings))
-        ledger.times["compile"] = library.compile_seconds - compiled
+        ledger.times["compile"] = watch.compiling
         ledger.notes = tuple(
             dict.fromkeys((*snapshot.notes, *self.materials.notes, *environment.notes, *self._lamp_maps.notes))
         )
@@ -740,12 +740,11 @@ def _timed(frame: Frame, parts: Iterator[None]) -> Iterator[None]:
     """The same parts; what they take is added to the frame's time."""
     end = object()
     while True:
-        started, compiled = time.perf_counter(), library.compile_seconds
+        watch = Stopwatch()
         part = next(parts, end)
-        compiling_s = library.compile_seconds - compiled
-        frame.drawn_s += time.perf_counter() - started - compiling_s
+        frame.drawn_s += watch.working
         times = frame.ledger.times
-        times["compile"] = times.get("compile", 0.0) + compiling_s
+        times["compile"] = times.get("compile", 0.0) + watch.compiling
         if part is end:
             return
         yield

@@ -18,6 +18,21 @@ EVERY = 16  # samples, one of which is measured
 FEWEST = 4  # samples: of a picture of fewer none is measured, unless each step waits anyhow
 
 
+class Stopwatch:
+    """Seconds since it was made: what programs took to compile, and the rest."""
+
+    def __init__(self):
+        self._started, self._compiled = time.perf_counter(), library.compile_seconds
+
+    @property
+    def compiling(self) -> float:
+        return library.compile_seconds - self._compiled
+
+    @property
+    def working(self) -> float:
+        return time.perf_counter() - self._started - self.compiling
+
+
 class Profiler:
     """Adds up seconds by step name, without those that programs took to compile.
 
@@ -34,14 +49,13 @@ class Profiler:
 
     @contextmanager
     def step(self, name: str):
-        start, compiled = time.perf_counter(), library.compile_seconds
+        watch = Stopwatch()
         try:
             yield
         finally:
             if self.wait:
                 finish()
-            took = time.perf_counter() - start - (library.compile_seconds - compiled)
-            self.seconds[name] = self.seconds.get(name, 0.0) + took
+            self.seconds[name] = self.seconds.get(name, 0.0) + watch.working
             self.calls[name] = self.calls.get(name, 0) + 1
 
     def steps(self, name: str, parts: Iterator) -> Iterator:

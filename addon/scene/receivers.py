@@ -9,6 +9,8 @@ import numpy as np
 
 from .culling import CORNERS
 
+TILE = 16  # pixels along each side of what a shader makes a box of
+
 
 @dataclass(frozen=True)
 class Receivers:
@@ -17,7 +19,7 @@ class Receivers:
     low: np.ndarray  # (T, 3)
     high: np.ndarray  # (T, 3)
     distance: np.ndarray  # (T,) from the camera, metres
-    side: int = 16  # pixels along each side of what a box is around
+    side: int = TILE  # pixels along each side of what a box is around
 
     @cached_property
     def typical_distance(self) -> float:
@@ -38,7 +40,6 @@ class Receivers:
         return [np.flatnonzero(level == k) for k in (3, 2, 1, 0) if (level == k).any()]
 
 
-TILE = 16  # pixels along each side of what a shader makes a box of
 MOST = 1024  # boxes: each map of a light is fitted to all of them, on the processor
 
 

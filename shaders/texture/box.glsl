@@ -1,5 +1,5 @@
-// Included where `finer_texel` is defined. The mean of what a texel covers of the finer level: two texels a side, or, where the finer side is odd, between two and
-// three, those at the ends in part.
+// The mean of what a texel covers of the finer level: two texels a side, or, where the finer side is odd, between two and
+// three, those at the ends in part. Included where `finer_texel` is defined.
 vec4 box_mean(ivec2 texel, ivec2 finer_size)
 {
   vec2 ratio = vec2(finer_size) / vec2(finer_size >> 1);

@@ -8,6 +8,7 @@ from addon.gfx import images, passes
 from addon.materials.volume import PHASES, Medium
 from addon.scene.media import phase_values
 from addon.snapshot.volumes import openvdb
+from bench.shaft_truth import meet
 
 trapezoid = getattr(np, "trapezoid", None) or getattr(np, "trapz")  # noqa: B009 (the name before numpy 2.0)
 
@@ -361,16 +362,6 @@ def beams_of_a_ball(density, ior=1.5, pixels=96, span=6.0, rays=400_000, bounces
     r, turn = np.sqrt(rng.random(rays)), 2 * np.pi * rng.random(rays)
     place = np.stack([r * np.cos(turn), r * np.sin(turn), np.sqrt(1 - r * r)], axis=1)
     direction = np.broadcast_to([0.0, 0.0, -1.0], place.shape)
-
-    def meet(direction, normal, eta):
-        """Direction bent and mirrored, and Fresnel's share that is mirrored."""
-        cosine = -(direction * normal).sum(axis=1)
-        squared = 1 - eta**2 * (1 - cosine**2)
-        inside = np.sqrt(np.maximum(squared, 0))
-        s = (eta * cosine - inside) / (eta * cosine + inside)
-        p = (cosine - eta * inside) / (cosine + eta * inside)
-        bent = eta * direction + (eta * cosine - inside)[:, None] * normal
-        return bent, direction + 2 * cosine[:, None] * normal, np.where(squared > 0, (s * s + p * p) / 2, 1.0)
 
     flux = np.pi / rays * np.exp(-density * (half - place[:, 2]))
     bent, mirrored, share = meet(direction, place, 1 / ior)

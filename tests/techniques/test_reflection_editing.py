@@ -8,6 +8,7 @@ import pytest
 from addon.gfx import images, passes
 from addon.surfaces import geodesic, reflection_edits
 from addon.surfaces.reflection_edits import EUCLIDEAN, SOLVE, Constraint, Region, edit_table, mirrored
+from bench.reflection_costs import torus
 
 UP = np.array([0.0, 0.0, 1.0])
 EVERYWHERE = Region(EUCLIDEAN, np.zeros(3), 1e6, 0.0)
@@ -237,23 +238,10 @@ def test_the_nearest_place_of_a_mesh():
     assert weights @ positions[triangles[triangle]] == pytest.approx([0.0, 0.6, 0.0])
 
 
-def bumpy_torus(n):
-    """(V, 3), (2 n n, 3): closed, with bumps, of triangles that differ in size."""
-    angle = 2 * np.pi * np.arange(n) / n
-    u, v = np.meshgrid(angle, angle, indexing="ij")
-    thick = 0.4 + 0.03 * np.sin(9 * u) * np.sin(7 * v)
-    positions = np.stack([(1 + thick * np.cos(v)) * np.cos(u), (1 + thick * np.cos(v)) * np.sin(u), thick * np.sin(v)])
-    a = np.arange(n * n).reshape(n, n)
-    b, d = np.roll(a, -1, axis=0), np.roll(a, -1, axis=1)
-    c = np.roll(b, -1, axis=1)
-    halves = [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))]
-    return positions.reshape(3, -1).T, np.concatenate(halves)
-
-
 @pytest.mark.parametrize("reach", [0.0, 0.2, 1.0])
 def test_a_search_with_an_end_finds_the_same_distances_up_to_it(reach):
     """Also at all corners of triangles that `reach` crosses, between which distances are interpolated."""
-    positions, triangles = bumpy_torus(60)
+    positions, triangles = torus(60)
     graph = geodesic.neighbours(positions, triangles)
     seeds, at = triangles[40], np.array([0.01, 0.02, 0.03])
     whole = geodesic.distances(graph, seeds, at)
@@ -265,7 +253,7 @@ def test_a_search_with_an_end_finds_the_same_distances_up_to_it(reach):
 
 def test_the_nearest_place_is_that_of_all_triangles_looked_at():
     rng = np.random.default_rng(8)
-    positions, triangles = bumpy_torus(24)
+    positions, triangles = torus(24)
     stray = np.concatenate([positions, [[0.5, 0.5, 5.0]]])  # a vertex that no triangle uses
     for point in rng.normal(size=(30, 3)) * 1.5:
         weights = rng.dirichlet(np.ones(3), size=(400, 1))
@@ -278,7 +266,7 @@ def test_the_nearest_place_is_that_of_all_triangles_looked_at():
 
 
 def test_a_point_that_moves_leaves_distances_from_others_as_they_are():
-    surface = geodesic.Surface(*bumpy_torus(24))
+    surface = geodesic.Surface(*torus(24))
     stays, moves = np.array([1.4, 0.0, 0.0]), np.array([0.0, 1.4, 0.0])
     first = surface.along(stays, 1.0)
     surface.along(moves, 1.0)
@@ -290,7 +278,7 @@ def test_a_point_that_moves_leaves_distances_from_others_as_they_are():
 
 def test_half_a_million_triangles_take_seconds_and_a_moved_point_much_less():
     """Bounds are ten times what two busy cores take: 2 s for the first search, .1 s for one of a tenth of the mesh."""
-    surface = geodesic.Surface(*bumpy_torus(500))
+    surface = geodesic.Surface(*torus(500))
     assert len(surface.triangles) == 500_000
     start = time.perf_counter()
     surface.along(np.array([1.4, 0.0, 0.0]), np.inf)
