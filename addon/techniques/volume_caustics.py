@@ -88,7 +88,7 @@ class VolumeCaustics(Technique):
     params = (
         Param(
             "rays", "Rays", 192,
-            "Light rays along each side of the grid that each lamp sends towards glass and mirrors in a sample; at most "
+            "Light rays along each side of the grid that each lamp sends to glass and mirrors in a sample, at most "
             "four for each pixel along the picture's longer side",
             8, 1024, draft=64,
         ),
