@@ -32,6 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 from ..frame.light_paths import MEDIUM, SURFACE, named
 from ..frame.run import Frame
@@ -41,6 +42,7 @@ from ..gfx.library import Program
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..surfaces.draw import refracts
+from .together import SUM, terms
 
 POINTS = Param(
     "points", "Film points", 8,
@@ -123,48 +125,58 @@ def shown_paths(frame: Frame) -> set[str]:
     return {path for path in paths if f"radiance.{path}" in written and (glossy or not path.startswith("glossy"))}
 
 
-def _programs(repeated: bool) -> tuple[Program, Program]:
-    """Without light through glass, and with it."""
-    return tuple(
-        passes.fullscreen_program(
-            "film light between points, edges marked" if repeated else "film light between points",
-            "film/between.frag.glsl",
-            textures=tuple(
-                ("RGBA32F", texture)
-                for texture in (
-                    *(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES),
-                    *(f"light_{path}" for path in paths),
-                )
-            ),
-            blocks=((VIEW, "film_view"),),
-            constants=(("VEC2", "offset"),),
-            defines=(*defines, *((("REPEATED", "1"),) if repeated else ())),
-            writes_depth=repeated,
-            outputs=tuple(("VEC4", f"out_{path}") for path in paths),
-        )
-        for paths, defines in ((REFLECTED, ()), (PATHS, (("TRANSMISSION", ""),)))
+@cache
+def between_program(paths: tuple[str, ...], drawn: tuple[str, ...], repeated: bool) -> Program:
+    """Of the light of these `paths` those that are `drawn` each into an image; SUM among them: all others into one."""
+    summed = [path for path in paths if path not in drawn]
+    written = {path: f"light.{path}" for path in drawn} | {SUM: terms(summed, "light.{0}")}
+    return passes.fullscreen_program(
+        "film light between points, edges marked" if repeated else "film light between points",
+        "film/between.frag.glsl",
+        textures=tuple(
+            ("RGBA32F", texture)
+            for texture in (
+                *(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES),
+                *(f"light_{path}" for path in paths),
+            )
+        ),
+        blocks=((VIEW, "film_view"),),
+        constants=(("VEC2", "offset"),),
+        defines=(
+            *((("TRANSMISSION", ""),) if len(paths) == len(PATHS) else ()),
+            *((("REPEATED", "1"),) if repeated else ()),
+            ("WRITE_ALL", " ".join(f"out_{name} = {written[name]};" for name in drawn)),
+        ),
+        writes_depth=repeated,
+        outputs=tuple(("VEC4", f"out_{name}") for name in drawn),
     )
 
 
-BETWEEN, MARKING = _programs(False), _programs(True)
+BETWEEN = tuple(
+    between_program(paths, drawn, repeated)
+    for paths in (REFLECTED, PATHS)
+    for drawn in (paths, (SUM,), (*REFLECTED[:2], SUM))
+    for repeated in (False, True)
+)
 
 
 def light_between(
     frame: Frame,
     paths: tuple[str, ...],
+    drawn: tuple[str, ...],
     target: images.Target,
     surfaces: dict[str, images.Image],
     point: int,
     repeated: bool,
 ) -> None:
-    """Draw into `target`, an image for each path, what `surfaces` (by names of SURFACE_IMAGES), seen at this point of
-    the film, reflect of this sample's light. `repeated`: direct light at edges is left to repeated_light.py; the
-    target's depth marks them by 1."""
+    """Draw into `target`, an image for each that is `drawn` (as of between_program), what `surfaces` (by names of
+    SURFACE_IMAGES), seen at this point of the film, reflect of this sample's light. `repeated`: direct light at edges
+    is left to repeated_light.py; the target's depth marks them by 1."""
     between = tuple(there - own for there, own in zip(frame.film_offset(point), frame.film_offset(frame.sample)))
     textures = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
     textures |= {f"surface_{guide}": surfaces[guide] for guide in GUIDES}
     textures |= {f"known_{guide}": frame.images[f"surface.{guide}"] for guide in GUIDES}
     passes.fullscreen(
-        (MARKING if repeated else BETWEEN)[len(paths) == len(PATHS)], target, textures=textures,
+        between_program(paths, drawn, repeated), target, textures=textures,
         blocks={"film_view": frame.view_block}, constants={"offset": between},
     )  # fmt: skip

@@ -124,6 +124,15 @@ class Frame:
         """Read an image of the pool, together with others, when one of them is asked for; the pool gets it back."""
         return self.readback.later(image)
 
+    def is_apart(self, name: str) -> bool:
+        """Whether anybody looks at this sum over samples by itself: whoever asked for the picture, or a technique."""
+        return self.settings.shows is None or name in self._looked_at
+
+    @cached_property
+    def _looked_at(self) -> frozenset[str]:
+        needs = (technique.looks_at(self.settings) for technique in self.plan.techniques)
+        return self.settings.shows.union(*needs)
+
     @cached_property
     def emitters(self) -> list[Emitter]:
         """The scene's lights that give something, in an order of their own."""
@@ -575,7 +584,7 @@ class Renderer:
     def finish(self, frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Mean images by name, (H, W, C) float32, row 0 at the bottom; completes and publishes the ledger.
 
-        Values that are not finite become 0; the ledger counts them.
+        Values that are not finite become 0; the ledger counts them. KeyError for sums that are not held apart.
         """
         started = time.perf_counter()
         first = next((name for name in names if name in frame.images), None)
@@ -588,6 +597,8 @@ class Renderer:
         sums = frame.sums
         out, bad = {}, 0
         for name in names:
+            if name in sums and not frame.is_apart(name):
+                raise KeyError(f"{name} is not held apart: settings.shows must name it when the picture begins.")
             if name not in frame.images:  # no technique of the plan brings such light
                 out[name] = np.zeros((*frame.size[::-1], 4), np.float32)
                 continue
@@ -703,7 +714,7 @@ class Renderer:
             lights_key(snapshot), self._lamp_maps.changes, casters, self._environment[0], self.materials.fingerprint(),
             volumes_key(snapshot), snapshot.film,
             camera.matrix.tobytes(), camera.kind, camera.frame, camera.clip_start, camera.clip_end, camera.aperture,
-            settings.seed, settings.bounces, settings.draft, settings.whole and settings.samples,
+            settings.seed, settings.bounces, settings.draft, settings.shows, settings.whole and settings.samples,
             settings.whole and (settings.sample_offset, settings.samples_to_draw),
             settings.whole and (settings.time_limit, settings.noise_threshold),
             tuple(sorted(settings.slots.items())), tuple(sorted(self.drawn_with(settings).items())),

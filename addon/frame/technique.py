@@ -159,6 +159,10 @@ class Technique:
         """Whether Auto takes it for its slot in this scene, whatever the benchmark's means over scenes say."""
         return False
 
+    def looks_at(self, settings: Settings) -> tuple[str, ...]:
+        """Sums over samples of light paths, colours and normals that it needs by themselves (Frame.is_apart)."""
+        return ()
+
     def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
         """Equal keys in two frames mean that what `prepare` made still stands."""
         return None

@@ -139,6 +139,9 @@ class Denoise(Technique):
             return "the scene has no surface"
         return no_diffuse_light(snapshot)
 
+    def looks_at(self, settings: Settings) -> tuple[str, ...]:
+        return (*(f"radiance.{path}" for path in FILTERS), "color.diffuse", "color.glossy", "surface.normal_sum")
+
     def begin(self, frame: Frame) -> None:
         for write in self.writes:
             if write.name.startswith("denoise."):  # a pass tree may show what no light path needs
