@@ -312,6 +312,7 @@ class Film(Technique):
         seen = dict(zip(self._held, collected))
         seen |= {f"film.{path}": image for path, image in light.items()}
         seen = {name: image for name, image in seen.items() if name in self._shown}
+        frame.count(self, "images filtered", len(seen))
         media = frame.service(MediaService)
         offset = frame.film_offset(point)
         for service in map(frame.service, film_points.AT_POINTS):
