@@ -12,8 +12,8 @@ over by their weights times reflectance, of lobes of the same kind. Emission, th
 exact at every point.
 
 K = points / samples, from 1 to MOST. Eight points a picture, as a sample beyond them pays better than a point: since
-points go to all pixels whose filter covers them (film/filter.py), edges need no more. Pictures without indirect light
-have a quarter of that, since there a point costs nearly as much as a sample.
+points go to all pixels whose filter covers them (film/filter.py), edges need no more. Fewer where a point costs much
+beside a sample's light on this device (film/point_costs.py): without indirect light, or of many triangles.
 
 relMSE at 256x192 and seconds, all light, one point a sample, and K as here: one sample, garden .033 1.2, .015 1.5;
 window .086 1.1, .054 1.3; four samples, garden .0087 1.4, .0072 1.6; window .0201 1.9, .0176 2.1. With four points at
@@ -42,6 +42,7 @@ from ..gfx.library import Program
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..surfaces.draw import refracts
+from .point_costs import PointCosts, costs_of, count_of
 from .together import SUM, terms
 
 POINTS = Param(
@@ -51,7 +52,6 @@ POINTS = Param(
     1, 1024, draft=1,
 )  # fmt: skip
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
-MOST = 8  # points of the film that share a sample's light
 PATHS = named(SURFACE)
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
@@ -89,21 +89,24 @@ class OwnPoint:
         self.needed = False
 
 
-def count_of(points: int, samples: int) -> int:
-    """How many points of the film a sample shows where the picture is to have that many in all."""
-    return min(max(-(-points // max(samples, 1)), 1), MOST)
+def all_alike(frame: Frame) -> bool:
+    """Whether all points of a sample would show the same, or what may not be shown."""
+    by_lot = any(material.transparent for material in frame.materials.compiled)
+    narrow = frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot
+    return narrow or frame.shared(OwnPoint).needed
 
 
 def points_of_sample(frame: Frame, points: int) -> int:
     """How many of the picture's `points` of the film a sample shows: one where all of them would show the same."""
-    by_lot = any(material.transparent for material in frame.materials.compiled)
-    if frame.shared(OwnPoint).needed:
+    if all_alike(frame):
         return 1
-    if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
-        return 1
-    count = count_of(points, frame.settings.samples)
-    # Without indirect light a sample costs hardly more than a point.
-    return count if frame.plan.fills("indirect") else -(-count // 4)
+    return costs(frame).count(count_of(points, frame.settings.samples))
+
+
+def costs(frame: Frame) -> PointCosts:
+    """Of a point of this picture, and of a sample's light."""
+    width, height = frame.size
+    return costs_of(width * height, frame.geometry.triangles, frame.plan.fills("indirect"))
 
 
 def lit_paths(frame: Frame) -> tuple[str, ...]:

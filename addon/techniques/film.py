@@ -20,6 +20,7 @@ from functools import cache
 from ..film import filter as film_filter
 from ..film import points as film_points
 from ..film import together
+from ..film.point_costs import count_of
 from ..film.resolve import COMBINED, resolve
 from ..frame.light_paths import LIGHT_PATHS, SEEN, TOGETHER
 from ..frame.run import Frame
@@ -192,7 +193,8 @@ class Film(Technique):
         self._first_seen(frame)
 
     def sample(self, frame: Frame) -> Iterator[None]:
-        count = film_points.points_of_sample(frame, frame.settings.get(self, film_points.POINTS.name))
+        points = frame.settings.get(self, film_points.POINTS.name)
+        asked, count = count_of(points, frame.settings.samples), film_points.points_of_sample(frame, points)
         with _borrowed(frame, len(self._held)) as collected:
             light = {path: frame.images[f"radiance.{path}"] for path in (*self._paths, *self._pixel_paths)}
             self._collect(frame, surface_bindings(frame), collected, {path: light[path] for path in self._summed})
@@ -202,6 +204,8 @@ class Film(Technique):
             emission = {EMISSION if EMISSION in self._held else TOGETHER: frame.images[shining.image]}
             frame.count(self, "passes", film_filter.add(frame, emission, frame.film_offset(frame.sample), 1.0))
         frame.count(self, "points", count)
+        if frame.is_first and asked > 1 and not film_points.all_alike(frame):
+            frame.chose(self, "points", film_points.costs(frame).why(asked))
         if count > 1:
             yield
             yield from self._between(frame, count)
