@@ -38,7 +38,7 @@ class Place:
     uv: tuple[float, float] = (0.0, 0.0)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Source:
     """What is shown, as Blender has it during this walk."""
 
