@@ -31,8 +31,22 @@ COLLECTED = (*(path.image for path in LIGHT_PATHS if path.origin == SEEN), *BESI
 MOST_COLLECTED = 5  # beside the sum: a pass draws into six images
 
 
+class Held:
+    """What a picture holds (frame.shared), found when first asked for."""
+
+    def __init__(self):
+        self.collected: tuple[str, ...] | None = None
+
+
 def collected(frame: Frame) -> tuple[str, ...]:
     """Images of what each point of the film shows without light, and of the sum of all that is not held apart."""
+    known = frame.shared(Held)
+    if known.collected is None:
+        known.collected = _collected(frame)
+    return known.collected
+
+
+def _collected(frame: Frame) -> tuple[str, ...]:
     held = tuple(name for name in COLLECTED if frame.is_apart(name))
     summed = any(path.origin != MEDIUM and not frame.is_apart(path.image) for path in LIGHT_PATHS)
     return (TOGETHER, *held) if summed and len(held) <= MOST_COLLECTED else held

@@ -90,9 +90,10 @@ class Frame:
     _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
     _hierarchies: dict[tuple, Hierarchy | None] = field(default_factory=dict)  # of this frame, see `hierarchy`
     _receivers: Receivers | None = None
+    _film_offsets: dict[int, tuple[float, float]] = field(default_factory=dict)
     _texel_counters: TexelCounters = field(default_factory=TexelCounters)
 
-    @property
+    @cached_property
     def size(self) -> tuple[int, int]:
         return self.view.size
 
@@ -181,8 +182,12 @@ class Frame:
 
     def film_offset(self, number: int) -> tuple[float, float]:
         """Where point `number` of the film lies, in pixels from a pixel's middle."""
-        x, y = (blackman_harris_offset(u, self.snapshot.film.filter_width) for u in self.random_at(number, FILM))
-        return x, y
+        found = self._film_offsets.get(number)
+        if found is None:
+            width, (x, y) = self.snapshot.film.filter_width, self.random_at(number, FILM)
+            found = blackman_harris_offset(x, width), blackman_harris_offset(y, width)
+            self._film_offsets[number] = found
+        return found
 
     @property
     def typical_distance(self) -> float:

@@ -55,7 +55,7 @@ def fullscreen(
         where = "ALWAYS"
     with _state(target, viewport, blend=blend, depth_test=where, depth_write=program.writes_depth, rows=rows):
         shader.bind(**bindings)
-        _fullscreen_batch().draw(shader.handle)
+        (_triangle[0] if _triangle else _fullscreen_batch()).draw(shader.handle)
     gpu.shader.unbind()
 
 
