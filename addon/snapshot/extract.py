@@ -187,21 +187,20 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     """The instances, by mesh in `order`; those of the last sync where nothing has changed. `resolved`: key of the mesh
     materials and links, by identity of the source."""
     keys = [place.key for place in places]
+    facts = [place.source.facts for place in places]
+    looks = [(place.random, place.generated, place.uv, *resolved[id(place.source)]) for place in places]
     before = cache.placed
     known = before is not None and before.keys == keys
     same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
-    made, facts = [], [place.source.facts for place in places]
+    if known and all(same) and (before.order, before.facts, before.looks) == (order, facts, looks):
+        return before.ordered
+    made = []
     like: dict[int, dict[str, object]] = {}  # fields of an instance of each source
     for k, place in enumerate(places):
-        mesh, chosen, links = resolved[id(place.source)]
-        if known and same[k] and before.facts[k] is facts[k]:
-            old = before.made[k]
-            if (
-                old.mesh == mesh and old.materials == chosen and old.links == links
-                and old.random == place.random and old.generated == place.generated and old.uv == place.uv
-            ):  # fmt: skip
-                made.append(old)
-                continue
+        if known and same[k] and before.facts[k] is facts[k] and before.looks[k] == looks[k]:
+            made.append(before.made[k])
+            continue
+        *_, mesh, chosen, links = looks[k]
         of_object = facts[k]
         alike = like.get(id(place.source))
         if alike is None:
@@ -227,7 +226,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     instances = tuple(instance for group in ordered for instance in groups[group])
     if known and instances == before.ordered:
         instances = before.ordered
-    cache.placed = Placed(keys, transforms, facts, made, instances)
+    cache.placed = Placed(keys, transforms, facts, looks, made, order, instances)
     return instances
 
 
