@@ -16,7 +16,8 @@ from .film import catcher
 from .film.noise import NoiseMeter
 from .frame import ledger as ledgers
 from .frame import slices, time_steps
-from .frame.run import Frame, Renderer
+from .frame.picture import Frame
+from .frame.run import Renderer
 from .frame.settings import Settings
 from .gfx import images
 from .gfx.context import turn

@@ -27,7 +27,8 @@ import numpy as np
 
 from . import techniques
 from .frame.bands import Bands
-from .frame.run import Frame, Renderer
+from .frame.picture import Frame
+from .frame.run import Renderer
 from .frame.settings import Settings
 from .gfx import context as gpu_context
 from .gfx import images, library, passes

@@ -34,7 +34,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from ..frame.light_paths import MEDIUM, TOGETHER, named
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..scene.view import blackman_harris

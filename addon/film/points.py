@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from ..frame.light_paths import MEDIUM, SURFACE, named
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Param, Service
 from ..gfx import images, passes
 from ..gfx.library import Program

@@ -15,7 +15,7 @@ from __future__ import annotations
 from functools import cache
 
 from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS, SEEN, TOGETHER
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from .neighbours import shown_sum

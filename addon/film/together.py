@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..frame.light_paths import IN_MEDIA, LIGHT_PATHS, MEDIUM, SEEN, SURFACE, TOGETHER, LightPath
-from ..frame.run import Frame
+from ..frame.picture import Frame
 
 SUM = TOGETHER.rpartition(".")[2]  # beside names of paths
 BESIDE = ("color.diffuse", "color.glossy", "color.transmission", "surface.normal_sum")  # sums that are no light

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..gfx.library import Program
     from ..snapshot.scene import Snapshot
-    from .run import Frame
+    from .picture import Frame
     from .settings import Settings
 
 

@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 
 from ..film.points import shown_paths
 from ..film.resolve import COMBINED, resolve
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes

@@ -23,7 +23,7 @@ from ..film import together
 from ..film.point_costs import count_of
 from ..film.resolve import COMBINED, resolve
 from ..frame.light_paths import LIGHT_PATHS, SEEN, TOGETHER
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
