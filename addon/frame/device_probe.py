@@ -26,6 +26,7 @@ from ..gfx.device import Device
 from ..gfx.library import Program
 from ..gfx.user_folder import user_folder
 from ..scene import acceleration
+from ..scene.traced_triangles import opaque_code
 from ..scene.culling import Boxes
 from ..scene.projection import ROWS
 
@@ -150,7 +151,7 @@ def _town() -> np.ndarray:
 def _rays(target: images.Target, wait: float) -> float:
     corners = _town()
     look = np.zeros((len(corners), 8))
-    look[:, 0] = acceleration.opaque_code()
+    look[:, 0] = opaque_code()
     hierarchy = acceleration.build(corners, look).hierarchy
 
     def work(side: int) -> None:

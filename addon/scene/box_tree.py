@@ -37,7 +37,7 @@ class BoxTree:
     first_leaf: np.ndarray  # (N,) number of the first child that is a leaf
     leaves: np.ndarray  # (N,) how many are
     levels: tuple[int, ...]  # nodes on each level
-    place: np.ndarray  # (B,) of each box: leaf x LEAF + slot
+    place: np.ndarray  # (B,) of each box: leaf x boxes of a leaf + slot
     leaf_count: int
 
     def of_children(self, leaves: np.ndarray, joined: np.ufunc, empty: float) -> np.ndarray:
@@ -54,20 +54,21 @@ class BoxTree:
                 out[level][rows, slot] = own[first[rows] + slot]
                 rows = np.flatnonzero((slot >= nodes) & (slot < count))
                 out[level][rows, slot] = leaves[self.first_leaf[level][rows] + slot - nodes[rows]]
-            own[level] = joined.reduce(out[level], axis=1)
+            some = out[level]
+            own[level] = joined(joined(some[:, 0], some[:, 1]), joined(some[:, 2], some[:, 3]))
             last -= width
         return out
 
 
-def build(low: np.ndarray, high: np.ndarray) -> BoxTree:
-    """The tree of boxes `low` to `high`, (B, 3) finite."""
+def build(low: np.ndarray, high: np.ndarray, leaf: int = LEAF) -> BoxTree:
+    """The tree of boxes `low` to `high`, (B, 3) finite, at most `leaf` (4 or 1) of which are together."""
     order = np.argsort(morton_codes((low + high) * 0.5), kind="stable")
     low, high = _unit(low[order], high[order])
     if len(low) <= MOST_CLUSTERED:
-        tree = _widened(_clustered(low, high), order)
+        tree = _widened(_clustered(low, high), order, leaf)
         if len(tree.levels) <= DEEPEST:
             return tree
-    return _widened(_halves(low, high), order, full=True)
+    return _widened(_halves(low, high), order, leaf, full=True)
 
 
 @dataclass(frozen=True)
@@ -165,18 +166,18 @@ def _halves(low: np.ndarray, high: np.ndarray) -> _Binary:
     return _Binary(children, area, boxes)
 
 
-def _widened(binary: _Binary, order: np.ndarray, full: bool = False) -> BoxTree:
-    """Four children for each node, of those that its two would have; leaves as `full` as they may be, or smaller where
-    there is room for two of them."""
+def _widened(binary: _Binary, order: np.ndarray, most: int = LEAF, full: bool = False) -> BoxTree:
+    """Four children for each node, of those that its two would have; leaves of at `most` so many boxes, as `full` as
+    they may be, or smaller where there is room for two of them."""
     count = len(order)
     first_node, nodes, first_leaf, leaves, levels, leaf_roots = [], [], [], [], [], []
     next_node, next_leaf = 1, 0
     root = len(binary.area) - 1 if count else -1  # -1: none
-    held = np.array([[root, -1, -1, -1] if count <= LEAF else [*binary.children[root], -1, -1]])
+    held = np.array([[root, -1, -1, -1] if count <= most else [*binary.children[root], -1, -1]])
     while len(held):
         for slot in range(2, WIDTH):
-            _open(binary, held, slot, full)
-        kind = np.where(held < 0, 2, np.where(binary.boxes[held] > LEAF, 0, 1))
+            _open(binary, held, slot, most, full)
+        kind = np.where(held < 0, 2, np.where(binary.boxes[held] > most, 0, 1))
         sorting = np.argsort(kind, axis=1, kind="stable")
         held, kind = np.take_along_axis(held, sorting, axis=1), np.take_along_axis(kind, sorting, axis=1)
         node_count, leaf_count = (kind == 0).sum(axis=1), (kind == 1).sum(axis=1)
@@ -192,21 +193,21 @@ def _widened(binary: _Binary, order: np.ndarray, full: bool = False) -> BoxTree:
         held = np.full((len(inner), WIDTH), -1)
         held[:, :2] = binary.children[inner]
     place = np.zeros(count, np.int64)
-    box, leaf = _boxes_of(binary, np.concatenate(leaf_roots), count)
+    box, leaf = _boxes_of(binary, np.concatenate(leaf_roots), count, most)
     slot = np.arange(len(leaf)) - np.searchsorted(leaf, leaf)
-    place[order[box]] = leaf * LEAF + slot
+    place[order[box]] = leaf * most + slot
     return BoxTree(
         np.concatenate(first_node), np.concatenate(nodes), np.concatenate(first_leaf), np.concatenate(leaves),
         tuple(levels), place, next_leaf,
     )  # fmt: skip
 
 
-def _open(binary: _Binary, held: np.ndarray, slot: int, full: bool) -> None:
+def _open(binary: _Binary, held: np.ndarray, slot: int, most: int, full: bool) -> None:
     """Put the halves of one child into its place and `slot`: of the largest node, or, where all are leaves and need not
     be `full`, of the one whose halves are smallest beside it."""
     known = held[:, :slot]
     children = binary.children[known]
-    is_node = binary.boxes[known] > LEAF
+    is_node = binary.boxes[known] > most
     saved = binary.area[known] - binary.area[children].sum(axis=2)
     worth = np.where(is_node, 1.0 + binary.area[known], np.where((children[..., 0] >= 0) & (not full), saved, -1.0))
     worth[known < 0] = -1.0
@@ -216,10 +217,10 @@ def _open(binary: _Binary, held: np.ndarray, slot: int, full: bool) -> None:
     held[rows, chosen[rows]], held[rows, slot] = halves[:, 0], halves[:, 1]
 
 
-def _boxes_of(binary: _Binary, roots: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The boxes below `roots` (R,) of at most LEAF each, and below which of them each is, in its order."""
+def _boxes_of(binary: _Binary, roots: np.ndarray, count: int, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """The boxes below `roots` (R,) of at `most` so many each, and below which of them each is, in its order."""
     below, root = roots, np.arange(len(roots))
-    for _ in range(LEAF - 1):
+    for _ in range(most - 1):
         inner = below >= count
         halves = binary.children[below[inner]]
         below = np.concatenate([below[~inner], halves[:, 0], halves[:, 1]])

@@ -14,12 +14,37 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
   Place place;
   place.index = 0;
   place.leaf = false;
+#ifdef INSTANCED
+  place.record = false;
+  vec3 world_origin = origin;
+  mat4 world_rays = rays;
+  int inside = 0;  // record of the instance that the rays are in
+  int bottom = 0;
+#endif
   uint pending[DEEPEST];  // node, and as its last four bits the children still to visit
   int height = 0;
   uint top = 0u;
   for (int round = 0; round < 4096 && open != 0u; round++) {
     bool more = true;
     while (more && !place.leaf) {
+#ifdef INSTANCED
+      if (place.record) {
+        if (!none_pending(top)) {
+          pending[height] = top;
+          height++;
+        }
+        top = 0u;
+        bottom = height;
+        inside = place.index;
+        origin = record_placed(inside, world_origin);
+        for (int k = 0; k < 4; k++) {
+          rays[k].xyz = record_turned(inside, world_rays[k].xyz);
+          inverses[k] = vec4(1.0) / mix(rays[k], vec4(1e-20), equal(rays[k], vec4(0.0)));
+        }
+        place.record = false;
+        place.index = int(node_texel(inside * NODE_TEXELS + 3).x);
+      }
+#endif
       Boxes boxes = boxes_read(place.index * NODE_TEXELS);
       uint met = 0u;
       for (int k = 0; k < 4; k++) {
@@ -34,11 +59,26 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
         }
         top = (uint(place.index) << 4u) | met;
       }
+#ifdef INSTANCED
+      if (none_pending(top) && inside != 0) {
+        inside = 0;
+        bottom = 0;
+        origin = world_origin;
+        rays = world_rays;
+        for (int k = 0; k < 4; k++) {
+          inverses[k] = vec4(1.0) / mix(rays[k], vec4(1e-20), equal(rays[k], vec4(0.0)));
+        }
+        if (height > 0) {
+          height--;
+          top = pending[height];
+        }
+      }
+#endif
       more = !none_pending(top);
       if (more) {
         int node;
         int child = next_pending(top, node);
-        if (none_pending(top) && height > 0) {
+        if (none_pending(top) && height > BOTTOM) {
           height--;
           top = pending[height];
         }
@@ -81,12 +121,27 @@ uint clear_bundle(vec3 origin, mat4 rays, uint open)
         }
       }
     }
+#ifdef INSTANCED
+    if (none_pending(top) && inside != 0) {
+      inside = 0;
+      bottom = 0;
+      origin = world_origin;
+      rays = world_rays;
+      for (int k = 0; k < 4; k++) {
+        inverses[k] = vec4(1.0) / mix(rays[k], vec4(1e-20), equal(rays[k], vec4(0.0)));
+      }
+      if (height > 0) {
+        height--;
+        top = pending[height];
+      }
+    }
+#endif
     if (none_pending(top)) {
       break;
     }
     int above;
     int child = next_pending(top, above);
-    if (none_pending(top) && height > 0) {
+    if (none_pending(top) && height > BOTTOM) {
       height--;
       top = pending[height];
     }
