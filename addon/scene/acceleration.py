@@ -33,7 +33,7 @@ from ..kernels.scatter import scatter
 from ..snapshot.scene import Instance, Snapshot
 from . import box_tree
 from .box_tree import LEAF
-from .instance_tree import OWN_TREE, RECORD_NODES, Copies, UpperTree, kept, parted
+from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, kept, parted
 from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .traced_triangles import ALL_RAYS, is_empty, is_met, mean_code, mean_emission, rays_met, world_triangles
 
@@ -312,7 +312,7 @@ class HierarchyCache:
             tree = used[named] = self._meshes.get(named) or _tree_of_mesh(some[own[0]], look)
             if tree.triangles:
                 own = [some[k] for k in own]
-                copies.append(Copies(tree, own, [number[id(one)] for one in own], *tree.boxes.bounds))
+                copies.append(Copies(tree, own, [number[id(one)] for one in own], *tree.boxes.around(MOST_BOXES)))
         world = Tree(*world_triangles(expanded, meshes, materials, origin, path, maps, glow))
         trees = Trees(world, maps.texels, copies, origin)
         trees.hierarchy = replace(trees.hierarchy, instances=shown, expanded=tuple(expanded))

@@ -20,6 +20,7 @@ from . import box_tree
 from .node_boxes import NODE_TEXELS, NodeBoxes
 
 OWN_TREE = 250_000  # triangles of copies of a mesh, beside the first, from which on it has a tree of its own
+MOST_BOXES = 64  # of a mesh, that are turned for that of an instance: one box alone grows by turning
 RECORD_NODES = 2  # a record takes the place of so many nodes
 WORST_TURN = 1e4  # condition of a matrix whose inverse float32 can still follow
 SLACK = 1e-6  # of a box, relative to its largest coordinate: rays in object space are rounded otherwise
@@ -27,8 +28,8 @@ SLACK = 1e-6  # of a box, relative to its largest coordinate: rays in object spa
 
 @dataclass
 class Copies:
-    """Instances that share a tree: `numbers` says which of the hierarchy's instances they are. `low` to `high` is their
-    mesh's box."""
+    """Instances that share a tree: `numbers` says which of the hierarchy's instances they are. Boxes `low` to `high`,
+    (B, 3), hold all of their mesh."""
 
     tree: object
     instances: list[Instance]
@@ -45,7 +46,7 @@ class UpperTree:
         self.instances = [one for some in copies for one in some.instances]
         self.numbers = np.array([k for some in copies for k in some.numbers])
         self.kind = np.repeat(np.arange(len(copies)), [len(some.instances) for some in copies])
-        self._ends = np.array([(some.low, some.high) for some in copies])
+        self._boxes = [(some.low.astype(float), some.high.astype(float)) for some in copies]
         low, high = self._bounds(np.arange(len(self.instances)))
         shape = box_tree.build(low, high, leaf=1)
         self.place = shape.place  # of each instance among the records
@@ -54,13 +55,16 @@ class UpperTree:
         self.cost = self.boxes.cost()
 
     def _bounds(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        ends = self._ends[self.kind[which]].astype(float)
+        """Boxes around the turned boxes of their meshes, (K, 3) each."""
         matrices = _matrices([self.instances[k] for k in which])
-        centre, half = ends.mean(axis=1), (ends[:, 1] - ends[:, 0]) / 2
-        middle = np.einsum("nij,nj->ni", matrices[:, :, :3], centre) + matrices[:, :, 3] - self.origin
-        reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :, :3]), half)
-        reach += SLACK * np.abs(np.abs(middle) + reach).max(axis=1, keepdims=True)
-        return (middle - reach).astype(np.float32), (middle + reach).astype(np.float32)
+        low, high = np.empty((2, len(which), 3))
+        for kind in np.unique(self.kind[which]):
+            own, ends = self.kind[which] == kind, self._boxes[kind]
+            turns, place = matrices[own, :, :3], matrices[own, :, 3] - self.origin
+            middle, reach = turns @ ((ends[0] + ends[1]) / 2).T, np.abs(turns) @ ((ends[1] - ends[0]) / 2).T
+            low[own], high[own] = (middle - reach).min(axis=2) + place, (middle + reach).max(axis=2) + place
+        slack = SLACK * np.maximum(np.abs(low), np.abs(high)).max(axis=1, keepdims=True)
+        return (low - slack).astype(np.float32), (high + slack).astype(np.float32)
 
     def linked(self, first_node: int, first_record: int, which=slice(None)) -> np.ndarray:
         """Rows of these nodes, whose links lead to nodes and to records that are so much higher."""

@@ -41,6 +41,23 @@ class NodeBoxes:
         """(3,) lowest and highest corner of all; inverted where there is nothing."""
         return self.low[0].min(axis=0), self.high[0].max(axis=0)
 
+    def around(self, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """At most so many boxes, (B, 3), that hold all leaves: those of the children of one level's nodes, of the lowest
+        one that has so few, and of leaves above it."""
+        nodes, found = np.zeros(1, np.int64), []
+        slots = np.arange(WIDTH)
+        while True:
+            there = (self.low[nodes] <= self.high[nodes]).all(axis=2)
+            inner = there & (slots < self.tree.nodes[nodes][:, None])
+            below = (self.tree.first_node[nodes][:, None] + slots)[inner]
+            done = [(nodes, there & ~inner)]
+            if not len(below) or sum(int(some.sum()) for _, some in (*found, *done)) + WIDTH * len(below) > most:
+                found.append((nodes, there))
+                break
+            found += done
+            nodes = below
+        return tuple(np.concatenate([ends[nodes][some] for nodes, some in found]) for ends in (self.low, self.high))
+
     def linked(self, first_node: int, first_leaf: int, which=slice(None)) -> np.ndarray:
         """The rows of these nodes with links that are so much higher."""
         rows = self.rows[which].copy()

@@ -205,10 +205,7 @@ Place node_child(int node, int child)
   place.index = place.leaf ? int(links.y) + child - nodes : int(links.x) + child;
 #ifdef INSTANCED
   place.record = place.leaf && links.w != 0.0;
-  if (place.record) {
-    place.leaf = false;
-    place.index = int(links.y) + 2 * (child - nodes);
-  }
+  place.index += place.record ? child - nodes : 0;
 #endif
   return place;
 }
@@ -269,6 +266,30 @@ uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }
 
+// The nearest triangle of a leaf that stops a ray before `nearest`, which it then is, if there is one.
+void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool bent, bool shadow, inout float nearest,
+              inout ivec2 hit)
+{
+  vec4 facing;
+  vec4 t = intersect_four(four_read(leaf), origin, direction, facing);
+  float best = min(min(t.x, t.y), min(t.z, t.w));
+  if (best < nearest) {
+    vec4 opacity = opacity_of_four(leaf, t, nearest, origin, direction, facing, bent, shadow);
+#ifdef OPAQUE_ONLY
+    opacity = floor(opacity);
+#endif
+    uint roll = hash3(uvec3(uint(leaf), salt, 77u + uint(record))).x;
+    vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
+                       to_unit(roll * 277803737u + 7u));
+    t = mix(vec4(1e30), t, lessThan(chance, opacity));
+    best = min(min(t.x, t.y), min(t.z, t.w));
+    if (best < nearest) {
+      nearest = best;
+      hit = ivec2(leaf, (record << 2) + ((best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3));
+    }
+  }
+}
+
 // Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
 // number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
 // Triangles with an opacity below one are passed at random, the same way for the same `salt`; those that may bend light
@@ -297,22 +318,6 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
     // Down to a leaf, nearest child first; then all rays of a group test triangles together.
     bool more = true;
     while (more && !place.leaf) {
-#ifdef INSTANCED
-      if (place.record) {
-        if (!none_pending(top)) {
-          pending[height] = top;
-          height++;
-        }
-        top = 0u;
-        bottom = height;
-        inside = place.index;
-        origin = record_placed(inside, world_origin);
-        direction = record_turned(inside, world_direction);
-        inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
-        place.record = false;
-        place.index = int(node_texel(inside * NODE_TEXELS + 3).x);
-      }
-#endif
       vec4 enter;
       uint met = boxes_met(boxes_read(place.index * NODE_TEXELS), origin, inverse, nearest, enter);
       int node = place.index;
@@ -331,61 +336,46 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
           top = (uint(node) << 4u) | met;
         }
       }
+      else if (!none_pending(top)) {
+        child = next_pending(top, node);
+        if (none_pending(top) && height > BOTTOM) {
+          height--;
+          top = pending[height];
+        }
+      }
       else {
-#ifdef INSTANCED
-        if (none_pending(top) && inside != 0) {
-          inside = 0;
-          bottom = 0;
-          origin = world_origin;
-          direction = world_direction;
-          inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
-          if (height > 0) {
-            height--;
-            top = pending[height];
-          }
-        }
-#endif
-        more = !none_pending(top);
-        if (more) {
-          child = next_pending(top, node);
-          if (none_pending(top) && height > BOTTOM) {
-            height--;
-            top = pending[height];
-          }
-        }
+        more = false;
       }
       if (more) {
         place = node_child(node, child);
       }
     }
+#ifdef INSTANCED
+    // Into an instance, and out again, here, where rays of a group are together.
+    if (more && place.record) {
+      if (!none_pending(top)) {
+        pending[height] = top;
+        height++;
+      }
+      top = 0u;
+      bottom = height;
+      inside = place.index;
+      origin = record_placed(inside, world_origin);
+      direction = record_turned(inside, world_direction);
+      inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
+      place.index = int(node_texel(inside * NODE_TEXELS + 3).x);
+      place.leaf = false;
+      continue;
+    }
+    if (more) {
+      leaf_met(place.index, inside, origin, direction, salt, bent, shadow, nearest, hit);
+    }
+#else
     if (!more) {
       break;
     }
-    vec4 facing;
-    vec4 t = intersect_four(four_read(place.index), origin, direction, facing);
-    float best = min(min(t.x, t.y), min(t.z, t.w));
-    if (best < nearest) {
-      vec4 opacity = opacity_of_four(place.index, t, nearest, origin, direction, facing, bent, shadow);
-#ifdef OPAQUE_ONLY
-      opacity = floor(opacity);
+    leaf_met(place.index, 0, origin, direction, salt, bent, shadow, nearest, hit);
 #endif
-#ifdef INSTANCED
-      uint roll = hash3(uvec3(uint(place.index), salt, 77u + uint(inside))).x;
-#else
-      uint roll = hash3(uvec3(uint(place.index), salt, 77u)).x;
-#endif
-      vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
-                         to_unit(roll * 277803737u + 7u));
-      t = mix(vec4(1e30), t, lessThan(chance, opacity));
-      best = min(min(t.x, t.y), min(t.z, t.w));
-      if (best < nearest) {
-        nearest = best;
-        hit = ivec2(place.index, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
-#ifdef INSTANCED
-        hit.y += inside << 2;
-#endif
-      }
-    }
     if (nearest < enough) {
       break;
     }

@@ -111,7 +111,7 @@ def together(meshes, placed, world) -> Trees:
         look[:, 5:] = _packed_normals(normals)
         tree = Tree(corners, look)
         instances = [Instance("thing", "mesh", matrix, (0,)) for matrix in some]
-        copies.append(Copies(tree, instances, list(range(number, number + len(some))), *tree.boxes.bounds))
+        copies.append(Copies(tree, instances, list(range(number, number + len(some))), *tree.boxes.around(64)))
         number += len(some)
     return Trees(Tree(*world), copies=copies, origin=ORIGIN)
 
