@@ -112,9 +112,7 @@ def in_one(meshes: list[np.ndarray], matrices: list[np.ndarray]):
     """The same in one tree."""
     from addon.scene import acceleration
 
-    parts = [
-        corners @ matrix[:3, :3].T + matrix[:3, 3] for corners, some in zip(meshes, matrices) for matrix in some
-    ]
+    parts = [corners @ matrix[:3, :3].T + matrix[:3, 3] for corners, some in zip(meshes, matrices) for matrix in some]
     corners = np.concatenate(parts).astype(np.float32)
     return acceleration.build(corners, look_of(len(corners)))
 
@@ -202,7 +200,9 @@ def rays(size: float) -> list[tuple[str, ...]]:
         origins, directions = from_camera(apart * np.sqrt(count), side)
         hits = np.flatnonzero(met[:, 3] < 1e29)
         chosen = hits[rng.integers(len(hits), size=side * side)]
-        normal = np.where((met[chosen, :3] * directions[chosen]).sum(1, keepdims=True) > 0, -met[chosen, :3], met[chosen, :3])
+        normal = np.where(
+            (met[chosen, :3] * directions[chosen]).sum(1, keepdims=True) > 0, -met[chosen, :3], met[chosen, :3]
+        )
         away = normal + rng.normal(size=normal.shape) / 1.5
         away *= np.sign((away * normal).sum(1, keepdims=True))
         away /= np.linalg.norm(away, axis=1, keepdims=True)

@@ -26,9 +26,9 @@ from ..gfx.device import Device
 from ..gfx.library import Program
 from ..gfx.user_folder import user_folder
 from ..scene import acceleration
-from ..scene.traced_triangles import opaque_code
 from ..scene.culling import Boxes
 from ..scene.projection import ROWS
+from ..scene.traced_triangles import opaque_code
 
 LEAST_S, REPEATS = 0.002, 2
 SIDE = 1024  # of the target

@@ -19,7 +19,7 @@ from ..snapshot.scene import Instance, Mesh
 from . import box_tree
 from .node_boxes import NODE_TEXELS, NodeBoxes
 
-OWN_TREE = 250_000  # triangles of copies of a mesh, beside the first, from which on it has a tree of its own
+OWN_TREE = 1_000_000  # triangles of copies of a mesh, beside the first, from which on it has a tree of its own
 MOST_BOXES = 64  # of a mesh, that are turned for that of an instance: one box alone grows by turning
 RECORD_NODES = 2  # a record takes the place of so many nodes
 WORST_TURN = 1e4  # condition of a matrix whose inverse float32 can still follow

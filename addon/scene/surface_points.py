@@ -21,8 +21,8 @@ import numpy as np
 
 from ..gfx import images
 from ..sampling.sequence import bits
-from .traced_triangles import coverage, world_triangles
 from .pieces import halved, octahedral
+from .traced_triangles import coverage, world_triangles
 
 RUNS = 32
 COVER = 1.2  # radius of a disc beside that of the area which its point stands for

@@ -35,9 +35,9 @@ import numpy as np
 
 from ..gfx import images
 from ..sampling.sequence import bits
-from .traced_triangles import coverage, world_triangles
 from .pieces import farthest, halved, octahedral
 from .seen import UNSEEN, seen_sides
+from .traced_triangles import coverage, world_triangles
 
 MEMBERS = 8  # points of its cell at which a surfel is lit, in turn
 CLOUD = 16  # points of the cloud for each surfel

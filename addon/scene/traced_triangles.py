@@ -9,7 +9,6 @@ Cost: numpy over all triangles of all instances, some 0.3 us each.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -52,7 +51,9 @@ def world_triangles(
     }  # fmt: skip
     shown = [one for one in instances if is_met(one, path) and meshes[one.mesh].triangle_count]
     # Of instances with equal kinds all triangles look the same.
-    turns = np.linalg.det([one.matrix[:3, :3] for one in shown]) if shown else ()
+    matrices_of_all = np.array([one.matrix[:3] for one in shown], float).reshape(-1, 3, 4)
+    turns = np.linalg.det(matrices_of_all[:, :, :3])
+    cofactors_of_all, first_of_kind = _cofactors(matrices_of_all[:, :, :3]), 0
     kinds = zip(shown, (
         (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), turn < 0.0) for one, turn in zip(shown, turns)
     ))  # fmt: skip
@@ -68,14 +69,15 @@ def world_triangles(
         if shining is not None:
             _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
         for first in range(0, len(copies), at_once):
-            some = copies[first : first + at_once]
-            matrices = np.stack([one.matrix[:3] for one in some])
+            own = slice(first_of_kind + first, first_of_kind + min(first + at_once, len(copies)))
+            matrices = matrices_of_all[own]
             turned, moved = matrices[:, :, :3], (matrices[:, :, 3] - origin).astype(np.float32)
             world = mesh.positions @ turned.transpose(0, 2, 1).astype(np.float32) + moved[:, None]
             corners.append(world[:, mesh.corner_vertices[mesh.triangle_corners]].reshape(-1, 3, 3))
-            normals = _packed_normals(mesh.corner_normals @ _cofactors(turned).transpose(0, 2, 1))
-            of_copies = np.broadcast_to(look_of_triangle, (len(some), *look_of_triangle.shape))
+            normals = _packed_normals(mesh.corner_normals @ cofactors_of_all[own].transpose(0, 2, 1))
+            of_copies = np.broadcast_to(look_of_triangle, (len(matrices), *look_of_triangle.shape))
             looks.append(np.concatenate([of_copies, normals[:, mesh.triangle_corners]], axis=2).reshape(-1, 8))
+        first_of_kind += len(copies)
     if not corners:
         return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
     return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
