@@ -158,7 +158,7 @@ class ImageSpaceSubsurface(Technique):
         shown = snapshot.used_materials
         if not any(may_scatter(snapshot.materials[material].graph) for material in shown):
             return "no material scatters light below its surface"
-        return acceleration.too_many(snapshot)
+        return acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         return GATHER, APPLY, CHORD, LIGHTING

@@ -145,7 +145,7 @@ class ImplicitVisibility(Technique):
         self._glossy = VirtualLights()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
+        return no_indirect_light(snapshot, settings) or acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         return (SEES, *PROGRAMS, *surfel_light.PROGRAMS)
