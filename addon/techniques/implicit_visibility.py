@@ -35,7 +35,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..frame.run import Frame, lights_key
+from ..frame.picture import Frame
+from ..frame.run import lights_key
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
