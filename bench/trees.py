@@ -1,4 +1,4 @@
-"""The trees that rays search: `python -m bench trees`, which takes about three minutes and writes docs/trees.md.
+"""The trees that rays search: `python -m bench trees`, which takes about two minutes and writes docs/trees.md.
 
 Rays: those of a camera and as many that leave a surface in any direction, through the same triangles in one tree and
 with trees of meshes' own. Moves: one of 2,000 objects of 500 triangles each moves in a viewport's draft, and the view
@@ -19,7 +19,7 @@ from bench.markdown import put_between, table
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "trees.md"
 COMMAND = "python -m bench trees"
-SIDE = 512  # rays along a side of their image
+SIDE = 256  # rays along a side of their image
 OBJECTS, EACH = 2000, 500  # of the scene of a million triangles
 MAIN = """
 #include "trace/hierarchy.glsl"
@@ -180,10 +180,10 @@ def rays(size: float) -> list[tuple[str, ...]]:
     rng = np.random.default_rng(3)
     side = int(SIDE * np.sqrt(size))
     scenes = {
-        "2,000 objects, each of its own mesh": (2000, 2000, 500, 2.5),
-        "100 copies of a mesh, side by side": (1, 100, 10_000, 3.0),
-        "100 copies of a mesh, in each other": (1, 100, 10_000, 1.0),
-        "2,000 copies of a small mesh": (1, 2000, 500, 2.5),
+        "500 objects, each of its own mesh": (500, 500, 500, 2.5),
+        "40 copies of a mesh, side by side": (1, 40, 10_000, 3.0),
+        "40 copies of a mesh, in each other": (1, 40, 10_000, 1.0),
+        "500 copies of a small mesh": (1, 500, 500, 2.5),
     }
     rows = [("scene", "triangles", "rays", "one tree, ms", "trees of meshes, ms", "ratio", "MB", "MB")]
     for name, (kinds, count, triangles, apart) in scenes.items():
