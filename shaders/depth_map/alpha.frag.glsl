@@ -49,6 +49,7 @@ void main()
   q_dx = gradient.x;
   q_dy = gradient.y;
 #endif
+#ifndef CASTS_WHOLE
   point.refracts = glass_blocks != 0;  // what it lets through is a lobe then, and no transparency
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u));
   bits = hash3(uvec3(bits.x, uint(gl_PrimitiveID), uint(sample_index)));
@@ -60,5 +61,6 @@ void main()
   if (to_unit(bits.x) < passing) {
     discard;
   }
+#endif
   out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn at random
 }
