@@ -77,6 +77,11 @@ def set_culling(cull: str) -> None:
     gpu.state.face_culling_set(cull)
 
 
+def write_alpha_alone() -> None:
+    """Let the next draws change nothing but alpha and depth. Only inside `drawing`, to whose end it lasts."""
+    gpu.state.color_mask_set(False, False, False, True)
+
+
 def draw_screen(shader: Shader) -> None:
     """Draw a triangle over the whole viewport with the bound shader, whose inputs are FULLSCREEN_INPUTS. Only inside
     `drawing`."""

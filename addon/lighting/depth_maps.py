@@ -290,10 +290,12 @@ class Atlas:
 
 @dataclass(frozen=True)
 class AlphaCasters:
-    """Casters whose material lets some light pass, and the shader and bindings of each material."""
+    """Casters whose material lets some light pass, and the shader and bindings of each material; layers on surfaces
+    (see shaders/lib/shadow.glsl) with what draws each."""
 
     draws: list[Draw]
     programs: dict[int, tuple[Shader, dict]]
+    layers: tuple[tuple[Draw, Shader, dict, dict], ...] = ()  # bindings, constants
 
 
 def draw_views(
@@ -351,6 +353,15 @@ def draw_views(
                 passes.draw(shader, call.draw.batch, call.count)
                 sent += call.triangles
             passes.set_culling("NONE")
+        seen = Boxes.of([draw for draw, *_ in alpha.layers]).seen(view.rows, view.least_q) if alpha.layers else ()
+        with passes.drawing(atlas.target, viewport=viewport) if np.any(seen) else nullcontext():
+            for draw, shader, bindings, extra in (alpha.layers[k] for k in np.flatnonzero(seen)):
+                passes.write_alpha_alone()
+                own = {"first_instance": draw.first, "sample_index": sample, "light_point": view.light_point,
+                       "glass_blocks": 0, "channel_asked": 0}  # fmt: skip
+                shader.bind(**bindings, constants={**constants, **own, **extra})
+                passes.draw(shader, draw.batch, draw.count)
+                sent += draw.triangles
         yield sent
 
 

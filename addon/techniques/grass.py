@@ -40,6 +40,7 @@ from ..gfx.library import Program
 from ..grass.patch import Patch, PatchError, kept
 from ..grass.table import Field, table_of
 from ..lighting.grass import TABLE, GrassTable
+from ..lighting.visibility import Layer, Layers
 from ..materials.estimate import srgb_decode
 from ..snapshot.scene import Material, Snapshot
 from ..surfaces.draw import StandIns
@@ -58,6 +59,27 @@ def grass_program(surface: Program) -> Program:
         textures=(*surface.textures, TABLE), constants=(*surface.constants, ("INT", "grass_entry")),
         defines=(*surface.defines, ("OWN_CLOSURES", "")),
         snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
+    )  # fmt: skip
+
+
+@cache
+def grass_caster(caster: Program) -> Program:
+    """The program that draws blades into depth maps, of one that draws a material that lets light pass."""
+    glsl = '#include "grass/surface.glsl"\n'
+    others = tuple(one for one in caster.snippets if one[0] != "generated/own_surface")
+    # Vectors first: each begins at a multiple of 16 bytes, and there are 128.
+    constants = sorted((*caster.constants, ("INT", "grass_entry")), key=lambda one: one[0] != "VEC4")
+    own = (
+        ("OWN_CLOSURES", ""),
+        ("CASTS_WHOLE", ""),
+        ("LAYER_CASTER", "4.0"),
+        ("GRASS_SAMPLE", "sample_index"),
+        ("GRASS_SEED", "0"),
+    )
+    return replace(
+        caster, name=f"{caster.name} grass", vertex="grass/surface.vert.glsl",
+        textures=(*caster.textures, TABLE), constants=tuple(constants),
+        defines=(*caster.defines, *own), snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
     )  # fmt: skip
 
 
@@ -143,10 +165,12 @@ class Grass(Technique):
             self._table = (key, images.upload(table_of(fields), TABLE[0]))
             self._patches = [one.patch for one in fields]  # their ids stay theirs
         table = self._table[1]
-        stand_ins = frame.shared(StandIns)
+        stand_ins, layers = frame.shared(StandIns), frame.shared(Layers)
         for material, entry in entries.items():
             program = grass_program(frame.materials.surface_program(material))
             stand_ins.of[material] = (program, {TABLE[1]: table}, {"grass_entry": entry})
+            caster = grass_caster(frame.materials.caster_program(material))
+            layers.of[material] = Layer(caster, {TABLE[1]: table}, {"grass_entry": entry}, fields[entry].height)
         frame.shared(OwnPoint).needed = True
         frame.provide(GrassTable(table))
         frame.count(self, "patches", len({id(one.patch) for one in fields}))

@@ -5,6 +5,10 @@
 #include "grass/table.glsl"
 
 #define CREST_LENGTH 6.0  // by the height
+#ifndef GRASS_SAMPLE
+#define GRASS_SAMPLE film_view.sample_index
+#define GRASS_SEED film_view.seed
+#endif
 
 struct OwnHit {
   bool bare;       // no blade stands here: the material's own surface shows
@@ -17,8 +21,8 @@ struct OwnHit {
 // A number of this sample and pixel, stratified over the samples.
 float grass_roll(int purpose)
 {
-  uvec2 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(purpose) + uint(film_view.seed) * 64u)).xy;
-  return shuffled(film_view.sample_index, salt);
+  uvec2 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(purpose) + uint(GRASS_SEED) * 64u)).xy;
+  return shuffled(GRASS_SAMPLE, salt);
 }
 
 float grass_cell(ivec2 cell)
@@ -130,6 +134,7 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   return true;
 }
 
+#ifndef CASTS_WHOLE
 void own_closures(inout Closures c, SurfacePoint point, OwnHit hit)
 {
   if (!hit.bare) {
@@ -153,3 +158,4 @@ void own_store(SurfacePoint point, OwnHit hit)
     out_emission = vec4(0.0, 0.0, 0.0, 1.0);
   }
 }
+#endif
