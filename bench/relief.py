@@ -7,8 +7,8 @@ Error is relMSE of Combined, of all pixels and of those that are farther than a 
 depth jumps, or its direct light ends, in a picture of one ray a pixel. Outlines are compared as the border of what
 covers half a pixel, and where a box stands in the floor as the border of what is red: the mean distance, in pixels, of
 places of one border to the other, over both. Times are seconds of the wall of whole renders, sync to picture, the
-shortest of three after a first one (EEVEE: the second); before each the scene is built anew, so that nothing is known of
-its mesh.
+shortest of three after a first one (EEVEE: the second); before each the scene is built anew, so that nothing is known
+of its mesh.
 
 How time grows with detail is measured with as many texels of heights as the mesh has faces along a side: the shortest
 of up to three renders in turn. Processor seconds, of all threads, tell about the same on a machine that others use.
