@@ -31,6 +31,7 @@ class Strip:
     scenes: tuple[str, ...]
     make: Callable[[str], None]  # leaves the scene of that name open
     entrants: tuple[Entrant, ...]  # the last sets the exposure: Cycles, where it takes part
+    bounces: int | None = None
     own_exposure: bool = True  # of each scene; else all have that of the first, as of a flight
 
 
@@ -60,7 +61,7 @@ def _over_relief(frame: str) -> None:
     from bench import relief_scenes
 
     relief_scenes.build("box", "SUN", 0, "RELIEF")
-    along = float(frame)
+    along = 0.4 * float(frame) + 1.0
     camera = bpy.context.scene.camera
     camera.location = (-0.7 + 0.2 * along, -1.9 + 0.1 * along, 0.75)
     camera.rotation_euler = (np.radians(70.0), 0.0, 0.2 - 0.1 * along)
@@ -82,21 +83,24 @@ def _stones_of_mesh(frame: str) -> None:
     camera.location, camera.rotation_euler, camera.data.angle = place, turn, 0.8
 
 
-def _over_grass(frame: str) -> None:
-    """A camera that walks over the shipped meadow at eye height, 0.4 m (a tile) in four pictures."""
+def _over_grass(name: str) -> None:
+    """A camera that walks over the shipped meadow at eye height, 0.1 m from picture to picture; its tiles repeated, or
+    varied."""
+    frame, varied = name.split()[0], name.endswith("varied")
     import bpy
 
     from bench import grass
 
     grass.clear()
     grass.field(True, 40)
+    bpy.data.materials["Soil"].candela.grass_varied = varied
     data = bpy.data.cameras.new("Camera")
     data.angle = 0.9
     camera = bpy.data.objects.new("Camera", data)
     bpy.context.scene.collection.objects.link(camera)
     bpy.context.scene.camera = camera
-    camera.location = (0.05 * float(frame), -8.0 + 0.1 * float(frame), 1.7)
-    camera.rotation_euler = (np.radians(72.0), 0.0, 0.02 * float(frame))
+    camera.location = (0.0, -8.0 + 0.1 * float(frame), 1.7)
+    camera.rotation_euler = (np.radians(72.0), 0.0, 0.0)
 
 
 NO_BOUNCES = ("slot_indirect", "OFF")
@@ -113,7 +117,11 @@ STRIPS = {
         ),
     ),
     "grass_flight": Strip(
-        (128, 96), tuple("01234567"), _over_grass, (Entrant("CANDELA", 8, (NO_BOUNCES,)),), own_exposure=False
+        (128, 96),
+        tuple("012345"),
+        lambda frame: _over_grass(f"{frame} varied"),
+        (Entrant("CANDELA", 8, (NO_BOUNCES,), _over_grass), Entrant("CANDELA", 8, (NO_BOUNCES,))),
+        own_exposure=False,
     ),
     "media": Strip(
         (128, 128),
@@ -125,7 +133,8 @@ STRIPS = {
         (128, 96),
         tuple("0123456"),
         _over_relief,
-        (Entrant("CANDELA", 8, (NO_BOUNCES,)), Entrant("CYCLES", 16, made_by=_stones_of_mesh)),
+        (Entrant("CANDELA", 8, (NO_BOUNCES,)), Entrant("CYCLES", 64, made_by=_stones_of_mesh)),
+        bounces=0,
         own_exposure=False,
     ),
     "reflections": Strip(
@@ -175,7 +184,7 @@ def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarra
         settings = bpy.context.scene.candela
         for key, value in one.settings:
             setattr(settings, key, value)
-        found = render_passes(bpy.context.scene, one.engine, one.samples, 1, size=strip.size)
+        found = render_passes(bpy.context.scene, one.engine, one.samples, 1, size=strip.size, bounces=strip.bounces)
         pictures.append(found.images["combined"][..., :3])
     if exposure is None:
         exposure = float(-np.log2(max(np.percentile(pictures[-1], 97), 1e-6)))

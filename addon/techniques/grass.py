@@ -8,17 +8,19 @@ J. Konttinen, S. Pattanaik, "Real-time rendering of realistic-looking grass", GR
 
 The mesh is the ground; what is drawn is the plane on top of the blades, `height` above it along its normals. Tiles
 lie along the object's X and Y axes. Lamps, the world and meshes that shine light it in one loop (lighting/loop.py),
-with shadows of other things where the blade is; indirect light takes its albedo under a uniform sky.
+with shadows of other things where the blade is; indirect light takes its albedo under a uniform sky. In depth maps it is
+a layer (lighting/visibility.py): blades as the light sees them, which shadow everything but grass.
 
 | cost | |
 |---|---|
 | surface pass, per pixel of grass and sample | 1 view of four, 1 texel: up to 12 fetches of rings, 9 of the patch |
 | light loop, per light and pixel of grass | 20 fetches of pictures, up to 5 of rings |
+| depth maps, per texel of grass | as the surface pass; where grass is shown, lamps have maps and no rays |
 | memory | 32 bytes for each texel and view: 7 MiB for 64 x 64 and 57 views |
 
 Bias: colours are interpolated between sampled directions; pictures of two views are hardly alike, so that blades
-dissolve into each other as the view moves. Left out: wind, shadows that grass casts on other things, what reflections
-and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and blades nearer than
+dissolve into each other as the view moves. Left out: wind, shadows of grass in filtered (soft) maps and for rays, what
+reflections and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and blades nearer than
 five times their height, which need geometry. A flat-shaded mesh leaves gaps in the plane on top: shade it smooth.
 """
 
@@ -107,6 +109,11 @@ class Grass(Technique):
             0.0, 1000.0, "DISTANCE", scope=MATERIAL,
         ),
         Param(
+            "varied", "Vary Tiles", False,
+            "Shift the tile at random from place to place, so that repeats cannot be seen in large fields",
+            scope=MATERIAL,
+        ),
+        Param(
             "density", "Density", 1.0,
             "Share of the ground that is covered by grass",
             0.0, 1.0, "FACTOR", scope=MATERIAL,
@@ -155,7 +162,7 @@ class Grass(Technique):
             tuple(id(one.patch) for one in fields),
             tuple(
                 (
-                    one.size, one.height, one.density, one.map_size,
+                    one.size, one.height, one.density, one.map_size, one.varied,
                     _map_key(frame.snapshot, frame.snapshot.materials[material]),
                 )
                 for one, material in zip(fields, entries)
@@ -221,7 +228,8 @@ def _field(snapshot: Snapshot, material: Material) -> Field:
     size = own_value(material.own, Grass, "size") or patch.size
     height = own_value(material.own, Grass, "height") or patch.height * size / patch.size
     density, reach = (own_value(material.own, Grass, name) for name in ("density", "map_size"))
-    return Field(patch, size, height, density, _density_map(snapshot, material), reach)
+    varied = bool(own_value(material.own, Grass, "varied"))
+    return Field(patch, size, height, density, _density_map(snapshot, material), reach, varied)
 
 
 def _field_key(snapshot: Snapshot, material: Material) -> Hashable:
