@@ -165,7 +165,7 @@ def test_a_thin_sheet_glows_where_it_is_lit_from_behind(stage):
 
 @pytest.mark.parametrize("thickness", [0.05, 0.2])
 def test_light_through_a_thin_slab_is_the_integral_of_the_profile(stage, thickness):
-    """Cycles' lines along the normal find the far side: 2 pi R(r) r over the distance from the line, r to the far side."""
+    """Cycles finds the far side by lines along the normal: 2 pi r R(r) over their distances, r to the far side."""
     stage.rectangle((-2, -2), (2, 2), material=scattering(stage, scale=1.0))
     stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = thickness
     stage.light("SUN", turn=(np.pi, 0, 0), energy=np.pi)
