@@ -329,7 +329,8 @@ def plan(job: Job) -> None:
         )
         print(found.text())
         if found.runs("direct_light") and figures is not None:
-            for sentence in ledgers.some_of(tuple(foreseen(snapshot, settings))):
+            soft = found.filled.get("shadow") == "shadows_by_light"
+            for sentence in ledgers.some_of(tuple(foreseen(snapshot, settings, soft))):
                 print(f"  {sentence}")
         _print_notes([*snapshot.notes, *_material_notes(snapshot)])
 

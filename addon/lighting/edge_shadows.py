@@ -29,9 +29,9 @@ from ..surfaces.draw import SURFACES
 from . import edge_tiles, repeated_light, silhouettes
 from .edge_tiles import EdgeTiles, Lit
 from .point_maps import PointMaps
-from .silhouettes import Extent
+from .silhouettes import Extent, Silhouettes
 from .textured_volumes import CARD_WORDS, CardCache
-from .visibility import Lookup, Maps, VisibilityProvider
+from .visibility import Lookup, Maps, VisibilityProvider, has_extent
 
 NEAR = 0.25  # radius / distance of a round light from which rays take over, as direct_light has it
 PATTERNS = 16  # of neighbouring pixels, four by four
@@ -89,17 +89,29 @@ class EdgeShadows(PointMaps):
 
     def begin(self, frame: Frame) -> None:
         super().begin(frame)
-        geometry = frame.geometry
-        self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
-        self._served = {}
+        self.find_casters(frame)
         for emitter in frame.emitters:
             reason, extent = self.suits(frame, emitter)
             frame.count(self, reason or "lights by edges")
             if extent is not None:
-                self._served[emitter.light.key] = extent
+                self.serve(emitter, extent)
         if len(self._served) < len(frame.emitters):
             self.fallback.begin(frame)
             frame.provide(self, VisibilityProvider)
+
+    def find_casters(self, frame: Frame) -> None:
+        """What `suits` asks; no light is served yet."""
+        geometry = frame.geometry
+        self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
+        self._served = {}
+
+    def serve(self, emitter: lights.Emitter, extent: Extent) -> None:
+        """Answer for this light from now on."""
+        self._served[emitter.light.key] = extent
+
+    def silhouettes(self, frame: Frame, extent: Extent) -> Silhouettes:
+        """The candidate edges of a light that `suits`."""
+        return self.tiles.found(frame, self._casters, extent, self.accurate(frame), self.by_group)[1]
 
     def suits(self, frame: Frame, emitter: lights.Emitter) -> tuple[str, Extent | None]:
         """Why edges do not suit a light, and its extent where they do."""
@@ -111,8 +123,7 @@ class EdgeShadows(PointMaps):
         if emitter.kind in (lights.POINT, lights.SPHERE) and emitter.radius > NEAR * nearest:
             return "round lights that are near: rays or maps", None
         extent = Extent.of(emitter, nearest)
-        found = self.tiles.found(frame, self._casters, extent, self.accurate(frame), self.by_group)[1]
-        if found.count > frame.settings.get(self, "most_edges"):
+        if self.silhouettes(frame, extent).count > frame.settings.get(self, "most_edges"):
             return "lights with too many edges: rays or maps", None
         return "", extent
 
@@ -208,15 +219,9 @@ class EdgeShadows(PointMaps):
         self._served, self._casters = {}, edges.NO_EDGES
 
 
-def has_extent(light) -> bool:
-    """Whether the light has extent, casts shadows, and gives something."""
-    extent = {"SUN": light.angle, "AREA": max(map(abs, light.size), default=0.0)}.get(light.kind, light.radius)
-    return light.cast_shadow and extent > 0.0 and bool(np.any(light.strength))
-
-
 def shared_patterns(frame: Frame, extent: Extent, points: int, patterns: int) -> tuple[np.ndarray, int]:
-    """Patterns of points of a light for neighbouring pixels in this sample, as texels of edges/depth_complexity.comp.glsl,
-    and their shape (edge_tiles). Each pattern, and all together, are nets of the sequence; each sample has others."""
+    """Patterns of points of a light for neighbouring pixels in this sample, as edges/depth_complexity.comp.glsl reads
+    them, and their shape (edge_tiles). Each, and all together, are nets of the sequence; each sample has others."""
     emitter, count = extent.emitter, points * patterns
     xy = sequence.points(frame.sample * count, count, "edges/light", frame.settings.seed).reshape(patterns, points, 2)
     x, y = xy[..., :1], xy[..., 1:]
@@ -260,8 +265,8 @@ BOX = 16  # points that a box is around
 
 
 def in_pairs(places: np.ndarray, sort: bool = False) -> np.ndarray:
-    """(patterns, points / 2 + points / BOX, 4) float32 texels of places (patterns, points, 2): two points each, then boxes
-    around each BOX (middle, half sides). `sort`: boxes are quadrants, where a net has as many points in each."""
+    """(patterns, points / 2 + points / BOX, 4) float32 texels of places (patterns, points, 2): two points each, then
+    boxes around each BOX (middle, half sides). `sort`: those are quadrants, as a net has as many points in each."""
     patterns, points = places.shape[:2]
     if sort:
         quadrant = (places[..., 0] >= 0) + 2 * (places[..., 1] >= 0)

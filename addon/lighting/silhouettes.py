@@ -74,8 +74,8 @@ class Extent:
 
     @property
     def half_axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of a rectangle around the centre (at infinity: at a distance of 1) that holds all points; zeros where it turns
-        with the receiver, or would be too wide to be told by."""
+        """Of a rectangle around the centre (at infinity: at a distance of 1) that holds all points; zeros where it
+        turns with the receiver, or would be too wide to be told by."""
         emitter = self.emitter
         if emitter.has_span:
             return np.asarray(emitter.u[:3], float), np.asarray(emitter.v[:3], float)

@@ -78,9 +78,7 @@ NORMAL = ("RGBA32F", "surface_normal")
 
 
 @cache
-def gathering(
-    points: int, tile: int, bits: bool, cards: bool, standard: bool = False, space: bool = False
-) -> Program:
+def gathering(points: int, tile: int, bits: bool, cards: bool, standard: bool = False, space: bool = False) -> Program:
     """The dispatch that counts layers. `space`: points of the light that lie in no plane."""
     seen = ("seen_points", "R32UI", "UINT_2D", "WRITE") if bits else ("seen_share", "R32F", "FLOAT_2D", "WRITE")
     return Program(

@@ -231,8 +231,9 @@ class PenumbraWedges(EdgeShadows):
         none = self.tiles.kept("no layers", *frame.size, "R16F")
         images.Target((none,)).clear()
         alone = self.tiles.kept("cards share", *frame.size, CARDS_SHARE[0])
+        program = gathering(CARD_POINTS, lit.tile, False, True, space=shape >= edge_tiles.BALL_DISC)
         passes.compute(
-            gathering(CARD_POINTS, lit.tile, False, True, space=shape >= edge_tiles.BALL_DISC), frame.size, images={"seen_share": alone},
+            program, frame.size, images={"seen_share": alone},
             textures={
                 **lit.textures, "centre_count": none, "light_pattern": images.upload(texels), **cards,
                 "surface_normal": frame.images["surface.normal"],
