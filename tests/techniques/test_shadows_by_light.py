@@ -127,7 +127,8 @@ def test_edges_err_less_at_one_sample(few_edges):
     few_edges.scene.candela.accumulated_maps_by = "RAYS"
     few_edges.scene.candela.slot_shadow = "accumulated_maps"
     expected = irradiance(few_edges, 256, (32, 32))
-    errors = [float(np.sqrt(((one - expected) ** 2).mean())) for one in (by_edges, by_maps)]
+    beside = slice(18, None)  # of the plate, whose outline is the film's
+    errors = [float(np.sqrt(((one - expected)[:, beside] ** 2).mean())) for one in (by_edges, by_maps)]
     assert errors[0] < 0.5 * errors[1]
 
 
