@@ -119,8 +119,9 @@ def test_few_edges_are_taken_where_they_cost_less_on_this_device(few_edges):
 
 def test_edges_err_less_at_one_sample(few_edges):
     few_edges.light(SOFT[0], (0, 0, HEIGHT), **SOFT[1])
-    few_edges.blocker((-1.0, -0.2), (1.0, 0.1), 2.0).visible_camera = False
-    few_edges.camera_above(1.5)
+    for height in (1.2, 2.0):
+        few_edges.blocker((0.1, -0.2), (0.5, 0.1), height).visible_camera = False
+    few_edges.camera_above(3.0)
     by_edges = irradiance(few_edges, 1, (32, 32))
     few_edges.scene.candela.shadows_by_light_few_edges = False
     by_maps = irradiance(few_edges, 1, (32, 32))
