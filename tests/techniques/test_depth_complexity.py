@@ -116,15 +116,15 @@ def lamp(stage, kind, **options):
         made = stage.light("AREA", (0.6, 0.5, 3.6), (0.2, 0.1, 0), shape="RECTANGLE", size=1.0, size_y=0.8)
     elif kind == "ELLIPSE":
         made = stage.light("AREA", (0.6, 0.5, 3.6), shape="ELLIPSE", size=1.0, size_y=0.6)
-    elif kind == "SUN":
-        made = stage.light("SUN", turn=(0.4, 0.3, 0), angle=0.2)
+    elif kind.endswith("SUN"):
+        made = stage.light("SUN", turn=(0.4, 0.3, 0), angle=2.9 if kind == "WIDE SUN" else 0.2)
     else:
         made = stage.light("POINT", (0.6, 0.5, 3.9), shadow_soft_size=0.3)
         made.data.use_soft_falloff = kind == "POINT"
     return made
 
 
-@pytest.mark.parametrize("kind", ("RECTANGLE", "ELLIPSE", "SUN", "SPHERE", "POINT"))
+@pytest.mark.parametrize("kind", ("RECTANGLE", "ELLIPSE", "SUN", "WIDE SUN", "SPHERE", "POINT"))
 def test_every_bit_is_what_brute_force_says(by_edges, kind):
     """Exact integers: no tolerance but for the rounding of float32 where a way meets an edge."""
     stage = by_edges
