@@ -33,6 +33,7 @@ NORMAL_WEIGHT = 1.2  # more than one: faces at right angles part before what is 
 FLAT = 0.7  # cosine of the half angle of a cone of normals, up to which a group is drawn as a disc
 LOOSE = 3.0  # area of a rectangle beside that of the group that it stands for
 EXACT = 1.5  # the same of a group of pieces
+STRAIGHT = 1e-9  # of an edge's square: what two parts of it may bend
 NODE_TEXELS = 3
 
 
@@ -55,12 +56,14 @@ class PointTree:
     along: np.ndarray
     half: np.ndarray
     exact: np.ndarray
+    piece: np.ndarray
+    thick: np.ndarray
 
     @property
     def flat(self) -> np.ndarray:
         """(2 n,) groups that a rectangle stands for: those whose rectangle is not much larger than they are."""
         loose = np.where(self.exact, EXACT, LOOSE)
-        return (self.cone >= FLAT) & (4.0 * self.half.prod(axis=1) <= loose * self.area)
+        return ~self.piece & (self.cone >= FLAT) & (4.0 * self.half.prod(axis=1) <= loose * self.area)
 
     @property
     def leaves(self) -> int:
@@ -71,9 +74,11 @@ class PointTree:
         cosine, radius of the disc (negative: of a ball); octahedral side of the rectangle, its half lengths."""
         rows = np.zeros((2 * self.leaves, NODE_TEXELS, 4), np.float32)
         rows[:, 0, :3], rows[:, 0, 3] = self.centre, self.radius
-        rows[:, 1, :2], rows[:, 1, 2] = octahedral(self.axis), self.cone
+        rows[:, 1, :2], rows[:, 1, 2] = octahedral(self.axis), np.where(self.piece, -self.half[:, 1], self.thick)
         rows[:, 1, 3] = np.where(self.flat, self.disc, -self.disc / 2)  # of a ball: a quarter of the area
-        rows[self.leaves :, 1, 3] = self.disc[self.leaves :]
+        drawn = self.piece.copy()
+        drawn[self.leaves :] = True
+        rows[drawn, 1, 3] = self.disc[drawn]
         rows[:, 2, :2], rows[:, 2, 2:] = octahedral(self.along), self.half
         return rows.reshape(-1, 4)
 
@@ -106,6 +111,43 @@ def split(positions: np.ndarray, normals: np.ndarray, sides: np.ndarray | None =
     return order
 
 
+def parting(first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """How many of `count` (N,) leaves, two or more, from `first` on lie in the first child of the smallest node of a
+    heap that holds them all."""
+    last = first + count - 1
+    level = np.frexp((first ^ last).astype(float))[1] - 1
+    return np.where(count > 1, ((last >> level) << level) - first, 1)
+
+
+def arranged(place: np.ndarray, normal: np.ndarray, sides: np.ndarray, leaves: np.ndarray) -> np.ndarray:
+    """The order (M,) of things at places (M, 3), each with a number of leaves in a row: as `split`, but that those with
+    more than one leaf stay whole. `sides`: as there, of those with one."""
+    order: list[np.ndarray] = []
+    open_ = [(np.arange(len(place)), 0)]
+    while open_:
+        own, first = open_.pop()
+        count = int(leaves[own].sum())
+        if len(own) < 2:
+            order.append(own)
+            continue
+        if count == len(own) and count & (count - 1) == 0 and first % count == 0:
+            order.append(own[split(place[own], normal[own], sides[own])])
+            continue
+        grouped = np.concatenate([place[own], normal[own]], axis=1)
+        extent = np.ptp(grouped, axis=0)
+        extent[3:] *= NORMAL_WEIGHT * extent[:3].max()
+        own = own[np.argsort(grouped[:, extent.argmax()], kind="stable")]
+        edges = np.cumsum(leaves[own])
+        half = int(parting(np.array([first]), np.array([count]))[0])
+        # What lies across the middle stands between both halves.
+        across = int(np.searchsorted(edges, half, side="right"))
+        whole = across > 0 and edges[across - 1] == half
+        parts = (own[:across], own[across:]) if whole else (own[:across], own[[across]], own[across + 1 :])
+        begun = first + np.concatenate([[0], np.cumsum([leaves[part].sum() for part in parts])])
+        open_ += [(part, int(start)) for part, start in zip(parts, begun) if len(part)][::-1]
+    return np.concatenate(order) if order else np.zeros(0, int)
+
+
 def _frames(normal: np.ndarray, side: np.ndarray) -> np.ndarray:
     """(N, 3, 3) along, across and up as columns; the axes of space where `side` is 0."""
     length = np.linalg.norm(side, axis=1, keepdims=True)
@@ -132,8 +174,11 @@ def fitted(
         own = exact[n:] = np.isfinite(pieces[order]).all(axis=(1, 2))
         corners[own] = pieces[order][own]
     centre[n:], axis[n:], radius[n:], whole[n:] = place, normal, disc, area
-    own = np.flatnonzero(exact[n:])
-    _set_pieces(centre, along, half, radius, disc, corners, normal, n, own)
+    piece = np.zeros(2 * n, bool)
+    piece[n:] = exact[n:]
+    triangle = np.full((2 * n, 3, 3), np.nan)
+    triangle[n:] = corners
+    thick = np.zeros(2 * n)
     overhang = np.where(exact[n:], 0.0, disc)  # of corners
     wanted = np.zeros((n, 3)) if sides is None else sides[order] * exact[n:, None]
     whole_pieces = not overhang.any()
@@ -162,18 +207,40 @@ def fitted(
             middle = middle + side * ((first + last) / 2 - (middle * side).sum(axis=1))[:, None]
         centre[level] = middle
         off = of_node - middle[:, None]
+        piece[level], triangle[level] = _joined(piece[2 * parts : 4 * parts], triangle[2 * parts : 4 * parts])
+        rise = np.abs(np.einsum("nki,ni->nk", off, axis[level]))
+        thick[level] = (rise if whole_pieces else rise + np.repeat(overhang, 3).reshape(parts, -1)).max(axis=1)
         away = np.sqrt(np.einsum("nki,nki->nk", off, off))
         away = (away if whole_pieces else away + np.repeat(overhang, 3).reshape(parts, -1)).max(axis=1)
         radius[level] = np.maximum(away, np.linalg.norm(half[level], axis=1) * (cone[level] >= FLAT))
         parts //= 2
     disc_of_node = COVER * np.sqrt(whole / np.pi)
     disc_of_node[n:] = disc
-    return PointTree(order, centre, radius, axis, cone, disc_of_node, whole, along, half, exact)
+    _set_pieces(centre, along, half, radius, disc_of_node, triangle, axis, np.flatnonzero(piece))
+    thick[n:] = 0.0
+    thick[piece] = 0.0
+    return PointTree(order, centre, radius, axis, cone, disc_of_node, whole, along, half, exact, piece, thick)
 
 
-def _set_pieces(centre, along, half, radius, disc, corners, normal, n: int, own: np.ndarray) -> None:
-    """Fill in what leaves `own` say about their pieces, see PointTree."""
-    piece = corners[own]
+def _joined(piece: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which pairs of pieces (2 N,) are the halves of a triangle, (N,), and its corners (N, 3, 3)."""
+    both, whole = np.zeros(len(piece) // 2, bool), triangle[0::2].copy()
+    for first in range(3):
+        for second in range(3):
+            left, right = np.roll(triangle[0::2], first, axis=1), np.roll(triangle[1::2], second, axis=1)
+            joined = np.stack([left[:, 0], right[:, 1], left[:, 2]], axis=1)
+            edge, part = joined[:, 1] - joined[:, 0], left[:, 1] - left[:, 0]
+            bend = np.linalg.norm(np.cross(edge, part), axis=1)
+            good = (left[:, 1:] == right[:, [0, 2]]).all(axis=(1, 2)) & ~both
+            good &= bend <= STRAIGHT * (edge * edge).sum(axis=1)
+            both |= good
+            whole[good] = joined[good]
+    return both & piece[0::2] & piece[1::2], whole
+
+
+def _set_pieces(centre, along, half, radius, disc, triangle, normal, own: np.ndarray) -> None:
+    """Fill in what nodes `own` say about their pieces, see PointTree."""
+    piece = triangle[own]
     longest = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2).argmax(axis=1)
     a, b, c = (piece[np.arange(len(own)), (longest + k) % 3] for k in range(3))
     edge = b - a
@@ -184,9 +251,9 @@ def _set_pieces(centre, along, half, radius, disc, corners, normal, n: int, own:
     apex = c - middle
     up = (apex * across).sum(axis=1)
     side = side * np.where(up < 0.0, -1.0, 1.0)[:, None]
-    centre[n + own], along[n + own], disc[own] = middle, side, length / 2
-    half[n + own, 0], half[n + own, 1] = (apex * side).sum(axis=1), np.maximum(np.abs(up), 1e-30)
-    radius[n + own] = np.maximum(length / 2, np.linalg.norm(apex, axis=1))
+    centre[own], along[own], disc[own] = middle, side, length / 2
+    half[own, 0], half[own, 1] = (apex * side).sum(axis=1), np.maximum(np.abs(up), 1e-30)
+    radius[own] = np.maximum(length / 2, np.linalg.norm(apex, axis=1))
 
 
 def _sides(axis: np.ndarray, extent: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

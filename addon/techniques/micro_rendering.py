@@ -129,7 +129,7 @@ class MicroRendering(MultiresRadiosity):
             "centre, which enlarges silhouettes",
         ),
         Param(
-            "groups", "Groups", 1024,
+            "groups", "Groups", 512,
             "Groups of points that gather light for further bounces",
             16, 1 << 14, draft=256,
         ),
