@@ -37,7 +37,7 @@ from .lit_points import LitPoints
 ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
-LIGHTS, OTHERS = 4, 4  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+LIGHTS, OTHERS = 16, 16  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
 CLIPS = passes.fullscreen_program(
     "where light of points holds",
     "micro/clips.frag.glsl",
@@ -50,6 +50,7 @@ CLIPS = passes.fullscreen_program(
     defines=(("POINT_ROW", str(ROW)),),
     outputs=(("VEC4", "out_clips"),),
 )  # fmt: skip
+NOTHING_STANDS = 1e29  # less than NONE of shaders/micro/clips.frag.glsl
 SHARPNESS = 64.0  # see PointLight: a bright spot is one of thousands of points that are gathered
 
 
@@ -173,6 +174,10 @@ class PointRuns:
             },
             constants={"leaf_count": tree.leaves, "offset_size": frame.offset_size},
         )  # fmt: skip
+        parted = _parted(images.read(clips))
+        if parted.any():
+            tree = tree.opened(parted)
+            nodes = tree.upload()
         materials = frozenset(material[np.isfinite(position).all(axis=1)].astype(int).tolist())
         return Run(points, tree, nodes, own, facing, clips, materials, self._seen[points.triangle])
 
@@ -201,6 +206,12 @@ class PointRuns:
         self._lit.release()
         self._surfaces = self._seen = self._key = None
         self._moved = False
+
+
+def _parted(clips: np.ndarray) -> np.ndarray:
+    """(leaves,) whether something stands on the piece of a point, on either side."""
+    lines = clips.reshape(-1, 4)[:, 1::2]
+    return (lines < NOTHING_STANDS).any(axis=1).reshape(-1, 2).any(axis=1)
 
 
 def _keys(frame: Frame) -> tuple[tuple, tuple]:

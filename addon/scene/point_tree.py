@@ -21,7 +21,7 @@ Source: Ritschel 2009, chapter 6.2. Ours: splits by normal, discs by area, piece
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,6 +68,17 @@ class PointTree:
     @property
     def leaves(self) -> int:
         return len(self.order)
+
+    def opened(self, leaves: np.ndarray) -> PointTree:
+        """The tree whose groups that hold one of `leaves` (n,) bool are never drawn as the rectangle or the piece that
+        they are: light differs within them."""
+        held = np.zeros(2 * self.leaves, bool)
+        held[self.leaves :] = leaves
+        for level in range(self.leaves.bit_length() - 2, -1, -1):
+            first = 1 << level
+            held[first : 2 * first] = held[2 * first : 4 * first].reshape(-1, 2).any(axis=1)
+        held[self.leaves :] = False
+        return replace(self, piece=self.piece & ~held, cone=np.where(held, -1.0, self.cone))
 
     def packed(self) -> np.ndarray:
         """(2 n NODE_TEXELS, 4) float32 for shaders/micro/buffer.glsl: centre, radius of the ball; octahedral axis,

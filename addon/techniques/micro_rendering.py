@@ -129,7 +129,7 @@ class MicroRendering(MultiresRadiosity):
             "centre, which enlarges silhouettes",
         ),
         Param(
-            "groups", "Groups", 512,
+            "groups", "Groups", 1024,
             "Groups of points that gather light for further bounces",
             16, 1 << 14, draft=256,
         ),
