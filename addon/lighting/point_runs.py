@@ -37,7 +37,7 @@ from .lit_points import LitPoints
 ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
-LIGHTS, OTHERS = 16, 16  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+LIGHTS, OTHERS = 4, 16  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
 CLIPS = passes.fullscreen_program(
     "where light of points holds",
     "micro/clips.frag.glsl",
