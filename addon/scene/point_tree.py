@@ -1,17 +1,17 @@
 """A tree over points of surfaces: the discs that they stand for, bounds and normals of groups of them.
 
-A complete binary tree over 2^L points by median splits, in the order of a heap: node 1 is the root, nodes 2k and 2k + 1
-are the halves of node k, the last 2^L nodes the points. A group is split where it is longest, in place or, each unit of
-a normal counting as NORMAL_WEIGHT of the group's extent, in normal: so that the sides of a box, or both faces of a thin
-sheet that are wound the other way, part early and what is left is flat. Ties go by order: coincident points are split,
-too.
+A complete binary tree over 2^L points, in the order of a heap: node 1 is the root, nodes 2k and 2k + 1 are the halves
+of node k, the last 2^L nodes the points. Points of one triangle stand in a row, and the triangle is cut where nodes
+part them (area_points.py), so that each group of them is a triangle, too. What is left is split by medians where it is
+longest, in place or, each unit of a normal counting as NORMAL_WEIGHT of its extent, in normal: so that the sides of a
+box, or both faces of a thin sheet that are wound the other way, part early. Ties go by order.
 
-    node    bounding ball, mean normal, cosine of the half angle of the cone of normals
+    node    bounding ball, mean normal, how far off the plane through its middle it reaches
     point   a piece of a triangle, or the radius of a disc that has COVER^2 times the area that it stands for
-    group   flat: a rectangle that holds its pieces and discs; else a ball, of a radius that goes by the area
+    group   a triangle; flat: a rectangle that holds its pieces and discs; else a ball, whose radius goes by the area
 
-A rectangle lies along an edge of a piece's triangle, so that none of a rectangular wall reaches over its rim, however
-it is turned; one that is more than EXACT times as large as its pieces stands for nothing.
+A rectangle lies along an edge of a piece's triangle; one that is more than EXACT times as large as its pieces stands
+for nothing. Nor do groups with a piece on which something stands (`opened`).
 
 Points that have moved keep their places in the tree: bounds are made anew from the leaves up (refit). `numpy` for 2^14
 points: 0.09 s, 0.05 refitted; 2^18: 2 s and 1.
@@ -41,9 +41,10 @@ NODE_TEXELS = 3
 class PointTree:
     """`order` (n,): the points in the order of leaves. By node (2 n; 0 is unused): `centre` (2 n, 3), `radius` of the
     bounding ball, `axis` (2 n, 3), `cone` (cosine), `disc` (radius), `area`, m2, `along` (2 n, 3), a side of a flat
-    group's rectangle, and `half` (2 n, 2) of its lengths along and across; `exact` (2 n,): no discs are below.
+    group's rectangle, and `half` (2 n, 2) of its lengths along and across; `exact` (2 n,): no discs are below; `piece`
+    (2 n,): a triangle; `thick` (2 n,): how far it reaches off the plane through its middle.
 
-    Of a leaf that is a piece, `centre` is the middle of its longest edge, which runs along `along`, `disc` half of its
+    Of a node that is a piece, `centre` is the middle of its longest edge, which runs along `along`, `disc` half of its
     length, and `half` where the third corner is, across from 0 up. `half` of a disc is 0."""
 
     order: np.ndarray
@@ -82,7 +83,8 @@ class PointTree:
 
     def packed(self) -> np.ndarray:
         """(2 n NODE_TEXELS, 4) float32 for shaders/micro/buffer.glsl: centre, radius of the ball; octahedral axis,
-        cosine, radius of the disc (negative: of a ball); octahedral side of the rectangle, its half lengths."""
+        thickness or, of a piece, less than 0: its height; radius of the disc (negative: of a ball); octahedral side of
+        the rectangle, its half lengths."""
         rows = np.zeros((2 * self.leaves, NODE_TEXELS, 4), np.float32)
         rows[:, 0, :3], rows[:, 0, 3] = self.centre, self.radius
         rows[:, 1, :2], rows[:, 1, 2] = octahedral(self.axis), np.where(self.piece, -self.half[:, 1], self.thick)
