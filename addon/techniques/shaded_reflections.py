@@ -260,7 +260,8 @@ class ShadedReflections(Technique):
                 if number + 1 < rounds:
                     before = {
                         "met_origin": rays.colors[0], "met_direction": rays.colors[1], "met_path": rays.colors[2],
-                        "met_travelled": rays.colors[3], "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
+                        "met_travelled": rays.colors[3],
+                        "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
                     }  # fmt: skip
                     bound = closure_bindings(closures)
                     self._scatter(frame, onward, round_, number + 1, records.target.depth, bound, before)
