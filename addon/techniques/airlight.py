@@ -130,24 +130,41 @@ def _defines(stride: int, kinds: int, world: bool) -> tuple[tuple[str, str], ...
     return ("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
 
 
+GUIDE_TEXTURE = ("RGBA32F", "airlight_guide")
+
+
+@cache
+def guide_program(kinds: int) -> Program:
+    """Finds what lamps of these kinds would send without shadows, at every pixel."""
+    return passes.fullscreen_program(
+        "airlight's guide",
+        "media/guide.frag.glsl",
+        textures=(*MEDIA_TEXTURES, ("RGBA32F", "surface_position")),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+        constants=(("INT", "light_count"), ("INT", "glass_blocks")),
+        defines=(("LIGHT_KINDS", str(kinds)),),
+        outputs=(("VEC4", "out_guide"),),
+    )
+
+
 SPREAD, SPREAD_ON_SURFACES = (
     passes.fullscreen_program(
-        f"airlight spread{', on surfaces' if on_surfaces else ''}",
+        f"airlight spread{', on surfaces' if on_surfaces else ', guided'}",
         "media/spread.frag.glsl",
         textures=(
             ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
             *ATTENUATION_TEXTURES,
-            *((("RGBA32F", "surface_diffuse"),) if on_surfaces else ()),
+            ("RGBA32F", "surface_diffuse") if on_surfaces else GUIDE_TEXTURE,
         ),
         blocks=((VIEW, "film_view"),),
         constants=(("IVEC2", "shown_pixel"),),
-        defines=(("STRIDE", str(COARSE)), *((("ON_SURFACES", "1"),) if on_surfaces else ())),
+        defines=(("STRIDE", str(COARSE)), ("ON_SURFACES" if on_surfaces else "GUIDED", "1")),
         outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
     )
     for on_surfaces in (False, True)
 )  # fmt: skip
 PROGRAMS = tuple(made(stride, -1, True) for made in (airlight_program, indirect_program) for stride in (1, COARSE))
-PROGRAMS = (*PROGRAMS, at_hits_program(-1, True, True))
+PROGRAMS = (*PROGRAMS, at_hits_program(-1, True, True), guide_program(-1))
 
 
 @dataclass(frozen=True)
@@ -282,6 +299,17 @@ class Airlight(Technique):
         passes.fullscreen(program, images.Target(found), **bindings)
         yield
         read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
+        if spread is SPREAD:
+            found += (images.pool.take(*frame.size, "RGBA32F"),)
+            program = guide_program(self._lit.kinds)
+            bound = bindings["textures"] | read
+            passes.fullscreen(
+                program, images.Target(found[2:]), textures={name: bound[name] for _, name in program.textures},
+                blocks={name: bindings["blocks"][name] for _, name in program.blocks},
+                constants={"light_count": self._lit.rows, "glass_blocks": 0},
+            )  # fmt: skip
+            read["airlight_guide"] = found[2]
+            frame.count(self, "passes")
         passes.fullscreen(
             spread, target, blend="ADDITIVE_PREMULT",
             textures={

@@ -33,7 +33,7 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
 #endif
   Light light = light_read(number);
   float density;
-  asked = ask_light(light, position, density);
+  asked = ask_light(light, position, u, density);
   float lobe = max(dot(normal, asked.direction), 0.0) / PI;
   asked.found *= lobe;
 #ifdef WORLD_LIT
@@ -71,7 +71,7 @@ vec3 walk(vec3 position, vec3 direction, vec3 weight, bool media_only, inout uin
     if (scattered) {
       int k;
       float t;
-      Around around = around_row(number, position, direction, bins.from[0], bins.to[bins.count - 1]);
+      Around around = around_row(number, ask_turn, position, direction, bins.from[0], bins.to[bins.count - 1]);
       float v = media_random(seed);
       if (around.exists && v < 0.5) {
         t = around_draw(around, 2.0 * v);
