@@ -52,6 +52,7 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
 #define LOOK 1
 #define LOOK_AT_LIT 2
 #define GO_ON 3
+#define AIMED 0.25  // of steps that go on to places by the rays of the lamp
 
 // A place that a walk has come to: in media, or on a surface of albedo 1.
 struct Stop {
@@ -104,13 +105,14 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     vec3 from = stop.position;
     float wanted = -1.0;
     vec3 way;
-    bool chosen = doing == LOOK && rays.exist;
+    bool more = doing == GO_ON && bounce + 1 < bounces;
+    float aimed = !rays.exist ? 0.0 : ((doing == LOOK) ? 0.5 : (more ? AIMED : 0.0));  // share along rays of the lamp
     if (doing == FIND_LIT) {
       from = rays.source;
       way = lamp_rays_way(rays, turn);
     }
-    else if (doing == LOOK_AT_LIT || (chosen && media_random(seed) < 0.5)) {
-      vec3 offset = (doing == LOOK) ? lamp_rays_draw(rays, from, vec3(turn, media_random(seed))) : lit - from;
+    else if (doing == LOOK_AT_LIT || media_random(seed) < aimed) {
+      vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(rays, from, vec3(turn, media_random(seed)));
       wanted = length(offset);
       way = offset / max(wanted, 1e-30);
     }
@@ -136,15 +138,17 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     bool in_media = bins.total > 0.0 && bins.count > 0;
     bool at_surface = hit.x >= 0 && first_surface;
     float chance = !in_media ? 0.0 : (at_surface ? clamp(1.0 - dot(bins.end, vec3(1.0 / 3.0)), 0.1, 0.9) : 1.0);
-    bool scattered = (doing == LOOK) ? in_media : (doing == GO_ON && media_random(seed) < chance);
+    chance = (doing == LOOK) ? 1.0 : chance;
+    bool found_aim = doing != LOOK_AT_LIT && wanted > 0.0;
+    bool scattered = (doing == LOOK || found_aim) ? in_media : (doing == GO_ON && media_random(seed) < chance);
     Asked asked = ask_nothing();
     vec3 position = from;
     vec3 arrives = vec3(0.0);
     int k = -1;
     float t = wanted;
     if (doing == GO_ON) {
-      sum += passed / lobe * bins.emitted;
-      if (!scattered && !at_surface) {
+      sum += found_aim ? vec3(0.0) : passed / (lobe * (1.0 - aimed)) * bins.emitted;
+      if (!scattered && (found_aim || !at_surface)) {
         break;
       }
     }
@@ -159,19 +163,23 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       else {
         t = bins_draw(bins, around.exists ? 2.0 * v - 1.0 : v, k);
       }
-      if (k < 0) {
-        continue;  // between media, or behind a surface
+      if (k < 0) {  // between media, or behind a surface
+        if (doing == LOOK) {
+          continue;
+        }
+        break;
       }
       float density = bins_density(bins, k, t);
-      density = lobe * (around.exists ? 0.5 * (density + around_density(around, t)) : density);
-      density = chosen ? 0.5 * (density + lamp_rays_density(rays, from, way, t)) : density;
+      density = lobe * chance * (around.exists ? 0.5 * (density + around_density(around, t)) : density);
+      density = (aimed > 0.0) ? mix(density, lamp_rays_density(rays, from, way, t), aimed) : density;
       position += t * way;
       arrives = passed * bin_passing(bins, k, t) / max(density, 1e-30);
       if (doing == LOOK) {
         asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
       }
       else {
-        weight = arrives / chance;
+        weight = arrives;
+        arrives = vec3(0.0);
         stop.inside = bins.media[k];
         stop.lobe = media_lobe(stop.inside, position, seed);
         stop.onwards = -way;
@@ -182,7 +190,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       normal = (dot(normal, way) > 0.0) ? -normal : normal;
       position = ray_origin(position + limit * way, normal);
       vec3 bounced = passed * bins.end * mean_albedo(hit);
-      float going = lobe * (1.0 - chance);
+      float going = lobe * (1.0 - chance) * (1.0 - aimed);
       if (number >= 0) {
         asked = ask_surface(number, position, normal, ask_turn);
         float from_lamp = 0.0;
