@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .shading import one_shader
+
 ALBEDO = 0.8
 
 
@@ -30,31 +32,16 @@ def clear() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
-def material(kind: str, **inputs):
-    import bpy
-
-    made = bpy.data.materials.new(kind)
-    if bpy.app.version < (5, 0):
-        made.use_nodes = True
-    nodes = made.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
-    made.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    for name, value in inputs.items():
-        shader.inputs[name].default_value = value
-    return made
-
-
 def glass(ior: float = 1.5):
-    return material("ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=ior)
+    return one_shader("Glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0, IOR=ior)
 
 
 def mirror():
-    return material("ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.0)
+    return one_shader("Mirror", "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.0)
 
 
 def white():
-    return material("ShaderNodeBsdfDiffuse", Color=(ALBEDO, ALBEDO, ALBEDO, 1))
+    return one_shader("White", "ShaderNodeBsdfDiffuse", Color=(ALBEDO, ALBEDO, ALBEDO, 1))
 
 
 def solid(name: str, vertices, faces, surface, smooth: bool, seen: bool = True, place=(0, 0, 0)):

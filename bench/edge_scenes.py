@@ -21,21 +21,15 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from .shading import one_shader
+
 
 def _material(name: str, roughness: float | None = None) -> bpy.types.Material:
     """Diffuse .8, or a glossy one of a roughness."""
-    made = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0):
-        made.use_nodes = True
-    nodes = made.node_tree.nodes
-    nodes.clear()
-    kind = "ShaderNodeBsdfDiffuse" if roughness is None else "ShaderNodeBsdfAnisotropic"
-    shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
-    shader.inputs["Color"].default_value = (0.8, 0.8, 0.8, 1)
-    if roughness is not None:
-        shader.inputs["Roughness"].default_value = roughness
-    made.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    return made
+    grey = (0.8, 0.8, 0.8, 1)
+    if roughness is None:
+        return one_shader(name, "ShaderNodeBsdfDiffuse", Color=grey)
+    return one_shader(name, "ShaderNodeBsdfAnisotropic", Color=grey, Roughness=roughness)
 
 
 def _masked(mask: np.ndarray) -> bpy.types.Material:

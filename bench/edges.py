@@ -23,6 +23,7 @@ import numpy as np
 
 from . import edge_scenes, markdown, soft, soft_scenes
 from .quick import size_of, table
+from .shading import node_of, tree_of
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "edge_shadows.md"
 COMMAND = "python -m bench edges --page"
@@ -217,10 +218,7 @@ def _card(scene) -> None:
     image.pixels.foreach_set(pixels.ravel())
     image.pack()
     material = bpy.data.materials.new("Wires")
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    tree = material.node_tree
-    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree, shader = tree_of(material), node_of(material, "BSDF_PRINCIPLED")
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image, texture.interpolation = image, "Closest"
     tree.links.new(texture.outputs["Alpha"], shader.inputs["Alpha"])

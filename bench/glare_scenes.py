@@ -9,6 +9,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from .shading import node_of, one_shader
+
 
 def clear() -> bpy.types.Scene:
     """An empty scene with a black world."""
@@ -19,33 +21,16 @@ def clear() -> bpy.types.Scene:
 
 
 def background(scene, color, strength: float) -> None:
-    node = _nodes(scene.world)["Background"]
+    node = node_of(scene.world, "BACKGROUND")
     node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (*color, 1.0), strength
 
 
-def _nodes(block):
-    if bpy.app.version < (5, 0):
-        block.use_nodes = True
-    return block.node_tree.nodes
-
-
-def _material(name: str, kind: str, **inputs):
-    made = bpy.data.materials.new(name)
-    nodes = _nodes(made)
-    nodes.clear()
-    shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
-    made.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    for key, value in inputs.items():
-        shader.inputs[key.replace("_", " ")].default_value = value
-    return made
-
-
 def _emission(color, strength: float):
-    return _material("Light", "ShaderNodeEmission", Color=(*color, 1.0), Strength=strength)
+    return one_shader("Light", "ShaderNodeEmission", Color=(*color, 1.0), Strength=strength)
 
 
 def _principled(color, roughness: float, metallic: float = 0.0):
-    return _material(
+    return one_shader(
         "Surface", "ShaderNodeBsdfPrincipled", Base_Color=(*color, 1.0), Roughness=roughness, Metallic=metallic
     )
 

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from . import markdown
+from .shading import one_shader
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "grass.md"
@@ -106,14 +107,7 @@ def field(patch: bool, tiles: int, blades: int = 1) -> None:
         field_of(recipe(blades), scene, range(-tiles, tiles), ground=False)
     mesh = bpy.data.meshes.new("Ground")
     mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
-    soil = bpy.data.materials.new("Soil")
-    if bpy.app.version < (5, 0):
-        soil.use_nodes = True
-    nodes = soil.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    shader.inputs["Color"].default_value = (*SOIL, 1.0)
-    soil.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    soil = one_shader("Soil", "ShaderNodeBsdfDiffuse", Color=(*SOIL, 1.0))
     soil.candela.grass_patch = "MEADOW" if patch else "NONE"
     mesh.materials.append(soil)
     scene.collection.objects.link(bpy.data.objects.new("Ground", mesh))

@@ -8,6 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .shading import node_of, one_shader
+
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 SIDE_VIEW = (np.pi / 2, 0, 0)
 
@@ -21,10 +23,7 @@ def begin() -> None:
 
 
 def _background():
-    world = bpy.context.scene.world
-    if world.node_tree is None:  # before Blender 5
-        world.use_nodes = True
-    return next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    return node_of(bpy.context.scene.world, "BACKGROUND")
 
 
 def link(name: str, data, location=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1)):
@@ -41,16 +40,7 @@ def camera(name: str, location, turn, angle: float = 0.8):
 
 
 def material(node: str, socket: str = "Surface", **inputs):
-    made = bpy.data.materials.new(node)
-    if made.node_tree is None:  # before Blender 5
-        made.use_nodes = True
-    nodes = made.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new(node), nodes.new("ShaderNodeOutputMaterial")
-    made.node_tree.links.new(shader.outputs[0], output.inputs[socket])
-    for key, value in inputs.items():
-        shader.inputs[key.replace("_", " ")].default_value = value
-    return made
+    return one_shader(node, node, socket, **inputs)
 
 
 def volume(node: str = "ShaderNodeVolumeScatter", **inputs):

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.cells import ROOT
+from bench.shading import tree_of
 
 RESULTS = ROOT / "out" / "memory.json"
 OPERATIONS = ("ADD", "MULTIPLY", "MINIMUM", "SINE", "FRACT", "POWER", "ABSOLUTE")
@@ -67,9 +68,7 @@ def build(number: int):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     material = bpy.data.materials.new("Own")
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    tree = material.node_tree
+    tree = tree_of(material)
     tree.nodes.clear()
     socket = tree.nodes.new("ShaderNodeTexCoord").outputs["Object"]
     for _ in range(draw.randint(2, 8)):

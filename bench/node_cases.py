@@ -15,6 +15,8 @@ import numpy as np
 
 from addon.compare.reference import render_passes
 
+from .shading import tree_of
+
 CELLS = "Cells"  # object coordinates rounded down to a grid: white noise tells numbers apart by their last bit
 
 
@@ -189,9 +191,7 @@ def picture() -> bpy.types.Image:
 def new_material(name: str) -> bpy.types.Material:
     """An empty tree, on every Blender."""
     material = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
-    material.node_tree.nodes.clear()
+    tree_of(material).nodes.clear()
     return material
 
 

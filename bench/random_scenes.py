@@ -19,6 +19,7 @@ import mathutils
 import numpy as np
 
 from bench.quick import size_of
+from bench.shading import tree_of
 
 UNITS = (1.0, 1.0, 1.0, 0.01, 100.0)  # metres of what is about a metre large
 WORST = 0.01  # of the pixels: edges in few samples
@@ -93,16 +94,10 @@ def build(number: int) -> tuple[bpy.types.Scene, str]:
     return scene, ", ".join(lot.notes)
 
 
-def _nodes(block):
-    if bpy.app.version < (5, 0):
-        block.use_nodes = True
-    return block.node_tree
-
-
 def _material(lot: Lot) -> bpy.types.Material:
     lot.notes.append("material:")
     made = bpy.data.materials.new("Material")
-    tree = _nodes(made)
+    tree = tree_of(made)
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     draw = lot.draw
     values = [
@@ -235,7 +230,7 @@ def _lamp(lot: Lot, unit: float, scene: bpy.types.Scene) -> None:
 
 def _world(lot: Lot, scene: bpy.types.Scene) -> None:
     scene.world = bpy.data.worlds.new("World")
-    tree = _nodes(scene.world)
+    tree = tree_of(scene.world)
     background = next(node for node in tree.nodes if node.type == "BACKGROUND")
     background.inputs["Color"].default_value = lot.color()
     background.inputs["Strength"].default_value = lot.draw.choice((0, 0, 0.05, 0.3, 1))

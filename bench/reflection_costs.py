@@ -17,6 +17,7 @@ import numpy as np
 
 from . import markdown
 from .reflections import PAGE, SIZE
+from .shading import even_world
 
 COMMAND = "python -m bench reflection_costs --page"
 SAMPLES, REPEATS = 4, 3
@@ -71,7 +72,7 @@ def cubes(count: int, kind: str):
     from . import reflection_scenes as scenes
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    scenes._world((0.5, 0.5, 0.55))
+    even_world((0.5, 0.5, 0.55))
     scenes._plane(
         scenes._material("Mirror", (0.9, 0.9, 0.9, 1), **scenes.MIRROR), (0, 3, 0), (np.pi / 2, 0, 0), (3, 2, 1)
     )

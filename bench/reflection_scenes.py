@@ -23,21 +23,15 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from .shading import even_world, node_of, one_shader
+
 
 def _material(name: str, color=(0.8, 0.8, 0.8, 1), tiles: float = 0.0, other=(0.1, 0.1, 0.1, 1), **inputs):
     """A Principled material; with `tiles` its colour is a chequer of so many tiles over the UV map."""
-    made = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0):
-        made.use_nodes = True
-    nodes, links = made.node_tree.nodes, made.node_tree.links
-    nodes.clear()
-    shader, output = nodes.new("ShaderNodeBsdfPrincipled"), nodes.new("ShaderNodeOutputMaterial")
-    links.new(shader.outputs[0], output.inputs["Surface"])
-    shader.inputs["Base Color"].default_value = color
-    for key, value in inputs.items():
-        shader.inputs[key.replace("_", " ")].default_value = value
+    made = one_shader(name, "ShaderNodeBsdfPrincipled", Base_Color=color, **inputs)
     if tiles:
-        links.new(_chequer(made, tiles, color, other), shader.inputs["Base Color"])
+        shader = node_of(made, "BSDF_PRINCIPLED")
+        made.node_tree.links.new(_chequer(made, tiles, color, other), shader.inputs["Base Color"])
     return made
 
 
@@ -100,21 +94,12 @@ def _look(location, target, lens=35.0):
     bpy.context.scene.camera = made
 
 
-def _world(color):
-    world = bpy.data.worlds.new("World")
-    if bpy.app.version < (5, 0):
-        world.use_nodes = True
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (*color, 1)
-    bpy.context.scene.world = world
-
-
 TURNED = np.pi / 2
 MIRROR = {"Metallic": 1.0, "Roughness": 0.0}
 
 
 def corridor() -> None:
-    _world((0.1, 0.12, 0.15))
+    even_world((0.1, 0.12, 0.15))
     _plane(_material("Floor", (0.7, 0.6, 0.5, 1), 12, (0.2, 0.15, 0.1, 1)), (0, 0, 0), scale=(2, 6, 1))
     _plane(_material("Left", (0.8, 0.2, 0.1, 1), 10, (0.8, 0.8, 0.7, 1)), (-2, 0, 1.5), (0, TURNED, 0), (1.5, 6, 1))
     _plane(_material("Right", (0.1, 0.3, 0.8, 1), 10, (0.8, 0.8, 0.7, 1)), (2, 0, 1.5), (0, -TURNED, 0), (1.5, 6, 1))
@@ -126,7 +111,7 @@ def corridor() -> None:
 
 
 def roughness_map() -> None:
-    _world((0.25, 0.28, 0.35))
+    even_world((0.25, 0.28, 0.35))
     _plane(_material("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.15, 0.1, 0.25, 1)), (0, 0, 0), scale=(4, 4, 1))
     metal = _material("Metal", (0.9, 0.85, 0.8, 1), Metallic=1.0)
     shader = next(node for node in metal.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
@@ -138,7 +123,7 @@ def roughness_map() -> None:
 
 
 def glass_ball() -> None:
-    _world((0.4, 0.45, 0.5))
+    even_world((0.4, 0.45, 0.5))
     _plane(_material("Tiles", (0.8, 0.75, 0.7, 1), 16, (0.2, 0.3, 0.2, 1)), (0, 0, 0), scale=(4, 4, 1))
     _ball(_material("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.45, Transmission_Weight=1.0), (-0.3, -1.2, 0.7), 0.7)
     _ball(_material("Copper", (0.9, 0.5, 0.3, 1), Metallic=1.0, Roughness=0.25), (0.5, 0.8, 0.9), 0.9)
@@ -147,7 +132,7 @@ def glass_ball() -> None:
 
 
 def two_mirrors() -> None:
-    _world((0.05, 0.05, 0.06))
+    even_world((0.05, 0.05, 0.06))
     _plane(_material("Floor", (0.7, 0.7, 0.7, 1), 8, (0.3, 0.3, 0.35, 1)), (0, 0, 0), scale=(3, 2, 1))
     mirror = _material("Mirror", (0.9, 0.9, 0.9, 1), **MIRROR)
     _plane(mirror, (0, 1.5, 1.2), (TURNED, 0, 0), (2, 1.1, 1))
@@ -158,7 +143,7 @@ def two_mirrors() -> None:
 
 
 def car_paint() -> None:
-    _world((0.15, 0.17, 0.2))
+    even_world((0.15, 0.17, 0.2))
     _plane(_material("Floor", (0.4, 0.4, 0.4, 1), 10, (0.2, 0.2, 0.2, 1)), (0, 0, 0), scale=(5, 5, 1))
     paint = _material("Paint", (0.6, 0.02, 0.03, 1), Metallic=0.8, Roughness=0.45, Coat_Weight=1.0, Coat_Roughness=0.03)
     ball = _ball(paint, (0, 0, 0.8), 0.8)
@@ -169,7 +154,7 @@ def car_paint() -> None:
 
 
 def window_pane() -> None:
-    _world((0.5, 0.55, 0.65))
+    even_world((0.5, 0.55, 0.65))
     _plane(_material("Ground", (0.5, 0.5, 0.45, 1), 20, (0.3, 0.35, 0.25, 1)), (0, 0, 0), scale=(6, 6, 1))
     glass = _material("Glass", (1, 1, 1, 1), Roughness=0.0, IOR=1.5, Transmission_Weight=1.0)
     pane = _cube(glass, (0, 0, 1.2), 1)
@@ -180,7 +165,7 @@ def window_pane() -> None:
 
 
 def water() -> None:
-    _world((0.4, 0.5, 0.7))
+    even_world((0.4, 0.5, 0.7))
     _plane(_material("Ground", (0.8, 0.7, 0.5, 1), 12, (0.5, 0.4, 0.3, 1)), (0, 0, -0.6), scale=(5, 5, 1))
     _plane(_material("Picture", (0.9, 0.2, 0.1, 1), 6, (0.9, 0.9, 0.8, 1)), (0, 4, 1.5), (TURNED, 0, 0), (3, 1.8, 1))
     water_like = _material("Water", (1, 1, 1, 1), Roughness=0.0, IOR=1.33, Transmission_Weight=1.0)
@@ -197,7 +182,7 @@ def water() -> None:
 
 
 def patterned_floor() -> None:
-    _world((0.0, 0.0, 0.0))
+    even_world((0.0, 0.0, 0.0))
     _plane(_material("Tiles", (0.9, 0.1, 0.05, 1), 4, (0.05, 0.2, 0.9, 1), Roughness=1.0), (0, 0, 0), scale=(2, 2, 1))
     _plane(_white(), (0, 2, 1), (TURNED, 0, 0), (2, 1, 1))
     _area((0, 0.5, 3.5), 150, 0.5, (0, 0.5, 0))
@@ -205,7 +190,7 @@ def patterned_floor() -> None:
 
 
 def picture_off_screen() -> None:
-    _world((0.0, 0.0, 0.0))
+    even_world((0.0, 0.0, 0.0))
     picture = _material("Picture", (0.9, 0.8, 0.1, 1), 2, (0.02, 0.05, 0.6, 1), Roughness=1.0)
     _plane(picture, (-2.5, 1.2, 1), (0, TURNED, 0), (1, 1, 1))
     _plane(_white(), (0, 0, 0), scale=(2.6, 4, 1))

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .shading import even_world, one_shader
+
 SIZE = 512  # texels along a side of a field
 IMAGE = 256  # of a height image: as many as the subdivided mesh has faces
 DEPTH = 0.1  # m, of the relief of the plane
@@ -95,17 +97,8 @@ def link(name: str, data, location=(0, 0, 0), turn=(0, 0, 0)):
 
 
 def plain(color=(0.5, 0.5, 0.5)):
-    import bpy
 
-    made = bpy.data.materials.new("Plain")
-    if bpy.app.version < (5, 0):
-        made.use_nodes = True
-    nodes = made.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    made.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    shader.inputs["Color"].default_value = (*color, 1)
-    return made
+    return one_shader("Plain", "ShaderNodeBsdfDiffuse", Color=(*color, 1))
 
 
 def displaced(heights: np.ndarray, depth: float, midlevel: float = 0.0, method: str = "DISPLACEMENT", **scale):
@@ -206,12 +199,7 @@ def build(name: str, lamp: str, detail: int, mode: str = "AUTO") -> None:
     camera.angle = angle
     bpy.context.scene.camera = link("Camera", camera, place, turn)
     if lamp == "WORLD":
-        world = bpy.data.worlds.new("World")
-        if bpy.app.version < (5, 0):
-            world.use_nodes = True
-        node = next(one for one in world.node_tree.nodes if one.type == "BACKGROUND")
-        node.inputs["Color"].default_value = (0.8, 0.9, 1.0, 1.0)
-        bpy.context.scene.world = world
+        even_world((0.8, 0.9, 1.0))
         return
     light = bpy.data.lights.new(lamp, lamp)
     if lamp == "SUN":

@@ -20,6 +20,8 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from .shading import one_shader
+
 LIGHT_HEIGHT = 4.0
 LIGHT_SIZE = 1.0
 
@@ -124,14 +126,7 @@ def build(family: str) -> bpy.types.Scene:
     """An empty Blender with the family's scene. Its light is the object "Light"; "Speck" lies where nobody sees it."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    white = bpy.data.materials.new("White")
-    if bpy.app.version < (5, 0):
-        white.use_nodes = True
-    nodes = white.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    shader.inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
-    white.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    white = one_shader("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0))
     for name, fill in zip(("Blockers", "Receivers", "Speck"), (*FAMILIES[family], _speck)):
         made = Faces()
         fill(made)

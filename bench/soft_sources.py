@@ -16,6 +16,7 @@ import numpy as np
 
 from . import markdown, soft, soft_scenes
 from .quick import size_of, table
+from .shading import one_shader, tree_of
 
 COMMAND = "python -m bench soft_sources --page"
 FAMILY = "stacked blockers"
@@ -41,16 +42,9 @@ def emissive_mesh(scene: bpy.types.Scene) -> None:
     half = 0.5 * soft_scenes.LIGHT_SIZE
     mesh = bpy.data.meshes.new("Emitter")
     mesh.from_pydata([(-half, -half, 0), (-half, half, 0), (half, half, 0), (half, -half, 0)], [], [(0, 1, 2, 3)])
-    material = bpy.data.materials.new("Emission")
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
     # A lamp of `energy` watts sends energy / (pi area) to each side that it has.
-    shader.inputs["Strength"].default_value = light.data.energy / (math.pi * soft_scenes.LIGHT_SIZE**2)
-    material.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    mesh.materials.append(material)
+    strength = light.data.energy / (math.pi * soft_scenes.LIGHT_SIZE**2)
+    mesh.materials.append(one_shader("Emission", "ShaderNodeEmission", Strength=strength))
     emitter = bpy.data.objects.new("Emitter", mesh)
     emitter.location = light.location
     scene.collection.objects.link(emitter)
@@ -71,9 +65,7 @@ def world(scene: bpy.types.Scene) -> None:
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     scene.world = bpy.data.worlds.new("Sky")
-    if bpy.app.version < (5, 0):
-        scene.world.use_nodes = True
-    nodes = scene.world.node_tree.nodes
+    nodes = tree_of(scene.world).nodes
     nodes.clear()
     texture, shader, output = (
         nodes.new(f"ShaderNode{kind}") for kind in ("TexEnvironment", "Background", "OutputWorld")

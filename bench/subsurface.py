@@ -18,6 +18,7 @@ import numpy as np
 
 from . import markdown
 from .quick import size_of, table
+from .shading import even_world, node_of
 
 METHODS = ("BURLEY", "RANDOM_WALK_SKIN", "RANDOM_WALK")
 # Radii of the random walk are mean free paths, a twelfth of what looks alike with the others.
@@ -36,9 +37,7 @@ def material(method: str, color, radius, scale: float):
     import bpy
 
     made = bpy.data.materials.new("Scattering")
-    if bpy.app.version < (5, 0):
-        made.use_nodes = True
-    node = next(one for one in made.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    node = node_of(made, "BSDF_PRINCIPLED")
     node.subsurface_method = method
     scale *= WALK_SCALE if method == "RANDOM_WALK" else 1.0
     values = {
@@ -87,17 +86,6 @@ def _shape(operator, shown, smooth=True, **placement):
         polygon.use_smooth = smooth
     made.data.materials.append(shown)
     return made
-
-
-def _world(strength: float) -> None:
-    import bpy
-
-    made = bpy.data.worlds.new("World")
-    if bpy.app.version < (5, 0):
-        made.use_nodes = True
-    node = next(one for one in made.node_tree.nodes if one.type == "BACKGROUND")
-    node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (1, 1, 1, 1), strength
-    bpy.context.scene.world = made
 
 
 SKIN = ((0.8, 0.55, 0.45), (1.0, 0.35, 0.2))
@@ -164,9 +152,7 @@ def candle(method: str) -> None:
     shown = material(method, *WAX, 0.8)
     _shape(bpy.ops.mesh.primitive_cylinder_add, shown, vertices=64, radius=0.6, depth=2.0, location=(0, 0, -0.4))
     glow = bpy.data.materials.new("Flame")
-    if bpy.app.version < (5, 0):
-        glow.use_nodes = True
-    node = next(one for one in glow.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    node = node_of(glow, "BSDF_PRINCIPLED")
     node.inputs["Emission Color"].default_value = (1, 0.7, 0.4, 1)
     node.inputs["Emission Strength"].default_value = 60.0
     _shape(bpy.ops.mesh.primitive_uv_sphere_add, glow, radius=0.12, segments=16, ring_count=8, location=(0, 0, 0.9))
@@ -186,7 +172,7 @@ def under_the_world(method: str) -> None:
     import bpy
 
     _shape(bpy.ops.mesh.primitive_uv_sphere_add, material(method, *SKIN, 0.5), segments=64, ring_count=32)
-    _world(1.0)
+    even_world((1, 1, 1), 1.0)
     camera((0, -4, 0), (np.pi / 2, 0, 0))
 
 

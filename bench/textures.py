@@ -11,6 +11,8 @@ from unittest.mock import patch
 
 import numpy as np
 
+from .shading import tree_of
+
 SIZE = (128, 96)
 SIDE = 256  # texels of the floor's image
 LARGE = 4096
@@ -89,9 +91,8 @@ def _floor(bpy, pixels: np.ndarray):
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     material = bpy.data.materials.new("Floor")
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    tree = tree_of(material)
+    nodes, links = tree.nodes, tree.links
     nodes.clear()
     shown, emission = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeEmission")
     shown.image = image

@@ -11,6 +11,7 @@ import re
 import sys
 import tempfile
 import time
+import weakref
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -141,6 +142,7 @@ class Shader:
     def __init__(self, program: Program):
         self.program = program
         self.handle = _compile(program)
+        weakref.finalize(self, _dropped.append, self.handle).atexit = False
         self.used = 0  # the last picture that asked for it
         handle, loaded = self.handle, program.loaded
         # By kind and name, how each is set; one that the driver dropped is not set again.
@@ -220,6 +222,9 @@ def _leave(_name: str, _value) -> None:
 MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
 
 _shaders: dict[Program, Shader] = {}
+# Handles of shaders that are no more. Python may collect garbage in any thread, and Blender 4.5 ends with a
+# segmentation fault where a thread without a GPU context frees a program: they wait here for one that draws.
+_dropped: list = []
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
 compile_seconds = 0.0  # what that took
 
@@ -254,18 +259,24 @@ def _free_old() -> None:
     """Of more than MOST_PROGRAMS free those that were asked for the longest ago, but none that a recent picture used:
     a scene of very many materials keeps them all."""
     surplus = len(_shaders) - MOST_PROGRAMS
-    if surplus <= 0:
-        return
-    old = [program for program, shader in _shaders.items() if shader.used < context.pictures - context.RECENT]
-    if old:
-        gpu.shader.unbind()
-    for program in sorted(old, key=lambda one: _shaders[one].used)[:surplus]:
-        del _shaders[program]
+    if surplus > 0:
+        old = [program for program, shader in _shaders.items() if shader.used < context.pictures - context.RECENT]
+        for program in sorted(old, key=lambda one: _shaders[one].used)[:surplus]:
+            del _shaders[program]
+    _free_dropped()
+
+
+def _free_dropped() -> None:
+    if _dropped:
+        gpu.shader.unbind()  # the last one that drew may be among them
+        _dropped.clear()
 
 
 @on_release
 def _release() -> None:
     _shaders.clear()
+    if context.available():
+        _free_dropped()
 
 
 def _compile(program: Program):

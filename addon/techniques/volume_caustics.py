@@ -79,6 +79,7 @@ BEAMS = Program(
     constants=(("INT", "ray_side"), ("FLOAT", "beam_pixels"), ("FLOAT", "beam_most_pixels")),
     outputs=(("VEC4", "out_volume"),),
 )  # fmt: skip
+MOST_RAYS = 4  # along each side of the grid, for each pixel along the longer side: more fall on the same pixels
 
 
 class VolumeCaustics(Technique):
@@ -87,7 +88,8 @@ class VolumeCaustics(Technique):
     params = (
         Param(
             "rays", "Rays", 192,
-            "Light rays along each side of the grid that each lamp sends towards glass and mirrors in a sample",
+            "Light rays along each side of the grid that each lamp sends to glass and mirrors in a sample, at most "
+            "four for each pixel along the picture's longer side",
             8, 1024, draft=64,
         ),
     )  # fmt: skip
@@ -129,7 +131,7 @@ class VolumeCaustics(Technique):
         media = frame.service(MediaService)
         if media is None or not self._emitters or not media.media.scatters:
             return
-        side = frame.settings.get(self, "rays")
+        side = min(frame.settings.get(self, "rays"), MOST_RAYS * max(frame.size))
         drawn = [one.sample(*frame.random_volume("beams/light")) for one in self._emitters]
         sources = self._sources.set([e.row(point, 0, 1) for e, point in zip(self._emitters, drawn)])
         centre, radius = self._casters

@@ -1,10 +1,11 @@
 """The shader library: includes, declarations, errors that name file and line, and the cache."""
 
+import threading
 from dataclasses import replace
 
 import pytest
 
-from addon.gfx import library
+from addon.gfx import context, library
 from addon.gfx.library import SHADER_ROOT, Program, ShaderError, resolve
 from addon.gfx.struct import Struct
 from tests.gfx.declared import programs
@@ -131,6 +132,18 @@ def test_an_equal_declaration_is_compiled_once(gpu_context):
     assert library.compile_count == before + 1
     assert library.get(compute_program(name="cached", defines=(("OTHER", "1"),))) is not first
     assert library.compile_count == before + 2
+
+
+def test_a_program_that_goes_in_another_thread_is_freed_in_one_that_draws(gpu_context):
+    """As when Python collects garbage there: Blender 4.5 ended with a segmentation fault."""
+    context.begin_picture()
+    held = [library.Shader(compute_program(name="dropped"))]
+    thread = threading.Thread(target=held.clear)
+    thread.start()
+    thread.join()
+    assert len(library._dropped) == 1
+    context.begin_picture()
+    assert not library._dropped
 
 
 def test_a_program_that_failed_is_tried_again(gpu_context):
