@@ -102,6 +102,15 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     task = (doing == FIND_LIT) ? LOOK : ((doing == LOOK) ? (lit_exists && first_surface ? LOOK_AT_LIT : GO_ON)
                                                         : ((doing == LOOK_AT_LIT) ? GO_ON : LOOK));
     vec2 turn = vec2(media_random(seed), media_random(seed));
+#ifdef WORLD_LIT
+    // Of the world another row at each stop: its rows are the last ones.
+    int first = light_count - int(world_rows + 0.5);
+    float lot = media_random(seed);
+    if (number >= first) {
+      number = min(first + int(lot * float(ROWS_ASKED - first)), ROWS_ASKED - 1);
+      ask_turn = vec2(media_random(seed), media_random(seed));
+    }
+#endif
     vec3 from = stop.position;
     float wanted = -1.0;
     vec3 way;
