@@ -20,7 +20,8 @@ from . import final, main_loop, viewport
 from .film.catcher import has_catchers
 from .frame import slices
 from .frame.bands import Leash, samples_in_parts
-from .frame.run import Frame, Renderer
+from .frame.picture import Frame
+from .frame.run import Renderer
 from .frame.settings import Settings
 from .gfx import context, images
 from .snapshot import SnapshotCache, UnsupportedScene, camera_of_scene, shutter, take

@@ -16,7 +16,8 @@ from .film import catcher
 from .film.noise import NoiseMeter
 from .frame import ledger as ledgers
 from .frame import slices, time_steps
-from .frame.run import Frame, Renderer
+from .frame.picture import Frame
+from .frame.run import Renderer
 from .frame.settings import Settings
 from .gfx import images
 from .gfx.context import turn
@@ -80,6 +81,9 @@ def steps(order: Order) -> Generator[Progress | None, None, tuple[dict[str, np.n
     plates = None
     if order.catches:
         order, plates = yield from _plates(order)
+    if order.take is None and order.given is None:  # slices hold all there is
+        asked = images_of(order.wanted, catcher.IMAGES if plates else ())
+        order = replace(order, settings=replace(order.settings, shows=frozenset(asked)))
     parts, total, held = parts_of(order.snapshot), light_groups.Sum(order.snapshot.film), None
     for number, part in enumerate(parts):
         own = str(number) if len(parts) > 1 else ""  # under which a slice holds the part's images
@@ -99,7 +103,8 @@ def _plates(order: Order) -> Generator[Progress | None, None, tuple[Order, tuple
     """Draw the pictures with all and with shadow catchers alone; returns what is left to be drawn, and what that is
     composed with: both as catcher.Layer, and whether the film is transparent. The first tells how many samples all
     have, and has a third of a time limit."""
-    found, settings = [], replace(order.settings, time_limit=order.settings.time_limit / PICTURES_OF_CATCHERS)
+    shows, limit = frozenset(catcher.IMAGES), order.settings.time_limit / PICTURES_OF_CATCHERS
+    found, settings = [], replace(order.settings, time_limit=limit, shows=shows)
     for changed in (catcher.over_nothing, catcher.catchers_alone):
         plate = order.of_scene(lambda one, changed=changed: _ungrouped(changed(one)), settings)
         plate.shows, plate.notes, plate.started = False, (), time.perf_counter()
@@ -278,13 +283,18 @@ def picture_of(renderer: Renderer, frame: Frame) -> np.ndarray:
     return np.nan_to_num(images.read(image if image is not None else shown), posinf=0.0, neginf=0.0)
 
 
+def images_of(wanted: list[RenderPass], more: tuple[str, ...] = ()) -> set[str]:
+    """Names of a frame's images that the picture and these passes are made from."""
+    sources = {COMBINED, *more, *(name for asked in wanted for name in asked.images)} - {CATCHER.source}
+    return light_groups.frame_images(sources)
+
+
 def mean_images(
     renderer: Renderer, frame: Frame, wanted: list[RenderPass], more: tuple[str, ...] = ()
 ) -> dict[str, np.ndarray]:
     """Mean images of a frame that passes are made from."""
     renderer.show(frame)
-    sources = {COMBINED, *more, *(name for asked in wanted for name in asked.images)} - {CATCHER.source}
-    arrays = renderer.finish(frame, sorted(light_groups.frame_images(sources)))
+    arrays = renderer.finish(frame, sorted(images_of(wanted, more)))
     if GLARE.source not in frame.images:  # an eye that no plan could use: the pass shows what it would look at
         arrays[GLARE.source] = arrays[COMBINED]
     return arrays

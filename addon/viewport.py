@@ -27,7 +27,8 @@ import numpy as np
 
 from . import techniques
 from .frame.bands import Bands
-from .frame.run import Frame, Renderer
+from .frame.picture import Frame
+from .frame.run import Renderer
 from .frame.settings import Settings
 from .gfx import context as gpu_context
 from .gfx import images, library, passes
@@ -263,7 +264,7 @@ class Viewport:
         border = floor(border[0] * x), floor(border[1] * y), ceil(border[2] * x), ceil(border[3] * y)
         film = replace(self._snapshot.film, width=width, height=height, border=border)
         # A part is done when the GPU has done it; a draft is drawn as one, and its passes need not wait for each other.
-        settings = replace(settings, profile=scale == 1)
+        settings = replace(settings, profile=scale == 1, shows=frozenset())
         if scale > 1:
             settings = settings.as_draft()
         frame = self.renderer.begin(replace(self._snapshot, camera=camera, film=film), settings)

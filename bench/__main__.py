@@ -39,6 +39,7 @@ from bench import (
     subsurface,
     subsurface_costs,
     textures,
+    trees,
 )
 
 VERBS = {
@@ -67,6 +68,7 @@ VERBS = {
     "soft_sources": soft_sources,
     "subsurface": subsurface,
     "textures": textures,
+    "trees": trees,
     "subsurface_costs": subsurface_costs,
     "page": page,
     "points_motion": points_motion,

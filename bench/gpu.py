@@ -79,9 +79,13 @@ class View:
         return take(graph, self.cache, *self.size)
 
     def settings(self, samples: int, **changes):
+        from addon.final import images_of
+        from addon.ui.passes import wanted_passes
         from addon.ui.properties import settings_of
 
-        return replace(settings_of(self.scene, viewport=False, layer=self.layer), samples=samples, **changes)
+        shows = frozenset(images_of(wanted_passes(self.layer, self.scene)))  # as a final render asks for
+        settings = settings_of(self.scene, viewport=False, layer=self.layer)
+        return replace(settings, samples=samples, shows=shows, **changes)
 
     def draw(self, settings) -> dict[str, float]:
         """Milliseconds of a picture by its stages, the GPU waited for at the end."""

@@ -32,7 +32,7 @@ def command(options: argparse.Namespace) -> int:
     from addon.cli.terminal import quiet
     from addon.compare.metrics import relative_squared_error
     from addon.compare.reference import render_passes
-    from addon.frame.run import Frame
+    from addon.frame.picture import Frame
     from addon.gfx import context
     from addon.scene.textures import upload_texture
     from addon.snapshot.scene import Image

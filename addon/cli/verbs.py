@@ -15,6 +15,8 @@ import bpy
 
 from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
+from ..film import point_costs
+from ..film.points import POINTS
 from ..frame import device_probe
 from ..frame import ledger as ledgers
 from ..frame.plan import PlanError, make_plan
@@ -328,8 +330,14 @@ def plan(job: Job) -> None:
             f"{triangles} triangles, {len(snapshot.materials)} materials, {len(snapshot.lights)} lights"
         )
         print(found.text())
-        if found.runs("direct_light") and figures is not None:
-            for sentence in ledgers.some_of(tuple(foreseen(snapshot, settings))):
+        if figures is not None:
+            sentences = []
+            if found.runs("film"):
+                points = settings.value("film", POINTS)
+                sentences += point_costs.foreseen(snapshot, points, settings.samples, found.fills("indirect"))
+            if found.runs("direct_light"):
+                sentences += ledgers.some_of(tuple(foreseen(snapshot, settings)))
+            for sentence in sentences:
                 print(f"  {sentence}")
         _print_notes([*snapshot.notes, *_material_notes(snapshot)])
 

@@ -33,8 +33,8 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from ..frame.light_paths import MEDIUM, named
-from ..frame.run import Frame
+from ..frame.light_paths import MEDIUM, TOGETHER, named
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..scene.view import blackman_harris
@@ -150,4 +150,4 @@ def _dimmed(name: str) -> int:
     """What media do to the image that is added to this sum."""
     if name == "surface.normal_sum" or name.removeprefix("film.") in named(MEDIUM):
         return CLEAR
-    return COVERED if name == "radiance.environment" else DIMMED
+    return COVERED if name in ("radiance.environment", TOGETHER) else DIMMED

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images
 from .resolve import resolve
 

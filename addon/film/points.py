@@ -12,8 +12,8 @@ over by their weights times reflectance, of lobes of the same kind. Emission, th
 exact at every point.
 
 K = points / samples, from 1 to MOST. Eight points a picture, as a sample beyond them pays better than a point: since
-points go to all pixels whose filter covers them (film/filter.py), edges need no more. Pictures without indirect light
-have a quarter of that, since there a point costs nearly as much as a sample.
+points go to all pixels whose filter covers them (film/filter.py), edges need no more. Fewer where a point costs much
+beside a sample's light on this device (film/point_costs.py): without indirect light, or of many triangles.
 
 relMSE at 256x192 and seconds, all light, one point a sample, and K as here: one sample, garden .033 1.2, .015 1.5;
 window .086 1.1, .054 1.3; four samples, garden .0087 1.4, .0072 1.6; window .0201 1.9, .0176 2.1. With four points at
@@ -32,15 +32,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 from ..frame.light_paths import MEDIUM, SURFACE, named
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Param, Service
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..surfaces.draw import refracts
+from .point_costs import PointCosts, costs_of, count_of
+from .together import SUM, terms
 
 POINTS = Param(
     "points", "Film points", 8,
@@ -49,7 +52,6 @@ POINTS = Param(
     1, 1024, draft=1,
 )  # fmt: skip
 LEAST_WIDTH = 0.1  # pixels: a narrower filter sees a point
-MOST = 8  # points of the film that share a sample's light
 PATHS = named(SURFACE)
 REFLECTED = tuple(path for path in PATHS if not path.startswith("transmission"))
 GUIDES = ("position", "normal", "diffuse", "tint", "lobe")
@@ -87,21 +89,24 @@ class OwnPoint:
         self.needed = False
 
 
-def count_of(points: int, samples: int) -> int:
-    """How many points of the film a sample shows where the picture is to have that many in all."""
-    return min(max(-(-points // max(samples, 1)), 1), MOST)
+def all_alike(frame: Frame) -> bool:
+    """Whether all points of a sample would show the same, or what may not be shown."""
+    by_lot = any(material.transparent for material in frame.materials.compiled)
+    narrow = frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot
+    return narrow or frame.shared(OwnPoint).needed
 
 
 def points_of_sample(frame: Frame, points: int) -> int:
     """How many of the picture's `points` of the film a sample shows: one where all of them would show the same."""
-    by_lot = any(material.transparent for material in frame.materials.compiled)
-    if frame.shared(OwnPoint).needed:
+    if all_alike(frame):
         return 1
-    if frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot:
-        return 1
-    count = count_of(points, frame.settings.samples)
-    # Without indirect light a sample costs hardly more than a point.
-    return count if frame.plan.fills("indirect") else -(-count // 4)
+    return costs(frame).count(count_of(points, frame.settings.samples))
+
+
+def costs(frame: Frame) -> PointCosts:
+    """Of a point of this picture, and of a sample's light."""
+    width, height = frame.size
+    return costs_of(width * height, frame.geometry.triangles, frame.plan.fills("indirect"))
 
 
 def lit_paths(frame: Frame) -> tuple[str, ...]:
@@ -123,48 +128,58 @@ def shown_paths(frame: Frame) -> set[str]:
     return {path for path in paths if f"radiance.{path}" in written and (glossy or not path.startswith("glossy"))}
 
 
-def _programs(repeated: bool) -> tuple[Program, Program]:
-    """Without light through glass, and with it."""
-    return tuple(
-        passes.fullscreen_program(
-            "film light between points, edges marked" if repeated else "film light between points",
-            "film/between.frag.glsl",
-            textures=tuple(
-                ("RGBA32F", texture)
-                for texture in (
-                    *(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES),
-                    *(f"light_{path}" for path in paths),
-                )
-            ),
-            blocks=((VIEW, "film_view"),),
-            constants=(("VEC2", "offset"),),
-            defines=(*defines, *((("REPEATED", "1"),) if repeated else ())),
-            writes_depth=repeated,
-            outputs=tuple(("VEC4", f"out_{path}") for path in paths),
-        )
-        for paths, defines in ((REFLECTED, ()), (PATHS, (("TRANSMISSION", ""),)))
+@cache
+def between_program(paths: tuple[str, ...], drawn: tuple[str, ...], repeated: bool) -> Program:
+    """Of the light of these `paths` those that are `drawn` each into an image; SUM among them: all others into one."""
+    summed = [path for path in paths if path not in drawn]
+    written = {path: f"light.{path}" for path in drawn} | {SUM: terms(summed, "light.{0}")}
+    return passes.fullscreen_program(
+        "film light between points, edges marked" if repeated else "film light between points",
+        "film/between.frag.glsl",
+        textures=tuple(
+            ("RGBA32F", texture)
+            for texture in (
+                *(f"{which}_{guide}" for which in ("surface", "known") for guide in GUIDES),
+                *(f"light_{path}" for path in paths),
+            )
+        ),
+        blocks=((VIEW, "film_view"),),
+        constants=(("VEC2", "offset"),),
+        defines=(
+            *((("TRANSMISSION", ""),) if len(paths) == len(PATHS) else ()),
+            *((("REPEATED", "1"),) if repeated else ()),
+            ("WRITE_ALL", " ".join(f"out_{name} = {written[name]};" for name in drawn)),
+        ),
+        writes_depth=repeated,
+        outputs=tuple(("VEC4", f"out_{name}") for name in drawn),
     )
 
 
-BETWEEN, MARKING = _programs(False), _programs(True)
+BETWEEN = tuple(
+    between_program(paths, drawn, repeated)
+    for paths in (REFLECTED, PATHS)
+    for drawn in (paths, (SUM,), (*REFLECTED[:2], SUM))
+    for repeated in (False, True)
+)
 
 
 def light_between(
     frame: Frame,
     paths: tuple[str, ...],
+    drawn: tuple[str, ...],
     target: images.Target,
     surfaces: dict[str, images.Image],
     point: int,
     repeated: bool,
 ) -> None:
-    """Draw into `target`, an image for each path, what `surfaces` (by names of SURFACE_IMAGES), seen at this point of
-    the film, reflect of this sample's light. `repeated`: direct light at edges is left to repeated_light.py; the
-    target's depth marks them by 1."""
+    """Draw into `target`, an image for each that is `drawn` (as of between_program), what `surfaces` (by names of
+    SURFACE_IMAGES), seen at this point of the film, reflect of this sample's light. `repeated`: direct light at edges
+    is left to repeated_light.py; the target's depth marks them by 1."""
     between = tuple(there - own for there, own in zip(frame.film_offset(point), frame.film_offset(frame.sample)))
     textures = {f"light_{path}": frame.images[f"radiance.{path}"] for path in paths}
     textures |= {f"surface_{guide}": surfaces[guide] for guide in GUIDES}
     textures |= {f"known_{guide}": frame.images[f"surface.{guide}"] for guide in GUIDES}
     passes.fullscreen(
-        (MARKING if repeated else BETWEEN)[len(paths) == len(PATHS)], target, textures=textures,
+        between_program(paths, drawn, repeated), target, textures=textures,
         blocks={"film_view": frame.view_block}, constants={"offset": between},
     )  # fmt: skip

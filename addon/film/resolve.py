@@ -4,7 +4,8 @@
 
     alpha    = coverage - what of the world shows through clear glass (Film > Transparent Glass)
 
-summed over the light paths of the table (frame/light_paths.py) that the picture has. With a transparent film the world
+summed over the light paths of the table (frame/light_paths.py) that the picture has, and the sum of those that it does
+not hold apart (film/together.py). With a transparent film the world
 shows in its own pass only. While a viewport has few samples, indirect diffuse light is shown filtered
 (film/neighbours.py); the sums stay as they are. One pass, a fetch for each light path.
 """
@@ -13,18 +14,19 @@ from __future__ import annotations
 
 from functools import cache
 
-from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS, SEEN
-from ..frame.run import Frame
+from ..frame.light_paths import DIRECT, INDIRECT, LIGHT_PATHS, SEEN, TOGETHER
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from .neighbours import shown_sum
+from .together import SUM, held_apart
 
 COMBINED = "film.combined"
 
 
 @cache
 def resolve_program(names: tuple[str, ...]) -> Program:
-    """Sums up the light paths of these names."""
+    """Sums up the light paths of these names, SUM among them where some are summed up already."""
     of_order = {
         order: [p.name for p in LIGHT_PATHS if p.name in names and p.origin != SEEN and p.order == order]
         for order in (DIRECT, INDIRECT)
@@ -38,6 +40,9 @@ def resolve_program(names: tuple[str, ...]) -> Program:
     through = [p.name for p in LIGHT_PATHS if p.name in names and p.lobe == "transmission"]
     sums += "float seen_through_glass(ivec2 pixel)\n{\n  return "
     sums += (" + ".join(f"{name}_fetch(pixel).a" for name in through) or "0.0") + ";\n}\n"
+    for name in ("emission", "environment", SUM):
+        sums += f"vec4 seen_{name}(ivec2 pixel)\n{{\n  return "
+        sums += (f"{name}_fetch(pixel)" if name in names else "vec4(0.0)") + ";\n}\n"
     return passes.fullscreen_program(
         "film resolve",
         "film/resolve.frag.glsl",
@@ -48,22 +53,29 @@ def resolve_program(names: tuple[str, ...]) -> Program:
     )
 
 
-RESOLVE = tuple(
-    resolve_program(tuple(path.name for path in LIGHT_PATHS if all_of_them or not path.by_need))
-    for all_of_them in (False, True)
+RESOLVE = (
+    resolve_program((SUM,)),
+    *(
+        resolve_program(tuple(path.name for path in LIGHT_PATHS if all_of_them or not path.by_need))
+        for all_of_them in (False, True)
+    ),
 )
 
 
 def resolve(frame: Frame) -> images.Image:
     """Draw the picture into film.combined. Needs a plan with a film."""
     target = frame.target(COMBINED)
-    paths = tuple(path.name for path in LIGHT_PATHS if path.image in frame.images)
+    paths = tuple(path.name for path in LIGHT_PATHS if path.image in frame.images and held_apart(frame, path))
     with shown_sum(frame, "diffuse_indirect") as indirect:
         textures = {name: frame.to_show(f"radiance.{name}") for name in paths}
+        if "diffuse_indirect" in paths:
+            textures["diffuse_indirect"] = indirect
+        if TOGETHER in frame.images:
+            paths, textures = (*paths, SUM), textures | {SUM: frame.images[TOGETHER]}
         passes.fullscreen(
             resolve_program(paths),
             target,
-            textures={**textures, "diffuse_indirect": indirect},
+            textures=textures,
             constants={
                 "scale": 1.0 / max(frame.samples_done, 1), "exposure": frame.snapshot.film.exposure,
                 "transparent": int(frame.snapshot.film.transparent),

@@ -28,6 +28,7 @@ from ..gfx.user_folder import user_folder
 from ..scene import acceleration
 from ..scene.culling import Boxes
 from ..scene.projection import ROWS
+from ..scene.traced_triangles import opaque_code
 
 LEAST_S, REPEATS = 0.002, 2
 SIDE = 1024  # of the target
@@ -150,7 +151,7 @@ def _town() -> np.ndarray:
 def _rays(target: images.Target, wait: float) -> float:
     corners = _town()
     look = np.zeros((len(corners), 8))
-    look[:, 0] = acceleration.opaque_code()
+    look[:, 0] = opaque_code()
     hierarchy = acceleration.build(corners, look).hierarchy
 
     def work(side: int) -> None:

@@ -1,7 +1,8 @@
 """The light paths of a picture: one row for each, from which film, passes, panels and comparison derive theirs.
 
 Radiance is split as Cycles splits its render passes, so that each path is compared with Cycles' own. Techniques add
-the light of a path to the image `radiance.NAME`.
+the light of a path to the image `radiance.NAME`. Which paths a picture holds apart is asked of its frame
+(Frame.is_apart): those that its passes show or a technique looks at. The sum of all others is the image TOGETHER.
 
 Some techniques take over a kind of *transport* as a whole (Technique.owns), whatever path it ends in: light that
 mirrors and glass focus on surfaces, light in media, light below surfaces. What else would bring such light asks
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+TOGETHER = "radiance.together"  # the image of all paths that nobody looks at apart (film/together.py)
 SURFACE, MEDIUM, SEEN = "surface", "medium", "seen"
 DIRECT, INDIRECT = "direct", "indirect"
 

@@ -66,6 +66,7 @@ class Settings:
     time_limit: float = TIME_LIMIT.default  # s; the picture may end with fewer samples than it asks for
     noise_threshold: float = NOISE_THRESHOLD.default  # the same
     motion_steps: int = MOTION_STEPS.default  # asked of by the engine alone, where motion blur is on
+    shows: frozenset[str] | None = None  # images of the frame that are asked for beside the picture; None: any may be
     profile: bool = False  # wait for the GPU after each step, so that times are true
 
     def get(self, technique: Technique, name: str):

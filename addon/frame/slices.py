@@ -23,7 +23,7 @@ import numpy as np
 from ..gfx import images
 from ..kernels import ranks
 from ..snapshot.scene import RANKED
-from .run import Frame
+from .picture import Frame
 
 HALF = "_half"
 LAST = ("surface.position",)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..gfx.library import Program
     from ..snapshot.scene import Snapshot
-    from .run import Frame
+    from .picture import Frame
     from .settings import Settings
 
 
@@ -158,6 +158,10 @@ class Technique:
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         """Whether Auto takes it for its slot in this scene, whatever the benchmark's means over scenes say."""
         return False
+
+    def looks_at(self, settings: Settings) -> tuple[str, ...]:
+        """Sums over samples of light paths, colours and normals that it needs by themselves (Frame.is_apart)."""
+        return ()
 
     def key(self, snapshot: Snapshot, settings: Settings) -> Hashable:
         """Equal keys in two frames mean that what `prepare` made still stands."""

@@ -28,7 +28,8 @@ from ..gfx import images
 from ..gfx.context import turn
 from ..gfx.readback import put
 from ..snapshot.scene import Snapshot
-from .run import Frame, Renderer
+from .picture import Frame
+from .run import Renderer
 from .settings import Settings
 from .slices import HALF
 

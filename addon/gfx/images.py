@@ -218,7 +218,7 @@ class Target:
     @property
     def framebuffer(self) -> gpu.types.GPUFrameBuffer:
         """The attachments as an object of the current GPU context, made when first asked for by any target."""
-        return _framebuffers().over(self.colors, self.depth)
+        return (getattr(_thread, "framebuffers", None) or _framebuffers()).over(self.colors, self.depth)
 
     @property
     def size(self) -> tuple[int, int]:

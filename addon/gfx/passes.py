@@ -55,7 +55,7 @@ def fullscreen(
         where = "ALWAYS"
     with _state(target, viewport, blend=blend, depth_test=where, depth_write=program.writes_depth, rows=rows):
         shader.bind(**bindings)
-        _fullscreen_batch().draw(shader.handle)
+        (_triangle[0] if _triangle else _fullscreen_batch()).draw(shader.handle)
     gpu.shader.unbind()
 
 
@@ -116,17 +116,17 @@ def compute(program: Program, size: tuple[int, int], **bindings) -> None:
 
 def _for_images(program: Program, bindings: dict) -> Shader:
     """The shader of a program, with what the images that it reads define and bring along, if it has room for that."""
-    read = bindings.get("textures") or {}
-    bound = (*read.values(), *(bindings.get("blocks") or {}).values())
-    for one in bound:
-        if one.beside:
+    read, blocks = bindings.get("textures") or {}, bindings.get("blocks") or {}
+    for image in read.values():
+        if image.beside or image.defines:
             break
     else:
-        for image in read.values():
-            if image.defines:
+        for block in blocks.values():
+            if block.beside:
                 break
         else:
             return get(program)
+    bound = (*read.values(), *blocks.values())
     beside = {name: image for one in bound for name, image in one.beside.items() if name not in read}
     if len(program.textures) + len(beside) > MOST_TEXTURES:
         beside = {}
@@ -161,7 +161,11 @@ class _state:
         self._bound = target.framebuffer.bind()
         self._bound.__enter__()
         # Of the bound framebuffer. GPUFrameBuffer.viewport_set says the same but takes no arguments before Blender 5.2.
-        state.viewport_set(*(self._viewport or (0, 0, *target.size)))
+        if self._viewport:
+            state.viewport_set(*self._viewport)
+        else:
+            image = target.colors[0] if target.colors else target.depth
+            state.viewport_set(0, 0, image.width, image.height)
         state.blend_set(self._blend)
         state.depth_test_set(self._depth_test)
         state.depth_mask_set(self._depth_write)

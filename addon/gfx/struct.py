@@ -53,6 +53,7 @@ class Struct:
             lines.append(f"  float _pad{pads};")
             pads, offset = pads + 1, offset + 4
         self.dtype = np.dtype(numpy_fields)
+        self._matrices = frozenset(field for field, (kind, _) in self.fields.items() if kind == "mat4")
         self.glsl = f"struct {name} {{\n" + "\n".join(lines) + "\n};\n"
 
     def pack(self, **values) -> np.ndarray:
@@ -62,8 +63,7 @@ class Struct:
             raise KeyError(f"Struct {self.name}: missing or unknown fields {', '.join(wrong)}.")
         record = np.zeros((), self.dtype)
         for field, value in values.items():
-            kind, _ = self.fields[field]
-            if kind == "mat4":
+            if field in self._matrices:
                 value = np.swapaxes(np.asarray(value, np.float32), -1, -2)
                 value = value.reshape(*value.shape[:-2], 16)
             record[field] = value
@@ -78,13 +78,15 @@ class Block:
         self.struct = struct
         self.beside: dict[str, object] = {}
         self._data = struct.pack(**values)
+        self._content = self._data.tobytes()
         self.buffer = gpu.types.GPUUniformBuf(self._bytes())
 
     def update(self, **values) -> None:
         """Upload new values; equal values upload nothing."""
         data = self.struct.pack(**values)
-        if data.tobytes() != self._data.tobytes():
-            self._data = data
+        content = data.tobytes()
+        if content != self._content:
+            self._data, self._content = data, content
             self.buffer.update(self._bytes())
 
     def value(self, field: str) -> np.ndarray:
@@ -92,5 +94,5 @@ class Block:
         return self._data[field]
 
     def _bytes(self):
-        flat = np.frombuffer(self._data.tobytes(), np.float32)
+        flat = np.frombuffer(self._content, np.float32)
         return gpu.types.Buffer("FLOAT", flat.size, flat.copy())

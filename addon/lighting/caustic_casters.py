@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..materials.compiler import may_emit, may_refract
 from ..materials.graph import Graph, Node
 from ..snapshot.scene import Instance, Light, Mesh, Snapshot

@@ -120,7 +120,7 @@ def point_views(
             wide = reach * (1.0 / max(nearest, 0.1 * far) - 1.0 / far)
             low, high = _padded(*_widened(low, high, wide), jitter, resolution)
             far = float(depth[_that_meet(tangents, low, high)].max())
-            views.append(_perspective(position, u, v, forward, low, high, geometry.size, far))
+            views += _perspectives(position, np.array([[u, v, forward]]), low, high, geometry.size, [far])
         return views
     centre, radius = offsets.mean(axis=1), np.linalg.norm(offsets[:, 7] - offsets[:, 0], axis=1) / 2
     faces = np.array((
@@ -139,20 +139,23 @@ def point_views(
     low, high = np.full(2, -1.0 - slack), np.full(2, 1.0 + slack)
     shift = (np.array(jitter[:2]) - 0.5) * (high - low) / size
     low, high = low + shift, high + shift
-    return [
-        _perspective(position, *faces[k, 1:], faces[k, 0], low, high, geometry.size, far[k], 2)
-        for k in np.flatnonzero(met)
-    ]
+    return _perspectives(position, faces[met][:, [1, 2, 0]], low, high, geometry.size, far[met].tolist(), 2)
 
 
-def _perspective(position, u, v, forward, low, high, size, far, scale=1) -> MapView:
-    near = 1e-4 * min(size, max(float(far), 1e-6 * size))  # what is seen may be small in a scene with a far background
-    rows = np.zeros((4, 4))
-    rows[:3, :3] = u, v, forward
-    rows[:3, 3] = -(rows[:3, :3] @ position)
-    rows[:2] = (2 * rows[:2] - (low + high)[:, None] * rows[2]) / (high - low)[:, None]
-    rows[3, 3] = 1.0
-    return MapView(rows, near, (*position, 1.0), scale, 1.0 / max(float(far), near))
+def _perspectives(
+    position, axes: np.ndarray, low, high, size: float, far: list[float], scale: int = 1
+) -> list[MapView]:
+    """Views along the last of `axes` (V, 3, 3), from `low` to `high` along the others, one metre ahead."""
+    rows = np.zeros((len(axes), 4, 4))
+    rows[:, :3, :3] = axes
+    rows[:, :3, 3] = -(axes @ position)
+    rows[:, :2] = (2 * rows[:, :2] - (low + high)[:, None] * rows[:, 2:3]) / (high - low)[:, None]
+    rows[:, 3, 3] = 1.0
+    place, views = (*position, 1.0), []
+    for own, farthest in zip(rows, far):
+        near = 1e-4 * min(size, max(farthest, 1e-6 * size))  # what is seen may be small before a far background
+        views.append(MapView(own, near, place, scale, 1.0 / max(farthest, near)))
+    return views
 
 
 def _merged_rectangles(place: np.ndarray, groups: list[np.ndarray], floor: float):

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import context, geometry, images, passes
 from ..gfx.library import Program

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..materials.compiled import CompiledMaterial
 from ..scene.emission_maps import TriangleEmission
 from ..sources import lights

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..materials.compiled import CompiledMaterial
 
 

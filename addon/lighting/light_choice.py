@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..kernels import ordered_lists

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Service
 from ..sources.rates import Rate
 

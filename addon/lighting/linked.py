@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..gfx.library import Program

@@ -26,7 +26,7 @@ from functools import cache
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import passes
 from ..gfx.library import Program

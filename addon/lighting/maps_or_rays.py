@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import device
 from ..gfx.device import milliseconds
 from .depth_maps import MapView

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Service, Technique
 from ..gfx import images, passes
 from ..gfx.library import Program

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..materials.compiler import may_emit
 from ..sampling.sequence import lot

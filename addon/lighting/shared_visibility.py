@@ -35,7 +35,7 @@ from functools import cache
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import context, images, passes
 from ..gfx.library import Program

@@ -15,7 +15,7 @@ Bias: as lit_points.py.
 
 from __future__ import annotations
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..scene import acceleration

@@ -36,7 +36,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.context import to_hold
 from ..gfx.library import Program

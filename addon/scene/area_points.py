@@ -27,7 +27,7 @@ import numpy as np
 
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance
-from . import acceleration
+from .traced_triangles import coverage, world_triangles
 
 PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
 ALONE = 0.7  # how much nearer to the middle of its triangle a point lies that is the only one
@@ -53,7 +53,7 @@ class Surfaces:
         instances, meshes, _ = frame.geometry.placed
         shown = tuple(one for one in instances if one.visibility.diffuse and meshes[one.mesh].triangle_count)
         maps = frame.opacity_maps, frame.emission_maps
-        corners, look = acceleration.world_triangles(
+        corners, look = world_triangles(
             shown, meshes, frame.measured_materials, frame.geometry.origin, "diffuse", *maps
         )
         counts = [meshes[one.mesh].triangle_count for one in shown]
@@ -63,7 +63,7 @@ class Surfaces:
         return cls(
             shown,
             corners.astype(np.float64),
-            np.where(passes, 0.0, acceleration.coverage(look[:, 0], maps[0])),
+            np.where(passes, 0.0, coverage(look[:, 0], maps[0])),
             np.repeat(np.arange(len(shown)), counts),
             np.concatenate([np.arange(count) for count in counts]) if counts else np.zeros(0, int),
         )

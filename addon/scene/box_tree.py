@@ -14,6 +14,8 @@ Cost: 1.5 to 2 us per box. Coincident boxes are paired at random but always the 
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +25,11 @@ from ..kernels.morton import morton_codes
 LEAF = 4  # boxes
 WIDTH = 4  # children
 REACH = 10  # boxes to either side, in Morton order
-MOST_CLUSTERED = 1_000_000  # boxes: above, time and memory count for more
+# More boxes than this are paired in blocks of the order, one thread each, until one of LEFT remains; closer together, so
+# that the best pair is likely to be near.
+MOST_AT_ONCE, BLOCK, LEFT, REACH_IN_BLOCKS = 1 << 17, 1 << 15, 16, 5
+MOST_THREADS = 8
+MOST_CLUSTERED = 4_000_000  # boxes: above, time and memory count for more
 DEEPEST = 32  # levels of nodes that a ray can remember (shaders/trace/hierarchy.glsl)
 
 
@@ -37,7 +43,7 @@ class BoxTree:
     first_leaf: np.ndarray  # (N,) number of the first child that is a leaf
     leaves: np.ndarray  # (N,) how many are
     levels: tuple[int, ...]  # nodes on each level
-    place: np.ndarray  # (B,) of each box: leaf x LEAF + slot
+    place: np.ndarray  # (B,) of each box: leaf x boxes of a leaf + slot
     leaf_count: int
 
     def of_children(self, leaves: np.ndarray, joined: np.ufunc, empty: float) -> np.ndarray:
@@ -54,29 +60,30 @@ class BoxTree:
                 out[level][rows, slot] = own[first[rows] + slot]
                 rows = np.flatnonzero((slot >= nodes) & (slot < count))
                 out[level][rows, slot] = leaves[self.first_leaf[level][rows] + slot - nodes[rows]]
-            own[level] = joined.reduce(out[level], axis=1)
+            some = out[level]
+            own[level] = joined(joined(some[:, 0], some[:, 1]), joined(some[:, 2], some[:, 3]))
             last -= width
         return out
 
 
-def build(low: np.ndarray, high: np.ndarray) -> BoxTree:
-    """The tree of boxes `low` to `high`, (B, 3) finite."""
+def build(low: np.ndarray, high: np.ndarray, leaf: int = LEAF) -> BoxTree:
+    """The tree of boxes `low` to `high`, (B, 3) finite, at most `leaf` (4 or 1) of which are together."""
     order = np.argsort(morton_codes((low + high) * 0.5), kind="stable")
     low, high = _unit(low[order], high[order])
     if len(low) <= MOST_CLUSTERED:
-        tree = _widened(_clustered(low, high), order)
+        tree = _widened(_clustered(low, high), order, leaf)
         if len(tree.levels) <= DEEPEST:
             return tree
-    return _widened(_halves(low, high), order, full=True)
+    return _widened(_halves(low, high), order, leaf, full=True)
 
 
 @dataclass(frozen=True)
 class _Binary:
-    """A binary tree: nodes 0..B-1 are the boxes, the last one is the root."""
+    """A binary tree: nodes 0..B-1 are the boxes, the last one is the root; some numbers between may be of none."""
 
-    children: np.ndarray  # (2 B - 1, 2); -1 for boxes
-    area: np.ndarray  # (2 B - 1,)
-    boxes: np.ndarray  # (2 B - 1,) how many each holds
+    children: np.ndarray  # (N, 2); -1 for boxes
+    area: np.ndarray  # (N,)
+    boxes: np.ndarray  # (N,) how many each holds
 
 
 def _unit(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -94,39 +101,68 @@ def _area(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return x * y + y * z + z * x
 
 
+class _Clusters:
+    """Boxes (N, 3) in Morton order that are paired, and the binary tree of all pairs so far."""
+
+    def __init__(self, low: np.ndarray, high: np.ndarray):
+        self.count = len(low)
+        blocks = -(-self.count // BLOCK)
+        total = max(2 * self.count, 1) + (self.count // LEFT + 2 * blocks) * (self.count > MOST_AT_ONCE)
+        self.children = np.full((total, 2), -1, np.int64)
+        self.area, self.boxes = np.zeros(total, np.float32), np.ones(total, np.int64)
+        self.area[: self.count] = _area(low, high)
+        # Who is chosen of several that are equally close.
+        self.lot = np.random.default_rng(1).random(self.count + 64, np.float32)
+        self.axes = [np.ascontiguousarray(corners[:, axis]) for corners in (low, high) for axis in range(3)]
+
+    def joined(
+        self, number: np.ndarray, axes: list[np.ndarray], made: int, reach: int, left: int = 1
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Pair nodes `number` with boxes `axes` until at most `left` remain; new nodes are numbered from `made` on."""
+        while len(number) > left:
+            first, second = _pairs(axes, self.lot, reach)
+            new = np.arange(made, made + len(first))
+            made += len(first)
+            self.children[new, 0], self.children[new, 1] = number[first], number[second]
+            self.boxes[new] = self.boxes[number[first]] + self.boxes[number[second]]
+            number[first] = new
+            for axis, corner in enumerate(axes):
+                corner[first] = (np.minimum if axis < 3 else np.maximum)(corner[first], corner[second])
+            x, y, z = (axes[axis + 3][first] - axes[axis][first] for axis in range(3))
+            self.area[new] = x * y + y * z + z * x
+            stays = np.ones(len(number), bool)
+            stays[second] = False
+            number, axes = number[stays], [corner[stays] for corner in axes]
+        return number, axes
+
+    def block(self, first: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """What remains of BLOCK boxes from the `first` on, of which new nodes are numbered behind all boxes."""
+        last = min(first + BLOCK, self.count)
+        axes = [corner[first:last].copy() for corner in self.axes]
+        left = max((last - first) // LEFT, 1)
+        return self.joined(np.arange(first, last), axes, self.count + first, REACH_IN_BLOCKS, left)
+
+
 def _clustered(low: np.ndarray, high: np.ndarray) -> _Binary:
-    count = len(low)
-    total = max(2 * count - 1, 1)
-    children = np.full((total, 2), -1, np.int64)
-    area, boxes = np.zeros(total, np.float32), np.ones(total, np.int64)
-    area[:count] = _area(low, high)
-    lot = np.random.default_rng(1).random(count + 64, np.float32)  # who is chosen of several that are equally close
-    number = np.arange(count)
-    axes = [np.ascontiguousarray(corners[:, axis]) for corners in (low, high) for axis in range(3)]
-    made = count
-    while len(number) > 1:
-        left, right = _pairs(axes, lot)
-        new = np.arange(made, made + len(left))
-        made += len(left)
-        children[new, 0], children[new, 1] = number[left], number[right]
-        boxes[new] = boxes[number[left]] + boxes[number[right]]
-        number[left] = new
-        for axis, corner in enumerate(axes):
-            corner[left] = (np.minimum if axis < 3 else np.maximum)(corner[left], corner[right])
-        x, y, z = (axes[axis + 3][left] - axes[axis][left] for axis in range(3))
-        area[new] = x * y + y * z + z * x
-        stays = np.ones(len(number), bool)
-        stays[right] = False
-        number, axes = number[stays], [corner[stays] for corner in axes]
-    return _Binary(children, area, boxes)
+    some = _Clusters(low, high)
+    number, axes, made = np.arange(some.count), some.axes, some.count
+    if some.count > MOST_AT_ONCE:
+        with ThreadPoolExecutor(min(os.cpu_count() or 1, MOST_THREADS)) as threads:
+            parts = list(threads.map(some.block, range(0, some.count, BLOCK)))
+        number = np.concatenate([part[0] for part in parts])
+        axes = [np.concatenate([part[1][k] for part in parts]) for k in range(6)]
+        made = 2 * some.count
+    number, _ = some.joined(number, axes, made, REACH)
+    root = int(number[0]) + 1 if len(number) else 1
+    return _Binary(some.children[:root], some.area[:root], some.boxes[:root])
 
 
-def _pairs(axes: list[np.ndarray], lot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(axes: list[np.ndarray], lot: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
     """Clusters that are each other's nearest: numbers of the first and the second of each pair."""
     count = len(axes[0])
     nearest, best = np.full(count, np.inf, np.float32), np.zeros(count, np.int64)
     own = np.arange(count)
-    for step in range(1, min(REACH, count - 1) + 1):
+    for step in range(1, min(reach, count - 1) + 1):
         low = [np.minimum(corner[:-step], corner[step:]) for corner in axes[:3]]
         high = [np.maximum(corner[:-step], corner[step:]) for corner in axes[3:]]
         x, y, z = (b - a for a, b in zip(low, high))
@@ -165,18 +201,18 @@ def _halves(low: np.ndarray, high: np.ndarray) -> _Binary:
     return _Binary(children, area, boxes)
 
 
-def _widened(binary: _Binary, order: np.ndarray, full: bool = False) -> BoxTree:
-    """Four children for each node, of those that its two would have; leaves as `full` as they may be, or smaller where
-    there is room for two of them."""
+def _widened(binary: _Binary, order: np.ndarray, most: int = LEAF, full: bool = False) -> BoxTree:
+    """Four children for each node, of those that its two would have; leaves of at `most` so many boxes, as `full` as
+    they may be, or smaller where there is room for two of them."""
     count = len(order)
     first_node, nodes, first_leaf, leaves, levels, leaf_roots = [], [], [], [], [], []
     next_node, next_leaf = 1, 0
     root = len(binary.area) - 1 if count else -1  # -1: none
-    held = np.array([[root, -1, -1, -1] if count <= LEAF else [*binary.children[root], -1, -1]])
+    held = np.array([[root, -1, -1, -1] if count <= most else [*binary.children[root], -1, -1]])
     while len(held):
         for slot in range(2, WIDTH):
-            _open(binary, held, slot, full)
-        kind = np.where(held < 0, 2, np.where(binary.boxes[held] > LEAF, 0, 1))
+            _open(binary, held, slot, most, full)
+        kind = np.where(held < 0, 2, np.where(binary.boxes[held] > most, 0, 1))
         sorting = np.argsort(kind, axis=1, kind="stable")
         held, kind = np.take_along_axis(held, sorting, axis=1), np.take_along_axis(kind, sorting, axis=1)
         node_count, leaf_count = (kind == 0).sum(axis=1), (kind == 1).sum(axis=1)
@@ -192,21 +228,21 @@ def _widened(binary: _Binary, order: np.ndarray, full: bool = False) -> BoxTree:
         held = np.full((len(inner), WIDTH), -1)
         held[:, :2] = binary.children[inner]
     place = np.zeros(count, np.int64)
-    box, leaf = _boxes_of(binary, np.concatenate(leaf_roots), count)
+    box, leaf = _boxes_of(binary, np.concatenate(leaf_roots), count, most)
     slot = np.arange(len(leaf)) - np.searchsorted(leaf, leaf)
-    place[order[box]] = leaf * LEAF + slot
+    place[order[box]] = leaf * most + slot
     return BoxTree(
         np.concatenate(first_node), np.concatenate(nodes), np.concatenate(first_leaf), np.concatenate(leaves),
         tuple(levels), place, next_leaf,
     )  # fmt: skip
 
 
-def _open(binary: _Binary, held: np.ndarray, slot: int, full: bool) -> None:
+def _open(binary: _Binary, held: np.ndarray, slot: int, most: int, full: bool) -> None:
     """Put the halves of one child into its place and `slot`: of the largest node, or, where all are leaves and need not
     be `full`, of the one whose halves are smallest beside it."""
     known = held[:, :slot]
     children = binary.children[known]
-    is_node = binary.boxes[known] > LEAF
+    is_node = binary.boxes[known] > most
     saved = binary.area[known] - binary.area[children].sum(axis=2)
     worth = np.where(is_node, 1.0 + binary.area[known], np.where((children[..., 0] >= 0) & (not full), saved, -1.0))
     worth[known < 0] = -1.0
@@ -216,10 +252,10 @@ def _open(binary: _Binary, held: np.ndarray, slot: int, full: bool) -> None:
     held[rows, chosen[rows]], held[rows, slot] = halves[:, 0], halves[:, 1]
 
 
-def _boxes_of(binary: _Binary, roots: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The boxes below `roots` (R,) of at most LEAF each, and below which of them each is, in its order."""
+def _boxes_of(binary: _Binary, roots: np.ndarray, count: int, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """The boxes below `roots` (R,) of at `most` so many each, and below which of them each is, in its order."""
     below, root = roots, np.arange(len(roots))
-    for _ in range(LEAF - 1):
+    for _ in range(most - 1):
         inner = below >= count
         halves = binary.children[below[inner]]
         below = np.concatenate([below[~inner], halves[:, 0], halves[:, 1]])

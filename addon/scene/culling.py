@@ -8,6 +8,7 @@ the light, which is all that a depth map keeps, is always one of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from .geometry import Draw
 
 LARGEST_OPEN, MOST_PARTS = 20_000, 64  # triangles and parts of a mesh that is taken apart
+# Of rows x, y, w, q: what is above 0 within a view.
+SIDES = np.array([[0, 0, 1, 0], [-1, 0, 1, 0], [1, 0, 1, 0], [0, -1, 1, 0], [0, 1, 1, 0]], np.float64)
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
 
 
@@ -47,15 +50,18 @@ class Boxes:
         Each condition is a linear form, whose extremes over a box are its value at the centre and its reach over the
         half axes: nothing is lost against testing all corners.
         """
-        x, y, w, q = rows
-        # By more than what float32 and the slack of the comparison could mistake.
-        before = q - least_q * (1.0 - 1e-3) * w if np.isfinite(least_q) else np.array([0.0, 0.0, 0.0, 1.0])
-        forms = np.stack([w, w - x, w + x, w - y, w + y, before])
-        middle = self.centre @ forms[:, :3].T + forms[:, 3]
-        reach = self.half @ np.abs(forms[:, :3]).T
+        forms = SIDES @ rows  # w, w - x, w + x, w - y, w + y
+        middle = forms[:, :3] @ self.centre.T + forms[:, 3:]
+        reach = np.abs(forms[:, :3]) @ self.half.T
         most = middle + reach
-        behind = (most[:, 5] < 0) & (middle[:, 0] > reach[:, 0])
-        return (most[:, 0] > 0) & (most[:, 1:5] >= 0).all(axis=1) & ~behind
+        seen = most[1:].min(axis=0) >= 0
+        seen &= most[0] > 0
+        if math.isfinite(least_q):
+            # By more than what float32 and the slack of the comparison could mistake.
+            before = rows[3] - least_q * (1.0 - 1e-3) * rows[2]
+            farthest = self.centre @ before[:3] + self.half @ np.abs(before[:3]) + before[3]
+            seen &= (farthest >= 0) | (middle[0] <= reach[0])
+        return seen
 
     def without(self, point: np.ndarray) -> np.ndarray:
         """(D,) whether `point` lies outside of the box, by more than rounding."""

@@ -104,11 +104,14 @@ class SceneGeometry:
         self._closed: dict[tuple[str, int], bool] = {}
         self._together: tuple[int, list[casters.Together]] = (-1, [])
         self._chunks: tuple[int, tuple | None] = (-1, None)
+        self._counted = (-1, 0)
         self._clusters: tuple[int, list[casters.Clusters] | None] = (-1, None)
 
     @property
     def triangles(self) -> int:
-        return sum(draw.triangles for draw in self.draws)
+        if self._counted[0] != self.drawn:
+            self._counted = (self.drawn, sum(draw.triangles for draw in self.draws))
+        return self._counted[1]
 
     def update(self, snapshot: Snapshot, materials: list[CompiledMaterial]) -> bool:
         """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""

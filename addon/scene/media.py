@@ -30,7 +30,7 @@ from ..materials.graph import Graph
 from ..materials.volume import PHASES, Medium
 from ..materials.volume_program import CompiledVolume, compile_volume
 from ..snapshot.scene import Instance, Note, Snapshot, Volume
-from . import acceleration
+from .acceleration import Tree
 from .materials import MATERIAL_SCENE, values_block, values_struct
 from .textures import upload_texture
 
@@ -321,7 +321,7 @@ class Media:
                 self.cells += int(np.prod(size))
         notes += self._bake(jobs, rows, snapshot, origin)
         tree = self._boundaries(first)
-        nodes = tree.nodes.reshape(-1, 4)
+        nodes = tree.boxes.rows.reshape(-1, 4)
         table[-1, 0] = images.LIST_WIDTH + len(nodes)  # where the leaves begin
         self.textures["media_table"] = images.upload_list(np.concatenate([table, nodes, tree.leaves.reshape(-1, 4)]))
         self.textures["media_table"].defines = (
@@ -331,13 +331,13 @@ class Media:
         )
         self.notes = tuple(notes)
 
-    def _boundaries(self, first: int) -> acceleration.Tree:
+    def _boundaries(self, first: int) -> Tree:
         bounded = [(k + first, one.corners) for k, one in enumerate(self.found) if one.corners is not None]
         corners = np.concatenate([c for _, c in bounded]) if bounded else np.zeros((0, 3, 3))
         look = np.zeros((len(corners), 8))
         look[:, 0] = 1.0  # any opacity: what is empty would be left out
         look[:, 4] = np.concatenate([np.full(len(c), k) for k, c in bounded]) if bounded else 0.0
-        return acceleration.build(corners.astype(np.float32), look)
+        return Tree(corners.astype(np.float32), look)
 
     def _bake(self, jobs: list, rows: int, snapshot: Snapshot, origin: np.ndarray) -> list[Note]:
         notes: list[Note] = []

@@ -21,8 +21,8 @@ import numpy as np
 
 from ..gfx import images
 from ..sampling.sequence import bits
-from . import acceleration
 from .pieces import halved, octahedral
+from .traced_triangles import coverage, world_triangles
 
 RUNS = 32
 COVER = 1.2  # radius of a disc beside that of the area which its point stands for
@@ -70,10 +70,10 @@ class SurfacePoints:
             return False
         shown = [i for i in snapshot.instances if i.visibility.diffuse and snapshot.meshes[i.mesh].triangle_count]
         known = maps, frame.emission_maps
-        corners, look = acceleration.world_triangles(shown, snapshot.meshes, materials, origin, "diffuse", *known)
+        corners, look = world_triangles(shown, snapshot.meshes, materials, origin, "diffuse", *known)
         meshes = [snapshot.meshes[i.mesh] for i in shown]
         surfaces = Surfaces(
-            corners, acceleration.coverage(look[:, 0], maps),
+            corners, coverage(look[:, 0], maps),
             np.repeat(np.arange(len(shown)), [mesh.triangle_count for mesh in meshes]),
             np.array([np.sign(np.linalg.det(i.matrix[:3, :3])) * frame.geometry.is_closed(m)
                       for i, m in zip(shown, meshes)]),

@@ -35,9 +35,9 @@ import numpy as np
 
 from ..gfx import images
 from ..sampling.sequence import bits
-from . import acceleration
 from .pieces import farthest, halved, octahedral
 from .seen import UNSEEN, seen_sides
+from .traced_triangles import coverage, world_triangles
 
 MEMBERS = 8  # points of its cell at which a surfel is lit, in turn
 CLOUD = 16  # points of the cloud for each surfel
@@ -221,9 +221,9 @@ class _Surface:
         stretch = np.round(stretch / unit, 5) * float(f"{unit:.5e}")  # of a rigid motion the same but for rounding
         turn = left @ right
         known = (instance,), snapshot.meshes, materials, frame.geometry.origin, "diffuse", maps, frame.emission_maps
-        look = acceleration.world_triangles(list(known[0]), *known[1:])[1]
+        look = world_triangles(list(known[0]), *known[1:])[1]
         corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]].astype(np.float64) @ stretch.T
-        opacity = acceleration.coverage(look[:, 0], maps) if len(look) == len(corners) else np.zeros(len(corners))
+        opacity = coverage(look[:, 0], maps) if len(look) == len(corners) else np.zeros(len(corners))
         closed = frame.geometry.is_closed(mesh)
         if np.linalg.det(linear) < 0.0:  # a mirrored mesh winds the other way, and so do its normals when turned
             corners = corners[:, ::-1]

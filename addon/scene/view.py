@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -78,24 +78,13 @@ class View:
         `lens`: the point of the aperture that is looked through, metres to the right and up. The frustum is sheared
         so that the plane in focus stays where it is.
         """
-        left, right, bottom, top = self.frame()
         orthographic = self.camera.kind == "ORTHOGRAPHIC"
-        shear = np.divide(lens, self.camera.aperture.focus) if any(lens) else np.zeros(2)
-        if not orthographic:
-            left, right, bottom, top = left - shear[0], right - shear[0], bottom - shear[1], top - shear[1]
-        frame = left, right, bottom, top
+        shear, frame, (right_axis, up, backward, eye), (x, y, depth) = self._looking(tuple(lens))
+        left, right, bottom, top = frame
         width, height = self.size
         dx, dy = jitter[0] * (right - left) / width, jitter[1] * (top - bottom) / height
         left, right, bottom, top = left + dx, right + dx, bottom + dy, top + dy
-        right_axis, up, backward, eye = (self.camera.matrix[:3, i] for i in range(4))
-        eye = eye - self.origin + lens[0] * right_axis + lens[1] * up
-
-        def affine(direction, constant=0.0):
-            return np.array((*direction.tolist(), constant - float(direction @ eye)))
-
-        depth = affine(-backward)  # distance along the axis
         one = np.array([0.0, 0.0, 0.0, 1.0])
-        x, y = affine(right_axis), affine(up)
         start, end = self.camera.clip_start, self.camera.clip_end
         if orthographic:
             w, centre = one, one
@@ -115,12 +104,41 @@ class View:
         row_y = (2.0 * y - (bottom + top) * centre) / (top - bottom)
         return {
             "row_x": row_x, "row_y": row_y, "row_w": w, "row_q": q,
-            "eye": (*eye, float(orthographic)), "right": (*right_axis, jitter[0]), "up": (*up, jitter[1]),
-            "backward": (*backward, near), "frame": frame, "film": (width, height, start, end),
+            "eye": (*eye.tolist(), float(orthographic)), "right": (*right_axis.tolist(), jitter[0]),
+            "up": (*up.tolist(), jitter[1]), "backward": (*backward.tolist(), near), "frame": frame,
+            "film": (width, height, start, end),
             "sample_index": sample, "seed": seed,
             "visibility": CAMERA_FLAG, "footprint_exact": footprints[0], "footprint_first": footprints[1],
             **dict(zip(("bits_x", "bits_y", "bits_z", "bits_w"), pixel_bits(sample))),
         }  # fmt: skip
+
+    def _looking(self, lens: tuple[float, float]) -> tuple:
+        """What all places of the film share that are looked at through a point of the aperture: how the frustum is
+        sheared and its frame; right, up, backward and the eye; and as affine forms x, y and the distance along the
+        axis. Kept for the last point."""
+        last = self._last
+        if last and last[0] == lens:
+            return last[1]
+        left, right, bottom, top = self.frame()
+        shear = np.divide(lens, self.camera.aperture.focus) if any(lens) else np.zeros(2)
+        if self.camera.kind != "ORTHOGRAPHIC":
+            left, right, bottom, top = left - shear[0], right - shear[0], bottom - shear[1], top - shear[1]
+        right_axis, up, backward, eye = (self.camera.matrix[:3, i] for i in range(4))
+        eye = eye - self.origin + lens[0] * right_axis + lens[1] * up
+
+        def affine(direction):
+            return np.array((*direction.tolist(), 0.0 - float(direction @ eye)))
+
+        found = (
+            shear, (left, right, bottom, top), (right_axis, up, backward, eye),
+            (affine(right_axis), affine(up), affine(-backward)),
+        )  # fmt: skip
+        last[:] = lens, found
+        return found
+
+    @cached_property
+    def _last(self) -> list:
+        return []
 
 
 def blackman_harris(t: np.ndarray) -> np.ndarray:

@@ -92,7 +92,9 @@ class Placed:
     keys: list[str]
     matrices: np.ndarray  # (N, 4, 4)
     facts: list  # ObjectFacts of each
+    looks: list[tuple]  # of each its own numbers, and with whose mesh, materials and links it is shown
     made: list[Instance]
+    order: list[str]  # of the meshes
     ordered: tuple[Instance, ...] = ()
 
 

@@ -18,7 +18,7 @@ from . import camera as cameras
 from . import motion as motions
 from .cache import MeshEntry, Placed, SnapshotCache
 from .images import ImageTable
-from .instances import Place, matrices, walk
+from .instances import Place, Source, matrices, walk
 from .lights import emission_of_graph, read_light, uses_nodes
 from .linking import LinkTable, read_links
 from .meshes import Wanted, build_mesh, read_mesh
@@ -142,9 +142,9 @@ def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np
 
 def _links(places: list[Place], light_places: list[Place]) -> LinkTable:
     """Light linking, which objects have that give light, or what instances them."""
-    sources = {id(place.source): place.source for place in (*places, *light_places)}
-    owners = [one.owner for one in sources.values() if one.facts.linked]
-    owners += [one.parent for one in sources.values() if one.facts.linked and one.parent is not None]
+    sources = dict.fromkeys([place.source for place in (*places, *light_places)])
+    owners = [one.owner for one in sources if one.facts.linked]
+    owners += [one.parent for one in sources if one.facts.linked and one.parent is not None]
     return read_links(owners)
 
 
@@ -156,16 +156,14 @@ def _meshes(
     override = depsgraph.view_layer_eval.material_override
     shown_with: dict[int, set[int]] = {}  # materials, by address of the mesh
     materials: dict[int, tuple[int, ...]] = {}  # by identity of the source, which all its instances share
-    first: dict[int, Place] = {}
-    for place in places:
-        source = place.source
-        if id(source) in materials:
-            continue
+    first: dict[int, Source] = {}
+    sources = dict.fromkeys([place.source for place in places])
+    for source in sources:
         slots = source.materials or (None,)
         chosen = tuple([shading.index_of(override or material) for material in slots])
         materials[id(source)] = chosen
         pointer = source.pointer
-        first.setdefault(pointer, place)
+        first.setdefault(pointer, source)
         shown_with.setdefault(pointer, set()).update(chosen)
     wanted = {
         pointer: reduce(or_, (shading.wanted[index] for index in sorted(used))) for pointer, used in shown_with.items()
@@ -176,19 +174,17 @@ def _meshes(
     notes: list[Note] = []
     read = 0
     keys = _mesh_keys(first)
-    for pointer, place in first.items():
-        entry, was_read = _sync_mesh(keys[pointer], place, wanted[pointer], cache)
+    for pointer, source in first.items():
+        entry, was_read = _sync_mesh(keys[pointer], source, wanted[pointer], cache)
         read += was_read
         notes += entry.notes
         meshes[entry.mesh.key] = by_pointer[pointer] = entry.mesh
 
     resolved: dict[int, tuple[str, tuple[int, ...], Links]] = {}
-    for place in places:
-        source = place.source
-        if id(source) not in resolved:
-            mesh = by_pointer[source.pointer]
-            own_links = links.of(source.facts.uid, source.facts.parent_uid)
-            resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots), own_links
+    for source in sources:
+        mesh = by_pointer[source.pointer]
+        own_links = links.of(source.facts.uid, source.facts.parent_uid)
+        resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots), own_links
     instances = _instances(places, transforms, resolved, list(meshes), cache)
     stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
     return meshes, instances, notes, stats
@@ -198,21 +194,20 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     """The instances, by mesh in `order`; those of the last sync where nothing has changed. `resolved`: key of the mesh
     materials and links, by identity of the source."""
     keys = [place.key for place in places]
+    facts = [place.source.facts for place in places]
+    looks = [(place.random, place.generated, place.uv, *resolved[id(place.source)]) for place in places]
     before = cache.placed
     known = before is not None and before.keys == keys
     same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
-    made, facts = [], [place.source.facts for place in places]
+    if known and all(same) and (before.order, before.facts, before.looks) == (order, facts, looks):
+        return before.ordered
+    made = []
     like: dict[int, dict[str, object]] = {}  # fields of an instance of each source
     for k, place in enumerate(places):
-        mesh, chosen, links = resolved[id(place.source)]
-        if known and same[k] and before.facts[k] is facts[k]:
-            old = before.made[k]
-            if (
-                old.mesh == mesh and old.materials == chosen and old.links == links
-                and old.random == place.random and old.generated == place.generated and old.uv == place.uv
-            ):  # fmt: skip
-                made.append(old)
-                continue
+        if known and same[k] and before.facts[k] is facts[k] and before.looks[k] == looks[k]:
+            made.append(before.made[k])
+            continue
+        *_, mesh, chosen, links = looks[k]
         of_object = facts[k]
         alike = like.get(id(place.source))
         if alike is None:
@@ -238,7 +233,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
     instances = tuple(instance for group in ordered for instance in groups[group])
     if known and instances == before.ordered:
         instances = before.ordered
-    cache.placed = Placed(keys, transforms, facts, made, instances)
+    cache.placed = Placed(keys, transforms, facts, looks, made, order, instances)
     return instances
 
 
@@ -247,15 +242,15 @@ def _fitted(materials: tuple[int, ...], slots: int) -> tuple[int, ...]:
     return (*materials[:slots], *(0,) * (slots - len(materials)))
 
 
-def _mesh_keys(first: dict[int, Place]) -> dict[int, str]:
+def _mesh_keys(first: dict[int, Source]) -> dict[int, str]:
     """A lasting name for each evaluated mesh: its data-block where it is shown as it is, else its object.
 
     One object may own several (geometry nodes): they are numbered in Blender's order.
     """
     keys: dict[int, str] = {}
     taken: dict[str, int] = {}
-    for pointer, place in first.items():
-        source, facts = place.source, place.source.facts
+    for pointer, source in first.items():
+        facts = source.facts
         if source.data.id_type == "HAIR":
             keys[pointer] = f"hair {facts.uid} {source.data.number}"
             continue
@@ -266,9 +261,9 @@ def _mesh_keys(first: dict[int, Place]) -> dict[int, str]:
     return keys
 
 
-def _sync_mesh(key: str, place: Place, wanted: Wanted, cache: SnapshotCache) -> tuple[MeshEntry, bool]:
+def _sync_mesh(key: str, source: Source, wanted: Wanted, cache: SnapshotCache) -> tuple[MeshEntry, bool]:
     """The mesh as it is now, and whether its content is new."""
-    source, facts = place.source, place.source.facts
+    facts = source.facts
     mesh, entry = source.data, cache.meshes.get(key)
     asked = wanted.names
     # Hair is dear to read, and never changes without a new evaluation.

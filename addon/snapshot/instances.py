@@ -38,7 +38,7 @@ class Place:
     uv: tuple[float, float] = (0.0, 0.0)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Source:
     """What is shown, as Blender has it during this walk."""
 
@@ -48,6 +48,11 @@ class Source:
     owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
     materials: tuple  # evaluated bpy materials (or None), one per slot
     parent: object = None  # evaluated instancer
+    own: str = ""  # end of its places' keys
+    is_light: bool = False
+
+
+LEFT_OUT = object()  # in place of the source of what is not drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +87,7 @@ def walk(
     meshes: list[Place] = []
     lights: list[Place] = []
     notes: dict[Note, None] = {}
-    known: dict[tuple[int, int, int], Source] = {}
+    known: dict[tuple, Source] = {}
     before, kept = cache.facts, {}
     told = cache.informed and not cache.arranged and shown is None
     changed = cache.changed
@@ -97,25 +102,26 @@ def walk(
         depsgraph.object_instances, *listed, strict=True
     ):
         found = instance.object
-        kind = found.type
-        if kind not in _DRAWN and kind != "LIGHT":
-            continue
         owner, parent = (instance.instance_object, instance.parent) if is_instance else (found, None)
         own_mesh = found.data if shows_self else None
-        shells = [own_mesh] if own_mesh is not None else []
-        if hairy and instance.show_particles and kind == "MESH":
-            shells += hair_systems(owner, final)
+        shells = () if own_mesh is None else (own_mesh,)
+        if hairy and instance.show_particles and found.type == "MESH":
+            shells = (*shells, *hair_systems(owner, final))
         for data in shells:
-            hair = isinstance(data, HairSystem)
-            if not (strands if hair else included.get(kind, True)):
-                continue
-            pointer = data.pointer if hair else data.as_pointer()
-            identity = (owner.as_pointer(), parent.as_pointer() if parent else 0, pointer)
+            # Blender's objects are as good as their addresses here, and asking each for its own takes longer.
+            identity = owner, parent, data.pointer if hairy and isinstance(data, HairSystem) else data
             source = known.get(identity)
             if source is None:
+                kind = found.type
+                hair = isinstance(data, HairSystem)
+                drawn = kind in _DRAWN or kind == "LIGHT"
+                if not drawn or not (strands if hair else included.get(kind, True)):
+                    known[identity] = LEFT_OUT
+                    continue
                 original = owner.original
                 parent_uid = parent.original.session_uid if parent is not None else 0
                 own_data = original.data
+                pointer = data.pointer if hair else data.as_pointer()
                 # Geometry that a modifier instances has no data-block of its own in the file.
                 is_own = own_data is not None and (
                     not is_instance or (owner.data is not None and owner.data.as_pointer() == pointer)
@@ -151,23 +157,24 @@ def walk(
                 materials = tuple([slot.material for slot in found.material_slots])
                 if hair and materials:
                     materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
-                source = known[identity] = Source(facts, data, pointer, owner, materials, parent)
+                own = f"/hair {data.number}" if hair else ""
+                source = known[identity] = Source(facts, data, pointer, owner, materials, parent, own, kind == "LIGHT")
                 for note in facts.notes:
                     notes[note] = None
-            facts = source.facts
-            if not facts.shown:
+            if source is LEFT_OUT or not source.facts.shown:
                 continue
-            own = f"/hair {data.number}" if hair else ""
+            facts = source.facts
             if is_instance:
-                if numbers[1] == _UNUSED_ID and numbers[2] == _UNUSED_ID:  # nearly always
-                    ids = "" if numbers[0] == _UNUSED_ID else str(numbers[0])
+                if numbers[2] == _UNUSED_ID and numbers[0] != _UNUSED_ID:  # nearly always
+                    first, second = numbers[0], numbers[1]
+                    ids = str(first) if second == _UNUSED_ID else f"{first}-{second}"
                 else:
                     ids = "-".join([str(number) for number in numbers if number != _UNUSED_ID])
-                key = f"{facts.uid}/{facts.parent_uid}/{ids}{own}"
+                key = f"{facts.uid}/{facts.parent_uid}/{ids}{source.own}"
                 place = Place(source, key, (number & 0xFFFFFFFF) / 0xFFFFFFFF, placed, tuple(orco), tuple(uv))
             else:
-                place = Place(source, f"{facts.uid}{own}", facts.random, placed)
-            (lights if kind == "LIGHT" else meshes).append(place)
+                place = Place(source, f"{facts.uid}{source.own}", facts.random, placed)
+            (lights if source.is_light else meshes).append(place)
     cache.facts = kept
     return meshes, lights, tuple(notes)
 

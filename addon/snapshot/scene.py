@@ -7,6 +7,7 @@ Arrays are C-contiguous and read-only by agreement: whoever wants a change makes
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -401,4 +402,9 @@ class Snapshot:
     @cached_property
     def triangle_count(self) -> int:
         """Triangles of all instances together."""
-        return sum(self.meshes[instance.mesh].triangle_count for instance in self.instances)
+        return sum(self.meshes[mesh].triangle_count * count for mesh, count in self.times_shown.items())
+
+    @cached_property
+    def times_shown(self) -> Counter[str]:
+        """How many instances each mesh has."""
+        return Counter(instance.mesh for instance in self.instances)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -348,11 +348,18 @@ def _ball_offset(x: float, y: float, z: float) -> np.ndarray:
     return np.interp(z, _RADIAL_CDF, _RADII) * np.array([ring * np.cos(turn), ring * np.sin(turn), height])
 
 
-def _cone_direction(axis: np.ndarray, half_angle: float, x: float, y: float) -> np.ndarray:
-    """Uniform over the cone's solid angle; the disc map keeps neighbouring numbers neighbours."""
+@lru_cache(maxsize=256)
+def _beside(axis: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors across an axis (its three float64), and across each other."""
+    axis = np.frombuffer(axis)
     helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     u = _unit(np.cross(helper, axis))
-    v = np.cross(axis, u)
+    return u, np.cross(axis, u)
+
+
+def _cone_direction(axis: np.ndarray, half_angle: float, x: float, y: float) -> np.ndarray:
+    """Uniform over the cone's solid angle; the disc map keeps neighbouring numbers neighbours."""
+    u, v = _beside(np.asarray(axis, np.float64).tobytes())
     one_minus_cos = x * 2.0 * np.sin(half_angle / 2) ** 2
     cos_theta = 1.0 - one_minus_cos
     sin_theta = np.sqrt(max(one_minus_cos * (2.0 - one_minus_cos), 0.0))

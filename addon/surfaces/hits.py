@@ -38,7 +38,7 @@ from itertools import groupby
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
@@ -253,11 +253,17 @@ class _Kind:
     first: int  # number of the first one among those of the material
 
 
+def _leaves_of_rows(hierarchy: Hierarchy) -> int:
+    """How many leaves' place the rows of its instances take in the list of owners."""
+    return -(-len(hierarchy.instances) // acceleration.LEAF) if hierarchy.shared else 0
+
+
 class Hits:
     """The triangles of a scene as its rays find them. One for each renderer: `frame.kept(Hits)`."""
 
     def __init__(self):
-        self._owners: dict[object, images.Image] = {}  # by hierarchy and instances
+        # By hierarchy and instances: rows of those, what triangles are numbered by, and the list.
+        self._owners: dict[object, tuple[bytes, object, images.Image]] = {}
         self._kinds: dict[int, list[_Kind]] = {}  # by material
         self._numbers: dict[tuple, np.ndarray] = {}  # by mesh, version and slots: of each triangle
         self._numbers_key: object = None
@@ -288,7 +294,8 @@ class Hits:
             },
             blocks={"film_view": frame.view_block},
             constants={
-                "ray_number": number, "glass_bends": int(refracts(frame)), "first_leaf": hierarchy.first_leaf,
+                "ray_number": number, "glass_bends": int(refracts(frame)),
+                "first_leaf": hierarchy.first_leaf - _leaves_of_rows(hierarchy),
                 "spread": pixel_spread(frame),
             },
         )  # fmt: skip
@@ -416,25 +423,44 @@ class Hits:
     # What stands behind triangles -----------------------------------------------------------------------------------
 
     def _owners_of(self, frame: Frame, hierarchy: Hierarchy) -> images.Image:
+        """The instance's row and the triangle's number, by slot of the leaves; before them, where trees are shared,
+        the rows of the hierarchy's instances."""
         key = (hierarchy.leaves, hierarchy.instances, frame.geometry.changes)
-        if key not in self._owners:
+        known = self._owners.get(key)
+        if known is None:
             self._number(frame)
             rows = {id(instance): row for row, instance in enumerate(frame.geometry.placed[0])}
-            meshes, parts = frame.geometry.placed[1], []
-            shown = [one for one in hierarchy.instances if meshes[one.mesh].triangle_count]
-            for kind, group in groupby(shown, lambda one: (one.mesh, meshes[one.mesh].version, one.materials)):
-                numbers, copies = self._numbers[kind], [rows[id(one)] for one in group]
-                of_copies = np.empty((len(copies), len(numbers), 2), np.float32)
-                of_copies[:, :, 0], of_copies[:, :, 1] = np.array(copies)[:, None], numbers
-                parts.append(of_copies.reshape(-1, 2))
-            found = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
-            slots = hierarchy.slots
-            height = max(-(-(int(slots.max(initial=0)) + 1) // images.LIST_WIDTH), 1)
-            listed = np.zeros((height * images.LIST_WIDTH, 2), np.float32)
-            listed[slots[slots >= 0]] = found[slots >= 0]
-            image = images.upload(listed.reshape(height, images.LIST_WIDTH, 2), "RG32F")
-            self._owners = dict([*self._owners.items()][-3:]) | {key: image}
-        return self._owners[key]
+            of_instances = np.array([rows.get(id(one), 0) for one in hierarchy.instances], np.float32)
+            # Where an object has moved it is another instance, in the same row.
+            same = [k for k in self._owners if k[0] is hierarchy.leaves and self._owners[k][:2] == (
+                of_instances.tobytes(), self._numbers_key
+            )]  # fmt: skip
+            image = self._owners.pop(same[0])[2] if same else self._owners_image(frame, hierarchy, of_instances)
+            known = of_instances.tobytes(), self._numbers_key, image
+            self._owners = dict([*self._owners.items()][-3:]) | {key: known}
+        return known[2]
+
+    def _owners_image(self, frame: Frame, hierarchy: Hierarchy, of_instances: np.ndarray) -> images.Image:
+        meshes, parts = frame.geometry.placed[1], []
+        row = dict(zip(map(id, hierarchy.instances), of_instances))
+        shown = [one for one in hierarchy.expanded if meshes[one.mesh].triangle_count]
+        for kind, group in groupby(shown, lambda one: (one.mesh, meshes[one.mesh].version, one.materials)):
+            numbers, copies = self._numbers[kind], [row[id(one)] for one in group]
+            of_copies = np.empty((len(copies), len(numbers), 2), np.float32)
+            of_copies[:, :, 0], of_copies[:, :, 1] = np.array(copies)[:, None], numbers
+            parts.append(of_copies.reshape(-1, 2))
+        slots = [hierarchy.slots, *(of_mesh for _, of_mesh in hierarchy.shared)]
+        for one, _ in hierarchy.shared:
+            numbers = self._numbers[one.mesh, meshes[one.mesh].version, one.materials]
+            parts.append(np.stack([np.zeros_like(numbers), numbers], axis=1))
+        found = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
+        slots, first = np.concatenate(slots), acceleration.LEAF * _leaves_of_rows(hierarchy)
+        height = max(-(-(first + int(slots.max(initial=0)) + 1) // images.LIST_WIDTH), 1)
+        listed = np.zeros((height * images.LIST_WIDTH, 2), np.float32)
+        if first:
+            listed[: len(of_instances), 0] = of_instances
+        listed[first + slots[slots >= 0]] = found[slots >= 0]
+        return images.upload(listed.reshape(height, images.LIST_WIDTH, 2), "RG32F")
 
     def _number(self, frame: Frame) -> None:
         """Number the triangles of each material over all meshes that show it."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.struct import Block
 from ..scene.culling import calls

@@ -39,7 +39,7 @@ from functools import cache
 import numpy as np
 
 from ..frame.light_paths import LIGHT_SPECULAR_MEDIUM
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes

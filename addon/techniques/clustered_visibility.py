@@ -38,7 +38,7 @@ from functools import cache
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..gfx import images, passes

@@ -29,7 +29,7 @@ import numpy as np
 
 from ..film import filter as film_filter
 from ..film.points import Coverage
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program

@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 
 from ..film.points import shown_paths
 from ..film.resolve import COMBINED, resolve
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
@@ -138,6 +138,9 @@ class Denoise(Technique):
         if not snapshot.instances:
             return "the scene has no surface"
         return no_diffuse_light(snapshot)
+
+    def looks_at(self, settings: Settings) -> tuple[str, ...]:
+        return (*(f"radiance.{path}" for path in FILTERS), "color.diffuse", "color.glossy", "surface.normal_sum")
 
     def begin(self, frame: Frame) -> None:
         for write in self.writes:

@@ -33,7 +33,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Param
 from ..gfx import images, passes
 from ..gfx.library import Program

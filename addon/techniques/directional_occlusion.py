@@ -37,7 +37,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..film.neighbours import reflect
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes

@@ -35,7 +35,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import AUTO, Settings
 from ..frame.technique import Param, Technique
 from ..lighting import depth_maps

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..eye import optics, point_spread
 from ..eye.aperture import Aperture, Eye, aperture_at
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import CAMERA, Param, Service, Technique
 from ..snapshot.scene import Snapshot

@@ -6,7 +6,8 @@ extent that the camera may see are intersected analytically and land in emission
 
 Techniques add the light of one sample to the images `radiance.*`, all at one point of each pixel's filter. When all
 have done so it goes into the sums of all pixels whose filter covers that point (film/filter.py), at several such points
-where the picture has few samples (film/points.py).
+where the picture has few samples (film/points.py). Light paths that nobody looks at apart are one sum
+(film/together.py).
 """
 
 from __future__ import annotations
@@ -18,9 +19,12 @@ from functools import cache
 
 from ..film import filter as film_filter
 from ..film import points as film_points
+from ..film import together
+from ..film.point_costs import count_of
 from ..film.resolve import COMBINED, resolve
-from ..frame.light_paths import LIGHT_PATHS, SEEN
-from ..frame.run import Frame
+from ..frame.light_paths import LIGHT_PATHS, SEEN, TOGETHER
+from ..frame.picture import Frame
+from ..frame.settings import Settings
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
 from ..gfx.context import to_hold
@@ -41,15 +45,17 @@ from ..surfaces.draw import (
     surface_bindings,
 )
 
-SUMS = (
-    Write("radiance.emission", "RGBA32F", "Emission of surfaces and lights seen by the camera", True),
-    Write("radiance.environment", "RGBA32F", "The world seen by the camera; alpha: coverage", True),
-    Write("color.diffuse", "RGBA32F", "Albedo of diffuse closures; alpha: mist, where a pass asks for it", True),
-    Write("color.glossy", "RGBA32F", "Albedo of glossy closures", True),
-    Write("color.transmission", "RGBA32F", "Share of light that glass lets through", True),
-    Write("surface.normal_sum", "RGBA32F", "World-space shading normal; alpha: hits", True),
-)
-EMISSION_SUM, WORLD_SUM = 0, 1  # in SUMS
+# Each is made where somebody looks at it, and drawn by this output of the program.
+SUMS = {
+    "radiance.emission": ("out_emission", "Emission of surfaces and lights seen by the camera"),
+    "radiance.environment": ("out_environment", "The world seen by the camera; alpha: coverage"),
+    "color.diffuse": ("out_diffuse_color", "Albedo of diffuse closures; alpha: mist, where a pass asks for it"),
+    "color.glossy": ("out_glossy_color", "Albedo of glossy closures"),
+    "color.transmission": ("out_transmission_color", "Share of light that glass lets through"),
+    "surface.normal_sum": ("out_normal", "World-space shading normal; alpha: hits"),
+    TOGETHER: ("out_together", "Light of all paths that nobody looks at apart; alpha: coverage"),
+}
+EMISSION, WORLD_SEEN = "radiance.emission", "radiance.environment"
 LIGHT = tuple(path for path in LIGHT_PATHS if path.origin != SEEN)  # what techniques add to in each sample
 
 
@@ -64,31 +70,57 @@ class Seen:
     kinds: int  # of lights, bits as in lights.LAMPS
 
 
+@dataclass(frozen=True)
+class Collected:
+    """What a point of the film is collected into: the names of SUMS that a picture holds, and which paths of light,
+    each an image, are added to TOGETHER (together.SUM: of what is summed up already)."""
+
+    held: tuple[str, ...]
+    light: tuple[str, ...] = ()
+    world: bool = True  # whether the sum holds the world
+
+    @property
+    def defines(self) -> tuple[tuple[str, str], ...]:
+        outputs = {name: SUMS[name][0] for name in SUMS}
+        left_out = [output for name, output in outputs.items() if name not in self.held]
+        parts = [together.terms(self.light, "light_{0}_fetch(pixel)")]
+        if EMISSION not in self.held:
+            parts.append(f"vec4({outputs[EMISSION]}.rgb, 0.0)")
+        if WORLD_SEEN not in self.held:
+            parts.append(outputs[WORLD_SEEN] if self.world else f"vec4(vec3(0.0), {outputs[WORLD_SEEN]}.a)")
+        summed = f"{outputs[TOGETHER]} = {' + '.join(parts)};" if TOGETHER in self.held else ""
+        return ("NOT_DRAWN", " ".join(f"vec4 {output};" for output in left_out)), ("SUM_ALL", summed)
+
+
+EVERYTHING = Collected(tuple(name for name in SUMS if name != TOGETHER))
+PICTURE_ALONE = Collected((TOGETHER,), film_points.PATHS)
+
+
 @cache
-def collect_program(seen: Seen) -> Program:
+def collect_program(seen: Seen, into: Collected = EVERYTHING) -> Program:
     shown = (("GLOSSY", seen.glossy), ("WORLD", seen.world))
     return passes.fullscreen_program(
         "film collect",
         "film/collect.frag.glsl",
         textures=(
             *SURFACE_TEXTURES, ("RGBA32F", "energy_table"), ("RGBA32F", "environment_map"),
-            ("R32F", "environment_density_map"),
+            ("R32F", "environment_density_map"), *(("RGBA32F", f"light_{name}") for name in into.light),
         ),
         blocks=((VIEW, "film_view"), (WORLD, "world_light"), (lights.SOURCES, "sources")),
         constants=(("INT", "light_count"), ("VEC4", "mist")),
         defines=(
             *SOFT_DEFINES[seen.soft], *((name, "1") for name, is_seen in shown if is_seen),
-            ("LIGHT_KINDS", str(seen.kinds)),
+            ("LIGHT_KINDS", str(seen.kinds)), *into.defines,
         ),
-        outputs=tuple(
-            ("VEC4", name)
-            for name in ("out_emission", "out_environment", "out_diffuse_color", "out_glossy_color",
-                         "out_transmission_color", "out_normal")
-        ),
+        outputs=tuple(("VEC4", SUMS[name][0]) for name in into.held),
     )  # fmt: skip
 
 
-COLLECT = (collect_program(Seen(True, True, True, -1)), collect_program(Seen(False, False, False, 0)))
+COLLECT = tuple(
+    collect_program(seen, into)
+    for seen in (Seen(True, True, True, -1), Seen(False, False, False, 0))
+    for into in (EVERYTHING, PICTURE_ALONE)
+)
 DEPTH = passes.fullscreen_program(
     "film depth",
     "film/depth.frag.glsl",
@@ -116,7 +148,7 @@ class Film(Technique):
     finishes = tuple(path.image for path in LIGHT)
     requests = (MediaService, MediaEmission, *film_points.AT_POINTS)
     writes = (
-        *SUMS,
+        *(Write(name, "RGBA32F", description, True, by_need=True) for name, (_, description) in SUMS.items()),
         *(Write(path.image, "RGBA32F", path.description, True, path.by_need) for path in LIGHT),
         Write("film.depth", "RGBA32F", "Depth along the camera axis at the pixel's centre, m; 1e10 for nothing"),
         Write("film.combined", "RGBA32F", "The picture, premultiplied by alpha"),
@@ -126,11 +158,20 @@ class Film(Technique):
         self._sources = lights.Sources()
         self._repeated = lights.Sources()
 
+    def looks_at(self, settings: Settings) -> tuple[str, ...]:
+        # A viewport at rest shows its first samples filtered (film/neighbours.py).
+        return () if settings.whole or settings.draft else ("radiance.diffuse_indirect", "color.diffuse")
+
     def begin(self, frame: Frame) -> None:
         self._paths, self._pixel_paths = film_points.lit_paths(frame), film_points.pixel_paths(frame)
-        for paths in (self._paths, self._pixel_paths):  # apart: a target has at most six images
-            if paths:
-                _target(frame, *(f"film.{path}" for path in paths)).clear()
+        apart, shown = together.apart_of(frame), film_points.shown_paths(frame)
+        self._apart = tuple(path for path in self._paths if path in apart)
+        self._summed = tuple(path for path in self._paths if path not in apart and path in shown)
+        self._held = together.collected(frame)
+        light = (tuple(f"film.{path}" for path in paths) for paths in (self._apart, self._pixel_paths))
+        for names in (self._held, *light):  # apart: a target has at most six images
+            if names:
+                _target(frame, *names).clear()
         emitters = frame.emitters
         seen = lights.traceable([e for e in emitters if e.flags & lights.CAMERA_FLAG])
         self._lights = self._sources.set([emitter.row(emitter.centre, 0, 0) for emitter in seen])
@@ -139,7 +180,10 @@ class Film(Technique):
         shown = frame.snapshot.world.visibility.camera and frame.environment.power > 0
         world = frame.environment.tree is None and shown
         glossy, world = to_hold((frame.materials.glossy, world), (True, True))
-        self._collecting = collect_program(Seen(frame.materials.soft, glossy, world, lights.kinds_of(seen)))
+        self._seen = Seen(frame.materials.soft, glossy, world, lights.kinds_of(seen))
+        if TOGETHER in self._held:
+            paths = ", ".join(path.label for path in LIGHT_PATHS if path.name in self._apart)
+            frame.chose(self, "light paths", f"summed before the filter{f', but for {paths}' if paths else ''}")
         passes.fullscreen(
             DEPTH,
             frame.target("film.depth"),
@@ -149,16 +193,19 @@ class Film(Technique):
         self._first_seen(frame)
 
     def sample(self, frame: Frame) -> Iterator[None]:
-        count = film_points.points_of_sample(frame, frame.settings.get(self, film_points.POINTS.name))
-        with _borrowed(frame, len(SUMS)) as collected:
-            self._collect(frame, surface_bindings(frame), collected)
+        points = frame.settings.get(self, film_points.POINTS.name)
+        asked, count = count_of(points, frame.settings.samples), film_points.points_of_sample(frame, points)
+        with _borrowed(frame, len(self._held)) as collected:
             light = {path: frame.images[f"radiance.{path}"] for path in (*self._paths, *self._pixel_paths)}
+            self._collect(frame, surface_bindings(frame), collected, {path: light[path] for path in self._summed})
             self._filter(frame, collected, light, surface_bindings(frame), frame.sample, 1.0 / count)
         shining = frame.service(MediaEmission)
         if shining is not None:
-            emission = {"radiance.emission": frame.images[shining.image]}
+            emission = {EMISSION if EMISSION in self._held else TOGETHER: frame.images[shining.image]}
             frame.count(self, "passes", film_filter.add(frame, emission, frame.film_offset(frame.sample), 1.0))
         frame.count(self, "points", count)
+        if frame.is_first and asked > 1 and not film_points.all_alike(frame):
+            frame.chose(self, "points", film_points.costs(frame).why(asked))
         if count > 1:
             yield
             yield from self._between(frame, count)
@@ -166,7 +213,7 @@ class Film(Technique):
             if paths:
                 frame.target(*(f"radiance.{path}" for path in paths)).clear()
         repeated_light.forget(frame)
-        for path in (*self._paths, *self._pixel_paths):
+        for path in (*self._apart, *self._pixel_paths):
             frame.shown[f"radiance.{path}"] = f"film.{path}"
 
     def show(self, frame: Frame) -> None:
@@ -196,40 +243,53 @@ class Film(Technique):
         # The first numbers are those of the samples' own points, so that all together are a prefix of the sequence.
         first = frame.settings.samples + frame.sample * (count - 1)
         repeated = frame.settings.get(self, "edges") and repeated_light.possible(frame)
+        own = repeated_light.PATHS if repeated else ()  # which are added to after the others
+        alone = tuple(path for path in self._paths if path in self._apart or path in own)
+        carried = (*alone, together.SUM) if set(self._summed) - set(alone) else alone
         with (
             _borrowed(frame, len(SURFACES)) as drawn,
-            _borrowed(frame, len(SUMS)) as collected,
-            _borrowed(frame, len(self._paths)) as light,
+            _borrowed(frame, len(self._held)) as collected,
+            _borrowed(frame, len(carried)) as light,
             _borrowed(frame, 1, "DEPTH_COMPONENT32F") as (depth,),
         ):
             target, marked = images.Target(drawn, depth), images.Target(light, depth)
-            surfaces, by_path = dict(zip(SURFACE_IMAGES, drawn)), dict(zip(self._paths, light))
-            direct = images.Target(tuple(by_path[path] for path in repeated_light.PATHS), depth)
+            surfaces, by_path = dict(zip(SURFACE_IMAGES, drawn)), dict(zip(carried, light))
+            added = {path: image for path, image in by_path.items() if path not in self._apart}
+            direct = images.Target(tuple(by_path[path] for path in own), depth) if repeated else None
             try:
                 for point in range(first, first + count - 1):
                     frame.look(film=point)
                     draw_sample(frame, self, target)
                     bindings = {f"surface_{name}": image for name, image in surfaces.items()}
-                    self._collect(frame, bindings, collected)
-                    film_points.light_between(frame, self._paths, marked, surfaces, point, repeated)
+                    film_points.light_between(frame, self._paths, carried, marked, surfaces, point, repeated)
                     frame.count(self, "passes")
                     if repeated:
                         repeated_light.repeat(frame, self._repeated, bindings, direct)
                         frame.count(self, "passes", len(frame.shared(repeated_light.KeptLight).passes))
-                    own = {path: frame.images[f"radiance.{path}"] for path in self._pixel_paths}
-                    self._filter(frame, collected, by_path | own, bindings, point, 1.0 / count)
+                    self._collect(frame, bindings, collected, added)
+                    by_pixel = {path: frame.images[f"radiance.{path}"] for path in self._pixel_paths}
+                    self._filter(frame, collected, by_path | by_pixel, bindings, point, 1.0 / count)
                     yield
             finally:
                 frame.look()
 
-    def _collect(self, frame: Frame, surfaces: dict[str, images.Image], collected: tuple[images.Image, ...]) -> None:
-        """Draw what needs no light, at the point of the film that is looked at, into an image for each of SUMS."""
+    def _collect(
+        self,
+        frame: Frame,
+        surfaces: dict[str, images.Image],
+        collected: tuple[images.Image, ...],
+        light: dict[str, images.Image],
+    ) -> None:
+        """Draw what needs no light, at the point of the film that is looked at, into an image for each sum that is
+        held; into that of all paths together with the `light` of those that are not apart."""
+        by_name, world = dict(zip(self._held, collected)), not frame.snapshot.film.transparent
         passes.fullscreen(
-            self._collecting,
+            collect_program(self._seen, Collected(self._held, tuple(light), world)),
             images.Target(collected),
             textures={
-                **surfaces, "energy_table": frame.materials.energy_table,
-                "environment_map": frame.environment.map, "environment_density_map": frame.environment.density_map,
+                **surfaces, **{f"light_{path}": image for path, image in light.items()},
+                "energy_table": frame.materials.energy_table, "environment_map": frame.environment.map,
+                "environment_density_map": frame.environment.density_map,
             },
             blocks={
                 "film_view": frame.view_block, "world_light": frame.environment.block, "sources": self._lights,
@@ -237,10 +297,10 @@ class Film(Technique):
             constants={"light_count": self._light_count, "mist": _mist_constant(frame)},
         )  # fmt: skip
         frame.count(self, "passes")
-        add_glow(frame, self, surfaces["surface_position"], collected[EMISSION_SUM])
-        if frame.environment.tree is not None and frame.snapshot.world.visibility.camera:
-            world = images.Target((collected[WORLD_SUM],))
-            frame.environment.tree.add_background(world, frame.view, frame.view_block, surfaces)
+        add_glow(frame, self, surfaces["surface_position"], by_name.get(EMISSION) or by_name[TOGETHER])
+        shown = by_name.get(WORLD_SEEN) or (by_name[TOGETHER] if world else None)
+        if frame.environment.tree is not None and frame.snapshot.world.visibility.camera and shown is not None:
+            frame.environment.tree.add_background(images.Target((shown,)), frame.view, frame.view_block, surfaces)
             frame.count(self, "passes")
 
     def _filter(
@@ -253,9 +313,10 @@ class Film(Technique):
         share: float,
     ) -> None:
         """Add what one point of the film shows to the sums."""
-        seen = {write.name: image for write, image in zip(SUMS, collected)}
+        seen = dict(zip(self._held, collected))
         seen |= {f"film.{path}": image for path, image in light.items()}
         seen = {name: image for name, image in seen.items() if name in self._shown}
+        frame.count(self, "images filtered", len(seen))
         media = frame.service(MediaService)
         offset = frame.film_offset(point)
         for service in map(frame.service, film_points.AT_POINTS):
@@ -269,10 +330,11 @@ class Film(Technique):
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:
         """Those of SUMS and of the sums of light in which something may be seen."""
-        shown = {f"film.{path}" for path in film_points.shown_paths(frame)}
-        shown |= {"radiance.environment", "color.diffuse", "surface.normal_sum"}
+        alone = {*self._apart, *self._pixel_paths}
+        shown = {f"film.{path}" for path in film_points.shown_paths(frame) if path in alone}
+        shown |= {WORLD_SEEN, "color.diffuse", "surface.normal_sum", TOGETHER}
         if lights_seen or any(material.emissive for material in frame.materials.compiled):
-            shown.add("radiance.emission")
+            shown.add(EMISSION)
         if "transmission_direct" in self._paths:
             shown.add("color.transmission")
         if may_be_glossy(frame.snapshot):

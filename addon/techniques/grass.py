@@ -32,7 +32,7 @@ from pathlib import Path
 import numpy as np
 
 from ..film.points import OwnPoint
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import MATERIAL, Param, Technique, own_value
 from ..gfx import images

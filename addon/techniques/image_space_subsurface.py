@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..frame.light_paths import SUBSURFACE
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import MATERIAL, Param, Technique, Write
 from ..gfx import images, passes
@@ -158,7 +158,7 @@ class ImageSpaceSubsurface(Technique):
         shown = snapshot.used_materials
         if not any(may_scatter(snapshot.materials[material].graph) for material in shown):
             return "no material scatters light below its surface"
-        return acceleration.too_many(snapshot)
+        return acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         return GATHER, APPLY, CHORD, LIGHTING

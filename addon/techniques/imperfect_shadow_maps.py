@@ -36,7 +36,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import geometry, images, passes

@@ -35,7 +35,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..frame.run import Frame, lights_key
+from ..frame.picture import Frame
+from ..frame.run import lights_key
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes
@@ -144,7 +145,7 @@ class ImplicitVisibility(Technique):
         self._glossy = VirtualLights()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        return no_indirect_light(snapshot, settings) or acceleration.too_many(snapshot)
+        return no_indirect_light(snapshot, settings) or acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         return (SEES, *PROGRAMS, *surfel_light.PROGRAMS)

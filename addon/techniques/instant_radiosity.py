@@ -39,7 +39,7 @@ from functools import cache
 import numpy as np
 
 from ..film.neighbours import smooth
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Service, Technique, Write
 from ..gfx import passes

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import images, passes

@@ -23,7 +23,7 @@ mirrors, and between surfaces that light each other, take nothing away but what 
 from __future__ import annotations
 
 from ..frame.light_paths import IN_MEDIA
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..lighting.media import MediaService

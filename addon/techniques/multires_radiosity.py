@@ -36,7 +36,7 @@ from collections.abc import Generator, Iterator
 from functools import cache
 
 from ..film.neighbours import smooth
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..gfx import context, images, passes

@@ -35,7 +35,7 @@ from functools import cache
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Param
 from ..gfx import images, passes
 from ..gfx.library import Program

@@ -26,7 +26,7 @@ from functools import cache
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import OBJECT, POINT, Param, Technique, Write, own_value
 from ..gfx import geometry, images, passes

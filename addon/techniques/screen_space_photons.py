@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..frame.light_paths import LIGHT_SPECULAR_DIFFUSE
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx.library import Program

@@ -36,7 +36,7 @@ import numpy as np
 from ..film import aovs as film_aovs
 from ..film import filter as film_filter
 from ..film.points import SurfaceValues
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images
 from ..scene.materials import AOV_GROUP

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
 from ..lighting.point_maps import PointMaps

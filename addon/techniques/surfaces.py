@@ -36,7 +36,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..film import points as film_points
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Technique, Write
 from ..gfx import images, passes
 from ..lighting.visibility import traced_roughness

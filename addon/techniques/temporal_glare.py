@@ -37,7 +37,7 @@ from ..eye import scatter
 from ..eye.aperture import Aperture
 from ..eye.optics import Scale
 from ..film.resolve import COMBINED
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import CAMERA, Param, Technique, Write
 from ..gfx import passes

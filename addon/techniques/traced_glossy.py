@@ -28,7 +28,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Technique
 from ..gfx import passes

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..frame.technique import Param
 from ..kernels import tables
 from ..lighting.loop import lighting

@@ -99,7 +99,7 @@ void main()
     travelled += t;
     blur_squared += lobe_spread * lobe_spread * t * t;
     vec3 normal = triangle_normal(hit);
-    int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+    int material = triangle_material(hit);
     vec4 glass = interface_table_fetch(ivec2(0, material));
     vec4 shape = interface_table_fetch(ivec2(1, material));
     vec4 body = interface_table_fetch(ivec2(2, material));

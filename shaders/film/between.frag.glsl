@@ -3,6 +3,7 @@
 // pixels around it that do, else as nearby; and leaves by the colours of the surface that is seen.
 // REPEATED: where the nearest own point lies elsewhere, and the light of pixels around that lie there is not even, direct
 // light is left out, but for that through glass, and the pixel marked by its depth (lighting/repeated_light.py).
+// WRITE_ALL: light paths to the images that are drawn, several summed up in one (film/points.py).
 #include "lib/gbuffer.glsl"
 #include "neighbours/pixel_size.glsl"
 
@@ -133,26 +134,32 @@ void arriving_mean(Arriving same, Arriving nearby, out vec3 direct, out vec3 ind
   indirect = mix(nearby.indirect / nearby_whole, same.indirect / same_whole, known);
 }
 
-void main()
+struct Reflected {
+  vec4 diffuse_direct;
+  vec4 diffuse_indirect;
+  vec4 glossy_direct;
+  vec4 glossy_indirect;
+  vec4 transmission_direct;
+  vec4 transmission_indirect;
+  bool repeated;  // the pixel is marked
+};
+
+Reflected reflected(ivec2 pixel)
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 size = known_position_size();
   ivec2 nearest = clamp(pixel + ivec2(floor(offset + 0.5)), ivec2(0), size - 1);  // whose own point lies next to this one
   vec2 beside = offset - vec2(nearest - pixel);
-#ifdef REPEATED
-  gl_FragDepth = 0.0;
-#endif
-  out_diffuse_direct = vec4(0.0);
-  out_diffuse_indirect = vec4(0.0);
-  out_glossy_direct = vec4(0.0);
-  out_glossy_indirect = vec4(0.0);
-#ifdef TRANSMISSION
-  out_transmission_direct = vec4(0.0);
-  out_transmission_indirect = vec4(0.0);
-#endif
+  Reflected light;
+  light.diffuse_direct = vec4(0.0);
+  light.diffuse_indirect = vec4(0.0);
+  light.glossy_direct = vec4(0.0);
+  light.glossy_indirect = vec4(0.0);
+  light.transmission_direct = vec4(0.0);
+  light.transmission_indirect = vec4(0.0);
+  light.repeated = false;
   Seen here = seen_here(pixel);
   if (!here.hit) {
-    return;
+    return light;
   }
   float tolerance = 2.0 * pixel_size_at(here.position);
   Arriving none;
@@ -241,13 +248,13 @@ void main()
   arriving_mean(same, nearby, direct, indirect);
 #ifdef REPEATED
   own = own || (spread_is_even(spread, same, here.color) && spread_is_even(lobe_spread, same_lobe, here.weight));
+  light.repeated = !own;
   if (!own) {
-    gl_FragDepth = 1.0;
     direct = vec3(0.0);
   }
 #endif
-  out_diffuse_direct.rgb = here.color * direct;
-  out_diffuse_indirect.rgb = here.color * indirect;
+  light.diffuse_direct.rgb = here.color * direct;
+  light.diffuse_indirect.rgb = here.color * indirect;
   arriving_mean(same_lobe, nearby_lobe, direct, indirect);
   direct *= here.weight;
   indirect *= here.weight;
@@ -255,14 +262,24 @@ void main()
   if (refracts) {
     // How much of the world shows through is the nearest pixel's, by the lobes' weights.
     float share = luminance(here.weight) / max(luminance(seen_there(nearest).weight), 1e-6);
-    out_transmission_direct = vec4(direct, light_transmission_direct_fetch(nearest).a * min(share, 4.0));
-    out_transmission_indirect = vec4(indirect, light_transmission_indirect_fetch(nearest).a * min(share, 4.0));
-    return;
+    light.transmission_direct = vec4(direct, light_transmission_direct_fetch(nearest).a * min(share, 4.0));
+    light.transmission_indirect = vec4(indirect, light_transmission_indirect_fetch(nearest).a * min(share, 4.0));
+    return light;
   }
 #endif
 #ifdef REPEATED
   direct *= own ? 1.0 : 0.0;
 #endif
-  out_glossy_direct.rgb = direct;
-  out_glossy_indirect.rgb = indirect;
+  light.glossy_direct.rgb = direct;
+  light.glossy_indirect.rgb = indirect;
+  return light;
+}
+
+void main()
+{
+  Reflected light = reflected(ivec2(gl_FragCoord.xy));
+#ifdef REPEATED
+  gl_FragDepth = light.repeated ? 1.0 : 0.0;
+#endif
+  WRITE_ALL
 }

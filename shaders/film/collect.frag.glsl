@@ -1,4 +1,5 @@
-// What does not depend on lights: emission, the visible world, colours and normals of this sample.
+// What does not depend on lights: emission, the visible world, colours and normals of this sample. NOT_DRAWN: outputs
+// that this picture does not hold, declared; SUM_ALL: the sum of light that is not held apart (film/together.py).
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
 #ifdef SOFT_LOBES
@@ -12,6 +13,7 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   Surface s = SURFACE_READ(pixel);
+  NOT_DRAWN
   out_emission = vec4(0.0);
   out_environment = vec4(0.0);
   out_diffuse_color = vec4(vec3(0.0), mist.w);
@@ -94,4 +96,5 @@ void main()
     }
   }
 #endif
+  SUM_ALL
 }

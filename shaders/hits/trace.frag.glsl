@@ -38,18 +38,22 @@ void main()
   if (t >= 1e29) {
     return;
   }
-  int base = hit.x * LEAF_TEXELS;
-  int k = hit.y;
   vec2 along = triangle_place(hit, start.xyz + t * direction);
-  vec3 corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
-  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
-  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  vec3 corner;
+  vec3 e1;
+  vec3 e2;
+  triangle_edges(hit, corner, e1, e2);
   // By the plane of the triangle: a long ray's own end lies beside it.
   vec3 position = corner + along.x * e1 + along.y * e2;
   vec3 normal = safe_normalize(cross(e1, e2));
   vec3 shading = triangle_shading_normal(hit, position);
-  int material_index = int(leaf_texel(base + MATERIAL_TEXEL)[k] + 0.5);
-  vec4 owner = owner_texel((hit.x - first_leaf) * 4 + k);
+  int material_index = triangle_material(hit);
+  vec4 owner = owner_texel((hit.x - first_leaf) * 4 + HIT_SLOT(hit));
+#ifdef INSTANCED
+  if (HIT_RECORD(hit) != 0) {  // of trees that copies share: the list begins with the rows of all instances
+    owner.x = owner_texel(int(node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).y)).x;
+  }
+#endif
   out_place = vec4(position, max(start.w + spread * t, 1e-30));
   out_triangle = vec4(owner.xy, along);
   out_normals = vec4(octahedral_encode(normal), octahedral_encode(shading));

@@ -50,14 +50,14 @@ bool pixel_of(vec3 position, vec3 normal, out ivec2 pixel, out float slant, out 
 // Mean reflectance of the material of a triangle that a ray has met.
 vec3 mean_albedo(ivec2 hit)
 {
-  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  int material = triangle_material(hit);
   return reflectance_fetch(ivec2(material & 15, material >> 4)).rgb;
 }
 
 // The same as a diffuse part and a lobe.
 Reflection mean_reflection(ivec2 hit)
 {
-  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  int material = triangle_material(hit);
   ivec2 place = ivec2(material & 15, material >> 4);
   int rows = reflectance_size().y / REFLECTANCE_BANDS;
   vec4 straight = reflectance_fetch(place + ivec2(0, 2 * rows));
@@ -107,7 +107,7 @@ bool trace_vertex(vec3 origin, vec3 direction, float limit, uint salt, out Verte
   }
   met.reflection = reflection_at(hit, met.position, met.normal);
 #ifdef MIRRORS_OWNED
-  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  int material = triangle_material(hit);
   met.photons = reflectance_fetch(ivec2(material & 15, material >> 4)).a > 0.5;
 #endif
   met.lit = met.normal;

@@ -196,7 +196,7 @@ void main()
 #else
     position = origin + t * direction;
     roll = hash3(roll + uvec3(uint(step), 0u, 0u));
-    int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+    int material = triangle_material(hit);
     vec4 glass = interface_table_fetch(ivec2(0, material));
     vec4 shape = interface_table_fetch(ivec2(1, material));
     vec3 smooth_normal = triangle_shading_normal(hit, position);

@@ -124,7 +124,7 @@ void main()
     flux *= media_transmittance(position, direction, t, seed + uint(i));  // in glass, too: fog fills what stands in it
     travelled += t;
     position += t * direction;
-    int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+    int material = triangle_material(hit);
     vec4 glass = beam_table_fetch(ivec2(0, material));
     vec4 kind = beam_table_fetch(ivec2(1, material));
     vec3 normal = triangle_normal(hit);

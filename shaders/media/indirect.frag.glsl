@@ -13,7 +13,7 @@
 
 vec3 mean_albedo(ivec2 hit)
 {
-  int material = int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[hit.y] + 0.5);
+  int material = triangle_material(hit);
   return reflectance_fetch(ivec2(material & 15, material >> 4)).rgb;
 }
 

@@ -2,19 +2,35 @@
 //
 // Where some triangles are opaque place by place, OPACITY_TILES is defined (the image of the leaves sees to it).
 //
+// Where meshes have trees of their own, INSTANCED is defined: leaves of the upper tree are records of instances, which lead
+// a ray into a mesh's tree, in the mesh's own space. There its direction is not of length one, so that distances stay those
+// of the world. Such hits hold the node number of the record above the slot's two bits.
+//
 // The tree is four-wide. A stack holds nodes of which some children are still to visit, and those children as four bits. Its
 // top is a number of its own, `top`, since most entries are taken off before another is put on them.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 
 #define NODE_TEXELS 4
-#define DEEPEST 32  // nodes above each other, as in addon/scene/box_tree.py
+#ifdef INSTANCED
+#define DEEPEST 66  // nodes above each other, in two trees
+#else
+#define DEEPEST 32  // as in addon/scene/box_tree.py
+#endif
 #define LEAF_TEXELS 17
 #define OPACITY_TEXEL 9  // opacity_of_four
 #define SIDES 2048.0     // one more than what an opaque side has
 #define MAPPED 4.0       // from here on a code tells of a tile
 #define MATERIAL_TEXEL 13  // its number; .25 more or less: the triangle emits to its front or to its back alone
 #define NORMAL_TEXEL 14
+#ifdef INSTANCED
+#define HIT_SLOT(hit) (hit.y & 3)
+#define HIT_RECORD(hit) (hit.y >> 2)
+#define BOTTOM bottom  // of the stack: what lies below belongs to the upper tree
+#else
+#define HIT_SLOT(hit) hit.y
+#define BOTTOM 0
+#endif
 
 vec4 node_texel(int index)
 {
@@ -79,14 +95,48 @@ vec4 intersect_four(Four f, vec3 origin, vec3 direction, out vec4 facing)
   return mix(t, vec4(1e30), equal(determinant, vec4(0.0)));
 }
 
+#ifdef INSTANCED
+// Records of instances lie among the nodes, two nodes long: the rows that take places into the mesh's space; the root of
+// its tree, which of the hierarchy's instances it is, and -1 where it is mirrored; the rows of the way back.
+vec3 record_turned(int record, vec3 v)
+{
+  int base = record * NODE_TEXELS;
+  return vec3(dot(node_texel(base).xyz, v), dot(node_texel(base + 1).xyz, v), dot(node_texel(base + 2).xyz, v));
+}
+
+vec3 record_placed(int record, vec3 position)
+{
+  int base = record * NODE_TEXELS;
+  vec4 p = vec4(position, 1.0);
+  return vec3(dot(node_texel(base), p), dot(node_texel(base + 1), p), dot(node_texel(base + 2), p));
+}
+#endif
+
+// The first corner of a triangle and its two edges.
+void triangle_edges(ivec2 hit, out vec3 corner, out vec3 e1, out vec3 e2)
+{
+  int base = hit.x * LEAF_TEXELS;
+  int k = HIT_SLOT(hit);
+  corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
+  e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
+  e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+#ifdef INSTANCED
+  if (HIT_RECORD(hit) != 0) {
+    int back = HIT_RECORD(hit) + 1;  // the second half of the record
+    corner = record_placed(back, corner);
+    e1 = record_turned(back, e1);
+    e2 = record_turned(back, e2);
+  }
+#endif
+}
+
 // How far a place on a triangle is along its two edges.
 vec2 triangle_place(ivec2 hit, vec3 position)
 {
-  int base = hit.x * LEAF_TEXELS;
-  int k = hit.y;
-  vec3 corner = vec3(leaf_texel(base)[k], leaf_texel(base + 1)[k], leaf_texel(base + 2)[k]);
-  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
-  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  vec3 corner;
+  vec3 e1;
+  vec3 e2;
+  triangle_edges(hit, corner, e1, e2);
   vec3 across = cross(e1, e2);
   vec3 offset = position - corner;
   return vec2(dot(cross(offset, e2), across), dot(cross(e1, offset), across)) / max(dot(across, across), 1e-37);
@@ -140,6 +190,9 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
 struct Place {
   int index;
   bool leaf;
+#ifdef INSTANCED
+  bool record;  // of an instance, by the number of its node
+#endif
 };
 
 // Child of a node. Those that are nodes come first, and those of either kind follow each other.
@@ -150,6 +203,10 @@ Place node_child(int node, int child)
   Place place;
   place.leaf = child >= nodes;
   place.index = place.leaf ? int(links.y) + child - nodes : int(links.x) + child;
+#ifdef INSTANCED
+  place.record = place.leaf && links.w != 0.0;
+  place.index += place.record ? child - nodes : 0;
+#endif
   return place;
 }
 
@@ -209,6 +266,30 @@ uint boxes_met(Boxes b, vec3 origin, vec3 inverse, float reach, out vec4 enter)
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }
 
+// The nearest triangle of a leaf that stops a ray before `nearest`, which it then is, if there is one.
+void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool bent, bool shadow, inout float nearest,
+              inout ivec2 hit)
+{
+  vec4 facing;
+  vec4 t = intersect_four(four_read(leaf), origin, direction, facing);
+  float best = min(min(t.x, t.y), min(t.z, t.w));
+  if (best < nearest) {
+    vec4 opacity = opacity_of_four(leaf, t, nearest, origin, direction, facing, bent, shadow);
+#ifdef OPAQUE_ONLY
+    opacity = floor(opacity);
+#endif
+    uint roll = hash3(uvec3(uint(leaf), salt, 77u + uint(record))).x;
+    vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
+                       to_unit(roll * 277803737u + 7u));
+    t = mix(vec4(1e30), t, lessThan(chance, opacity));
+    best = min(min(t.x, t.y), min(t.z, t.w));
+    if (best < nearest) {
+      nearest = best;
+      hit = ivec2(leaf, (record << 2) + ((best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3));
+    }
+  }
+}
+
 // Distance along the unit `direction` to the nearest triangle before `limit`, or `limit`; `hit` is its leaf and its
 // number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
 // Triangles with an opacity below one are passed at random, the same way for the same `salt`; those that may bend light
@@ -223,6 +304,13 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
   Place place;
   place.index = 0;
   place.leaf = false;
+#ifdef INSTANCED
+  place.record = false;
+  vec3 world_origin = origin;
+  vec3 world_direction = direction;
+  int inside = 0;  // record of the instance that the ray is in
+  int bottom = 0;
+#endif
   uint pending[DEEPEST];  // node, and as its last four bits the children still to visit
   int height = 0;
   uint top = 0u;
@@ -250,7 +338,7 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
       }
       else if (!none_pending(top)) {
         child = next_pending(top, node);
-        if (none_pending(top) && height > 0) {
+        if (none_pending(top) && height > BOTTOM) {
           height--;
           top = pending[height];
         }
@@ -262,33 +350,54 @@ float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint 
         place = node_child(node, child);
       }
     }
+#ifdef INSTANCED
+    // Into an instance, and out again, here, where rays of a group are together.
+    if (more && place.record) {
+      if (!none_pending(top)) {
+        pending[height] = top;
+        height++;
+      }
+      top = 0u;
+      bottom = height;
+      inside = place.index;
+      origin = record_placed(inside, world_origin);
+      direction = record_turned(inside, world_direction);
+      inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
+      place.index = int(node_texel(inside * NODE_TEXELS + 3).x);
+      place.leaf = false;
+      continue;
+    }
+    if (more) {
+      leaf_met(place.index, inside, origin, direction, salt, bent, shadow, nearest, hit);
+    }
+#else
     if (!more) {
       break;
     }
-    vec4 facing;
-    vec4 t = intersect_four(four_read(place.index), origin, direction, facing);
-    float best = min(min(t.x, t.y), min(t.z, t.w));
-    if (best < nearest) {
-      vec4 opacity = opacity_of_four(place.index, t, nearest, origin, direction, facing, bent, shadow);
-#ifdef OPAQUE_ONLY
-      opacity = floor(opacity);
+    leaf_met(place.index, 0, origin, direction, salt, bent, shadow, nearest, hit);
 #endif
-      uint roll = hash3(uvec3(uint(place.index), salt, 77u)).x;
-      vec4 chance = vec4(to_unit(roll), to_unit(roll * 747796405u + 1u), to_unit(roll * 2891336453u + 3u),
-                         to_unit(roll * 277803737u + 7u));
-      t = mix(vec4(1e30), t, lessThan(chance, opacity));
-      best = min(min(t.x, t.y), min(t.z, t.w));
-      if (best < nearest) {
-        nearest = best;
-        hit = ivec2(place.index, (best == t.x) ? 0 : (best == t.y) ? 1 : (best == t.z) ? 2 : 3);
+    if (nearest < enough) {
+      break;
+    }
+#ifdef INSTANCED
+    if (none_pending(top) && inside != 0) {
+      inside = 0;
+      bottom = 0;
+      origin = world_origin;
+      direction = world_direction;
+      inverse = vec3(1.0) / mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
+      if (height > 0) {
+        height--;
+        top = pending[height];
       }
     }
-    if (nearest < enough || none_pending(top)) {
+#endif
+    if (none_pending(top)) {
       break;
     }
     int above;
     int child = next_pending(top, above);
-    if (none_pending(top) && height > 0) {
+    if (none_pending(top) && height > BOTTOM) {
       height--;
       top = pending[height];
     }
@@ -316,31 +425,54 @@ float trace_nearest(vec3 origin, vec3 direction, float limit, uint salt, out ive
 // Unit normal of a triangle.
 vec3 triangle_normal(ivec2 hit)
 {
-  int base = hit.x * LEAF_TEXELS;
-  int k = hit.y;
-  vec3 e1 = vec3(leaf_texel(base + 3)[k], leaf_texel(base + 4)[k], leaf_texel(base + 5)[k]);
-  vec3 e2 = vec3(leaf_texel(base + 6)[k], leaf_texel(base + 7)[k], leaf_texel(base + 8)[k]);
+  vec3 corner;
+  vec3 e1;
+  vec3 e2;
+  triangle_edges(hit, corner, e1, e2);
   return safe_normalize(cross(e1, e2));
+}
+
+// The number of a triangle's material.
+int triangle_material(ivec2 hit)
+{
+  return int(leaf_texel(hit.x * LEAF_TEXELS + MATERIAL_TEXEL)[HIT_SLOT(hit)] + 0.5);
 }
 
 // Radiance that a triangle emits (mean over its material) to where a ray along `direction` comes from; and its normal.
 vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)
 {
   int base = hit.x * LEAF_TEXELS;
-  int k = hit.y;
+  int k = HIT_SLOT(hit);
   normal = triangle_normal(hit);
   float material = leaf_texel(base + MATERIAL_TEXEL)[k];
-  bool dark = (material - floor(material + 0.5)) * dot(normal, direction) > 0.0;
+  float side = material - floor(material + 0.5);
+#ifdef INSTANCED
+  if (HIT_RECORD(hit) != 0) {
+    side *= node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).z;
+  }
+#endif
+  bool dark = side * dot(normal, direction) > 0.0;
   return dark ? vec3(0.0) : vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
+}
+
+vec3 corner_normal(ivec2 hit, int corner)
+{
+  vec3 normal = unpack_normal(leaf_texel(hit.x * LEAF_TEXELS + NORMAL_TEXEL + corner)[HIT_SLOT(hit)]);
+#ifdef INSTANCED
+  if (HIT_RECORD(hit) != 0) {
+    int base = HIT_RECORD(hit) * NODE_TEXELS;
+    normal = safe_normalize(normal.x * node_texel(base).xyz + normal.y * node_texel(base + 1).xyz
+                            + normal.z * node_texel(base + 2).xyz);
+  }
+#endif
+  return normal;
 }
 
 // Unit shading normal of a triangle where a ray meets it, interpolated between its corners.
 vec3 triangle_shading_normal(ivec2 hit, vec3 position)
 {
-  int base = hit.x * LEAF_TEXELS + NORMAL_TEXEL;
-  int k = hit.y;
   vec2 place = triangle_place(hit, position);
-  vec3 normal = (1.0 - place.x - place.y) * unpack_normal(leaf_texel(base)[k])
-                + place.x * unpack_normal(leaf_texel(base + 1)[k]) + place.y * unpack_normal(leaf_texel(base + 2)[k]);
+  vec3 normal = (1.0 - place.x - place.y) * corner_normal(hit, 0) + place.x * corner_normal(hit, 1)
+                + place.y * corner_normal(hit, 2);
   return safe_normalize(normal);
 }

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.gfx import images
 from addon.scene import acceleration
 
 
@@ -13,28 +14,48 @@ def triangles(gpu_context):
     return corners.astype(np.float32), rng.uniform(0, 1, (300, 8))
 
 
-def test_refitted_tree_is_that_of_the_moved_triangles_in_the_old_order(triangles):
+def test_moved_triangles_keep_their_places_and_boxes_follow_them(triangles):
     corners, look = triangles
     numbers = np.arange(40, 70)
     moved = corners.copy()
     moved[numbers] += np.float32(2.5)
-    tree = acceleration.build(corners, look)
-    order = tree.place.copy()
-    found = acceleration.refit(tree, numbers, moved[numbers], look[numbers])
-    assert found.refitted and not tree.refitted
-    assert np.array_equal(found.place, order)
+    trees = acceleration.build(corners, look)
+    order = trees.world.place.copy()
+    assert trees.move(numbers, (moved[numbers], look[numbers]), {}) and trees.moved
+    tree = trees.world
+    assert np.array_equal(tree.place, order)
     leaf, slot = order // acceleration.LEAF, order % acceleration.LEAF
-    assert np.array_equal(found.leaves[leaf, :3, slot], moved[:, 0])
-    assert np.array_equal(found.leaves[leaf, 3:6, slot], moved[:, 1] - moved[:, 0])
-    assert np.array_equal(found.low[order], moved.min(axis=1))
-    assert np.array_equal(found.high[order], moved.max(axis=1))
+    assert np.array_equal(tree.leaves[leaf, :3, slot], moved[:, 0])
+    assert np.array_equal(tree.leaves[leaf, 3:6, slot], moved[:, 1] - moved[:, 0])
+    assert np.array_equal(tree.low[order], moved.min(axis=1))
+    assert np.array_equal(tree.high[order], moved.max(axis=1))
 
 
-def test_triangle_that_is_not_finite_is_left_out_and_not_refitted(triangles):
+def test_nodes_above_what_moved_are_those_of_boxes_made_anew(triangles):
+    corners, look = triangles
+    trees = acceleration.build(corners, look)
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        numbers = rng.choice(300, 20, replace=False)
+        corners[numbers] += rng.uniform(-1, 1, (20, 1, 3)).astype(np.float32)
+        assert trees.move(numbers, (corners[numbers], look[numbers]), {})
+    boxes = trees.world.boxes
+    whole = acceleration.NodeBoxes(boxes.tree, *acceleration._of_leaves(trees.world.low, trees.world.high))
+    assert np.array_equal(boxes.low, whole.low) and np.array_equal(boxes.high, whole.high)
+    assert boxes.cost() == whole.cost() > trees.world.cost
+    # The images hold the same as the CPU's side.
+    nodes = images.read(trees.hierarchy.nodes).reshape(-1, 4)[: 4 * len(boxes.rows)]
+    assert np.array_equal(nodes.reshape(boxes.rows.shape), boxes.rows)
+    leaves = images.read(trees.hierarchy.leaves).reshape(-1, 4)[: trees.world.leaves.size // 4]
+    assert np.array_equal(leaves.ravel(), trees.world.leaves.ravel())
+
+
+def test_triangle_that_is_not_finite_is_left_out_and_not_moved(triangles):
     corners, look = triangles
     corners[3, 1, 2] = np.nan
-    tree = acceleration.build(corners, look)
-    assert tree.hierarchy.triangles == 299
-    assert tree.place[3] == -1 and len(set(np.delete(tree.place, 3))) == 299
-    assert acceleration.refit(tree, np.array([3]), np.zeros((1, 3, 3), np.float32), look[:1]) is None
-    assert acceleration.refit(tree, np.array([4]), corners[3:4], look[:1]) is None
+    trees = acceleration.build(corners, look)
+    assert trees.hierarchy.triangles == 299
+    place = trees.world.place
+    assert place[3] == -1 and len(set(np.delete(place, 3))) == 299
+    assert not trees.move(np.array([3]), (np.zeros((1, 3, 3), np.float32), look[:1]), {})
+    assert not trees.move(np.array([4]), (corners[3:4], look[:1]), {})

@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from addon.film import point_costs
 from addon.frame import device_probe
 from addon.gfx import context, device
 from addon.lighting import visibility
@@ -66,6 +67,24 @@ def test_the_plan_foresees_the_same_choice(room):
         device.use(figures)
         (sentence,) = visibility.foreseen(snapshot, settings)
         assert f": {method}, because" in sentence
+
+
+def test_film_points_differ_between_two_devices_and_ledger_and_plan_say_why(room):
+    """On one card triangles cost nothing, on the other all that there is."""
+    import bpy
+
+    room.scene.candela.film_points, room.scene.render.filter_size = 8, 1.5
+    said = {}
+    for drawer, count in ((replace(SOFTWARE, triangle=1e-3), 8), (replace(SOFTWARE, triangle=1e9), 4)):
+        device.use(drawer)
+        room.render(1, seed=count, bounces=1)
+        assert room.ledger.row("film").counters["points"] == count
+        snapshot = take(bpy.context.evaluated_depsgraph_get(), SnapshotCache(), 32, 32)
+        (foreseen,) = point_costs.foreseen(snapshot, 8, 1, indirect=True)
+        said[count] = foreseen.removeprefix("Film points: ")
+        assert f"points: {said[count]}" in room.ledger.row("film").choices
+    assert said[8].startswith("8 a sample; one takes ") and said[8].endswith(" of light here")
+    assert said[4].startswith("4 a sample of 8, because one takes ")
 
 
 def test_figures_are_measured_once_and_kept_for_this_driver(unknown):

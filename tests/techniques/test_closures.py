@@ -333,7 +333,7 @@ def test_a_sweep_of_principled_is_lit_as_in_cycles(stage, light, sweep):
     else:
         studio(stage)
     size = (CELL * COLUMNS, CELL * rows)
-    samples = 512 if sweep is LIT_GLASS else 128
+    samples = 256 if sweep is LIT_GLASS else 128
     ours, cycles = stage.render(samples, size), stage.render(1024, size, engine="CYCLES")
     found, expected = (
         light_paths(images)["direct_light"] - images["environment"][..., :3] for images in (ours, cycles)

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.frame.run import ORTHOGRAPHIC_DISTANCE
+from addon.frame.picture import ORTHOGRAPHIC_DISTANCE
 from addon.techniques.directional_occlusion import blurred
 from tests.techniques.conftest import places
 from tests.techniques.test_environment_light import sky

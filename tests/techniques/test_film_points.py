@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from addon.compare.passes import light_paths
-from addon.film.points import MOST, count_of
+from addon.film.point_costs import MOST, count_of
 
 SIZE = (24, 24)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addon.compare.metrics import relative_squared_error
-from addon.frame.run import Frame
+from addon.frame.picture import Frame
 
 SIZE = (64, 48)
 

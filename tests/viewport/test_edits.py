@@ -6,6 +6,7 @@ import pytest
 
 from addon.frame import ledger
 from addon.gfx import images
+from addon.scene import acceleration, instance_tree
 from tests.viewport.region import Region
 
 
@@ -77,6 +78,27 @@ def test_draft_after_an_edit_is_that_of_a_new_viewport(scene, region, edit):
     fresh = images.read(other.draw())
     other.viewport.release()
     assert np.isclose(picture, fresh, rtol=1e-3, atol=1e-4).all(axis=-1).mean() > 0.98
+
+
+@pytest.mark.parametrize("own_trees", [False, True])
+def test_view_at_rest_keeps_a_large_tree_after_a_move(scene, region, monkeypatch, own_trees):
+    """Small ones are built anew; so this one counts as large, and in turn all meshes have trees of their own."""
+    monkeypatch.setattr(acceleration, "ALWAYS_FRESH", 0)
+    monkeypatch.setattr(instance_tree, "OWN_TREE", 0 if own_trees else 10**9)
+    scene.candela.bounces = 2
+    for k in range(4):
+        bpy.ops.mesh.primitive_torus_add(location=(k - 1.5, -1.5, 0.5), major_segments=12, minor_segments=6)
+    region.rest()
+    made, tree = [], acceleration.Tree
+    monkeypatch.setattr(acceleration, "Tree", lambda *given: made.append(1) or tree(*given))
+    bpy.data.objects["Torus"].location.z += 0.1
+    region.viewport.dirty = True
+    moved = region.rest()
+    assert not made
+    other = Region()
+    fresh = other.rest()
+    other.viewport.release()
+    assert made and np.isclose(moved, fresh, rtol=1e-3, atol=1e-4).all(axis=-1).mean() > 0.95
 
 
 def test_more_samples_continue_where_it_rested(scene, region):

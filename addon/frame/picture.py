@@ -1,0 +1,345 @@
+"""One picture in the making: what techniques see while it is drawn, and by which they know of each other.
+
+A frame holds the scene, the settings and the plan of one picture, its images by name, and what is drawn now: which
+sample, through which point of the film and of the aperture. Services, shared objects and counters go through it, so
+that techniques need not import one another. Frames are made by the renderer (run.py), which takes back their images.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from ..gfx import images
+from ..gfx.readback import Readback, Reading
+from ..gfx.struct import Block
+from ..gfx.timing import Profiler
+from ..materials.compiled import CompiledMaterial
+from ..sampling.lens import point_of
+from ..sampling.sequence import FILM, LENS, lot, point, third
+from ..scene.acceleration import Hierarchy, HierarchyCache
+from ..scene.emission_maps import EmissionMaps
+from ..scene.geometry import SceneGeometry
+from ..scene.materials import MaterialSet
+from ..scene.opacity_maps import OpacityMaps
+from ..scene.receivers import Receivers
+from ..scene.surface_means import SurfaceMeans
+from ..scene.view import View, blackman_harris_offset
+from ..snapshot.scene import Snapshot
+from ..sources.environment import Environment
+from ..sources.lamp_maps import LampMaps
+from ..sources.lights import Emitter, emitters
+from .bands import Bands
+from .ledger import Ledger
+from .plan import Plan
+from .settings import Settings
+from .technique import Service, Technique, Write
+from .texel_counters import TexelCounters
+
+ServiceT = TypeVar("ServiceT", bound=Service)
+SharedT = TypeVar("SharedT")
+
+FOOTPRINT = 0.96  # side of a square that deviates as much as a pixel filter of half width 1
+FAR_BEYOND = 300.0  # by the typical distance of what is seen
+ORTHOGRAPHIC_DISTANCE = 1.4  # by the width of what is seen: a lens of 50 mm before a sensor of 36 mm
+
+
+@dataclass
+class Frame:
+    """One picture in the making: what a technique sees while it runs."""
+
+    snapshot: Snapshot
+    settings: Settings
+    view: View
+    plan: Plan
+    geometry: SceneGeometry
+    materials: MaterialSet
+    environment: Environment
+    images: dict[str, images.Image]
+    profiler: Profiler
+    ledger: Ledger
+    view_block: Block
+    hierarchies: HierarchyCache
+    surface_means: SurfaceMeans
+    measured_opacity: OpacityMaps
+    measured_emission: EmissionMaps
+    lamp_maps: LampMaps
+    view_rows: np.ndarray | None = None  # (4, 4) this sample's projection: rows x, y, w, q
+    sample: int = 0  # the sample that is running
+    film_points: int = 1  # that a sample shows; the surface technique says it before it looks
+    samples_done: int = 0
+    numbers: tuple[int, ...] | None = None  # of the picture's samples, those that are drawn; None: the settings' slice
+    first_part: int | None = None  # samples in the sums of half the samples, where they are not half (time_steps.py)
+    drawn_s: float = 0.0  # seconds that the samples took so far, without what others did between their parts
+    find_receivers: Callable[[], Receivers] | None = None
+    counters: dict[str, dict[str, int]] = field(default_factory=dict)
+    shared_out: Bands | None = None  # for a picture that is drawn between other work
+    shown: dict[str, str] = field(default_factory=dict)  # sums, and the images that show them better, as sums, too
+    picture: str = "film.combined"  # the image that is shown; a technique that shows another one says so in `show`
+    needless: dict[str, str] = field(default_factory=dict)  # why a technique found nothing to do, by name; see `leave`
+    choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
+    lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
+    more_writes: list[Write] = field(default_factory=list)  # see `add_write`
+    readback: Readback = field(default_factory=Readback)
+    _services: dict[type[Service], Service] = field(default_factory=dict)
+    _shared: dict[type, object] = field(default_factory=dict)
+    _targets: dict[tuple[str, ...], images.Target] = field(default_factory=dict)
+    _hierarchies: dict[tuple, Hierarchy | None] = field(default_factory=dict)  # of this frame, see `hierarchy`
+    _receivers: Receivers | None = None
+    _film_offsets: dict[int, tuple[float, float]] = field(default_factory=dict)
+    _texel_counters: TexelCounters = field(default_factory=TexelCounters)
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        return self.view.size
+
+    @property
+    def is_first(self) -> bool:
+        """Whether the first sample is running: for counters that are the same in each sample, read once."""
+        return self.sample == 0
+
+    @property
+    def samples_to_draw(self) -> int:
+        return self.settings.samples_to_draw if self.numbers is None else len(self.numbers)
+
+    def number_of(self, drawn: int) -> int:
+        """Which of the picture's samples is drawn after `drawn` others."""
+        return self.settings.sample_offset + drawn if self.numbers is None else self.numbers[drawn]
+
+    @property
+    def receivers(self) -> Receivers | None:
+        """Boxes around what the camera sees; None where no technique finds any. The first question may wait for the
+        GPU: what can be drawn before is."""
+        if self._receivers is None and self.find_receivers is not None:
+            self._receivers, self.find_receivers = self.find_receivers(), None
+        return self._receivers
+
+    def read_later(self, image: images.Image) -> Reading:
+        """Read an image of the pool, together with others, when one of them is asked for; the pool gets it back."""
+        return self.readback.later(image)
+
+    def is_apart(self, name: str) -> bool:
+        """Whether anybody looks at this sum over samples by itself: whoever asked for the picture, or a technique."""
+        return self.settings.shows is None or name in self._looked_at
+
+    @cached_property
+    def _looked_at(self) -> frozenset[str]:
+        needs = (technique.looks_at(self.settings) for technique in self.plan.techniques)
+        return self.settings.shows.union(*needs)
+
+    @cached_property
+    def emitters(self) -> list[Emitter]:
+        """The scene's lights that give something, in an order of their own."""
+        return emitters(self.snapshot, self.geometry.origin, self.lamp_maps)
+
+    def random(self, use: str) -> tuple[float, float]:
+        """This sample's point of the sequence for `use`."""
+        return point(self.sample, use, self.settings.seed)
+
+    def random_at(self, index: int, use: str) -> tuple[float, float]:
+        """Point `index` of the sequence for `use`, for uses that take more or fewer points than samples."""
+        return point(index, use, self.settings.seed)
+
+    def lot(self, use: str) -> float:
+        """A number of this sample that chooses among things, of which the chosen one then draws a point."""
+        return lot(self.sample, use, self.settings.seed)
+
+    def random_volume_at(self, index: int, use: str) -> tuple[float, float, float]:
+        """The same with a third number."""
+        return *self.random_at(index, use), third(index, use, self.settings.seed)
+
+    def random_volume(self, use: str) -> tuple[float, float, float]:
+        """The same with a third number."""
+        return *self.random(use), third(self.sample, use, self.settings.seed)
+
+    def look(self, lens: tuple[float, float] | None = None, film: int | None = None) -> None:
+        """Set the view of this sample: its place on the film and, unless `lens` says another (as View.values), its
+        point of the aperture. The first sample looks through the middle of both: as in Cycles depth is taken from it,
+        and a picture that just began is sharp. `film`: the number of another point of the film, with which layers are
+        drawn at random anew, too.
+        """
+        settings, aperture = self.settings, self.snapshot.camera.aperture
+        number = self.sample if film is None else film
+        if lens is None:
+            lens = point_of(aperture, *self.random(LENS)) if aperture else (0.0, 0.0)
+        values = self.view.values(
+            number, settings.seed, self.film_offset(number), self.geometry.size, lens, self._footprints()
+        )
+        self.view_block.update(**values)
+        self.view_rows = np.stack([values[f"row_{name}"] for name in "xywq"])
+
+    def _footprints(self) -> tuple[float, float]:
+        """Sides in pixels of the squares over which lookups of textures average (materials/averages.py). All samples
+        of a picture, and their points of the film, share what the pixel filter covers; where any number of samples may
+        be shown, sample n takes the n-th of it."""
+        samples = self.settings.samples if self.settings.whole else self.sample + 1
+        side = FOOTPRINT * self.snapshot.film.filter_width * (self.film_points * samples) ** -0.5
+        return side, side if self.is_first else 0.0
+
+    def film_offset(self, number: int) -> tuple[float, float]:
+        """Where point `number` of the film lies, in pixels from a pixel's middle."""
+        found = self._film_offsets.get(number)
+        if found is None:
+            width, (x, y) = self.snapshot.film.filter_width, self.random_at(number, FILM)
+            found = blackman_harris_offset(x, width), blackman_harris_offset(y, width)
+            self._film_offsets[number] = found
+        return found
+
+    @property
+    def typical_distance(self) -> float:
+        """Of what is seen, m; of an orthographic camera that from which a common lens would see as much, since its own
+        place says nothing. Asked where there are receivers."""
+        camera = self.snapshot.camera
+        if camera.kind == "ORTHOGRAPHIC":
+            left, right, bottom, top = camera.frame
+            return ORTHOGRAPHIC_DISTANCE * max(right - left, top - bottom)
+        return self.receivers.typical_distance
+
+    @property
+    def offset_size(self) -> float:
+        """How far beside a surface rays begin at least, m: what float32 may be wrong about a position. Of a scene that
+        reaches far beyond what is seen (a sky of some kilometres), only what is seen counts."""
+        seen = self.receivers is not None and len(self.receivers.distance)
+        reach = FAR_BEYOND * self.typical_distance if seen else np.inf
+        return 1e-6 * min(self.geometry.size, reach)
+
+    @cached_property
+    def blocker_sets(self) -> frozenset[frozenset[int]]:
+        """Groups of blockers that lights let pass, all that differ."""
+        snapshot = self.snapshot
+        return frozenset(one.links.passing for one in (*snapshot.lights, *snapshot.instances) if one.links.passing)
+
+    @cached_property
+    def measured_materials(self) -> list[CompiledMaterial]:
+        """The scene's materials, with the means that they have on the surfaces that show them."""
+        return self.surface_means.of(self.materials, self.geometry)
+
+    @cached_property
+    def opacity_maps(self) -> OpacityMaps:
+        """How opaque triangles are, place by place."""
+        self.measured_opacity.update(self.materials, self.geometry)
+        return self.measured_opacity
+
+    @cached_property
+    def emission_maps(self) -> EmissionMaps:
+        """What triangles emit, place by place, where that varies."""
+        self.measured_emission.update(self.materials, self.geometry)
+        return self.measured_emission
+
+    def hierarchy(self, path: str = "glossy", passing: frozenset[int] = frozenset()) -> Hierarchy | None:
+        """Triangles that rays of a path (a name of Visibility) can meet, without objects of the groups of blockers
+        `passing` (snapshot/linking.py); None where there are too many. Built on the first call."""
+        key = path, passing
+        if key not in self._hierarchies:  # to find it again each sample would mean to go through all instances
+            self._hierarchies[key] = self.hierarchies.get(self, path, passing)
+        return self._hierarchies[key]
+
+    def provide(self, service: Service, kind: type[Service] | None = None) -> None:
+        """Hand a service to the other techniques of this picture, as one of its class, or of the base `kind`."""
+        self._services[kind or type(service)] = service
+
+    def service(self, kind: type[ServiceT]) -> ServiceT | None:
+        """The service of this class; None where no technique has provided one."""
+        return self._services.get(kind)
+
+    def shared(self, kind: type[SharedT]) -> SharedT:
+        """The one object of a class that all techniques share in this picture, made by `kind()` when first asked."""
+        if kind not in self._shared:
+            self._shared[kind] = kind()
+        return self._shared[kind]
+
+    def kept(self, kind: type[SharedT]) -> SharedT:
+        """The same, kept from picture to picture. Where it has `release`, that is called with the renderer's."""
+        if kind not in self.lasting:
+            self.lasting[kind] = kind()
+        return self.lasting[kind]
+
+    def owned(self, transport: str) -> bool:
+        """Whether a technique of the plan takes over this kind of transport (light_paths.TRANSPORTS)."""
+        return self.plan.owner(transport) is not None
+
+    @property
+    def shown_with(self) -> tuple:
+        """What decides how the samples so far are shown: where it differs, `show` shows them otherwise."""
+        showing = [technique for technique in self.plan.techniques if technique.only_shows]
+        return tuple((t.name, self.settings.of(t), self.snapshot.moment) for t in showing)
+
+    def count(self, technique: Technique, name: str, amount: int = 1) -> None:
+        """Add to a counter of the technique's ledger row."""
+        row = self.counters.setdefault(technique.name, {})
+        row[name] = row.get(name, 0) + amount
+
+    def chose(self, technique: Technique, of: str, why: str) -> None:
+        """Between methods, by what they cost on this device: the ledger's row says it."""
+        self.choices.setdefault(technique.name, {})[of] = why
+
+    def count_texel(
+        self, technique: Technique, name: str, image: images.Image, factor: int = 1, at: tuple[int, int] = (0, 0)
+    ) -> None:
+        """Add the first number of an image's texel, times `factor`, to a counter, without reading it now: it comes with
+        the picture. Sums below 2^24 are exact."""
+        self._texel_counters.add((technique.name, name, factor), image, at)
+
+    def read_with_counters(self, image: images.Image | None) -> np.ndarray | None:
+        """An image's pixels; what `count_texel` has counted is read with them, and added to the counters."""
+        pixels, found = self._texel_counters.read(image)
+        for (technique, name, factor), amount in found:
+            if amount > 0.0:  # as with `count`: what did not happen is not counted
+                row = self.counters.setdefault(technique, {})
+                row[name] = row.get(name, 0) + factor * round(amount)
+        return pixels
+
+    def add_write(self, write: Write) -> images.Image:
+        """An image that this picture alone has, as for passes that its view layer asks for by name; empty.
+        In `begin`."""
+        if write.name not in self.images:
+            self.images[write.name] = images.pool.take(*self.size, write.format)
+            self.more_writes.append(write)
+        self.target(write.name).clear()
+        return self.images[write.name]
+
+    @property
+    def writes(self) -> list[Write]:
+        """What the plan's techniques write, and what was added for this picture."""
+        return [*(write for technique in self.plan.techniques for write in technique.writes), *self.more_writes]
+
+    @property
+    def sums(self) -> set[str]:
+        """Names of what adds up over samples."""
+        return {write.name for write in self.writes if write.accumulates}
+
+    def drop(self) -> None:
+        """Give back the images of the frame."""
+        self.readback.drop()
+        self._texel_counters.drop()
+        for image in self.images.values():
+            images.pool.give(image)
+
+    def leave(self, technique: Technique, reason: str) -> None:
+        """The picture itself shows that the technique is not needed: its ledger row says skipped, and why."""
+        self.needless[technique.name] = reason
+
+    def to_show(self, name: str) -> images.Image:
+        """The image of that name, or, of sums, the one that shows them better."""
+        return self.images[self.shown.get(name, name)]
+
+    def bands(self, technique: Technique, part: str = "") -> Iterator[tuple[int, int]]:
+        """Rows (from, to) of the picture: a long pass draws them one after the other, with a `yield` after each.
+
+        A technique with several long passes names the `part`, since each has its own time.
+        """
+        height = self.size[1]
+        return iter([(0, height)]) if self.shared_out is None else self.shared_out.split(technique.name + part, height)
+
+    def target(self, *names: str, depth: str = "") -> images.Target:
+        """A render target over named images; kept with the frame."""
+        key = (*names, "depth:" + depth)
+        if key not in self._targets:
+            self._targets[key] = images.Target(
+                tuple(self.images[name] for name in names), self.images[depth] if depth else None
+            )
+        return self._targets[key]

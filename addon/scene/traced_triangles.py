@@ -1,0 +1,200 @@
+"""What rays meet, triangle by triangle: corners, and what leaves of the hierarchy hold of their looks.
+
+Whether a ray passes a triangle is one number, which holds the opacity of both sides, or where to look for that place by
+place (opacity_maps.py), and which rays it is about. Instances of one kind look the same, so that all their triangles are
+made together.
+
+Cost: numpy over all triangles of all instances, some 0.3 us each.
+"""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+
+from ..materials.compiled import CompiledMaterial
+from ..snapshot.scene import Instance, Mesh
+from .emission_maps import EmissionMaps, TriangleEmission
+from .opacity_maps import OpacityMaps, TriangleOpacity
+
+AT_ONCE = 1 << 16  # triangles of copies that are expanded together: one by one numpy's calls take longer than its work
+# Which rays a triangle stops: all, all but those to lights, those alone, all and those to lights for certain.
+ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE, WHOLE_SHADOW = range(4)
+MAPPED = 4  # added to the above: what follows is a tile of OpacityMaps
+FRONT_ALONE = 0.25  # added to the material's number
+SIDE_STEPS = 2047  # of the opacity of a side: those of two, and the above, are exact in one float
+NORMAL_STEPS = 4095  # of each octahedral coordinate: two of them are exact in one float
+
+
+def world_triangles(
+    instances: list[Instance],
+    meshes: dict[str, Mesh],
+    materials: list[CompiledMaterial],
+    origin: np.ndarray,
+    path: str,
+    maps: OpacityMaps,
+    glow: EmissionMaps,
+) -> tuple[np.ndarray, np.ndarray]:
+    """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
+    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_codes), mean emitted radiance, number of the material
+    (with the side that emits, mean_emission) and packed corner normals."""
+    corners, looks = [], []
+    look = {
+        (rays, mirrored): np.array([
+            (mean_code(m, rays), *radiance, k + side)
+            for k, m in enumerate(materials)
+            for radiance, side in [mean_emission(m, mirrored)]
+        ])
+        for rays in (ALL_RAYS, OPEN_TO_SHADOW, SHADOW_ALONE)
+        for mirrored in (False, True)
+    }  # fmt: skip
+    shown = [one for one in instances if is_met(one, path) and meshes[one.mesh].triangle_count]
+    # Of instances with equal kinds all triangles look the same.
+    matrices_of_all = np.array([one.matrix[:3] for one in shown], float).reshape(-1, 3, 4)
+    turns = np.linalg.det(matrices_of_all[:, :, :3])
+    cofactors_of_all, first_of_kind = _cofactors(matrices_of_all[:, :, :3]), 0
+    kinds = zip(shown, (
+        (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path), turn < 0.0) for one, turn in zip(shown, turns)
+    ))  # fmt: skip
+    for (key, slots, _, _, rays, mirrored), group in groupby(kinds, lambda pair: pair[1]):
+        mesh = meshes[key]
+        of_triangle = mesh.triangle_materials(slots)
+        look_of_triangle = look[rays, bool(mirrored)][of_triangle]
+        copies, at_once = [one for one, _ in group], max(AT_ONCE // mesh.triangle_count, 1)
+        known = maps.of(copies[0])
+        if known is not None:
+            _refine(look_of_triangle, of_triangle, materials, known, rays, bool(mirrored))
+        shining = glow.of(copies[0])
+        if shining is not None:
+            _shine(look_of_triangle, of_triangle, shining, bool(mirrored))
+        for first in range(0, len(copies), at_once):
+            own = slice(first_of_kind + first, first_of_kind + min(first + at_once, len(copies)))
+            matrices = matrices_of_all[own]
+            turned, moved = matrices[:, :, :3], (matrices[:, :, 3] - origin).astype(np.float32)
+            world = mesh.positions @ turned.transpose(0, 2, 1).astype(np.float32) + moved[:, None]
+            corners.append(world[:, mesh.corner_vertices[mesh.triangle_corners]].reshape(-1, 3, 3))
+            normals = _packed_normals(mesh.corner_normals @ cofactors_of_all[own].transpose(0, 2, 1))
+            of_copies = np.broadcast_to(look_of_triangle, (len(matrices), *look_of_triangle.shape))
+            looks.append(np.concatenate([of_copies, normals[:, mesh.triangle_corners]], axis=2).reshape(-1, 8))
+        first_of_kind += len(copies)
+    if not corners:
+        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
+    return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
+
+
+def is_met(instance: Instance, path: str) -> bool:
+    return getattr(instance.visibility, path) or instance.visibility.shadow
+
+
+def rays_met(instance: Instance, path: str) -> int:
+    """Which rays meet an instance."""
+    if not getattr(instance.visibility, path):
+        return SHADOW_ALONE
+    return ALL_RAYS if instance.visibility.shadow else OPEN_TO_SHADOW
+
+
+def mean_code(material: CompiledMaterial, rays: int = ALL_RAYS) -> float:
+    """The code of triangles of a material of which no more is known than its mean opacity."""
+    if not material.transparent:
+        return float(_codes(rays, np.ones(2), False, False))
+    stopped, whole = _stopped(material, rays)
+    opacity = 1.0 if whole else min(material.opacity, 1.0 - 1.0 / SIDE_STEPS)  # some ray may pass, however few
+    return float(_codes(stopped, np.full(2, opacity), False, material.glass is not None))
+
+
+def opaque_code() -> float:
+    """The code of triangles that stop every ray."""
+    return float(_codes(ALL_RAYS, np.ones(2), False, False))
+
+
+def _stopped(material: CompiledMaterial, rays: int) -> tuple[int, bool]:
+    """Which rays a transparent material's triangles stop, and whether they stop those wherever they meet them."""
+    if material.casts_by_lot or material.glass:
+        return rays, False
+    return (WHOLE_SHADOW if rays == ALL_RAYS else rays), rays == SHADOW_ALONE
+
+
+def _codes(stopped: int, sides: np.ndarray, mirrored: bool, glass: bool, tile=0) -> np.ndarray:
+    """What decides whether rays pass triangles, as shaders/trace/hierarchy.glsl reads it: coverage (..., 2) of front
+    and back by which they pass at random, or, where it is not 0, the `tile` (...) that tells it for each place, and
+    which rays that is about; negative where rays may also be bent. `mirrored`: corners run the other way round."""
+    steps = np.rint(np.clip(sides[..., ::-1] if mirrored else sides, 0.0, 1.0) * SIDE_STEPS)
+    even = (stopped * (SIDE_STEPS + 1) + steps[..., 0]) * (SIDE_STEPS + 1) + steps[..., 1]
+    # Twice a whole number: beyond 2^24 every second one is a float.
+    tiled = (MAPPED + stopped) * (SIDE_STEPS + 1) ** 2 + 2 * (2 * np.asarray(tile) + mirrored)
+    codes = np.where(np.asarray(tile) > 0, tiled, even).astype(float)
+    return -np.maximum(codes, 1.0) if glass else codes
+
+
+def _refine(
+    look: np.ndarray,
+    of_triangle: np.ndarray,
+    materials: list[CompiledMaterial],
+    known: TriangleOpacity,
+    rays: int,
+    mirrored: bool,
+) -> None:
+    """Put what OpacityMaps found of an instance's triangles, `known`, into their rows of `look`."""
+    for number in np.unique(of_triangle[known.measured]):
+        material = materials[number]
+        stopped, whole = _stopped(material, rays)
+        if not whole:
+            own = np.flatnonzero(known.measured & (of_triangle == number))
+            glass = material.glass is not None
+            look[own, 0] = _codes(stopped, known.sides[own], mirrored, glass, known.tile[own])
+
+
+def mean_emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple[float, float, float], float]:
+    """Mean radiance that a triangle emits, and what is added to the number of its material where it does so to one side
+    only: FRONT_ALONE or -FRONT_ALONE. Of two sides that both shine the mean stands for either."""
+    front, behind = material.emission, material.emission_behind
+    if not material.emissive:
+        return (0.0, 0.0, 0.0), 0.0
+    if front == behind or (any(front) and any(behind)):
+        return tuple((a + b) / 2 for a, b in zip(front, behind)), 0.0
+    side = FRONT_ALONE if any(front) else -FRONT_ALONE
+    return (front if any(front) else behind), -side if mirrored else side
+
+
+def _shine(look: np.ndarray, of_triangle: np.ndarray, known: TriangleEmission, mirrored: bool) -> None:
+    """Put what EmissionMaps found of an instance's triangles, `known`, into their rows of `look`, as mean_emission does."""
+    own = np.flatnonzero(known.measured)
+    front, behind = known.mean[own, 0], known.mean[own, 1]
+    lit, lit_behind = front.any(axis=1), behind.any(axis=1)
+    both = (lit & lit_behind)[:, None]
+    look[own, 1:4] = np.where(both, (front + behind) / 2, front + behind)
+    side = FRONT_ALONE * (lit.astype(float) - lit_behind)
+    look[own, 4] = of_triangle[own] + (-side if mirrored else side)
+
+
+def coverage(codes: np.ndarray, maps: OpacityMaps) -> np.ndarray:
+    """(N,) mean of the two sides' opacity, of what world_triangles says of (N,) triangles."""
+    sides = np.abs(codes) % (SIDE_STEPS + 1) ** 2
+    mean = (sides // (SIDE_STEPS + 1) + sides % (SIDE_STEPS + 1)) / (2 * SIDE_STEPS)
+    tiled = np.abs(codes) >= MAPPED * (SIDE_STEPS + 1) ** 2
+    if tiled.any():
+        mean[tiled] = maps.means[(sides[tiled] / 4).astype(int)]
+    return mean
+
+
+def is_empty(codes: np.ndarray) -> np.ndarray:
+    """(N,) triangles that no ray can meet."""
+    return (codes >= 0) & (codes % (SIDE_STEPS + 1) ** 2 == 0) & (codes < WHOLE_SHADOW * (SIDE_STEPS + 1) ** 2)
+
+
+def _cofactors(matrices: np.ndarray) -> np.ndarray:
+    """(K, 3, 3) that take normals to world space, outwards where an object is mirrored; also where it is flattened."""
+    a, b, c = np.moveaxis(matrices, 2, 0)
+    columns = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+    mirrored = (a * columns[0]).sum(axis=1) < 0
+    return np.stack(columns, axis=2) * np.where(mirrored, -1.0, 1.0)[:, None, None]
+
+
+def _packed_normals(normals: np.ndarray) -> np.ndarray:
+    """(..., 3) of any length as (...) numbers: octahedral coordinates side by side; unpacked in shaders/trace."""
+    flat = normals / np.maximum(np.abs(normals).sum(axis=-1, keepdims=True), 1e-30)
+    folded = (1.0 - np.abs(flat[..., 1::-1])) * np.where(flat[..., :2] >= 0.0, 1.0, -1.0)
+    square = np.where(flat[..., 2:] >= 0.0, flat[..., :2], folded)
+    steps = np.floor((square * 0.5 + 0.5) * NORMAL_STEPS + 0.5)
+    return np.nan_to_num(steps[..., 0] + (NORMAL_STEPS + 1) * steps[..., 1])
