@@ -269,9 +269,8 @@ def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
     said = []
     if _is_linked(owner):
         said.append("light linking counts for light that reaches surfaces straight; bounced light follows none.")
-    if kind in _DRAWN:
-        if owner.is_shadow_catcher and not final:
-            said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
+    if kind in _DRAWN and owner.is_shadow_catcher and not final:
+        said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
     return tuple(Note(f"Object '{name}'", text) for text in said)
 
 

@@ -1,8 +1,8 @@
 """Smoke and fire of Blender's fluid simulation: the grids of gas domains, as volumes beside those of OpenVDB objects.
 
 A domain is a mesh with a fluid modifier. What stands in its evaluated grids (density, color, flame, temperature, heat)
-is laid over its mesh's texture space, as Cycles does, and its mesh itself is not drawn. Colours are stored multiplied by
-density; they are divided by it here. A domain that has not been simulated at this frame is empty, and says so.
+is laid over its mesh's texture space, as Cycles does, and its mesh itself is not drawn. Colours are stored multiplied
+by density; they are divided by it here. A domain that has not been simulated at this frame is empty, and says so.
 """
 
 from __future__ import annotations

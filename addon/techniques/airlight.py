@@ -9,15 +9,16 @@ balance heuristic: the first ends the singularity at a lamp in fog and keeps to 
 media. V are rays of the hierarchy, T is that of media.py. What media emit is integrated in closed form.
 
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
-spread their light over opacity to pixels whose rays end equally far away. Others take a quarter as many at every pixel,
-and converge. Light of several bounces, one walk a pixel and sample, is smooth, and spread below MANY samples
-(in pictures of at least WIDE pixels a side).
+spread their light, divided by what lamps would send without shadows, to pixels whose rays end equally far away.
+Others take a quarter as many at every pixel, and converge. Light of several bounces, one walk a pixel and sample, is
+smooth, and spread over opacity below MANY samples (in pictures of at least WIDE pixels a side). At each stop walks look
+for places along a lamp's rays, and at the surface that one of these ends at, beside those that they meet by chance.
 
 | cost | per sample |
 |---|---|
-| passes | 1, and 1 at full size where it is spread |
-| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights |
-| memory | 3 images; 2 of a quarter where it is spread |
+| passes | 1, and 2 at full size where it is spread |
+| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights; 6 a stop of walks |
+| memory | 3 images; 1 and 2 of a quarter where it is spread |
 
 Sources: Kulla & Fajardo, "Importance sampling techniques for path tracing in participating media", EGSR 2012; Veach &
 Guibas 1995 (balance heuristic).
@@ -25,7 +26,8 @@ Guibas 1995 (balance heuristic).
 In mirrors and behind glass (shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass
 more for each round of them.
 
-Bias: in pictures below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is.
+Bias: below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is. Penumbrae
+of round lamps on surfaces that walks meet are those of points in a ball.
 Phase functions of several shaders mixed at one place are one of their mean anisotropy. Mirrors and glass show single
 scattering alone, none in drafts and rough lobes, and no beams.
 """
