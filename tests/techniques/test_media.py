@@ -489,8 +489,8 @@ def test_voxels_absorb_what_stands_in_them(stage, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["lamp inside", "gem", "speck", "box beside", "along the shaft"])
 def test_beams_of_odd_casters_are_finite(stage, case):
-    """A lamp in the glass, light that is mirrored inside over and over, glass of a millimetre, fog that is around half of the
-    way only, and a camera within the beam that looks along it."""
+    """A lamp in the glass, light that is mirrored inside over and over, glass of a millimetre, fog around half of the
+    way, and a camera within the beam that looks along it."""
     stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
     if case == "along the shaft":
         stage.camera((0, 0, -3), (np.pi, 0, 0))

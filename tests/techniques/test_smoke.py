@@ -70,6 +70,7 @@ def test_a_domain_absorbs_what_stands_in_its_cells(stage, stands_in):
         stage, volume(stage, "ShaderNodeVolumePrincipled", Density=1.0, Color=(0, 0, 0, 1)), (-1, -1, -1), (1, 1, 1)
     )
     made.name = "Domain"
+    stage.scene.candela.slot_volume = "OFF"  # nothing in it scatters
     seen = stage.render(4, size=(16, 16))["combined"][8, :, 0]
     assert seen[10] == pytest.approx(2 * np.exp(-0.8), rel=0.02)
     assert seen[5] == pytest.approx(2.0, rel=0.01)
@@ -81,6 +82,7 @@ def test_a_domain_that_was_not_simulated_says_so(stage, stands_in):
     stage.camera_above()
     glowing_floor(stage)
     box(stage, volume(stage, "ShaderNodeVolumePrincipled"), (-1, -1, -1), (1, 1, 1)).name = "Domain"
+    stage.scene.candela.slot_volume = "OFF"
     seen = stage.render(size=(8, 8))["combined"][4, 4, 0]
     assert seen == pytest.approx(2.0, rel=1e-5)
     assert any("baked for this frame" in note.text for note in stage.renderer.frame.snapshot.notes)
