@@ -19,7 +19,7 @@ import numpy as np
 from . import final, main_loop, viewport
 from .film.catcher import has_catchers
 from .frame import slices
-from .frame.bands import Leash, samples_in_parts
+from .frame.bands import QueueLimit, samples_in_parts
 from .frame.picture import Frame
 from .frame.run import Renderer
 from .frame.settings import Settings
@@ -310,13 +310,13 @@ def eyes(scene) -> list[str]:
 
 
 def _whole_samples(renderer: Renderer, frame: Frame) -> Iterator[None]:
-    leash = Leash(frame.profiler, BEHIND_S)
+    limit = QueueLimit(frame.profiler, BEHIND_S)
     yield
     while frame.samples_done < frame.samples_to_draw:
         with context.turn:
             renderer.advance(frame)
             if frame.samples_done < frame.samples_to_draw:  # the picture is read next, which waits
-                leash.sample()
+                limit.sample()
         yield
 
 

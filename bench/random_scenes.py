@@ -50,7 +50,7 @@ HIDDEN = {"visible_shadow": 0.1, "visible_camera": 0.06, "visible_diffuse": 0.06
 
 
 @dataclass
-class Lot:
+class Draws:
     """Draws of one scene, and what was drawn, in words."""
 
     number: int
@@ -78,88 +78,88 @@ class Lot:
 def build(number: int) -> tuple[bpy.types.Scene, str]:
     """Scene `number` in an empty file, and what it holds."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene, lot = bpy.context.scene, Lot(number)
-    unit = lot.draw.choice(UNITS)
-    lot.notes.append(f"{unit:g} m")
-    materials = [_material(lot) for _ in range(4)]
+    scene, draws = bpy.context.scene, Draws(number)
+    unit = draws.draw.choice(UNITS)
+    draws.notes.append(f"{unit:g} m")
+    materials = [_material(draws) for _ in range(4)]
     bpy.ops.mesh.primitive_plane_add(size=12 * unit)
     bpy.context.object.data.materials.append(materials[0])
-    for _ in range(lot.draw.randint(2, 6)):
-        _object(lot, unit, materials)
-    for _ in range(lot.draw.randint(1, 4)):
-        _lamp(lot, unit, scene)
-    _world(lot, scene)
-    _camera(lot, unit, scene)
+    for _ in range(draws.draw.randint(2, 6)):
+        _object(draws, unit, materials)
+    for _ in range(draws.draw.randint(1, 4)):
+        _lamp(draws, unit, scene)
+    _world(draws, scene)
+    _camera(draws, unit, scene)
     scene.view_settings.view_transform = "Standard"
-    return scene, ", ".join(lot.notes)
+    return scene, ", ".join(draws.notes)
 
 
-def _material(lot: Lot) -> bpy.types.Material:
-    lot.notes.append("material:")
+def _material(draws: Draws) -> bpy.types.Material:
+    draws.notes.append("material:")
     made = bpy.data.materials.new("Material")
     tree = tree_of(made)
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    draw = lot.draw
+    draw = draws.draw
     values = [
-        (1.0, {"Base Color": lot.color(), "Roughness": draw.uniform(0.1, 1.0)}),
+        (1.0, {"Base Color": draws.color(), "Roughness": draw.uniform(0.1, 1.0)}),
         (0.4, {"Metallic": draw.choice((1.0, draw.random()))}),
-        (0.2, {"Specular IOR Level": draw.random()}), (0.15, {"Specular Tint": lot.color()}),
+        (0.2, {"Specular IOR Level": draw.random()}), (0.15, {"Specular Tint": draws.color()}),
         (0.2, {"IOR": draw.uniform(1.1, 2.5)}), (0.15, {"Diffuse Roughness": draw.random()}),
         (0.2, {"Anisotropic": draw.random(), "Anisotropic Rotation": draw.random()}),
-        (0.2, {"Coat Weight": draw.random(), "Coat Roughness": draw.uniform(0.1, 0.6), "Coat Tint": lot.color()}),
+        (0.2, {"Coat Weight": draw.random(), "Coat Roughness": draw.uniform(0.1, 0.6), "Coat Tint": draws.color()}),
         (0.2, {"Sheen Weight": draw.random(), "Sheen Roughness": draw.uniform(0.1, 1.0)}),
-        (0.1, {"Emission Color": lot.color(), "Emission Strength": draw.uniform(0.05, 1.0)}),
+        (0.1, {"Emission Color": draws.color(), "Emission Strength": draw.uniform(0.05, 1.0)}),
         (0.12, {"Alpha": draw.uniform(0.2, 1.0)}),
     ]  # fmt: skip
     for chance, inputs in values:
-        if lot.happens(chance):
+        if draws.happens(chance):
             for name, value in inputs.items():
                 shader.inputs[name].default_value = value
-                lot.notes.append(f"{name} {value:.2f}" if isinstance(value, float) else name)
-    if lot.happens(0.6):
-        _texture(lot, tree, shader)
-    if lot.happens(0.25):
-        _mix(lot, tree, shader)
+                draws.notes.append(f"{name} {value:.2f}" if isinstance(value, float) else name)
+    if draws.happens(0.6):
+        _texture(draws, tree, shader)
+    if draws.happens(0.25):
+        _mix(draws, tree, shader)
     return made
 
 
-def _texture(lot: Lot, tree, shader) -> None:
+def _texture(draws: Draws, tree, shader) -> None:
     """Colours of a texture on one of the shader's inputs."""
-    texture = tree.nodes.new(f"ShaderNodeTex{lot.choice(TEXTURES)}")
+    texture = tree.nodes.new(f"ShaderNodeTex{draws.choice(TEXTURES)}")
     if "Scale" in texture.inputs:
-        texture.inputs["Scale"].default_value = lot.draw.uniform(0.5, 4.0)
+        texture.inputs["Scale"].default_value = draws.draw.uniform(0.5, 4.0)
     place, turned = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
-    turned.inputs["Rotation"].default_value = [lot.draw.uniform(0, 3) for _ in "xyz"]
-    turned.inputs["Location"].default_value = [lot.draw.random() for _ in "xyz"]
+    turned.inputs["Rotation"].default_value = [draws.draw.uniform(0, 3) for _ in "xyz"]
+    turned.inputs["Location"].default_value = [draws.draw.random() for _ in "xyz"]
     ramp = tree.nodes.new("ShaderNodeValToRGB")
     for element in ramp.color_ramp.elements:
-        element.color = lot.color()
+        element.color = draws.color()
     factor = next((one for one in texture.outputs if one.name in ("Fac", "Factor", "Distance")), texture.outputs[0])
-    tree.links.new(place.outputs[lot.choice(COORDINATES)], turned.inputs["Vector"])
+    tree.links.new(place.outputs[draws.choice(COORDINATES)], turned.inputs["Vector"])
     tree.links.new(turned.outputs[0], texture.inputs["Vector"])
     tree.links.new(factor, ramp.inputs[0])
-    name, colors = lot.choice(VARIED), ramp.outputs[0]
+    name, colors = draws.choice(VARIED), ramp.outputs[0]
     if name == "Normal":
         bump = tree.nodes.new("ShaderNodeBump")
-        bump.inputs["Strength"].default_value = lot.draw.uniform(0.1, 1.0)
-        bump.inputs["Distance"].default_value = lot.draw.uniform(0.02, 0.3)
+        bump.inputs["Strength"].default_value = draws.draw.uniform(0.1, 1.0)
+        bump.inputs["Distance"].default_value = draws.draw.uniform(0.02, 0.3)
         tree.links.new(colors, bump.inputs["Height"])
         colors = bump.outputs[0]
     if name == "Emission Color":
-        shader.inputs["Emission Strength"].default_value = lot.draw.uniform(0.05, 0.5)
+        shader.inputs["Emission Strength"].default_value = draws.draw.uniform(0.05, 0.5)
     tree.links.new(colors, shader.inputs[name])
 
 
-def _mix(lot: Lot, tree, shader) -> None:
+def _mix(draws: Draws, tree, shader) -> None:
     """A second shader mixed with or added to the first."""
-    other = tree.nodes.new(f"ShaderNodeBsdf{lot.choice(MIXED)}")
+    other = tree.nodes.new(f"ShaderNodeBsdf{draws.choice(MIXED)}")
     if "Roughness" in other.inputs:
-        other.inputs["Roughness"].default_value = lot.draw.uniform(0.15, 1.0)
-    both = tree.nodes.new(f"ShaderNode{lot.choice(('Mix', 'Mix', 'Add'))}Shader")
+        other.inputs["Roughness"].default_value = draws.draw.uniform(0.15, 1.0)
+    both = tree.nodes.new(f"ShaderNode{draws.choice(('Mix', 'Mix', 'Add'))}Shader")
     first, second = (socket for socket in both.inputs if socket.type == "SHADER")
     if len(both.inputs) > 2:
-        both.inputs[0].default_value = lot.draw.random()
-        if lot.happens(0.3, "by Fresnel"):
+        both.inputs[0].default_value = draws.draw.random()
+        if draws.happens(0.3, "by Fresnel"):
             tree.links.new(tree.nodes.new("ShaderNodeFresnel").outputs[0], both.inputs[0])
     output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
     tree.links.new(shader.outputs[0], first)
@@ -167,9 +167,9 @@ def _mix(lot: Lot, tree, shader) -> None:
     tree.links.new(both.outputs[0], output.inputs["Surface"])
 
 
-def _object(lot: Lot, unit: float, materials: list[bpy.types.Material]) -> None:
-    draw = lot.draw
-    OBJECTS[lot.choice(OBJECTS)]()
+def _object(draws: Draws, unit: float, materials: list[bpy.types.Material]) -> None:
+    draw = draws.draw
+    OBJECTS[draws.choice(OBJECTS)]()
     made = bpy.context.object
     if made.type == "CURVE":
         made.data.bevel_depth = 0.15
@@ -181,10 +181,10 @@ def _object(lot: Lot, unit: float, materials: list[bpy.types.Material]) -> None:
         if len(made.data.materials) > 1:
             slots = np.array([draw.randrange(2) for _ in made.data.polygons], np.int32)
             made.data.polygons.foreach_set("material_index", slots)
-        if lot.happens(0.4, "smooth"):
+        if draws.happens(0.4, "smooth"):
             made.data.shade_smooth()
-        if lot.happens(0.45):
-            kind = lot.choice(MODIFIERS)
+        if draws.happens(0.45):
+            kind = draws.choice(MODIFIERS)
             modifier = made.modifiers.new(kind, kind)
             for name, value in MODIFIERS[kind].items():
                 setattr(modifier, name, value)
@@ -194,12 +194,12 @@ def _object(lot: Lot, unit: float, materials: list[bpy.types.Material]) -> None:
     scale = draw.choice([(1, 1, 1), (1, 1, 1), uneven, (-1, 1, 1)])
     made.scale = unit * draw.uniform(0.3, 0.9) * np.array(scale)
     for name, chance in HIDDEN.items():
-        setattr(made, name, not lot.happens(chance, f"not {name}"))
-    made.is_holdout = lot.happens(0.05, "held out")
+        setattr(made, name, not draws.happens(chance, f"not {name}"))
+    made.is_holdout = draws.happens(0.05, "held out")
 
 
-def _lamp(lot: Lot, unit: float, scene: bpy.types.Scene) -> None:
-    draw, kind = lot.draw, lot.choice(("POINT", "SPOT", "SUN", "AREA"))
+def _lamp(draws: Draws, unit: float, scene: bpy.types.Scene) -> None:
+    draw, kind = draws.draw, draws.choice(("POINT", "SPOT", "SUN", "AREA"))
     light = bpy.data.lights.new("Lamp", kind)
     placed = bpy.data.objects.new("Lamp", light)
     scene.collection.objects.link(placed)
@@ -216,36 +216,36 @@ def _lamp(lot: Lot, unit: float, scene: bpy.types.Scene) -> None:
     if kind == "SUN":
         light.angle = draw.choice((0, 0.01, 0.1, 0.6))
     if kind == "AREA":
-        light.shape = lot.choice(("SQUARE", "RECTANGLE", "DISK", "ELLIPSE"))
+        light.shape = draws.choice(("SQUARE", "RECTANGLE", "DISK", "ELLIPSE"))
         light.size, light.size_y = (draw.uniform(0.1, 3) * unit for _ in "uv")
         light.spread = draw.choice((math.pi, math.pi, draw.uniform(0.3, 3)))
-    if hasattr(light, "exposure") and lot.happens(0.2, "exposure"):
+    if hasattr(light, "exposure") and draws.happens(0.2, "exposure"):
         light.exposure = draw.uniform(-1, 1)
-    if hasattr(light, "use_temperature") and lot.happens(0.2, "temperature"):
+    if hasattr(light, "use_temperature") and draws.happens(0.2, "temperature"):
         light.use_temperature, light.temperature = True, draw.uniform(2000, 9000)
-    light.use_shadow = not lot.happens(0.1, "no shadow")
-    if lot.happens(0.15, "scaled"):
+    light.use_shadow = not draws.happens(0.1, "no shadow")
+    if draws.happens(0.15, "scaled"):
         placed.scale = [draw.uniform(0.5, 2) for _ in "xyz"]
 
 
-def _world(lot: Lot, scene: bpy.types.Scene) -> None:
+def _world(draws: Draws, scene: bpy.types.Scene) -> None:
     scene.world = bpy.data.worlds.new("World")
     tree = tree_of(scene.world)
     background = next(node for node in tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = lot.color()
-    background.inputs["Strength"].default_value = lot.draw.choice((0, 0, 0.05, 0.3, 1))
-    if lot.happens(0.15, "sky"):
+    background.inputs["Color"].default_value = draws.color()
+    background.inputs["Strength"].default_value = draws.draw.choice((0, 0, 0.05, 0.3, 1))
+    if draws.happens(0.15, "sky"):
         sky = tree.nodes.new("ShaderNodeTexSky")
         tree.links.new(sky.outputs[0], background.inputs["Color"])
         background.inputs["Strength"].default_value = 0.1
-    elif lot.happens(0.2, "gradient"):
+    elif draws.happens(0.2, "gradient"):
         place, gradient = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexGradient")
         tree.links.new(place.outputs["Generated"], gradient.inputs[0])
         tree.links.new(gradient.outputs[0], background.inputs["Color"])
 
 
-def _camera(lot: Lot, unit: float, scene: bpy.types.Scene) -> None:
-    draw = lot.draw
+def _camera(draws: Draws, unit: float, scene: bpy.types.Scene) -> None:
+    draw = draws.draw
     data = bpy.data.cameras.new("Camera")
     scene.camera = bpy.data.objects.new("Camera", data)
     scene.collection.objects.link(scene.camera)
@@ -254,14 +254,14 @@ def _camera(lot: Lot, unit: float, scene: bpy.types.Scene) -> None:
     towards = mathutils.Vector((0, 0, 0.6 * unit)) - scene.camera.location
     scene.camera.rotation_euler = towards.to_track_quat("-Z", "Y").to_euler()
     data.lens, data.clip_start, data.clip_end = draw.uniform(22, 60), 0.01 * unit, 1000 * unit
-    if lot.happens(0.2, "orthographic"):
+    if draws.happens(0.2, "orthographic"):
         data.type, data.ortho_scale = "ORTHO", 6 * unit
-    if lot.happens(0.15, "shifted"):
+    if draws.happens(0.15, "shifted"):
         data.shift_x, data.shift_y = draw.uniform(-0.2, 0.2), draw.uniform(-0.2, 0.2)
-    if lot.happens(0.1, "depth of field"):
+    if draws.happens(0.1, "depth of field"):
         data.dof.use_dof, data.dof.focus_distance = True, distance
         data.dof.aperture_fstop = data.lens / 1000 / (unit * draw.uniform(0.02, 0.2))
-    scene.render.film_transparent = lot.happens(0.1, "transparent film")
+    scene.render.film_transparent = draws.happens(0.1, "transparent film")
 
 
 def differences(own: dict, first: dict, second: dict, tolerance: float) -> tuple[list[str], bool]:

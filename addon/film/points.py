@@ -91,8 +91,8 @@ class OwnPoint:
 
 def all_alike(frame: Frame) -> bool:
     """Whether all points of a sample would show the same, or what may not be shown."""
-    by_lot = any(material.transparent for material in frame.materials.compiled)
-    narrow = frame.snapshot.film.filter_width < LEAST_WIDTH and not by_lot
+    stochastic = any(material.transparent for material in frame.materials.compiled)
+    narrow = frame.snapshot.film.filter_width < LEAST_WIDTH and not stochastic
     return narrow or frame.shared(OwnPoint).needed
 
 

@@ -49,7 +49,7 @@ class Bands:
         self._rows[name] = min(max(rows, 1), MOST_ROWS)
 
 
-class Leash:
+class QueueLimit:
     """Keeps the GPU from falling behind: waits for it after so many samples that `seconds` lie between two waits.
 
     What is only asked of a GPU and not waited for, some drivers put off without end: it takes memory, and a render that
@@ -80,7 +80,7 @@ def samples_in_parts(renderer, frame) -> Iterator[None]:
     Each part takes a turn. That a part has ended is known by waiting for the GPU, which costs it some of its speed: a
     GPU that draws whole samples in the time of a part is not waited for any more.
     """
-    end, leash = object(), None
+    end, limit = object(), None
     frame.shared_out = bands = Bands()
     frame.profiler.wait = True
     while frame.samples_done < frame.samples_to_draw:
@@ -90,9 +90,9 @@ def samples_in_parts(renderer, frame) -> Iterator[None]:
                 started = time.perf_counter()
                 part = next(parts, end)
                 bands.learn(time.perf_counter() - started, PART_S)
-                if part is end and leash is not None:
-                    leash.sample()
+                if part is end and limit is not None:
+                    limit.sample()
             yield
-        if leash is None and time.perf_counter() - began < PART_S:
+        if limit is None and time.perf_counter() - began < PART_S:
             frame.shared_out, frame.profiler.wait = None, frame.settings.profile
-            leash = Leash(frame.profiler, PART_S)
+            limit = QueueLimit(frame.profiler, PART_S)

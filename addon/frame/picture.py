@@ -20,7 +20,7 @@ from ..gfx.struct import Block
 from ..gfx.timing import Profiler
 from ..materials.compiled import CompiledMaterial
 from ..sampling.lens import point_of
-from ..sampling.sequence import FILM, LENS, lot, point, third
+from ..sampling.sequence import FILM, LENS, point, third, uniform
 from ..scene.acceleration import Hierarchy, HierarchyCache
 from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
@@ -144,9 +144,9 @@ class Frame:
         """Point `index` of the sequence for `use`, for uses that take more or fewer points than samples."""
         return point(index, use, self.settings.seed)
 
-    def lot(self, use: str) -> float:
+    def uniform(self, use: str) -> float:
         """A number of this sample that chooses among things, of which the chosen one then draws a point."""
-        return lot(self.sample, use, self.settings.seed)
+        return uniform(self.sample, use, self.settings.seed)
 
     def random_volume_at(self, index: int, use: str) -> tuple[float, float, float]:
         """The same with a third number."""

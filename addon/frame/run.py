@@ -357,7 +357,7 @@ class Renderer:
         wanted += [
             self.materials.caster_program(material)
             for material in shown
-            if self.materials.compiled[material].casts_by_lot
+            if self.materials.compiled[material].casts_stochastically
         ]
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         varied = [k for k in shown if self.materials.compiled[k].uneven_emission]

@@ -203,7 +203,7 @@ class EdgeShadows(PointMaps):
         return {"card_records": cards.records, "card_tiles": cards.tiles, "card_words": found}
 
     def salt(self, frame: Frame) -> int:
-        """For lots of this sample."""
+        """For random choices of this sample."""
         return (frame.sample * 7919 + frame.settings.seed * 104729) % 2**24
 
     def gather(self, frame: Frame, lit: Lit, views: list[EdgeView], found: images.Image) -> Iterator[None]:

@@ -45,7 +45,7 @@ from .visibility import (
     Lookup,
     Maps,
     VisibilityProvider,
-    drawn_by_lot,
+    drawn_stochastically,
     ray_bindings,
     source_of,
     traced_roughness,
@@ -164,7 +164,7 @@ def light_surfaces(
 
 def tinted_casters(frame: Frame, stopped: frozenset[int] = frozenset()) -> bool:
     """Whether something that is drawn colours the light that it lets pass, besides the materials `stopped`."""
-    return any(frame.materials.compiled[draw.material].tinted for draw in drawn_by_lot(frame, stopped))
+    return any(frame.materials.compiled[draw.material].tinted for draw in drawn_stochastically(frame, stopped))
 
 
 def _share(point: LightPoint) -> float:

@@ -118,7 +118,7 @@ def buffer_bindings(frame: Frame, run: Run, side: int, threshold: float, centre_
     return {
         "micro_side": side, "leaf_count": run.tree.leaves, "id_bits": (4 * run.tree.leaves - 1).bit_length(),
         "detail": 0.81 * float(np.sqrt(threshold)), "centre_test": int(centre_test), "log_depths": (near, far),
-        "buffer_choice": (frame.lot(use), turn, x, y),
+        "buffer_choice": (frame.uniform(use), turn, x, y),
     }  # fmt: skip
 
 

@@ -74,7 +74,7 @@ class PathSources:
         count = len(self._emitters)
         chosen = np.arange(count)
         if count > self.most_lamps:
-            chosen = (np.arange(self.most_lamps) + frame.lot(f"{self.use}/choose")) * count / self.most_lamps
+            chosen = (np.arange(self.most_lamps) + frame.uniform(f"{self.use}/choose")) * count / self.most_lamps
             chosen = chosen.astype(int)
         for number in chosen:
             emitter = self._emitters[number]

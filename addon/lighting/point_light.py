@@ -19,7 +19,7 @@ import numpy as np
 from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..materials.compiler import may_emit
-from ..sampling.sequence import lot
+from ..sampling.sequence import uniform
 from ..sources import lights
 from .emissive_triangles import EmissiveTriangles
 from .loop import lighting
@@ -94,7 +94,7 @@ class PointLight:
             power = np.array([emitter.power for emitter in emitters])
             chance = np.minimum(FEW_POINTS * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
             edges = np.concatenate([[0.0], np.cumsum(chance)])
-            marks = np.arange(FEW_POINTS) + lot(sample_number, f"{self._use}/choose", settings.seed)
+            marks = np.arange(FEW_POINTS) + uniform(sample_number, f"{self._use}/choose", settings.seed)
             picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
             chosen = [(emitters[k], 1.0 / chance[k]) for k in picked]
         for emitter, weight in chosen:

@@ -18,15 +18,15 @@ from .caustic_casters import answered, stopped_by_all
 from .visibility import (
     ATLAS_TEXELS,
     EDGES,
-    FINER_BY_LOT,
     FINER_FROM,
+    FINER_STOCHASTIC,
     Batch,
     DepthMapService,
     LightPoint,
     Maps,
     VisibilityProvider,
     by_rays,
-    drawn_by_lot,
+    drawn_stochastically,
     map_resolution,
     ray_bindings,
     rounds,
@@ -97,8 +97,8 @@ class PointMaps(Technique, VisibilityProvider):
             )
 
     def resolution(self, frame: Frame) -> int:
-        by_lot = frame.settings.samples >= FINER_FROM and drawn_by_lot(frame, stopped_by_all(frame))
-        finer = FINER_BY_LOT if by_lot else 1.0
+        stochastic = frame.settings.samples >= FINER_FROM and drawn_stochastically(frame, stopped_by_all(frame))
+        finer = FINER_STOCHASTIC if stochastic else 1.0
         return map_resolution(frame, finer * frame.settings.get(self, "texels_per_pixel"))
 
     def traces(self, frame: Frame, emitter: lights.Emitter) -> bool:

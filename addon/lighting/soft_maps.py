@@ -33,7 +33,7 @@ from ..snapshot.scene import Snapshot
 from ..sources import lights
 from . import depth_maps, shared_visibility
 from .point_maps import PointMaps
-from .visibility import PART_TEXELS, RAY_CONSTANTS, Lookup, Maps, drawn_by_lot, map_resolution, ray_bindings
+from .visibility import PART_TEXELS, RAY_CONSTANTS, Lookup, Maps, drawn_stochastically, map_resolution, ray_bindings
 
 REFINE = Param(
     "refine", "Refine", True,
@@ -165,7 +165,7 @@ class SoftMaps(PointMaps):
     def draw(self, frame: Frame, views: list) -> Maps:
         seen = (frame.geometry.changes, self.resolution(frame), frame.settings.of(self), few_samples(frame))
         key = (*seen, *((view.rows.tobytes(), view.cell) for view in views))
-        if not drawn_by_lot(frame) and self._drawn is not None and self._drawn[0] == key:
+        if not drawn_stochastically(frame) and self._drawn is not None and self._drawn[0] == key:
             frame.count(self, "maps kept", len(views))
             return self._to_ask(frame, self._drawn[1])
         maps = self.service.draw(frame, self, views, self.resolution(frame))

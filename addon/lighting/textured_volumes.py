@@ -93,17 +93,17 @@ class CardCache:
     def cards(self, frame: Frame) -> Cards | None:
         """None where nothing passes light in places."""
         instances, meshes, materials = frame.geometry.placed
-        lot = np.array([bool(material.casts_by_lot) for material in materials], bool)
-        if not lot.any():
+        stochastic = np.array([bool(material.casts_stochastically) for material in materials], bool)
+        if not stochastic.any():
             return None
         maps = frame.opacity_maps
         opacity = tuple(material.opacity for material in materials)
-        key = (frame.geometry.changes, maps.changes, tuple(frame.geometry.origin), lot.tobytes(), opacity)
+        key = (frame.geometry.changes, maps.changes, tuple(frame.geometry.origin), stochastic.tobytes(), opacity)
         if self._known[0] != key:
-            self._known = (key, self._made(frame, instances, meshes, materials, lot, maps))
+            self._known = (key, self._made(frame, instances, meshes, materials, stochastic, maps))
         return self._known[1]
 
-    def _made(self, frame, instances, meshes, materials, lot, maps) -> Cards | None:
+    def _made(self, frame, instances, meshes, materials, stochastic, maps) -> Cards | None:
         corners, opacity = [], []
         mean = np.array([material.opacity for material in materials], float)
         for instance in instances:
@@ -111,7 +111,7 @@ class CardCache:
             if not instance.visibility.shadow or not mesh.triangle_count or not np.isfinite(instance.matrix).all():
                 continue
             material = mesh.triangle_materials(instance.materials)
-            own = np.flatnonzero(lot[material])
+            own = np.flatnonzero(stochastic[material])
             if not len(own):
                 continue
             matrix = instance.matrix[:3].astype(np.float64)

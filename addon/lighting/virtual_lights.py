@@ -284,7 +284,7 @@ class VirtualLights:
             power = np.array([emitter.power for emitter in self._emitters])
             chance = np.minimum(share * (0.8 * power / max(power.sum(), 1e-300) + 0.2 / len(power)), 1.0)
             edges = np.concatenate([[0.0], np.cumsum(chance)])
-            marks = np.arange(share) + frame.lot("virtual lights/choose")
+            marks = np.arange(share) + frame.uniform("virtual lights/choose")
             picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
             chosen = [(self._emitters[k], 1.0 / chance[k]) for k in picked]
         each = max(share // max(len(chosen), 1), 1)

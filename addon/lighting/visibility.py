@@ -32,7 +32,7 @@ RESOLUTION = Param(
 # Texels decide alone where casters let some light pass, and their error does not fall with samples: where leaves touch
 # it outweighs noise from so many on. alpha_foliage, direct light, 64 samples: relMSE .0008 to .0006 (gloss .0097 to
 # .0084) in 1.13 times the time; with 16 as much would be gained by more samples.
-FINER_BY_LOT, FINER_FROM = 2.0, 64
+FINER_STOCHASTIC, FINER_FROM = 2.0, 64
 MOST_RESOLUTION = 2048  # a map takes 84 MB then; with 4096 a handful of lights would need more than a GPU grants
 
 BY_COST, BY_MAPS, BY_RAYS = "COST", "MAPS", "RAYS"
@@ -211,10 +211,10 @@ class Layers:
         self.of: dict[int, Layer] = {}
 
 
-def drawn_by_lot(frame: Frame, stopped: frozenset[int] = frozenset()) -> list[Draw]:
+def drawn_stochastically(frame: Frame, stopped: frozenset[int] = frozenset()) -> list[Draw]:
     """Casters that let some light pass, without the materials `stopped`."""
     compiled = frame.materials.compiled
-    casting = {k for k, one in enumerate(compiled) if one.casts_by_lot and not one.bounds_alone} - stopped
+    casting = {k for k, one in enumerate(compiled) if one.casts_stochastically and not one.bounds_alone} - stopped
     return [draw for draw in frame.geometry.draws if draw.material in casting]
 
 
@@ -226,7 +226,7 @@ def by_rays(
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
     if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
         return False
-    if drawn_by_lot(frame) or frame.shared(Layers).of:  # maps ask the material itself; rays know it by cells
+    if drawn_stochastically(frame) or frame.shared(Layers).of:  # maps ask the material itself; rays know it by cells
         return False
     asked = views()
     if not asked or wanted == BY_RAYS:
@@ -306,7 +306,7 @@ class DepthMapService:
 
     def alpha_casters(self, frame: Frame, layers: bool = False) -> depth_maps.AlphaCasters:
         """What lets some light pass, and how to draw it; with what covers surfaces as `layers`."""
-        materials, draws = frame.materials, drawn_by_lot(frame)
+        materials, draws = frame.materials, drawn_stochastically(frame)
         programs = {
             index: (passes.get(materials.caster_program(index)), materials.bindings(index, frame.geometry.instances))
             for index in {draw.material for draw in draws}

@@ -54,7 +54,7 @@ class CompiledMaterial:
     images: tuple[str, ...]  # Image.key in sampler order
     values: np.ndarray  # (P, 4) float32, P >= 1
     transparent: bool  # some ray may pass: the surface is drawn with stochastic transparency
-    casts_by_lot: bool  # so may light on its way to a surface; else what is transparent casts a full shadow
+    casts_stochastically: bool  # so may light on its way to a surface; else what is transparent casts a full shadow
     emissive: bool
     # Mean radiance of the side that faces the viewer and of the other one, for choosing and sampling emissive geometry.
     emission: tuple[float, float, float]

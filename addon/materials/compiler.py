@@ -82,7 +82,7 @@ class _Compilation:
             images=tuple(code.image_keys),
             values=values,
             transparent=transparent,
-            casts_by_lot=transparent and (self.graph.transparent_shadow or summary.glass is not None),
+            casts_stochastically=transparent and (self.graph.transparent_shadow or summary.glass is not None),
             emissive=emissive,
             emission=shining,
             emission_behind=shining,

@@ -2,7 +2,7 @@
 
 Sobol' points, Owen-scrambled by hashing. Two scrambles of one dimension are functions of each other: what is integrated
 together needs dimensions of its own. Every use but these three takes dimensions 1 to 3 with a scramble of its own: the
-lens takes 4 and 5, since each point of it sees all lights, and numbers that choose one of many things (`lot`) take 8.
+lens takes 4 and 5, since each point of it sees all lights, and numbers that choose one of many (`uniform`) take 8.
 The first two are the perfect pair: every prefix of 2^k points has one in each cell of any shape. The film takes this
 pair, too, but with its index turned by a matrix over the bits (FILM_ORDER): each prefix of 2^k points is then the same
 set, perfect at edges, in another order, chosen so that the film and any one use form a net together as well. At an
@@ -150,7 +150,7 @@ def third(index: int, use: str, seed: int = 0) -> float:
     return _axis(index // BLOCK, 2, use, seed)[index % BLOCK]
 
 
-def lot(index: int, use: str, seed: int = 0) -> float:
+def uniform(index: int, use: str, seed: int = 0) -> float:
     """A number that chooses among things, of which the chosen one then takes a `point`."""
     return _axis(index // BLOCK, 7, use, seed)[index % BLOCK]
 

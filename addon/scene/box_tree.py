@@ -113,7 +113,7 @@ class _Clusters:
         self.area, self.boxes = np.zeros(total, np.float32), np.ones(total, np.int64)
         self.area[: self.count] = _area(low, high)
         # Who is chosen of several that are equally close.
-        self.lot = np.random.default_rng(1).random(self.count + 64, np.float32)
+        self.chance = np.random.default_rng(1).random(self.count + 64, np.float32)
         self.axes = [np.ascontiguousarray(corners[:, axis]) for corners in (low, high) for axis in range(3)]
 
     def joined(
@@ -121,7 +121,7 @@ class _Clusters:
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Pair nodes `number` with boxes `axes` until at most `left` remain; new nodes are numbered from `made` on."""
         while len(number) > left:
-            first, second = _pairs(axes, self.lot, reach)
+            first, second = _pairs(axes, self.chance, reach)
             new = np.arange(made, made + len(first))
             made += len(first)
             self.children[new, 0], self.children[new, 1] = number[first], number[second]
@@ -158,7 +158,7 @@ def _clustered(low: np.ndarray, high: np.ndarray) -> _Binary:
     return _Binary(some.children[:root], some.area[:root], some.boxes[:root])
 
 
-def _pairs(axes: list[np.ndarray], lot: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(axes: list[np.ndarray], chances: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
     """Clusters that are each other's nearest: numbers of the first and the second of each pair."""
     count = len(axes[0])
     nearest, best = np.full(count, np.inf, np.float32), np.zeros(count, np.int64)
@@ -167,7 +167,7 @@ def _pairs(axes: list[np.ndarray], lot: np.ndarray, reach: int) -> tuple[np.ndar
         low = [np.minimum(corner[:-step], corner[step:]) for corner in axes[:3]]
         high = [np.maximum(corner[:-step], corner[step:]) for corner in axes[3:]]
         x, y, z = (b - a for a, b in zip(low, high))
-        chance = lot[step : step + count - step]
+        chance = chances[step : step + count - step]
         common = (x * y + y * z + z * x) * (1.0 + 1e-3 * chance) + 1e-20 * chance
         closer = common < nearest[:-step]
         nearest[:-step][closer], best[:-step][closer] = common[closer], own[step:][closer]

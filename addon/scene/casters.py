@@ -70,7 +70,7 @@ def clusters(
         return None
     known: dict[str, np.ndarray] = {}
     sorts: dict[bool, list[_Part]] = {True: [], False: []}  # closed or not
-    opaque = ~np.array([material.casts_by_lot for material in materials])
+    opaque = ~np.array([material.casts_stochastically for material in materials])
     for instance in instances:
         mesh = meshes[instance.mesh]
         if not instance.visibility.shadow or not mesh.triangle_count or not np.isfinite(instance.matrix).all():
@@ -116,7 +116,7 @@ def together(
     """Of closed meshes that are opaque all over (`shell`, by instance), and of others. None of too many."""
     if sum(meshes[instance.mesh].triangle_count for instance in instances) > MOST_TOGETHER:
         return []
-    opaque = ~np.array([material.casts_by_lot for material in materials], bool)
+    opaque = ~np.array([material.casts_stochastically for material in materials], bool)
     positions, numbers, start = [], [], 0
     sorts: dict[bool, list[tuple[int, np.ndarray]]] = {True: [], False: []}
     known: dict[tuple, np.ndarray] = {}

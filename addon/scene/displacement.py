@@ -275,7 +275,9 @@ class Displacement:
             if self.modes[k] == MESH:
                 materials.compiled[k] = _moved_program(compiled, self._bumps(snapshot, materials, k))
             else:
-                materials.compiled[k] = replace(compiled, own_surface=relief_surface(compiled), casts_by_lot=True)
+                materials.compiled[k] = replace(
+                    compiled, own_surface=relief_surface(compiled), casts_stochastically=True
+                )
         self._settings = {k: snapshot.materials[k].own for k in ranges}
 
     @staticmethod
@@ -481,4 +483,4 @@ def relief_surface(compiled: CompiledMaterial) -> OwnSurface:
         ]
     lines += ["}", '#include "surface/relief.glsl"']
     text = '#include "surface/shell.glsl"\n' + "\n".join(lines) + "\n"
-    return OwnSurface(text, (("RGBA32F", "shell_corners"),), shell=True, lets_pass=compiled.casts_by_lot)
+    return OwnSurface(text, (("RGBA32F", "shell_corners"),), shell=True, lets_pass=compiled.casts_stochastically)

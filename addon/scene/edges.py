@@ -157,7 +157,7 @@ class EdgeCache:
         origin: np.ndarray, changes: int,
     ) -> CasterEdges:  # fmt: skip
         """Edges of what blocks all light. `changes` is the geometry's count of changes: equal ones find the same."""
-        blocks = np.array([not material.casts_by_lot for material in materials], bool)
+        blocks = np.array([not material.casts_stochastically for material in materials], bool)
         clear = np.array([bool(material.transparent) for material in materials], bool)
         key = (changes, blocks.tobytes(), clear.tobytes(), tuple(origin))
         if self._scene is not None and self._scene[0] == key:

@@ -118,7 +118,7 @@ class SceneGeometry:
         """True if anything was uploaded. `materials` runs parallel to snapshot.materials."""
         told = (
             tuple((key, mesh.version) for key, mesh in snapshot.meshes.items()),
-            tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials),
+            tuple((m.attributes, m.casts_stochastically, _in_shell(m)) for m in materials),
         )
         known = snapshot.instances is self._told[0] and told == self._told[1]
         if known and np.array_equal(self.origin, self._origin(snapshot.camera)):  # the camera alone has moved
@@ -135,7 +135,7 @@ class SceneGeometry:
         changed = self._update_transforms(instances, snapshot)
         key = (
             tuple((i.mesh, snapshot.meshes[i.mesh].version, i.materials) for i in instances),
-            tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials),
+            tuple((m.attributes, m.casts_stochastically, _in_shell(m)) for m in materials),
         )
         self.placed = (instances, snapshot.meshes, materials)
         self.changes += changed or key != self._draw_key
@@ -318,7 +318,7 @@ class SceneGeometry:
                     [(0, mesh, slots)],
                     [(k, length, list(range(k, k + length))) for k, length in spans],
                 )
-        attributes = tuple((m.attributes, m.casts_by_lot, _in_shell(m)) for m in materials)
+        attributes = tuple((m.attributes, m.casts_stochastically, _in_shell(m)) for m in materials)
         self._shell = shell
         self._plan: list[tuple[list[int], int, object, int, int, bool]] = []
         kept = {}
@@ -366,7 +366,9 @@ class SceneGeometry:
                 key = (mesh.key, mesh.version)
                 if key not in kept:
                     kept[key] = self._closed[key] if key in self._closed else _closed(mesh)
-                of_kind[kind] = kept[key] and not any(materials[slot].casts_by_lot for slot in instance.materials)
+                of_kind[kind] = kept[key] and not any(
+                    materials[slot].casts_stochastically for slot in instance.materials
+                )
             shell[k] = of_kind[kind]
         self._closed = kept
         return shell
@@ -450,7 +452,7 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
             batch.handle.vertbuf_add(extra[slot, attribute])
         surfaces.append((int(material), batch))
 
-    opaque = ~np.array([material.casts_by_lot for material in materials])[triangle_material]
+    opaque = ~np.array([material.casts_stochastically for material in materials])[triangle_material]
     if not opaque.any():
         return surfaces, []
     vertices = gfx_geometry.vertex_buffer(

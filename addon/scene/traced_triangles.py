@@ -110,7 +110,7 @@ def opaque_code() -> float:
 
 def _stopped(material: CompiledMaterial, rays: int) -> tuple[int, bool]:
     """Which rays a transparent material's triangles stop, and whether they stop those wherever they meet them."""
-    if material.casts_by_lot or material.glass:
+    if material.casts_stochastically or material.glass:
         return rays, False
     return (WHOLE_SHADOW if rays == ALL_RAYS else rays), rays == SHADOW_ALONE
 

@@ -347,7 +347,7 @@ class Airlight(Technique):
         count = len(emitters)
         chosen = np.arange(count)
         if count > MOST_LAMPS:
-            chosen = ((np.arange(MOST_LAMPS) + frame.lot("airlight/choose")) * count / MOST_LAMPS).astype(int)
+            chosen = ((np.arange(MOST_LAMPS) + frame.uniform("airlight/choose")) * count / MOST_LAMPS).astype(int)
         rows = []
         for number in chosen:
             emitter = emitters[number]

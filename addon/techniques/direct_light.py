@@ -169,7 +169,7 @@ class DirectLight(Technique):
         if (chance >= 1.0).all():
             return [(emitter, 1.0) for emitter in self._emitters]
         edges = np.concatenate([[0.0], np.cumsum(chance)])
-        marks = np.arange(int(np.ceil(edges[-1]))) + frame.lot("choose lights")
+        marks = np.arange(int(np.ceil(edges[-1]))) + frame.uniform("choose lights")
         picked = np.unique(np.searchsorted(edges, marks[marks < edges[-1]], side="right") - 1)
         return [(self._emitters[k], 1.0 / chance[k]) for k in picked]
 

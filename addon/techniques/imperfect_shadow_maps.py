@@ -71,7 +71,7 @@ SPLAT = Program(
     textures=(("RGBA32F", "surface_points"), ("RGBA32F", "virtual_lights")),
     constants=(
         *MAP_CONSTANTS, ("INT", "map_rows"), ("INT", "triangle_count"), ("INT", "first_run"), ("INT", "run_count"),
-        ("INT", "run_points"), ("FLOAT", "depth_unit"), ("INT", "lot"),
+        ("INT", "run_points"), ("FLOAT", "depth_unit"), ("INT", "draw_seed"),
     ),
     defines=(("ENTRY_TEXELS", str(TEXELS)), ("DISC", "0.0"), ("CUT_DISC", "1.0"), ("TRIANGLE", "2.0")),
     writes_depth=True,
@@ -128,7 +128,7 @@ class VirtualMaps:
                         "map_side": side, "map_columns": columns, "map_rows": rows,
                         "triangle_count": self._points.triangles, "run_points": self._points.points,
                         "first_run": frame.sample * len(lights) % RUNS, "run_count": RUNS, "depth_unit": unit,
-                        "lot": frame.sample,
+                        "draw_seed": frame.sample,
                     },
                 )  # fmt: skip
                 passes.draw_points(shader, numbers, len(lights))

@@ -42,7 +42,7 @@ from ..lighting.loop import tinted_casters
 from ..lighting.point_maps import PointMaps
 from ..lighting.silhouettes import Extent
 from ..lighting.soft_maps import SoftMaps
-from ..lighting.visibility import VisibilityProvider, drawn_by_lot, has_extent, rays_beside
+from ..lighting.visibility import VisibilityProvider, drawn_stochastically, has_extent, rays_beside
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
@@ -176,7 +176,7 @@ class ShadowsByLight(PointMaps):
         others = rays_beside(frame, views, self._providers[PLAIN].resolution(frame))
         frame.count(self, "edges", found.count)
         width, height = frame.size
-        return edge_costs.compared(width * height, before, others, rays=not drawn_by_lot(frame))
+        return edge_costs.compared(width * height, before, others, rays=not drawn_stochastically(frame))
 
     def release(self) -> None:
         for service in self._providers.values():

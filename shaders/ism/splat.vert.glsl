@@ -35,10 +35,10 @@ void main()
   vec3 second = entry_texel(index + 3).xyz;
   bool whole = first.w > 0.5;
   float radius = sqrt(place.w);
-  // What lets light pass stands in a share of the maps. Discs overlap, and lots for each would add up to too much: those
-  // of a block have one lot, layers that are farther apart have their own.
+  // What lets light pass stands in a share of the maps. Discs overlap, and random choices for each would add up to too much: those
+  // of a block have one number, layers that are farther apart have their own.
   uvec3 block = whole ? uvec3(uint(abs(look.w))) : uvec3(ivec3(clamp(floor(place.xyz / (BLOCK * radius)), -1e9, 1e9)));
-  if (to_unit(hash3(hash3(block) + uvec3(uint(map), uint(lot), 0u)).x) >= look.z) {
+  if (to_unit(hash3(hash3(block) + uvec3(uint(map), uint(draw_seed), 0u)).x) >= look.z) {
     return;
   }
   vec3 origin = virtual_lights_fetch(ivec2(map, 0)).xyz;

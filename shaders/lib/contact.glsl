@@ -3,7 +3,7 @@
 // A texel knows one plane: along the line where two surfaces meet it holds either the receiver or the blocker, and of two
 // wires that touch the light's middle sees one. Rays see both. They end where blockers cast penumbrae that the map
 // resolves, so that they meet few boxes of the hierarchy, and their noise stays within some texels of a contact.
-// Casters with alpha are left to the map, which drew lots for them.
+// Casters with alpha are left to the map, which chose at random for them.
 #include "trace/bundle.glsl"
 #include "trace/rays.glsl"
 
@@ -64,7 +64,7 @@ float contact_visibility(Light light, ShadowReceiver r, ivec2 pixel, vec3 positi
     return lit;  // beside so large a scene rays would start beyond what they look for
   }
   vec3 origin = ray_origin(position, normal);
-  // The same lots for all lights, so that two half lights are one.
+  // The same random numbers for all lights, so that two half lights are one.
   uvec3 salt = roll_of(pixel, film_view.sample_index, film_view.seed, 19);
   float open = 0.0;
   float all = 0.0;

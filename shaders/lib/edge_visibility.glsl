@@ -23,7 +23,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   r.layers = LAYERS_SHADE(pixel);
   vec2 corner = floor(r.texel - 0.5);
   int blocking = 0;
-  bool by_lot = false;
+  bool stochastic = false;
   float lowest = 1e30;
   float highest = 0.0;
   for (int k = 0; k < 4; k++) {
@@ -31,7 +31,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
     vec4 caster = shadow_caster(r, ivec2(r.rectangle.xy + cell));
     vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
     float above = max(behind.x, behind.y);
-    by_lot = by_lot || caster.w > 1.5;
+    stochastic = stochastic || caster.w > 1.5;
     if (above > 0.0) {
       lowest = min(lowest, above);
       highest = max(highest, max(caster.x + 0.5 * dot(abs(caster.yz), vec2(1.0)), r.q + max(behind.x, 0.0)));
@@ -48,7 +48,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   float density;
   light_sample(light, position, direction, density);
   vec2 penumbra = kernel_extent(light, r, 1.0) * lowest;
-  bool by_map = by_lot || min(penumbra.x, penumbra.y) > SHARP_TEXELS || dot(direction, normal) <= 0.0;
+  bool by_map = stochastic || min(penumbra.x, penumbra.y) > SHARP_TEXELS || dot(direction, normal) <= 0.0;
   by_map = by_map || ray_offset(position) > CLEARANCE * shadow_distance(r.view, position, direction, r.q + lowest);
   if (by_map) {
     return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;

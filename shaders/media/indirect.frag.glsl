@@ -105,9 +105,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
 #ifdef WORLD_LIT
     // Of the world another row at each stop: its rows are the last ones.
     int first = light_count - int(world_rows + 0.5);
-    float lot = media_random(seed);
+    float choice = media_random(seed);
     if (number >= first) {
-      number = min(first + int(lot * float(ROWS_ASKED - first)), ROWS_ASKED - 1);
+      number = min(first + int(choice * float(ROWS_ASKED - first)), ROWS_ASKED - 1);
       ask_turn = vec2(media_random(seed), media_random(seed));
     }
 #endif

@@ -1,4 +1,4 @@
-// What a material is at a point of a mesh for rays of a kind, without lots, and from which side it is seen.
+// What a material is at a point of a mesh for rays of a kind, without random choices, and from which side it is seen.
 #include "lib/math.glsl"
 #include "lib/random.glsl"
 #include "lib/closure.glsl"

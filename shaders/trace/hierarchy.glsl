@@ -294,7 +294,7 @@ void leaf_met(int leaf, int record, vec3 origin, vec3 direction, uint salt, bool
 // number there. A triangle nearer than `enough` ends the search at once, whether or not it is the nearest.
 // Triangles with an opacity below one are passed at random, the same way for the same `salt`; those that may bend light
 // are met for certain where `bent`. `shadow`: the ray looks for a light. With OPAQUE_ONLY what is not opaque is passed:
-// for lookups whose depth maps already drew lots for it.
+// for lookups whose depth maps already chose at random.
 float trace_layers(vec3 origin, vec3 direction, float limit, float enough, uint salt, bool bent, bool shadow,
                    out ivec2 hit)
 {

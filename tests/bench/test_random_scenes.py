@@ -1,4 +1,4 @@
-"""Scenes made by lot: the same number makes the same scene, and what differs is said."""
+"""Scenes made at random: the same number makes the same scene, and what differs is said."""
 
 import numpy as np
 import pytest

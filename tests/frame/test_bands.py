@@ -3,7 +3,7 @@
 import pytest
 
 from addon.frame import bands as bands_module
-from addon.frame.bands import FIRST, Bands, Leash
+from addon.frame.bands import FIRST, Bands, QueueLimit
 
 
 def drawn(bands, height, seconds_per_row, wanted=0.02, name="gather"):
@@ -72,9 +72,9 @@ class SlowGpu:
 @pytest.mark.parametrize(("seconds", "most"), [(1.0, 1), (0.05, 10), (0.001, 500)])
 def test_gpu_is_behind_by_no_more_than_it_may(monkeypatch, seconds, most):
     gpu = SlowGpu(seconds, monkeypatch)
-    leash = Leash(gpu, 0.5)
+    limit = QueueLimit(gpu, 0.5)
     for _ in range(3000):
         gpu.draw()
-        leash.sample()
+        limit.sample()
     assert most / 2 <= gpu.longest <= most
     assert gpu.awaited == pytest.approx(0.9 * seconds * (3000 - gpu.asked))

@@ -129,7 +129,7 @@ def test_an_object_that_moves_keeps_its_table():
         triangle_count=12, triangle_materials=lambda slots: np.zeros(12, int),
     )  # fmt: skip
     place = SimpleNamespace(mesh="cube", matrix=np.eye(4), visibility=Visibility(), materials=(0,))
-    material = SimpleNamespace(casts_by_lot=False, transparent=False)
+    material = SimpleNamespace(casts_stochastically=False, transparent=False)
     cache = edges.EdgeCache()
     first = cache.casters([place], {"cube": mesh}, [material], np.zeros(3), 1)
     known = list(cache._tables.values())

@@ -110,7 +110,7 @@ def test_many_small_moves_end_in_the_same_list_as_one(snapshot):
 
 
 def test_order_does_not_depend_on_the_numbers_in_names_of_meshes(snapshot):
-    """Names hold numbers of the session; what is drawn by lot depends on the order."""
+    """Names hold numbers of the session; what is drawn at random depends on the order."""
     orders = []
     for start in (8, 99):  # 8, 9 and 99, 100: as text the larger one comes first
         names = dict(zip(snapshot.meshes, (f"mesh {start}", f"mesh {start + 1}")))

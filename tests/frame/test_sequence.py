@@ -106,9 +106,9 @@ def test_lens_and_lots_cover_the_plane_together_with_what_they_choose():
     part of a light for ever."""
     count = 1024
     light = points(0, count, "light")
-    lots = np.array([sequence.lot(k, "choose lights") for k in range(count)])
+    numbers = np.array([sequence.uniform(k, "choose lights") for k in range(count)])
     lens = points(0, count, sequence.LENS)
-    for other in (lots, lens[:, 0], lens[:, 1]):
+    for other in (numbers, lens[:, 0], lens[:, 1]):
         for axis in (0, 1):
             cells = occupancy(np.stack([other, light[:, axis]], axis=1), (4, 4))
             assert cells.min() > 0 and cells.max() <= 16  # 4 on average; of one dimension 240 of 256 are empty

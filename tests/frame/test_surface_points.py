@@ -31,7 +31,7 @@ def test_discs_of_each_run_have_the_area_of_the_surface():
 
 
 def test_each_run_is_spread_evenly():
-    """A quarter of the square has a quarter of the points, which by lot would be off by 3.5 of 16."""
+    """A quarter of the square has a quarter of the points, which at random would be off by 3.5 of 16."""
     _, small = spread(surfaces(grid(32)), POINTS, EYE, 10.0)
     x, y = small[:, 0, 0].reshape(RUNS, POINTS), small[:, 0, 1].reshape(RUNS, POINTS)
     quarter = ((x < 0) & (y < 0)).sum(axis=1)

@@ -78,7 +78,7 @@ def test_coverage_is_that_of_cycles(written):
 
 @pytest.mark.slow
 def test_layers_cover_by_their_opacity(written):
-    """Both engines draw lots for layers: of Cycles' 4096 samples a pixel may be off by 0.02 for that alone."""
+    """Both engines choose layers at random: of Cycles' 4096 samples a pixel may be off by 0.02 for that alone."""
     assert_like_cycles(written, crowd(written, opacity=0.4), 512, 8 * ONE_STEP, 1.5 * ONE_STEP)
 
 

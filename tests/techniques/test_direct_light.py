@@ -318,7 +318,7 @@ def test_objects_in_another_order_give_the_same_picture(stage):
 
 @SLOW
 def test_of_many_lights_a_few_per_sample_give_the_sum_of_all(floor):
-    """Drawn by lot, each weighted by the inverse of its chance."""
+    """Drawn at random, each weighted by the inverse of its chance."""
     places_of_lights = [(x, y, 1.5) for x in np.linspace(-2, 2, 8) for y in np.linspace(-2, 2, 8)]
     for place in places_of_lights:
         floor.light("POINT", place, shadow_soft_size=0, energy=10 + 5 * place[0], use_shadow=False)

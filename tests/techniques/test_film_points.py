@@ -118,7 +118,7 @@ def test_every_lobe_keeps_its_light_at_edges(stage, light_of, kind):
 
 
 def test_a_mix_of_lobes_keeps_its_light(stage, light_of):
-    """Of several lobes a point draws one by lot, another than the sample that was lit."""
+    """Of several lobes a point draws one at random, another than the sample that was lit."""
     material = stage.principled(Base_Color=(0.8, 0.4, 0.2, 1), Roughness=0.5, Coat_Weight=0.8, Sheen_Weight=0.5)
     stripes(stage, 0.3, material, stage.diffuse(0.5))
     stage.light("SUN", turn=(0.3, 0.2, 0), energy=2.0)
@@ -131,7 +131,7 @@ def test_a_mix_of_lobes_keeps_its_light(stage, light_of):
 @pytest.mark.parametrize("inputs", [{"Coat_Weight": 0.25}, {"Coat_Weight": 1.0}, {"IOR": 1.2}], ids=str)
 @pytest.mark.parametrize("metal", [0.5, 1.0])
 def test_lobes_that_reflect_unlike_keep_their_light(stage, light_of, metal, inputs):
-    """A coat hardly reflects, and is drawn by lot seldom and with great weight; the metal below it nearly all."""
+    """A coat hardly reflects, and is drawn at random seldom and with great weight; the metal below it nearly all."""
     stage.floor(material=stage.principled(Base_Color=(0.8, 0.6, 0.4, 1), Metallic=metal, Roughness=0.5, **inputs))
     stage.light("SUN", turn=(0.3, 0.2, 0), energy=2.0)
     stage.world((1, 1, 1), 0.5)
@@ -139,7 +139,7 @@ def test_lobes_that_reflect_unlike_keep_their_light(stage, light_of, metal, inpu
     assert shared.mean() == pytest.approx(truth.mean(), rel=0.02)
 
 
-def test_layers_are_drawn_by_lot_at_every_point(stage, light_of):
+def test_layers_are_drawn_stochastically_at_every_point(stage, light_of):
     """A half transparent card: coverage of one sample with eight points is that of eight samples."""
     stage.rectangle((-2, -2), (2, 2), material=stage.see_through(0.5))
     stage.scene.render.film_transparent = True

@@ -28,7 +28,7 @@ def lifted(monkeypatch):
         made(self, snapshot)
         for k, one in enumerate(self.compiled):
             if one.name == "Lifted":
-                self.compiled[k] = replace(one, own_surface=LIFTED, casts_by_lot=True)
+                self.compiled[k] = replace(one, own_surface=LIFTED, casts_stochastically=True)
                 self.own_images[k] = {}
         self._share()  # what has a program of its own is not drawn with others
 

@@ -131,7 +131,7 @@ def test_the_same_picture_twice(stage, light_of):
 
 
 def test_layers_under_lamp_and_world_keep_their_mean(stage, light_of):
-    """Cards with alpha over a floor, under lamp and world: what maps and lots decide is decided again."""
+    """Cards with alpha over a floor, under lamp and world: what maps and random choices decide is decided again."""
     stage.floor(material=stage.diffuse(0.5))
     wires(stage, 0.3, stage.see_through(0.5), 0.06)
     stage.light("POINT", location=(0.5, 0.5, 2.0), energy=80.0)

@@ -64,7 +64,7 @@ def test_a_layer_with_alpha_lets_its_transparency_pass(lit, opacity):
     lit.blocker((-layer[0], -layer[1]), layer, 1.0, material=lit.see_through(opacity))
     share = irradiance(lit, 1, SIZE) / free
     assert share.mean() == pytest.approx(1 - opacity, abs=0.03)
-    assert share.std() < 0.06  # texels are drawn by lot, and a kernel holds many
+    assert share.std() < 0.06  # texels are drawn at random, and a kernel holds many
 
 
 def test_a_closed_box_stays_dark_inside_whatever_stands_in_it(lit):
