@@ -18,9 +18,10 @@ from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
 from ..scene import acceleration
 from ..scene.geometry import Draw
-from ..snapshot.scene import Snapshot
+from ..snapshot.scene import Light, Snapshot
 from ..sources import lights
-from . import depth_maps, repeated_light
+from . import depth_maps, edge_costs, repeated_light
+from .edge_costs import FEW_EDGES
 from .maps_or_rays import Compared, compared, maps_ns, rays_ns
 
 RESOLUTION = Param(
@@ -248,9 +249,10 @@ def rays_beside(frame: Frame, views: list, resolution: int) -> Compared:
 VIEWS = {"POINT": 6}  # of a map, by kind of lamp, where the lamp sees all around; one elsewhere
 
 
-def foreseen(snapshot: Snapshot, settings: Settings) -> list[str]:
+def foreseen(snapshot: Snapshot, settings: Settings, soft: bool = False) -> list[str]:
     """What is to be expected of `by_rays` before anything is drawn, as a sentence for each lamp with shadows: all
-    casters are taken for seen by it. The ledger of a picture says what was chosen."""
+    casters are taken for seen by it. `soft`: lamps with extent have soft maps, or their edges where these are few
+    (techniques/shadows_by_light.py). The ledger of a picture says what was chosen."""
     casters = [one for one in snapshot.instances if one.visibility.shadow]
     triangles = sum(snapshot.meshes[one.mesh].triangle_count for one in casters)
     lamps = [light for light in snapshot.lights if light.cast_shadow and np.any(light.strength)]
@@ -263,8 +265,19 @@ def foreseen(snapshot: Snapshot, settings: Settings) -> list[str]:
     for light in lamps:
         views = VIEWS.get(light.kind, 1)
         found = Compared(rays_ns(size[0] * size[1], triangles), maps_ns(triangles, views * side * side, views))
-        sentences.append(f"Shadows of {light.name}: {found.why}")
+        why = found.why
+        if soft and has_extent(light):
+            why = "soft maps"
+            if settings.value("shadows_by_light", FEW_EDGES):
+                why = edge_costs.foreseen(size[0] * size[1], triangles, found)
+        sentences.append(f"Shadows of {light.name}: {why}")
     return sentences
+
+
+def has_extent(light: Light) -> bool:
+    """Whether the light has extent, casts shadows, and gives something."""
+    extent = {"SUN": light.angle, "AREA": max(map(abs, light.size), default=0.0)}.get(light.kind, light.radius)
+    return light.cast_shadow and extent > 0.0 and bool(np.any(light.strength))
 
 
 def _far_off(frame: Frame) -> bool:
