@@ -19,10 +19,10 @@ is a layer (lighting/visibility.py): blades as the light sees them, which shadow
 | memory | 32 bytes for each texel and view: 7 MiB for 64 x 64 and 57 views |
 
 Bias: colours are interpolated between sampled directions; pictures of two views are hardly alike, so that blades
-dissolve into each other as the view moves. Left out: wind, shadows of grass in filtered (soft) maps and for rays, what
-reflections and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and blades
-nearer than five times their height, which need geometry. A flat-shaded mesh leaves gaps in the plane on top: shade it
-smooth.
+dissolve into each other as the view moves. Left out: wind, shadows of grass in filtered (soft) maps and for rays,
+what reflections and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and
+blades nearer than five times their height, which need geometry. A flat-shaded mesh leaves gaps in the plane on top:
+shade it smooth.
 """
 
 from __future__ import annotations
