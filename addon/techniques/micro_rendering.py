@@ -50,6 +50,7 @@ from ..lighting.micro_buffers import (
     buffer_bindings,
 )
 from ..lighting.point_runs import PointRuns, Run
+from ..scene import acceleration
 from ..scene.seen import SEES
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -148,6 +149,9 @@ class MicroRendering(MultiresRadiosity):
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return False
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        return super().skip(snapshot, settings) or acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         return (SEES, *micro_buffers.PROGRAMS, REFLECTED)
