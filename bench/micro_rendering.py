@@ -2,7 +2,7 @@
 
 Scenes x techniques x samples: squared error (relMSE, the noise of the reference taken off), bias, RMS beside the mean
 and seconds of a whole render whose programs are compiled, by the clock and of the processor, which hold where others
-use it, too. What error its peers have in the time of one sample of it, by a power law through their nearest two. Then
+use it, too. What error its peers have in the time of one sample of it, between their nearest two. Then
 error and time of micro-rendering by the side of its micro-buffers, the number of points, regions and threshold in one
 scene, at one sample. The seconds are of the machine that it runs on: where a GPU is drawn in software, a tree that is
 walked by each of eight lanes is what it does worst.
@@ -83,20 +83,17 @@ def equal_time(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
         seconds, told = float(mine[4]), [mine[5]]
         for peer in PEERS:
             known = sorted((float(row[4]), max(float(row[5]), 1e-5)) for row in own if row[1] == peer)
-            told.append(f"{at_time(known, seconds):.4f}" if known else "")
+            told.append(at_time(known, seconds) if known else "")
         found.append((scene, f"{seconds:.2f}", *told))
     return found
 
 
-def at_time(known: list[tuple[float, float]], seconds: float) -> float:
-    """The error after so long, of (seconds, error): along the line through the two nearest in logarithms; of less time
-    than the first takes, the first's."""
+def at_time(known: list[tuple[float, float]], seconds: float) -> str:
+    """The error after so long, of (seconds, error) in order: along lines in logarithms; the first's of less time than
+    that takes; of more time than the last takes it is at most the last's."""
     times, errors = np.log(known).T
-    at = np.log(max(seconds, known[0][0]))
-    if at <= times[-1] or len(known) < 2:
-        return float(np.exp(np.interp(at, times, errors)))
-    slope = min((errors[-1] - errors[-2]) / (times[-1] - times[-2]), 0.0)
-    return float(np.exp(errors[-1] + slope * (at - times[-1])))
+    error = f"{float(np.exp(np.interp(np.log(seconds), times, errors))):.4f}"
+    return error if seconds <= known[-1][0] else f"{error} or less"
 
 
 def of_scene(name: str, options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
