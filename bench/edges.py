@@ -5,6 +5,7 @@
 | families | visibility on the six families of bench/soft_scenes.py, against many rays of each pixel |
 | costs | processor time of the shadows alone, by points, patterns and modes |
 | fence | the same fence as a card of two triangles with a mask, and as a mesh of wires |
+| union | what wedges add up at the receivers themselves, without film and smoothing, against all triangles |
 | equal | casters by light size: time of rays and of maps with as many samples as leave the error of edges at one |
 | cycles | direct light of the scenes of bench/edge_scenes.py against Cycles |
 | growth | time, edges and bytes by casters, lights and pixels |
@@ -28,8 +29,9 @@ from .shading import node_of, tree_of
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "edge_shadows.md"
 COMMAND = "python -m bench edges --page"
 DCS, PWB = "depth_complexity", "penumbra_wedges"
+BY_EDGES = "soft lights with few edges: depth complexity"  # techniques/shadows_by_light.py
 RAYS_OF_TRUTH = 1024
-PARTS = ("families", "cycles", "costs", "fence", "equal", "growth")
+PARTS = ("families", "union", "cycles", "costs", "fence", "equal", "growth")
 
 
 def dcs(points: int, **values) -> tuple[tuple[str, object], ...]:
@@ -167,6 +169,47 @@ def _count(thing) -> int:
     return len(thing.data.loop_triangles)
 
 
+UNION_FAMILIES = ("grid", "far background", "stacked blockers")
+RECEIVERS, ACROSS = 200, 16
+
+
+def union(options) -> str:
+    """RMS of the share of the lamp's area that some receivers see."""
+    from addon import engine
+    from addon.gfx import images
+    from addon.lighting import silhouettes
+
+    rows = [("union", *UNION_FAMILIES)]
+    errors: dict[str, list[float]] = {}
+    for family in UNION_FAMILIES:
+        scene, expected = soft_scenes.build(family), None
+        for mode in ("BOXES", "PRODUCT", "SUM"):
+            soft.direct(scene, soft.Entrant(mode, PWB, (("union", mode),)), options.size)
+            renderer = engine.session(scene, "final").renderer
+            own = next(one for one in renderer.techniques if one.name == PWB)
+            receivers = images.read(own.tiles._kept["receivers"]).reshape(-1, 4)
+            found = images.read(own.tiles._kept["seen_share"]).reshape(-1)
+            valid = np.flatnonzero(receivers[:, 3] != 0)
+            chosen = valid[np.linspace(0, len(valid) - 1, RECEIVERS).astype(int)]
+            if expected is None:
+                emitter = renderer.frame.emitters[0]
+                grid = (np.arange(ACROSS) + 0.5) / ACROSS * 2 - 1
+                points = [emitter.centre + x * emitter.u[:3] + y * emitter.v[:3] for x in grid for y in grid]
+                corners = own._casters.corners
+                expected = np.array([
+                    np.mean([not silhouettes.crossings(corners, p, s).any() for s in points])
+                    for p in receivers[chosen, :3].astype(float)
+                ])  # fmt: skip
+            errors.setdefault(mode, []).append(float(np.sqrt(((found[chosen] - expected) ** 2).mean())))
+    names = {"BOXES": "boxes", "PRODUCT": "product", "SUM": "plain sum"}
+    rows += [(names[mode], *(f"{error:.4f}" for error in found)) for mode, found in errors.items()]
+    ratios = [boxes / max(product, 1e-9) for boxes, product in zip(errors["BOXES"], errors["PRODUCT"])]
+    rows.append(("boxes : product", *(f"{ratio:.2f}" for ratio in ratios)))
+    return (
+        f"### Unions at {RECEIVERS} receivers, against all triangles at {ACROSS**2} places of the lamp\n\n{show(rows)}"
+    )
+
+
 WIRES, SEGMENTS = 60, 162
 
 
@@ -258,6 +301,8 @@ def equal(options) -> str:
             "rays: samples, ms",
             "maps: samples, ms",
             "least",
+            "Auto, 1 sample",
+            "its RMS",
         )
     ]
     for count in (4, 32, 256, 2048):
@@ -279,9 +324,13 @@ def equal(options) -> str:
                 times[name] = each * needed if np.isfinite(needed) else np.inf
                 cells.append(f"{needed:.0f}, {1000 * times[name]:.0f}" if np.isfinite(needed) else "never")
             least = min(times, key=times.get)
+            auto = soft.Entrant("auto", "AUTO")
+            of_auto = truth.error(soft.visibility(scene, auto, options.size))[0]
+            soft.direct(scene, auto, options.size)
+            taken = "edges" if BY_EDGES in counters("shadows_by_light") else "soft maps"
             rows.append((
                 f"{count}", f"{light_size} m", f"{edges:,}", f"{error:.4f}", f"{1000 * times['edges']:.0f}",
-                *cells, least,
+                *cells, least, taken, f"{of_auto:.4f}",
             ))  # fmt: skip
     return "### The same error by edges, rays and maps\n\n" + show(rows)
 
@@ -395,6 +444,7 @@ def command(options: argparse.Namespace) -> int:
         "costs": costs,
         "fence": fence,
         "equal": equal,
+        "union": union,
         "growth": growth,
     }
     for part in options.parts:

@@ -336,7 +336,8 @@ def plan(job: Job) -> None:
                 points = settings.value("film", POINTS)
                 sentences += point_costs.foreseen(snapshot, points, settings.samples, found.fills("indirect"))
             if found.runs("direct_light"):
-                sentences += ledgers.some_of(tuple(foreseen(snapshot, settings)))
+                soft = found.filled.get("shadow") == "shadows_by_light"
+                sentences += ledgers.some_of(tuple(foreseen(snapshot, settings, soft)))
             for sentence in sentences:
                 print(f"  {sentence}")
         _print_notes([*snapshot.notes, *_material_notes(snapshot)])

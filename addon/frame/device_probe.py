@@ -5,10 +5,11 @@ clock, less what the wait alone takes. A kernel begins small and grows fourfold 
 a small part of it on a software driver and on a fast card alike. Of REPEATS runs at that size the least counts, since
 whatever else the machine does can only add.
 
-Kernels are those of the choices that ask: shadow rays between towers (trace/hierarchy.glsl, the same code
-as pictures run), small triangles and whole quads into a depth map, views with nothing in them, passes of one pixel, and
-texels far apart from a texture and from an image. What they leave out: caches that a whole picture fills, divergence of
-scenes with deep trees, alpha. They are good for choices between methods that differ by a factor, not for forecasts.
+Kernels are those of the choices that ask: shadow rays between towers (trace/hierarchy.glsl, the same code as pictures
+run), small triangles and whole quads into a depth map, views with nothing in them, passes of one pixel, texels far
+apart from a texture and from an image, and edges of a shadow. What they leave out: caches that a whole picture fills,
+divergence of scenes with deep trees, alpha. They are good for choices between methods that differ by a factor, not for
+forecasts.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ SMALLEST = 32
 TRIANGLES = 4096  # of the hierarchy and of the mesh
 VIEWS, BOXES = 8, 64
 READS, READ_SIDE = 64, 512
+EDGES = 32  # of a shadow
 DIGITS = 2  # to which figures are rounded, so that noise turns no choice
 
 RAY = passes.fullscreen_program(
@@ -65,6 +67,11 @@ def _texels_read(name: str, read: str, **declared) -> Program:
 # The type without a format keeps the texture from being bound as an image where those are faster (gfx/library.py).
 FETCH = _texels_read("fetches", "texelFetch(probed, texel, 0)", textures=(("FLOAT_2D", "probed"),))
 LOAD = _texels_read("loads", "imageLoad(probed, texel)", images=(("probed", "RGBA32F", "FLOAT_2D", "READ"),))
+
+EDGE = passes.fullscreen_program(
+    "probe of edges", "probe/edges.frag.glsl", textures=(("RGBA32F", "edge_records"), ("RGBA32F", "light_pattern")),
+    constants=(("INT", "side"),), outputs=(("VEC4", "out_color"),), defines=(("EDGES", str(EDGES)),),
+)  # fmt: skip
 
 
 def folder() -> Path:
@@ -100,6 +107,7 @@ def measure() -> Device:
         "texel": _texels(target, wait),
         "view": _views(target, wait),
     }
+    found["edge"] = _edges(target, wait)
     found["render_pass"], found["python"] = _passes(target, wait)
     device.measured_s = time.perf_counter() - started
     return Device(**{field.name: _rounded(1e9 * found[field.name]) for field in fields(Device)})
@@ -217,6 +225,23 @@ def _reads(target: images.Target, program: Program, kind: str, wait: float) -> f
         passes.fullscreen(program, target, viewport=(0, 0, side, side), **{kind: {"probed": probed}})
 
     return _each(work, _sides(), lambda side: side * side * READS, wait)
+
+
+def _edges(target: images.Target, wait: float) -> float:
+    """Edges over a floor before a square lamp, of which every pixel is asked about all."""
+    random = np.random.default_rng(2)
+    ends = np.zeros((2 * EDGES, 4), np.float32)
+    ends[:, :3] = np.repeat(random.uniform((0, 0, 0.4), (1, 1, 0.6), (EDGES, 3)), 2, axis=0)
+    ends[:, :3] += random.normal(0, 0.1, (2 * EDGES, 3))
+    textures = {
+        "edge_records": images.upload(ends[None]),
+        "light_pattern": images.upload(random.uniform(-1, 1, (1, 32, 4)).astype(np.float32)),
+    }
+
+    def work(side: int) -> None:
+        passes.fullscreen(EDGE, target, viewport=(0, 0, side, side), textures=textures, constants={"side": side})
+
+    return _each(work, _sides(), lambda side: side * side * EDGES, wait)
 
 
 def _passes(target: images.Target, wait: float) -> tuple[float, float]:

@@ -15,7 +15,7 @@ import tempfile
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-VERSION = 1  # of the kernels: figures of others are measured anew
+VERSION = 2  # of the kernels: figures of others are measured anew
 MOST_KEPT = 16  # drivers
 LOAD_GAIN = 0.7  # of a fetch's time, below which loads are worth the bindings that they take
 VARIABLE = "CANDELA_DEVICE"
@@ -33,20 +33,21 @@ class Device:
     python: float  # of a pass, until it is asked for
     fetch: float  # of a texel far from that before, from a texture
     load: float  # the same from an image
+    edge: float  # of a shadow, asked by a pixel for 64 points of a light
 
     def lines(self) -> list[str]:
         """For the panel and the terminal."""
         drawn = f"triangle {_time(self.triangle)}, depth texel {_time(self.texel)}, view {_time(self.view)}"
         asked = f"pass {_time(self.render_pass)}, of it Python and driver {_time(self.python)}"
-        read = f"texel fetched {_time(self.fetch)}, loaded {_time(self.load)}"
+        read = f"texel fetched {_time(self.fetch)}, loaded {_time(self.load)}; edge of a shadow {_time(self.edge)}"
         return [f"ray {_time(20 * self.ray_level)} (a million triangles), {drawn}", f"{asked}; {read}"]
 
 
 # Made up for tests, near to what two threads of llvmpipe and a fast card do: whole renders of 16 samples of direct
 # light, by maps and by rays; of cards only what others publish.
 MADE_UP = {
-    "software": Device(8.0, 130.0, 20.0, 8e5, 5e5, 3e5, 8.0, 2.5),
-    "card": Device(0.15, 0.3, 0.02, 5e3, 3e4, 2.5e4, 0.01, 0.012),
+    "software": Device(8.0, 130.0, 20.0, 8e5, 5e5, 3e5, 8.0, 2.5, 20.0),
+    "card": Device(0.15, 0.3, 0.02, 5e3, 3e4, 2.5e4, 0.01, 0.012, 0.05),
 }
 
 _current: Device | None = None

@@ -26,12 +26,12 @@ from ..scene.edges import CasterEdges, EdgeCache
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..surfaces.draw import SURFACES
-from . import edge_tiles, repeated_light
+from . import edge_tiles, repeated_light, silhouettes
 from .edge_tiles import EdgeTiles, Lit
 from .point_maps import PointMaps
-from .silhouettes import Extent
+from .silhouettes import Extent, Silhouettes
 from .textured_volumes import CARD_WORDS, CardCache
-from .visibility import Lookup, Maps, VisibilityProvider
+from .visibility import Lookup, Maps, VisibilityProvider, has_extent
 
 NEAR = 0.25  # radius / distance of a round light from which rays take over, as direct_light has it
 PATTERNS = 16  # of neighbouring pixels, four by four
@@ -89,17 +89,29 @@ class EdgeShadows(PointMaps):
 
     def begin(self, frame: Frame) -> None:
         super().begin(frame)
-        geometry = frame.geometry
-        self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
-        self._served = {}
+        self.find_casters(frame)
         for emitter in frame.emitters:
             reason, extent = self.suits(frame, emitter)
             frame.count(self, reason or "lights by edges")
             if extent is not None:
-                self._served[emitter.light.key] = extent
+                self.serve(emitter, extent)
         if len(self._served) < len(frame.emitters):
             self.fallback.begin(frame)
             frame.provide(self, VisibilityProvider)
+
+    def find_casters(self, frame: Frame) -> None:
+        """What `suits` asks; no light is served yet."""
+        geometry = frame.geometry
+        self._casters = self.edges.casters(*geometry.placed, geometry.origin, geometry.changes)
+        self._served = {}
+
+    def serve(self, emitter: lights.Emitter, extent: Extent) -> None:
+        """Answer for this light from now on."""
+        self._served[emitter.light.key] = extent
+
+    def silhouettes(self, frame: Frame, extent: Extent) -> Silhouettes:
+        """The candidate edges of a light that `suits`."""
+        return self.tiles.found(frame, self._casters, extent, self.accurate(frame), self.by_group)[1]
 
     def suits(self, frame: Frame, emitter: lights.Emitter) -> tuple[str, Extent | None]:
         """Why edges do not suit a light, and its extent where they do."""
@@ -111,8 +123,7 @@ class EdgeShadows(PointMaps):
         if emitter.kind in (lights.POINT, lights.SPHERE) and emitter.radius > NEAR * nearest:
             return "round lights that are near: rays or maps", None
         extent = Extent.of(emitter, nearest)
-        found = self.tiles.found(frame, self._casters, extent, self.accurate(frame), self.by_group)[1]
-        if found.count > frame.settings.get(self, "most_edges"):
+        if self.silhouettes(frame, extent).count > frame.settings.get(self, "most_edges"):
             return "lights with too many edges: rays or maps", None
         return "", extent
 
@@ -208,42 +219,64 @@ class EdgeShadows(PointMaps):
         self._served, self._casters = {}, edges.NO_EDGES
 
 
-def has_extent(light) -> bool:
-    """Whether the light has extent, casts shadows, and gives something."""
-    extent = {"SUN": light.angle, "AREA": max(map(abs, light.size), default=0.0)}.get(light.kind, light.radius)
-    return light.cast_shadow and extent > 0.0 and bool(np.any(light.strength))
-
-
-def shared_patterns(frame: Frame, emitter: lights.Emitter, points: int, patterns: int) -> tuple[np.ndarray, int]:
-    """Patterns of points of a light for neighbouring pixels in this sample: (patterns, points, 4) texels, and their
-    shape (edge_tiles). Each pattern, and all together, are nets of the sequence; each sample has others."""
-    count = points * patterns
+def shared_patterns(frame: Frame, extent: Extent, points: int, patterns: int) -> tuple[np.ndarray, int]:
+    """Patterns of points of a light for neighbouring pixels in this sample, as edges/depth_complexity.comp.glsl reads
+    them, and their shape (edge_tiles). Each, and all together, are nets of the sequence; each sample has others."""
+    emitter, count = extent.emitter, points * patterns
     xy = sequence.points(frame.sample * count, count, "edges/light", frame.settings.seed).reshape(patterns, points, 2)
-    texels = np.zeros((patterns, points, 4), np.float32)
     x, y = xy[..., :1], xy[..., 1:]
     if emitter.kind == lights.RECTANGLE:
-        texels[..., :3] = (2 * x - 1) * emitter.u[:3] + (2 * y - 1) * emitter.v[:3]
-        return texels, edge_tiles.AS_THEY_ARE
+        return in_pairs(2.0 * xy - 1.0, sort=True), edge_tiles.IN_PLANE
     disc = np.concatenate(_disc(x, y), axis=-1)
-    if emitter.kind == lights.ELLIPSE:
-        texels[..., :3] = disc[..., :1] * emitter.u[:3] + disc[..., 1:] * emitter.v[:3]
-        return texels, edge_tiles.AS_THEY_ARE
     if emitter.kind == lights.SUN:
-        texels[..., :3] = _cone_offsets(emitter, disc)
-        return texels, edge_tiles.AS_THEY_ARE
-    texels[..., :2] = disc
-    return texels, edge_tiles.FACING_SPHERE if emitter.kind == lights.SPHERE else edge_tiles.FACING_DISC
+        directions = _cone_offsets(emitter, disc) + emitter.centre
+        if not extent.in_plane:
+            return _in_space(directions - emitter.centre), edge_tiles.AS_THEY_ARE
+        return in_pairs(_places(extent, directions), sort=True), edge_tiles.IN_PLANE
+    facing = edge_tiles.FACING_SPHERE if emitter.kind == lights.SPHERE else edge_tiles.FACING_DISC
+    return in_pairs(disc, sort=True), edge_tiles.IN_PLANE if emitter.kind == lights.ELLIPSE else facing
 
 
-def point_patterns(emitter: lights.Emitter, samples: list[np.ndarray]) -> tuple[np.ndarray, int]:
-    """One pattern of the points by which the light is sampled (Emitter.sample): (1, points, 4) texels, and shape."""
-    texels = np.zeros((1, len(samples), 4), np.float32)
-    given = np.array(samples, float)
+def point_patterns(extent: Extent, samples: list[np.ndarray]) -> tuple[np.ndarray, int]:
+    """One pattern of the points by which the light is sampled (Emitter.sample), in their order: texels, and shape."""
+    emitter, given = extent.emitter, np.array(samples, float)[None]
     if emitter.kind in (lights.POINT, lights.SPHERE):
-        texels[0, :, :3] = given / emitter.radius
-        return texels, edge_tiles.BALL_SPHERE if emitter.kind == lights.SPHERE else edge_tiles.BALL_DISC
-    texels[0, :, :3] = given - emitter.centre
-    return texels, edge_tiles.AS_THEY_ARE
+        shape = edge_tiles.BALL_SPHERE if emitter.kind == lights.SPHERE else edge_tiles.BALL_DISC
+        return _in_space(given / emitter.radius), shape
+    if not extent.in_plane:
+        return _in_space(given - emitter.centre), edge_tiles.AS_THEY_ARE
+    return in_pairs(_places(extent, given)), edge_tiles.IN_PLANE
+
+
+def _places(extent: Extent, points: np.ndarray) -> np.ndarray:
+    """(..., 2) where points of a light (..., 3) lie along its half axes; at infinity their directions."""
+    if extent.infinite:
+        points = points / (points @ extent.centre)[..., None]
+    axes = np.linalg.pinv(np.stack(extent.half_axes, axis=1))
+    return (points - extent.centre) @ axes.T
+
+
+def _in_space(offsets: np.ndarray) -> np.ndarray:
+    """(patterns, points, 4) texels of offsets (patterns, points, 3), each by itself."""
+    return np.concatenate([offsets, np.zeros_like(offsets[..., :1])], axis=-1).astype(np.float32)
+
+
+BOX = 16  # points that a box is around
+
+
+def in_pairs(places: np.ndarray, sort: bool = False) -> np.ndarray:
+    """(patterns, points / 2 + points / BOX, 4) float32 texels of places (patterns, points, 2): two points each, then
+    boxes around each BOX (middle, half sides). `sort`: those are quadrants, as a net has as many points in each."""
+    patterns, points = places.shape[:2]
+    if sort:
+        quadrant = (places[..., 0] >= 0) + 2 * (places[..., 1] >= 0)
+        order = np.argsort(quadrant, axis=1, kind="stable")
+        places = np.take_along_axis(places, order[..., None], axis=1)
+    places = places.astype(np.float32)
+    boxed = places.reshape(patterns, points // BOX, BOX, 2)
+    low, high = boxed.min(axis=2), boxed.max(axis=2)
+    boxes = np.concatenate([(low + high) / 2, (high - low) / 2 * np.float32(1.0001) + np.float32(1e-6)], axis=-1)
+    return np.concatenate([places.reshape(patterns, points // 2, 4), boxes], axis=1)
 
 
 def _disc(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -260,10 +293,7 @@ def _disc(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _cone_offsets(emitter: lights.Emitter, disc: np.ndarray) -> np.ndarray:
     """(..., 3) directions of a sun's cone less its axis, evenly by solid angle, from points of the unit disc."""
     axis = np.asarray(emitter.centre, float)
-    helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    u = np.cross(helper, axis)
-    u /= np.linalg.norm(u)
-    v = np.cross(axis, u)
+    u, v = silhouettes.across(axis)
     squared = (disc**2).sum(axis=-1, keepdims=True)
     one_minus_cosine = squared * 2.0 * np.sin(emitter.radius / 2) ** 2
     sine = np.sqrt(np.maximum(one_minus_cosine * (2.0 - one_minus_cosine), 0.0))

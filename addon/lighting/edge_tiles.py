@@ -38,6 +38,8 @@ EDGE_LIGHT = Struct(
     "EdgeLight",
     ("vec4", "centre"),  # w = 1: a direction, the light is at infinity
     ("vec4", "axis"),  # of emission
+    ("vec4", "half_u"),  # half axes of what holds the points, where they are the same for all receivers
+    ("vec4", "half_v"),
     ("vec4", "size"),  # of the ball around the light; of the disc that faces the receiver; D(eye, c); receivers' offset
     ("vec4", "eye"),  # w = 1: a direction
     ("float", "reach"),  # m, of shadow quads; 0: to infinity
@@ -53,7 +55,7 @@ EDGE_LIGHT = Struct(
     ("int", "salt"),
     ("int", "group_count"),
 )
-AS_THEY_ARE, FACING_DISC, FACING_SPHERE, BALL_DISC, BALL_SPHERE = range(5)
+IN_PLANE, FACING_DISC, FACING_SPHERE, BALL_DISC, BALL_SPHERE, AS_THEY_ARE = range(6)  # edges/samples.glsl
 MOST_WORDS = 2048 * 8192
 SMALL_PICTURE = 100_000  # pixels, up to which tiles are finer
 TILES = (8, 16, 32, 64)
@@ -185,12 +187,13 @@ class EdgeTiles:
         columns, rows = -(-width // tile), -(-height // tile)
         eye = eye_of(frame)
         hidden = self._hidden(frame, casters, extent, eye)
+        half_u, half_v = extent.half_axes
         values = {
             "centre": (*extent.centre, float(extent.infinite)),
-            "axis": (*extent.emitter.axis, 0.0),
+            "axis": (*extent.emitter.axis, 0.0), "half_u": (*half_u, 0.0), "half_v": (*half_v, 0.0),
             "size": (extent.radius, extent.disc, float(hidden.sum()), frame.offset_size),
             "eye": tuple(eye), "reach": reach_of(frame, casters) if eye[3] > 0.5 else 0.0,
-            "shape": AS_THEY_ARE, "edge_count": made.count, "word_count": words,
+            "shape": IN_PLANE, "edge_count": made.count, "word_count": words,
             "tile_columns": columns, "point_count": 1, "pattern_count": 1, "picture_row": 0, "card_count": 0,
             "card_word_count": 0, "salt": 0, "group_count": 0,
         }  # fmt: skip

@@ -35,11 +35,15 @@ class Compared:
         return self.rays < self.maps
 
     @property
+    def name(self) -> str:
+        """Of what costs less."""
+        return "rays" if self.by_rays else "maps"
+
+    @property
     def why(self) -> str:
         """For the ledger and the terminal."""
         chosen, other = (self.rays, self.maps) if self.by_rays else (self.maps, self.rays)
-        name = "rays" if self.by_rays else "maps"
-        return f"{name}, because {milliseconds(chosen)} against {milliseconds(other)} here"
+        return f"{self.name}, because {milliseconds(chosen)} against {milliseconds(other)} here"
 
 
 def rays_ns(pixels: int, triangles: int, repeats: int = 0) -> float:

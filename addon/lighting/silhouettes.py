@@ -35,6 +35,7 @@ from ..scene.edges import CasterEdges
 from ..sources import lights
 
 RECORD_TEXELS, WEDGE_TEXELS = 4, 4
+WIDEST_IN_PLANE = 1.4  # half angle of a sun, radians
 SMALLEST_SUN = 1e-9  # sine of a half angle
 
 
@@ -71,6 +72,24 @@ class Extent:
             seen = radius / float(np.sqrt(max(1.0 - min(radius / max(nearest, 1e-30), 0.999) ** 2, 1e-6)))
         return cls(emitter, centre, False, seen, none, radius)
 
+    @property
+    def half_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of a rectangle around the centre (at infinity: at a distance of 1) that holds all points; zeros where it
+        turns with the receiver, or would be too wide to be told by."""
+        emitter = self.emitter
+        if emitter.has_span:
+            return np.asarray(emitter.u[:3], float), np.asarray(emitter.v[:3], float)
+        if not self.infinite or not self.in_plane:
+            return np.zeros(3), np.zeros(3)
+        u, v = across(self.centre)
+        reach = float(np.tan(emitter.radius))
+        return u * reach, v * reach
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether its points lie in one plane, of its own or before each receiver."""
+        return self.emitter.kind != lights.SUN or self.emitter.radius <= WIDEST_IN_PLANE
+
     def never_blocks(self, corners: np.ndarray) -> np.ndarray:
         """(T,) triangles (T, 3, 3) that lie in the light, or behind one that shines to one side. Light does not pass
         them, and layers could not be counted from a centre that lies on one."""
@@ -95,6 +114,14 @@ class Extent:
             reach = normal @ self.corners.T
             return (middle + reach.min(axis=1) < 0.0) & (middle + reach.max(axis=1) >= 0.0)
         return np.abs(middle) < self.radius * np.linalg.norm(normal, axis=1) * (1.0 + 1e-6)
+
+
+def across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors that with a unit `axis` (3,) are at right angles to each other."""
+    helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    u = np.cross(helper, axis)
+    u /= np.linalg.norm(u)
+    return u, np.cross(axis, u)
 
 
 @dataclass(frozen=True)

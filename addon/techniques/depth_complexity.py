@@ -78,8 +78,8 @@ NORMAL = ("RGBA32F", "surface_normal")
 
 
 @cache
-def gathering(points: int, tile: int, bits: bool, cards: bool, standard: bool = False) -> Program:
-    """The dispatch that counts layers."""
+def gathering(points: int, tile: int, bits: bool, cards: bool, standard: bool = False, space: bool = False) -> Program:
+    """The dispatch that counts layers. `space`: points of the light that lie in no plane."""
     seen = ("seen_points", "R32UI", "UINT_2D", "WRITE") if bits else ("seen_share", "R32F", "FLOAT_2D", "WRITE")
     return Program(
         name=f"depth complexity of {points} {'points' if bits else 'shares'}",
@@ -94,6 +94,7 @@ def gathering(points: int, tile: int, bits: bool, cards: bool, standard: bool = 
         defines=(
             ("POINTS", str(points)), ("TILE", str(tile)), *((("BITS", "1"),) if bits else ()),
             *((("CARDS", "1"),) if cards else ()), *((("STANDARD", "1"),) if standard else ()),
+            *((("SPACE", "1"),) if space else ()),
         ),
     )  # fmt: skip
 
@@ -106,12 +107,12 @@ SMOOTH = Program(
     blocks=((VIEW, "film_view"), LIGHT_BLOCK),
 )
 DECLARED = tuple(
-    gathering(points, tile, bits, cards, standard)
-    for points, tile, bits, cards, standard in (
-        (16, 16, False, False, False),
-        (64, 8, False, True, False),
-        (16, 8, True, True, True),
-        (64, 16, True, False, False),
+    gathering(points, tile, bits, cards, standard, space)
+    for points, tile, bits, cards, standard, space in (
+        (16, 16, False, False, False, False),
+        (64, 8, False, True, False, False),
+        (16, 8, True, True, True, True),
+        (64, 16, True, False, False, False),
     )
 )
 FRONT_END = edge_tiles.programs()
@@ -167,12 +168,11 @@ class DepthComplexity(EdgeShadows):
 
     def gather(self, frame: Frame, lit: Lit, views: list[EdgeView], found: images.Image) -> Iterator[None]:
         bits, points = self.points(frame) > 0, int(frame.settings.get(self, "points"))
-        emitter = views[0].emitter
         several = not bits and frame.settings.get(self, "interleaved")
         if bits:
-            texels, shape = point_patterns(emitter, [view.sample for view in views])
+            texels, shape = point_patterns(lit.extent, [view.sample for view in views])
         else:
-            texels, shape = shared_patterns(frame, emitter, points, PATTERNS if several else 1)
+            texels, shape = shared_patterns(frame, lit.extent, points, PATTERNS if several else 1)
         few = frame.settings.samples < FEW_SAMPLES or frame.settings.draft
         smooth = several and few and frame.settings.get(self, "smooth")
         cards = self.card_words(frame, lit)
@@ -181,7 +181,9 @@ class DepthComplexity(EdgeShadows):
         into = self.tiles.kept("raw share", *frame.size, "R32F") if smooth else found
         if smooth:
             lit.update(picture_row=0)
-        program = gathering(points, lit.tile, bits, bool(cards), not self.accurate(frame))
+        program = gathering(
+            points, lit.tile, bits, bool(cards), not self.accurate(frame), shape >= edge_tiles.BALL_DISC
+        )
         textures = {**lit.textures, "light_pattern": images.upload(texels), **cards}
         if not bits:
             textures["surface_normal"] = frame.images["surface.normal"]

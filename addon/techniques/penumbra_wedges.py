@@ -140,7 +140,7 @@ class PenumbraWedges(EdgeShadows):
         counts = self._draw_counts(frame, lit, names, quads)
         cards = self._cards_share(frame, lit, emitter)
         u, v = np.zeros(3), np.zeros(3)
-        values = {"group_count": len(names), "shape": edge_tiles.AS_THEY_ARE}
+        values = {"group_count": len(names), "shape": edge_tiles.IN_PLANE}
         if emitter.has_span:
             scale = SQUARE_OF_DISC if emitter.kind == lights.ELLIPSE else 1.0
             u, v = emitter.u[:3] * scale, emitter.v[:3] * scale
@@ -222,7 +222,7 @@ class PenumbraWedges(EdgeShadows):
         cards = self.card_words(frame, lit)
         if not cards:
             return {}
-        texels, shape = shared_patterns(frame, emitter, CARD_POINTS, 16)
+        texels, shape = shared_patterns(frame, lit.extent, CARD_POINTS, 16)
         values = dict(lit.values)
         lit.update(
             shape=shape, point_count=CARD_POINTS, pattern_count=len(texels), salt=self.salt(frame), word_count=0,
@@ -231,8 +231,9 @@ class PenumbraWedges(EdgeShadows):
         none = self.tiles.kept("no layers", *frame.size, "R16F")
         images.Target((none,)).clear()
         alone = self.tiles.kept("cards share", *frame.size, CARDS_SHARE[0])
+        program = gathering(CARD_POINTS, lit.tile, False, True, space=shape >= edge_tiles.BALL_DISC)
         passes.compute(
-            gathering(CARD_POINTS, lit.tile, False, True), frame.size, images={"seen_share": alone},
+            program, frame.size, images={"seen_share": alone},
             textures={
                 **lit.textures, "centre_count": none, "light_pattern": images.upload(texels), **cards,
                 "surface_normal": frame.images["surface.normal"],

@@ -4,12 +4,15 @@
 |---|---|---|
 | without extent | plain | nothing to filter |
 | widest penumbra below one texel of a plain map | plain | filtered or not, the map shows the same |
+| few silhouette edges before each pixel | edges (depth_complexity.py) | a third of the cost of equal rays or maps |
 | the `important` strongest of the others | variance (vssm.py) | the least error of one map |
 | all others | convolution (cssm.py) with 2 x 2 boxes and one contact ray | a lookup that costs less |
 
 The widest penumbra of a light is bounded by its angle a from the nearest receiver and the space s that a blocker can
 stand in: 2 a s, s the light's distance or the scene's size, whichever is less. A light's strength is the median of its
 unblocked irradiance over the picture's tiles: power, size, distance and the part of the picture that it can reach.
+
+What edges cost is known for this device and this picture (lighting/edge_costs.py); the ledger says what was compared.
 
 Auto takes this technique for pictures of one sample in which a light has extent and casts shadows. With more samples
 points of the lights (accumulated_maps.py) converge, and which is better is left to what the benchmark measured. Drafts
@@ -32,16 +35,23 @@ import numpy as np
 from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param
+from ..lighting import edge_costs
+from ..lighting.caustic_casters import answered
+from ..lighting.edge_costs import FEW_EDGES
+from ..lighting.loop import tinted_casters
 from ..lighting.point_maps import PointMaps
+from ..lighting.silhouettes import Extent
 from ..lighting.soft_maps import SoftMaps
-from ..lighting.visibility import VisibilityProvider
-from ..snapshot.scene import Light, Snapshot
+from ..lighting.visibility import VisibilityProvider, drawn_by_lot, has_extent, rays_beside
+from ..snapshot.scene import Snapshot
 from ..sources import lights
 from .accumulated_maps import AccumulatedMaps
 from .cssm import ConvolutionSoftShadows
+from .depth_complexity import DepthComplexity
 from .vssm import VarianceSoftShadows
 
 PLAIN = "lights without penumbra: plain maps"
+EDGES = "soft lights with few edges: depth complexity"
 VARIANCE, CONVOLUTION = "important soft lights: variance maps", "other soft lights: convolution maps"
 
 
@@ -58,6 +68,16 @@ class FewBoxes(ConvolutionSoftShadows):
         return min(super().cells(frame), 2)
 
 
+class FewEdges(DepthComplexity):
+    """Edges for lights that were found to have few, each taken as a whole."""
+
+    def begin(self, frame: Frame) -> None:
+        """Lights are served as they are chosen."""
+
+    def points(self, frame: Frame) -> int:
+        return 0
+
+
 class ShadowsByLight(PointMaps):
     name = "shadows_by_light"
     label = "Shadow maps by light"
@@ -72,16 +92,23 @@ class ShadowsByLight(PointMaps):
             "soft_maps", "Soft maps", True,
             "In pictures of one sample, use filtered maps for soft lights; otherwise several hard maps for each",
         ),
+        FEW_EDGES,
     )  # fmt: skip
 
     def __init__(self):
-        self._providers = {PLAIN: AccumulatedMaps(), VARIANCE: VarianceSoftShadows(), CONVOLUTION: FewBoxes()}
+        self._edges = FewEdges()
+        self._providers = {
+            PLAIN: AccumulatedMaps(),
+            EDGES: self._edges,
+            VARIANCE: VarianceSoftShadows(),
+            CONVOLUTION: FewBoxes(),
+        }
         self._kinds: dict[str, str] = {}
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         if settings.samples > 1 or settings.draft or not settings.get(self, "soft_maps"):
             return False
-        return any(_is_soft(light) for light in snapshot.lights)
+        return any(has_extent(light) for light in snapshot.lights)
 
     def begin(self, frame: Frame) -> None:
         self._kinds = self._chosen(frame)
@@ -106,6 +133,10 @@ class ShadowsByLight(PointMaps):
                 kinds[emitter.light.key] = PLAIN
             else:
                 soft.append(emitter)
+        if soft and self._may_have_edges(frame):
+            served = {emitter.light.key for emitter in soft if self._by_edges(frame, emitter)}
+            kinds |= dict.fromkeys(served, EDGES)
+            soft = [emitter for emitter in soft if emitter.light.key not in served]
         soft.sort(key=lambda emitter: -strength(frame, emitter))
         for kind in (VARIANCE, CONVOLUTION):
             self._providers[kind].least_side = LEAST_SIDE if len(soft) <= FEW_LIGHTS else SoftMaps.least_side
@@ -113,16 +144,44 @@ class ShadowsByLight(PointMaps):
         kinds |= {emitter.light.key: VARIANCE for emitter in soft[:most]}
         return kinds | {emitter.light.key: CONVOLUTION for emitter in soft[most:]}
 
+    def _may_have_edges(self, frame: Frame) -> bool:
+        """Whether it is worth to find silhouettes: one sample, and few triangles."""
+        if not frame.settings.get(self, "few_edges") or frame.settings.samples > 1:
+            return False
+        if frame.geometry.triangles > edge_costs.MOST_TRIANGLES:
+            return False
+        self._edges.find_casters(frame)
+        self._providers[PLAIN].begin(frame)
+        return True
+
+    def _by_edges(self, frame: Frame, emitter: lights.Emitter) -> bool:
+        """Whether edges cost so little for this light; then they serve it, and the ledger says why."""
+        # A share of a textured lamp says nothing of which part of it is hidden; nor one number of what tints its light.
+        told_apart = frame.lamp_maps.textured(emitter.light) or tinted_casters(frame) or answered(frame, emitter)
+        extent = None if told_apart else self._edges.suits(frame, emitter)[1]
+        plain = self._providers[PLAIN]
+        views = plain.views(frame, emitter, emitter.middle(), 0) if extent is not None else []
+        if not views:
+            return False
+        found = self._compared(frame, extent, views)
+        frame.chose(self, emitter.light.name, found.why)
+        if found.by_edges:
+            self._edges.serve(emitter, extent)
+        return found.by_edges
+
+    def _compared(self, frame: Frame, extent: Extent, views: list) -> edge_costs.EdgesCompared:
+        found, cards = self._edges.silhouettes(frame, extent), self._edges.cards.cards(frame)
+        before = edge_costs.edges_before(frame.receivers, found.wedges)
+        before += edge_costs.OF_CARD * (cards.count if cards is not None else 0)
+        others = rays_beside(frame, views, self._providers[PLAIN].resolution(frame))
+        frame.count(self, "edges", found.count)
+        width, height = frame.size
+        return edge_costs.compared(width * height, before, others, rays=not drawn_by_lot(frame))
+
     def release(self) -> None:
         for service in self._providers.values():
             service.release()
         self._kinds = {}
-
-
-def _is_soft(light: Light) -> bool:
-    """Whether the light has extent and casts shadows."""
-    extent = {"SUN": light.angle, "AREA": max(map(abs, light.size), default=0.0)}.get(light.kind, light.radius)
-    return light.cast_shadow and extent > 0.0 and bool(np.any(light.strength))
 
 
 def penumbra(frame: Frame, emitter: lights.Emitter) -> float:

@@ -1,11 +1,13 @@
 // Points of a light as offsets from its centre (at infinity: from the direction towards it), from a pattern's texels.
 //
-// `shape`: 0 the offset itself; 1, 2 a point of the unit disc, for a disc that faces the receiver: as large as the round
-// lamp, or as a sphere's outline is seen; 3, 4 an offset in the unit ball whose projection is that point. Discs of a sphere
-// have the radius of the cone around it.
+// `shape`: 0 a place along the light's half axes; 1, 2 a point of the unit disc, for a disc that faces the receiver: as large
+// as the round lamp, or as a sphere's outline is seen; 3, 4 an offset in the unit ball whose projection is that point; 5 the
+// offset itself. Discs of a sphere have the radius of the cone around it.
+#define IN_PLANE 0
 #define FACING_SPHERE 2
 #define BALL_DISC 3
 #define BALL_SPHERE 4
+#define AS_THEY_ARE 5
 
 struct LightFrame {
   vec3 u;
@@ -34,13 +36,11 @@ LightFrame light_frame(vec3 to_centre)
   return f;
 }
 
+// Of a point in space: shapes from BALL_DISC on.
 vec3 light_offset(LightFrame f, vec3 t)
 {
-  if (edge_light.shape == 0) {
+  if (edge_light.shape == AS_THEY_ARE) {
     return t;
-  }
-  if (edge_light.shape < BALL_DISC) {
-    return t.x * f.u + t.y * f.v;
   }
   vec3 across = t - f.axis * dot(t, f.axis);
   if (edge_light.shape == BALL_SPHERE) {

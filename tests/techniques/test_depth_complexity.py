@@ -116,15 +116,15 @@ def lamp(stage, kind, **options):
         made = stage.light("AREA", (0.6, 0.5, 3.6), (0.2, 0.1, 0), shape="RECTANGLE", size=1.0, size_y=0.8)
     elif kind == "ELLIPSE":
         made = stage.light("AREA", (0.6, 0.5, 3.6), shape="ELLIPSE", size=1.0, size_y=0.6)
-    elif kind == "SUN":
-        made = stage.light("SUN", turn=(0.4, 0.3, 0), angle=0.2)
+    elif kind.endswith("SUN"):
+        made = stage.light("SUN", turn=(0.4, 0.3, 0), angle=2.9 if kind == "WIDE SUN" else 0.2)
     else:
         made = stage.light("POINT", (0.6, 0.5, 3.9), shadow_soft_size=0.3)
         made.data.use_soft_falloff = kind == "POINT"
     return made
 
 
-@pytest.mark.parametrize("kind", ("RECTANGLE", "ELLIPSE", "SUN", "SPHERE", "POINT"))
+@pytest.mark.parametrize("kind", ("RECTANGLE", "ELLIPSE", "SUN", "WIDE SUN", "SPHERE", "POINT"))
 def test_every_bit_is_what_brute_force_says(by_edges, kind):
     """Exact integers: no tolerance but for the rounding of float32 where a way meets an edge."""
     stage = by_edges
@@ -299,12 +299,8 @@ def test_thousands_of_edges_before_a_pixel_are_all_asked(by_edges):
     assert (counts != layers).sum() == 0 and (bits != seen).mean() <= 5e-4
 
 
-def test_shadows_of_a_textured_lamp_have_its_colours(by_edges):
-    """A lamp whose left and right halves differ in colour, behind the edge of a plate: one sample as many rays."""
-    stage = by_edges
-    stage.floor()
-    stage.blocker((0, -9), (9, 9), 1.0)
-    light = stage.light("AREA", (0, 0, 3), size=2.0, shape="SQUARE").data
+def in_two_colours(light):
+    """Give a lamp red on its left and blue on its right."""
     if bpy.app.version < (5, 2):
         light.use_nodes = True
     tree = light.node_tree
@@ -316,6 +312,14 @@ def test_shadows_of_a_textured_lamp_have_its_colours(by_edges):
     tree.links.new(place.outputs["Parametric"], split.inputs[0])
     tree.links.new(split.outputs["X"], ramp.inputs["Factor"])
     tree.links.new(ramp.outputs["Result"], emission.inputs["Color"])
+
+
+def test_shadows_of_a_textured_lamp_have_its_colours(by_edges):
+    """A lamp whose left and right halves differ in colour, behind the edge of a plate: one sample as many rays."""
+    stage = by_edges
+    stage.floor()
+    stage.blocker((0, -9), (9, 9), 1.0)
+    in_two_colours(stage.light("AREA", (0, 0, 3), size=2.0, shape="SQUARE").data)
     stage.camera_above(span=2.0)
     found = stage.render(samples=1, size=(24, 24))["diffuse_direct"][..., :3]
     assert stage.ledger.row(NAME).counters["lights by edges"] == 1
