@@ -20,11 +20,8 @@ for places along a lamp's rays, and at the surface that one of these ends at, be
 | rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights; 6 a stop of walks |
 | memory | 3 images; 1 and 2 of a quarter where it is spread |
 
-Sources: Kulla & Fajardo, "Importance sampling techniques for path tracing in participating media", EGSR 2012; Veach &
-Guibas 1995 (balance heuristic).
-
-In mirrors and behind glass (shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass
-more for each round of them.
+Sources: Kulla & Fajardo 2012; Veach & Guibas 1995 (balance heuristic). In mirrors and behind glass
+(shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass more for each round of them.
 
 Bias: below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is. Penumbrae
 of round lamps on surfaces that walks meet are those of points in a ball.

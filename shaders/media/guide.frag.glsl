@@ -1,5 +1,5 @@
-// Light of lamps that media would scatter once towards the eye if nothing cast shadows and nothing were lost on the way to
-// the places: where it peaks, by few places at even steps. What spreads light over pixels (spread.frag.glsl) divides by it.
+// Light of lamps that media would scatter once towards the eye if nothing cast shadows and nothing were
+// lost on the way to the places: where it peaks, by few places at even steps. What spreads light over pixels (spread.frag.glsl) divides by it.
 //
 // All pixels draw the same numbers, so that what the grids' cells make of them cancels in that.
 #include "media/asking.glsl"

@@ -7,7 +7,6 @@
 #include "media/view_ray.glsl"
 
 #define REACH 2.0
-#define UNGUIDED 1e-4  // share of light that is spread over opacity alone: some comes where no lamp shines
 
 float overlap(float place, float middle)
 {
@@ -30,7 +29,9 @@ void main()
   float total = 0.0;
   float known_opacity = 0.0;
 #ifdef GUIDED
+  vec3 guided = vec3(0.0);
   vec3 guides = vec3(0.0);
+  vec3 here = airlight_guide_fetch(pixel).rgb;
   ivec2 last = airlight_guide_size() - 1;
 #endif
   for (int y = -2; y <= 2; y++) {
@@ -47,16 +48,19 @@ void main()
       emission += weight * second;
       known_opacity += weight * second.w;
 #ifdef GUIDED
-      guides += weight * airlight_guide_fetch(min(other * STRIDE + shown_pixel, last)).rgb;
+      // Shares of light, each as good as the next one: a peak among them must not outweigh all, nor a share of nothing.
+      vec3 there = airlight_guide_fetch(min(other * STRIDE + shown_pixel, last)).rgb;
+      vec3 trust = weight / max(there + here, vec3(1e-37));
+      guided += trust * found.rgb;
+      guides += trust * there;
 #endif
       total += weight;
     }
   }
   float share = (known_opacity > 0.0) ? opacity / known_opacity : 0.0;
 #ifdef GUIDED
-  vec3 here = mix(airlight_guide_fetch(pixel).rgb, guides * share, UNGUIDED);
-  out_direct = vec4(direct.rgb * here / max(guides, vec3(1e-37)), 0.0);
-  if (!(max_component(guides) > 0.0)) {  // what lamps' rims send and no place of the guide has met stays where it is
+  out_direct = vec4(guided * here / max(guides, vec3(1e-37)), 0.0);
+  if (!(max_component(guides) > 0.0)) {  // what no place of the guide has met stays where it is
     ivec2 nearest = clamp(ivec2(floor(middle + 0.5)), ivec2(0), size - 1);
     out_direct.rgb = coarse_direct_fetch(nearest).rgb * opacity / max(coarse_emission_fetch(nearest).w, 1e-30);
   }

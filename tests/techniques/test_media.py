@@ -147,7 +147,7 @@ def test_airlight_of_a_point_light_is_its_integral(stage, samples, mean_error, p
     fog(stage, Color=(0.75, 0.75, 0.75, 1), Density=0.2)
     box_far = stage.rectangle((-50, -50), (50, 50), material=stage.diffuse(0.0), location=(0, 10, 0))
     box_far.rotation_euler = (np.pi / 2, 0, 0)
-    fog_light = stage.render(samples, size=(12, 12))["volume_direct"][..., 0]
+    fog_light = stage.render(samples, size=(12, 12), bounces=0)["volume_direct"][..., 0]
     place = np.tan(0.4) * (np.arange(12) + 0.5 - 6) / 6
     expected = np.zeros((12, 12))
     for y, up in enumerate(place):
