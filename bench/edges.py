@@ -183,16 +183,18 @@ def union(options) -> str:
     errors: dict[str, list[float]] = {}
     for family in UNION_FAMILIES:
         scene, expected = soft_scenes.build(family), None
+        free = soft.direct(scene, soft.Entrant("free", PWB), options.size, shadows=False)[0]
+        reached = soft.lit(free).reshape(-1)  # what turns away from the lamp has a share of nothing
         for mode in ("BOXES", "PRODUCT", "SUM"):
             soft.direct(scene, soft.Entrant(mode, PWB, (("union", mode),)), options.size)
             renderer = engine.session(scene, "final").renderer
             own = next(one for one in renderer.techniques if one.name == PWB)
             receivers = images.read(own.tiles._kept["receivers"]).reshape(-1, 4)
             found = images.read(own.tiles._kept["seen_share"]).reshape(-1)
-            valid = np.flatnonzero(receivers[:, 3] != 0)
+            emitter = renderer.frame.emitters[0]
+            valid = np.flatnonzero((receivers[:, 3] != 0) & reached)
             chosen = valid[np.linspace(0, len(valid) - 1, RECEIVERS).astype(int)]
             if expected is None:
-                emitter = renderer.frame.emitters[0]
                 places = 2.0 * sequence.points(0, PLACES, "union", 1) - 1.0
                 lamp = emitter.centre + places[:, :1] * emitter.u[:3] + places[:, 1:] * emitter.v[:3]
                 expected = np.array([_seen(own._casters.corners, p, lamp) for p in receivers[chosen, :3].astype(float)])
