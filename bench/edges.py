@@ -170,7 +170,7 @@ def _count(thing) -> int:
 
 
 UNION_FAMILIES = ("grid", "far background", "stacked blockers")
-RECEIVERS, PLACES = 200, 1024
+RECEIVERS, PLACES = 1500, 1024
 
 
 def union(options) -> str:
