@@ -55,15 +55,13 @@ def command(options: argparse.Namespace) -> int:
             markdown.put_between(PAGE, mark, text)
         return 0
     scenes = media_scenes.MEDIA | media_scenes.CAUSTICS
-    rows: list[tuple[str, ...]] = []
     for name in options.scenes or media_scenes.MEDIA:
         media_scenes.begin()
         scenes[name]()
         added = measured(bpy.context.scene, name, options)
         print(table([HEAD, *added]), flush=True)
-        rows += added
         if options.page:  # after each scene: what is measured stays when the run is ended
-            markdown.put_between(PAGE, COMMAND, page(rows, options))
+            markdown.put_between(PAGE, COMMAND, page(kept(PAGE.read_text(encoding="utf-8"), added), options))
     return 0
 
 
@@ -96,7 +94,7 @@ def measured(scene, name: str, options) -> list[tuple[str, ...]]:
         for path in ("combined", "volume_direct", "volume_indirect"):
             alone = engine == "BLENDER_EEVEE" or denoised
             figures += _figures(seen.images, mean, half, path) if path == "combined" or not alone else ("", "")
-        rows.append((name if not rows else "", label, str(samples), *figures))
+        rows.append((f"{name} ({options.reference})" if not rows else "", label, str(samples), *figures))
     if options.pictures:
         _save(options.pictures / f"{name.replace(' ', '_')}.png", picture["combined"], mean["combined"])
     return rows
@@ -188,12 +186,25 @@ def motion(count: int, size: tuple[int, int] = (48, 48)) -> str:
     )
 
 
+def kept(document: str, added: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Rows of the document's table with those of one scene put in their place, or after the others."""
+    part = document.partition(markdown.begin(COMMAND))[2].partition(markdown.END)[0]
+    lines = [line for line in part.splitlines() if line.startswith("| ")][1:]
+    scenes: dict[str, list[tuple[str, ...]]] = {}
+    for line in lines:
+        row = tuple(cell.strip() for cell in line.strip("|").split("|"))
+        name = row[0].partition(" (")[0] or list(scenes)[-1]
+        scenes.setdefault(name, []).append(row)
+    scenes[added[0][0].partition(" (")[0]] = added
+    return [row for rows in scenes.values() for row in rows]
+
+
 def page(rows: list[tuple[str, ...]], options) -> str:
     """The table, and what it is of."""
     width, height = options.size
     text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two
-renders of {options.reference} samples by Cycles, whose noise is taken off the errors (relMSE). Candela and EEVEE draw
-on a software GPU. EEVEE has no such bounces: its bias is partly that.
+renders by Cycles of as many samples as stand behind the scene's name, whose noise is taken off the errors (relMSE).
+Candela and EEVEE draw on a software GPU. EEVEE has no such bounces: its bias is partly that.
 
 """
     return text + markdown.table([HEAD, *rows])

@@ -1,9 +1,11 @@
 """Micro-rendering beside its peers and Cycles' diffuse indirect pass: `python -m bench micro_rendering`.
 
-Scenes x techniques x samples: squared error (relMSE, the noise of the reference taken off), bias and seconds of a whole
-render whose programs are compiled; then the error and time of micro-rendering by the side of its micro-buffers, the
-number of points, regions and threshold in one scene, at one sample. The seconds are of the machine that it runs on:
-where a GPU is drawn in software, a tree that is walked by each of eight lanes is what it does worst.
+Scenes x techniques x samples: squared error (relMSE, the noise of the reference taken off), bias, RMS beside the mean
+and seconds of a whole render whose programs are compiled, by the clock and of the processor, which hold where others
+use it, too. What error its peers have in the time of one sample of it, by a power law through their nearest two. Then
+error and time of micro-rendering by the side of its micro-buffers, the number of points, regions and threshold in one
+scene, at one sample. The seconds are of the machine that it runs on: where a GPU is drawn in software, a tree that is
+walked by each of eight lanes is what it does worst.
 """
 
 from __future__ import annotations
@@ -13,15 +15,20 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from bench.indirect import BOUNCES, PATH, ROOMS, SCENES, reference, render
+from bench.points_motion import bent_object
 from bench.quick import size_of, table
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "micro_rendering.md"
 COMMAND = "python -m bench micro_rendering --page"
 NAME = "micro_rendering"
 PEERS = ("instant_radiosity", "imperfect_shadow_maps", "clustered_visibility", "ssdo")
-HEAD = ("scene", "technique", "samples", "seconds", "relMSE", "bias")
-DIAL_HEAD = ("dial", "value", "seconds", "relMSE", "bias", "counters")
+BENDING = "bending object"  # the Cornell box with a block that is bent
+HEAD = ("scene", "technique", "samples", "seconds", "processor", "relMSE", "bias", "RMS")
+EQUAL_HEAD = ("scene", "seconds", NAME, *PEERS)
+DIAL_HEAD = ("dial", "value", *HEAD[3:], "counters")
 DIALS = (
     ("side", (8, 12, 16, 24)),
     ("points", (2048, 4096, 8192, 16384)),
@@ -29,10 +36,11 @@ DIALS = (
     ("threshold", (0.25, 1.0, 4.0)),
 )
 DIAL_SCENE = "cornell_box"
+BENT_FRAMES = 8
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenes", nargs="*", default=ROOMS, metavar="NAME", help=f"default: {', '.join(ROOMS)}")
+    parser.add_argument("--scenes", nargs="*", default=(*ROOMS, BENDING), metavar="NAME")
     parser.add_argument("--techniques", nargs="+", default=(NAME, *PEERS), metavar="NAME")
     parser.add_argument("--samples", nargs="+", type=int, default=(1, 16, 64), metavar="N", help="default: 1 16 64")
     parser.add_argument("--most", type=int, default=64, metavar="N", help="samples of micro-rendering at most")
@@ -49,11 +57,46 @@ def measured(scene, technique: str, samples: int, size, truth) -> tuple[tuple[st
 
     scene.candela.slot_indirect = technique
     render(scene, "CANDELA", 1, 7, size)  # compiles
-    begun = time.perf_counter()
+    begun = time.perf_counter(), time.process_time()
     picture = render(scene, "CANDELA", samples, 1, size)
-    seconds = time.perf_counter() - begun
+    seconds = time.perf_counter() - begun[0], time.process_time() - begun[1]
     found = compare_radiance(PATH, picture, *truth)
-    return (f"{seconds:.2f}", f"{max(found.relmse - found.floor, 0.0):.4f}", f"{found.bias:.3f}"), picture
+    return (
+        f"{seconds[0]:.2f}", f"{seconds[1]:.2f}", f"{max(found.relmse - found.floor, 0.0):.4f}", f"{found.bias:.3f}",
+        f"{rms(picture, *truth):.3f}",
+    ), picture  # fmt: skip
+
+
+def rms(picture: np.ndarray, truth: np.ndarray, noise: np.ndarray) -> float:
+    """Root of the mean square of the error beside the mean of the picture, the reference's noise taken off."""
+    return float(np.sqrt(max(((picture - truth) ** 2).mean() - (noise**2).mean(), 0.0)) / truth.mean())
+
+
+def equal_time(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """By scene: processor seconds of the first render of micro-rendering, its error, and its peers' in as long."""
+    found = []
+    for scene in dict.fromkeys(row[0] for row in rows):
+        own = [row for row in rows if row[0] == scene]
+        mine = next((row for row in own if row[1] == NAME), None)
+        if mine is None:
+            continue
+        seconds, told = float(mine[4]), [mine[5]]
+        for peer in PEERS:
+            known = sorted((float(row[4]), max(float(row[5]), 1e-5)) for row in own if row[1] == peer)
+            told.append(f"{at_time(known, seconds):.4f}" if known else "")
+        found.append((scene, f"{seconds:.2f}", *told))
+    return found
+
+
+def at_time(known: list[tuple[float, float]], seconds: float) -> float:
+    """The error after so long, of (seconds, error): along the line through the two nearest in logarithms; of less time
+    than the first takes, the first's."""
+    times, errors = np.log(known).T
+    at = np.log(max(seconds, known[0][0]))
+    if at <= times[-1] or len(known) < 2:
+        return float(np.exp(np.interp(at, times, errors)))
+    slope = min((errors[-1] - errors[-2]) / (times[-1] - times[-2]), 0.0)
+    return float(np.exp(errors[-1] + slope * (at - times[-1])))
 
 
 def of_scene(name: str, options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
@@ -65,6 +108,7 @@ def of_scene(name: str, options: argparse.Namespace) -> Iterator[tuple[str, ...]
         for samples in options.samples:
             if technique != NAME or samples <= options.most:
                 figures, picture = measured(scene, technique, samples, options.size, truth)
+                print(name, technique, samples, *figures, flush=True)
                 yield name, technique, str(samples), *figures
                 shown += [picture] if samples == options.samples[0] else []
     if options.pictures:
@@ -90,14 +134,16 @@ def dials(options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
 def opened(name: str):
     import bpy
 
-    bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
+    file = DIAL_SCENE if name == BENDING else name
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{file}.blend"))
+    if name == BENDING:
+        for _ in range(BENT_FRAMES):
+            bent_object(bpy.context.scene)
     return bpy.context.scene
 
 
 def write_picture(path: Path, pictures: list) -> None:
     """Cycles and the techniques side by side, one scale of light for all."""
-    import numpy as np
-
     from addon.compare.png import png
 
     scale = max(float(np.percentile(pictures[0], 97)), 1e-30)
@@ -107,13 +153,21 @@ def write_picture(path: Path, pictures: list) -> None:
     path.write_bytes(png((large * 255 + 0.5).astype(np.uint8)))
 
 
+def tables(rows: list[tuple[str, ...]]) -> str:
+    from bench import markdown
+
+    equal = "Error (relMSE) in the processor seconds of one sample of micro-rendering:\n\n"
+    return f"{markdown.table([HEAD, *rows])}\n\n{equal}{markdown.table([EQUAL_HEAD, *equal_time(rows)])}"
+
+
 def page(rows: list, turned: list, options: argparse.Namespace) -> None:
     """Write the tables into the technique's page."""
     from bench import markdown
 
     size = "x".join(map(str, options.size))
     text = f"{size} pixels, {BOUNCES} bounces, references of {options.reference} samples.\n\n"
-    markdown.put_between(PAGE, f"{COMMAND} --no-dials", text + markdown.table([HEAD, *rows]))
+    if rows:
+        markdown.put_between(PAGE, f"{COMMAND} --no-dials", text + tables(rows))
     if turned:
         text = f"One sample, {DIAL_SCENE}.\n\n"
         markdown.put_between(PAGE, f"{COMMAND} --scenes", text + markdown.table([DIAL_HEAD, *turned]))
@@ -132,7 +186,8 @@ def command(options: argparse.Namespace) -> int:
         step()
         if options.page:  # after each scene: what is measured stays when the run is ended
             page(rows, turned, options)
-    print(table([HEAD, *rows]), flush=True)
+    if rows:
+        print(f"{table([HEAD, *rows])}\n\n{table([EQUAL_HEAD, *equal_time(rows)])}", flush=True)
     if turned:
         print(table([DIAL_HEAD, *turned]), flush=True)
     return 0

@@ -6,8 +6,12 @@ mesh subdivided to the detail of its heights (a face for each texel), displaced 
 Error is relMSE of Combined, of all pixels and of those that are farther than a pixel from an edge: where Cycles'
 depth jumps, or its direct light ends, in a picture of one ray a pixel. Outlines are compared as the border of what
 covers half a pixel, and where a box stands in the floor as the border of what is red: the mean distance, in pixels, of
-places of one border to the other, over both. Times are seconds of the wall of whole renders, sync to picture, of the
-second of two; before it the scene is built anew, so that nothing is known of its mesh.
+places of one border to the other, over both. Times are seconds of the wall of whole renders, sync to picture, the
+shortest of three after a first one (EEVEE: the second); before each the scene is built anew, so that nothing is known
+of its mesh.
+
+How time grows with detail is measured with as many texels of heights as the mesh has faces along a side: the shortest
+of up to three renders in turn. Processor seconds, of all threads, tell about the same on a machine that others use.
 """
 
 from __future__ import annotations
@@ -45,6 +49,7 @@ class Figures:
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--lamps", nargs="*", default=list(LAMPS), choices=LAMPS)
+    parser.add_argument("--details", nargs="*", type=int, default=DETAILS, help="of the table by detail")
     parser.add_argument("--page", action="store_true", help="write the tables into docs/relief.md")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what each entrant showed as PNG")
 
@@ -64,12 +69,14 @@ def command(options: argparse.Namespace) -> int:
     times = [["scene", *(label for label, *_ in TIMED), "mesh / relief"]]
     for name in options.scenes:
         seconds = [timed(name, *how) for _, *how in TIMED]
-        ratio = f"{seconds[1] / seconds[0]:.1f}"
+        ratio = f"{seconds[2] / seconds[0]:.1f}"
         times.append([SCENES[name].label, *(f"{one:.2f}" for one in seconds), ratio])
         print("  ".join(times[-1]), flush=True)
+    growth = growth_table(options.details) if options.details else [["no detail asked for"]]
     parts = [
         "**Beside Cycles' displaced mesh**\n\n" + markdown.table(table),
         "**Seconds from sync to picture, under the sun, 16 samples**\n\n" + markdown.table(times),
+        "**Seconds by detail, under the sun, 16 samples**\n\n" + markdown.table(growth),
         "**Iterations to a height within .01, bisection / false position**\n\n" + markdown.table(iteration_table()),
     ]
     text = "\n\n".join(parts)
@@ -185,24 +192,55 @@ def border_distance(a: np.ndarray, b: np.ndarray) -> float:
 
 TIMED = (
     ("relief", "CANDELA", False, "RELIEF"),
+    ("relief, thin features", "CANDELA", False, "RELIEF", True),
     ("mesh", "CANDELA", True, "MESH"),
     ("Cycles", "CYCLES", True, "AUTO"),
     ("EEVEE", "BLENDER_EEVEE", True, "AUTO"),
 )
 
 
-def timed(name: str, engine: str, subdivided: bool, mode: str) -> float:
-    """Seconds of the second render of a scene that has just been built."""
+def timed(name: str, engine: str, subdivided: bool, mode: str, safe: bool = False) -> float:
+    """Seconds of the shortest of some renders of a scene that has just been built, after a first one."""
+    detail = SCENES[name].detail if subdivided else 0
+    again = 1 if engine == "BLENDER_EEVEE" else 3
+    return min([once(name, engine, detail, mode, relief_scenes.IMAGE, safe)[0] for _ in range(1 + again)][1:])
+
+
+def once(name: str, engine: str, detail: int, mode: str, size: int, safe: bool = False) -> tuple[float, float]:
+    """Seconds of a render of a scene that has just been built, and of processors meanwhile."""
     import bpy
 
     from addon.compare.reference import render_passes
 
-    for _ in range(2):
-        relief_scenes.build(name, "SUN", SCENES[name].detail if subdivided else 0, mode)
-        start = time.perf_counter()
-        render_passes(bpy.context.scene, engine, SAMPLES, 0, size=SIZE, bounces=0)
-        seconds = time.perf_counter() - start
-    return seconds
+    relief_scenes.build(name, "SUN", detail, mode, size, safe)
+    start, work = time.perf_counter(), time.process_time()
+    render_passes(bpy.context.scene, engine, SAMPLES, 0, size=SIZE, bounces=0)
+    return time.perf_counter() - start, time.process_time() - work
+
+
+DETAILS = (64, 128, 256, 512, 1024)
+GROWN = ("stones", "cylinder")
+LARGE = 512  # from which on a mesh is rendered once: it takes a minute
+
+
+def growth_table(details: list[int]) -> list[list[str]]:
+    """Relief and mesh by detail."""
+    rows = [["scene", "faces", "relief", "mesh", "mesh / relief", "by processor seconds"]]
+    for name in GROWN:
+        for how in (0, "RELIEF"), (details[0], "MESH"):  # programs
+            once(name, "CANDELA", *how, details[0])
+        for detail in details:
+            relief, mesh = [], []
+            for turn in range(3):
+                relief.append(once(name, "CANDELA", 0, "RELIEF", detail))
+                if not turn or detail < LARGE:
+                    mesh.append(once(name, "CANDELA", detail, "MESH", detail))
+            (fast, work), (slow, more) = (np.min(one, axis=0) for one in (relief, mesh))
+            columns, lines = (3 * detail, detail // 2) if name == "cylinder" else (detail, detail)
+            ratios = f"{slow / fast:.1f}", f"{more / work:.1f}"
+            rows.append([SCENES[name].label, f"{columns} x {lines}", f"{fast:.2f}", f"{slow:.2f}", *ratios])
+            print("  ".join(rows[-1]), flush=True)
+    return rows
 
 
 # The search as arrays, for the table of iterations -------------------------------------------------------------------

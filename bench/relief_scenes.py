@@ -74,7 +74,7 @@ class Scene:
     """What to build; `lamp` SUN, AREA or WORLD."""
 
     label: str
-    surface: Callable[[int], None]
+    surface: Callable[[int, int], None]  # of a detail, and texels along a side of its height image
     camera: tuple[tuple[float, float, float], tuple[float, float, float], float]
     detail: int  # of the mesh that Cycles displaces
 
@@ -157,21 +157,21 @@ def round_about(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle), 2 * v - 1], axis=1)
 
 
-def stone_floor(detail: int) -> None:
-    lattice(max(detail, 1), max(detail, 1), flat, displaced(field("stones", IMAGE), DEPTH))
+def stone_floor(detail: int, size: int) -> None:
+    lattice(max(detail, 1), max(detail, 1), flat, displaced(field("stones", size), DEPTH))
 
 
-def stone_floor_with_box(detail: int) -> None:
+def stone_floor_with_box(detail: int, size: int) -> None:
     import bpy
 
-    stone_floor(detail)
+    stone_floor(detail, size)
     bpy.ops.mesh.primitive_cube_add(size=0.7, location=(0.1, -0.1, 0.05), rotation=(0.3, 0.2, 0.5))
     bpy.context.object.data.materials.append(plain((0.6, 0.1, 0.1)))
 
 
-def cylinder(detail: int) -> None:
+def cylinder(detail: int, size: int) -> None:
     columns, rows = (3 * detail, detail // 2) if detail else (48, 1)
-    lattice(columns, rows, round_about, displaced(field("bricks", IMAGE), BRICK_DEPTH))
+    lattice(columns, rows, round_about, displaced(field("bricks", size), BRICK_DEPTH))
 
 
 ABOVE = ((0.0, -2.3, 2.3), (np.pi / 4, 0.0, 0.0), 0.69)
@@ -184,16 +184,17 @@ SCENES = {
 LAMPS = ("SUN", "AREA", "WORLD")
 
 
-def build(name: str, lamp: str, detail: int, mode: str = "AUTO") -> None:
-    """Scene `name` under one lamp; `mode` of the displaced material as Candela has it."""
+def build(name: str, lamp: str, detail: int, mode: str = "AUTO", size: int = IMAGE, safe: bool = False) -> None:
+    """Scene `name` under one lamp; `mode` of the displaced material and whether thin features are safe, as Candela has
+    it; `size`: texels along a side of the heights."""
     import bpy
 
     clear()
     scene = SCENES[name]
-    scene.surface(detail)
+    scene.surface(detail, size)
     for material in bpy.data.materials:
         if material.name.startswith("Relief") and hasattr(material, "candela"):
-            material.candela.relief_mode = mode
+            material.candela.relief_mode, material.candela.relief_safe = mode, safe
     place, turn, angle = scene.camera
     camera = bpy.data.cameras.new("Camera")
     camera.angle = angle

@@ -22,6 +22,7 @@ class Entrant:
     engine: str
     samples: int
     settings: tuple[tuple[str, object], ...] = ()
+    made_by: Callable[[str], None] | None = None  # instead of the strip's own
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,9 @@ class Strip:
     size: tuple[int, int]
     scenes: tuple[str, ...]
     make: Callable[[str], None]  # leaves the scene of that name open
-    entrants: tuple[Entrant, ...]  # the last is Cycles, and sets the exposure
+    entrants: tuple[Entrant, ...]  # the last sets the exposure: Cycles, where it takes part
+    bounces: int | None = None
+    own_exposure: bool = True  # of each scene; else all have that of the first, as of a flight
 
 
 def _sample_file(name: str) -> None:
@@ -51,6 +54,55 @@ def _reflection(name: str) -> None:
     reflection_scenes.make(name)
 
 
+def _over_relief(frame: str) -> None:
+    """A camera that flies low over stones, past a box that stands in them."""
+    import bpy
+
+    from bench import relief_scenes
+
+    relief_scenes.build("box", "SUN", 0, "RELIEF")
+    along = 0.4 * float(frame) + 1.0
+    camera = bpy.context.scene.camera
+    camera.location = (-0.7 + 0.2 * along, -1.9 + 0.1 * along, 0.75)
+    camera.rotation_euler = (np.radians(70.0), 0.0, 0.2 - 0.1 * along)
+    camera.data.angle = 0.8
+
+
+def _stones_of_mesh(frame: str) -> None:
+    """The same of a mesh with a face for each texel, as Cycles displaces it."""
+    import bpy
+
+    from bench import relief_scenes
+
+    _over_relief(frame)
+    place, turn = (
+        tuple(value) for value in (bpy.context.scene.camera.location, bpy.context.scene.camera.rotation_euler)
+    )
+    relief_scenes.build("box", "SUN", relief_scenes.SCENES["box"].detail)
+    camera = bpy.context.scene.camera
+    camera.location, camera.rotation_euler, camera.data.angle = place, turn, 0.8
+
+
+def _over_grass(name: str) -> None:
+    """A camera that walks over the shipped meadow at eye height, 0.1 m from picture to picture; its tiles repeated, or
+    varied."""
+    frame, varied = name.split()[0], name.endswith("varied")
+    import bpy
+
+    from bench import grass
+
+    grass.clear()
+    grass.field(True, 40)
+    bpy.data.materials["Soil"].candela.grass_varied = varied
+    data = bpy.data.cameras.new("Camera")
+    data.angle = 0.9
+    camera = bpy.data.objects.new("Camera", data)
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    camera.location = (0.0, -8.0 + 0.1 * float(frame), 1.7)
+    camera.rotation_euler = (np.radians(72.0), 0.0, 0.0)
+
+
 NO_BOUNCES = ("slot_indirect", "OFF")
 CYCLES = Entrant("CYCLES", 128)
 STRIPS = {
@@ -64,11 +116,26 @@ STRIPS = {
             CYCLES,
         ),
     ),
+    "grass_flight": Strip(
+        (128, 96),
+        tuple("012345"),
+        lambda frame: _over_grass(f"{frame} varied"),
+        (Entrant("CANDELA", 8, (NO_BOUNCES,), _over_grass), Entrant("CANDELA", 8, (NO_BOUNCES,))),
+        own_exposure=False,
+    ),
     "media": Strip(
         (128, 128),
         ("spot in fog", "window in haze", "VDB cloud", "fire", "W1 glass ball"),
         _medium,
         (Entrant("CANDELA", 1), Entrant("CANDELA", 16), Entrant("CYCLES", 256)),
+    ),
+    "relief_flight": Strip(
+        (128, 96),
+        tuple("0123456"),
+        _over_relief,
+        (Entrant("CANDELA", 8, (NO_BOUNCES,)), Entrant("CYCLES", 64, made_by=_stones_of_mesh)),
+        bounces=0,
+        own_exposure=False,
     ),
     "reflections": Strip(
         (128, 96),
@@ -93,13 +160,19 @@ def command(options: argparse.Namespace) -> int:
         return 2
     for name in options.names or STRIPS:
         path = ROOT / "docs" / "images" / f"{name}.png"
-        _write(path, np.concatenate([_column(scene, STRIPS[name]) for scene in STRIPS[name].scenes], axis=1))
+        strip, columns, exposure = STRIPS[name], [], None
+        for scene in strip.scenes:
+            column, own = _column(scene, strip, None if strip.own_exposure else exposure)
+            exposure = own if exposure is None else exposure
+            columns.append(column)
+        _write(path, np.concatenate(columns, axis=1))
         print(path.relative_to(ROOT))
     return 0
 
 
-def _column(scene: str, strip: Strip) -> np.ndarray:
-    """The scene by each entrant, from top to bottom, (H, W, 3) of displayed values; row 0 at the top."""
+def _column(scene: str, strip: Strip, exposure: float | None) -> tuple[np.ndarray, float]:
+    """The scene by each entrant, from top to bottom, (H, W, 3) of displayed values, row 0 at the top, and its exposure
+    where that is not given."""
     import bpy
 
     from addon.compare.metrics import display
@@ -107,19 +180,20 @@ def _column(scene: str, strip: Strip) -> np.ndarray:
 
     pictures = []
     for one in strip.entrants:
-        strip.make(scene)
+        (one.made_by or strip.make)(scene)
         settings = bpy.context.scene.candela
         for key, value in one.settings:
             setattr(settings, key, value)
-        found = render_passes(bpy.context.scene, one.engine, one.samples, 1, size=strip.size)
+        found = render_passes(bpy.context.scene, one.engine, one.samples, 1, size=strip.size, bounces=strip.bounces)
         pictures.append(found.images["combined"][..., :3])
-    exposure = float(-np.log2(max(np.percentile(pictures[-1], 97), 1e-6)))
+    if exposure is None:
+        exposure = float(-np.log2(max(np.percentile(pictures[-1], 97), 1e-6)))
     width, height = strip.size
     column = np.ones(((height + GAP) * len(pictures) - GAP, width + GAP, 3))
     for row, picture in enumerate(pictures):
         top = row * (height + GAP)
         column[top : top + height, :width] = display(picture, exposure)[::-1]
-    return column
+    return column, exposure
 
 
 def _write(path: Path, shown: np.ndarray) -> None:

@@ -72,6 +72,16 @@ def draw(shader: Shader, batch: Batch, instances: int = 1) -> None:
     batch.handle.draw_instanced(shader.handle, instance_start=0, instance_count=instances)
 
 
+def set_culling(cull: str) -> None:
+    """Which faces the next draws leave out: BACK or NONE. Only inside `drawing` of all faces; NONE at its end."""
+    gpu.state.face_culling_set(cull)
+
+
+def write_alpha_alone() -> None:
+    """Let the next draws change nothing but alpha and depth. Only inside `drawing`, to whose end it lasts."""
+    gpu.state.color_mask_set(False, False, False, True)
+
+
 def draw_screen(shader: Shader) -> None:
     """Draw a triangle over the whole viewport with the bound shader, whose inputs are FULLSCREEN_INPUTS. Only inside
     `drawing`."""

@@ -14,8 +14,8 @@ import numpy as np
 from .patch import MOST_LUMA, MOST_RINGS, Patch
 
 WIDTH = 2048  # texels a row
-ENTRY, PICTURE, PLACE = 17, 5, 4  # texels
-VIEW_RINGS, LIGHT_RINGS, MAP = 3, 11, 16
+ENTRY, PICTURE, PLACE = 18, 5, 4  # texels
+VIEW_RINGS, LIGHT_RINGS, MAP, VARIED = 3, 11, 16, 17
 MOST_MAP = 256  # texels along a side of a density map
 ALIGNED = 16  # rows: the number of the first one is exact in a half float
 
@@ -23,7 +23,8 @@ ALIGNED = 16  # rows: the number of the first one is exact in a half float
 @dataclass(frozen=True)
 class Field:
     """How a material shows a patch. `size` of the tile and `height` of the blades in metres, `density` 0..1, and what
-    it is multiplied by: `density_map` (H, W), row 0 at the lowest y, over a square of `map_size` metres; None for 1."""
+    it is multiplied by: `density_map` (H, W), row 0 at the lowest y, over a square of `map_size` metres; None for 1.
+    `varied`: places show the tile shifted at random (shaders/grass/surface.glsl)."""
 
     patch: Patch
     size: float
@@ -31,6 +32,7 @@ class Field:
     density: float
     density_map: np.ndarray | None = None
     map_size: float = 0.0
+    varied: bool = False
 
 
 def table_of(fields: Sequence[Field]) -> np.ndarray:
@@ -80,6 +82,7 @@ def _entry(field: Field, row: int) -> np.ndarray:
     rows[0] = row, patch.texels, patch.views.number, patch.lights.number
     rows[1] = field.size, field.height, field.height / field.size / slope, field.density
     rows[2] = patch.white, slope, len(patch.views.polar), len(patch.lights.polar)
+    rows[VARIED, 0] = field.varied
     mean = patch.mean_heights()
     for start, rings, most in ((VIEW_RINGS, patch.views, MOST_RINGS[0]), (LIGHT_RINGS, patch.lights, MOST_RINGS[1])):
         for k, (polar, count, first) in enumerate(list(zip(rings.polar, rings.counts, rings.firsts))[:most]):

@@ -18,7 +18,7 @@ from ..gfx import images, passes
 from ..gfx.geometry import Batch
 from ..gfx.library import Program, Shader
 from ..scene.casters import Clusters
-from ..scene.culling import CORNERS, Boxes, calls, joined
+from ..scene.culling import CORNERS, Boxes, calls, entered, joined
 from ..scene.geometry import Draw, SceneGeometry
 from ..scene.projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES, ROWS
 from ..scene.receivers import Receivers
@@ -293,10 +293,12 @@ class Atlas:
 
 @dataclass(frozen=True)
 class AlphaCasters:
-    """Casters whose material lets some light pass, and the shader and bindings of each material."""
+    """Casters whose material lets some light pass, and the shader and bindings of each material; layers on surfaces
+    (see shaders/lib/shadow.glsl) with what draws each."""
 
     draws: list[Draw]
     programs: dict[int, tuple[Shader, dict]]
+    layers: tuple[tuple[Draw, Shader, dict, dict], ...] = ()  # bindings, constants
 
 
 def draw_views(
@@ -344,13 +346,25 @@ def draw_views(
             [*calls(alpha.draws, np.flatnonzero(alpha_boxes.seen(view.rows, view.least_q)))] if alpha.draws else []
         )
         with passes.drawing(atlas.target, viewport=viewport) if layered else nullcontext():
+            from_outside = entered(alpha.draws, alpha_boxes, view.rows) if layered else ()
             for call in layered:
+                passes.set_culling("BACK" if call.draw.material in from_outside else "NONE")
                 shader, bindings = alpha.programs[call.draw.material]
                 own = {"first_instance": call.first, "sample_index": sample, "light_point": view.light_point,
                        "glass_blocks": int(view.glass_blocks), "channel_asked": view.channel}  # fmt: skip
                 shader.bind(**bindings, constants={**constants, **own})
                 passes.draw(shader, call.draw.batch, call.count)
                 sent += call.triangles
+            passes.set_culling("NONE")
+        seen = Boxes.of([draw for draw, *_ in alpha.layers]).seen(view.rows, view.least_q) if alpha.layers else ()
+        with passes.drawing(atlas.target, viewport=viewport) if np.any(seen) else nullcontext():
+            for draw, shader, bindings, extra in (alpha.layers[k] for k in np.flatnonzero(seen)):
+                passes.write_alpha_alone()
+                own = {"first_instance": draw.first, "sample_index": sample, "light_point": view.light_point,
+                       "glass_blocks": 0, "channel_asked": 0}  # fmt: skip
+                shader.bind(**bindings, constants={**constants, **own, **extra})
+                passes.draw(shader, draw.batch, draw.count)
+                sent += draw.triangles
         yield sent
 
 

@@ -28,7 +28,7 @@ from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
 from ..scene.area_points import AreaPoints, Surfaces, spread
 from ..scene.pieces import octahedral
-from ..scene.point_tree import PointTree, fitted, split
+from ..scene.point_tree import PointTree, fitted
 from ..scene.seen import UNSEEN, seen_triangles
 from ..scene.view import VIEW
 from ..surfaces.hits import Hits, Records
@@ -37,7 +37,7 @@ from .lit_points import LitPoints
 ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
-LIGHTS, OTHERS = 4, 4  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+LIGHTS, OTHERS = 4, 16  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
 CLIPS = passes.fullscreen_program(
     "where light of points holds",
     "micro/clips.frag.glsl",
@@ -50,6 +50,7 @@ CLIPS = passes.fullscreen_program(
     defines=(("POINT_ROW", str(ROW)),),
     outputs=(("VEC4", "out_clips"),),
 )  # fmt: skip
+NOTHING_STANDS = 1e29  # less than NONE of shaders/micro/clips.frag.glsl
 SHARPNESS = 64.0  # see PointLight: a bright spot is one of thousands of points that are gathered
 
 
@@ -104,7 +105,7 @@ class PointRuns:
             else:  # what has moved may see something by now
                 self._seen = np.ones((len(self._surfaces.owner), 2), bool)
             for number, run in before.items():
-                self._runs[number] = self._placed(frame, run.points, run.tree.order)
+                self._runs[number] = self._placed(frame, run.points)
             frame.count(technique, "trees refitted", len(before))
         else:
             frame.count(technique, "trees kept", len(self._runs))
@@ -135,15 +136,12 @@ class PointRuns:
         images.pool.give(unused)
         return direct
 
-    def _placed(self, frame: Frame, points: AreaPoints, order: np.ndarray | None = None) -> Run:
-        """The run of these points, in the order of a tree that is known or made."""
+    def _placed(self, frame: Frame, points: AreaPoints) -> Run:
+        """The run of these points, which are in the order of a tree's leaves."""
         surfaces = self._surfaces
         position, normal, area = points.placed(surfaces)
         pieces = points.pieces(surfaces)
-        middle = np.where(np.isfinite(pieces[:, 0]), pieces.mean(axis=1), position)
-        sides = points.sides(surfaces)
-        order = split(middle, normal, sides) if order is None else order
-        tree = fitted(order, position, normal, area, pieces, sides)
+        tree = fitted(np.arange(len(points)), position, normal, area, pieces, points.sides(surfaces))
         hits, rows = frame.kept(Hits), {id(one): row for row, one in enumerate(frame.geometry.placed[0])}
         owner, number = surfaces.owner[points.triangle], surfaces.number[points.triangle]
         instance, of_material, material = (np.zeros(len(points)) for _ in range(3))
@@ -163,9 +161,9 @@ class PointRuns:
             np.concatenate([octahedral(normal), octahedral(shading)], axis=1),
             np.stack([material, np.isfinite(position).all(axis=1), *np.zeros((2, len(points)))], axis=1),
         )
-        own = tuple(images.upload(_both_sides(column[order])) for column in columns)
+        own = tuple(images.upload(_both_sides(column)) for column in columns)
         facing = np.zeros((2 * len(points), 4), np.float32)
-        facing[0::2, :3], facing[1::2, :3] = -normal[order], normal[order]  # from in front, from behind
+        facing[0::2, :3], facing[1::2, :3] = -normal, normal  # from in front, from behind
         nodes, facing = tree.upload(), images.upload(facing.reshape(-1, ROW, 4))
         clips = images.pool.take(*facing.size, "RGBA32F")
         passes.fullscreen(
@@ -176,8 +174,12 @@ class PointRuns:
             },
             constants={"leaf_count": tree.leaves, "offset_size": frame.offset_size},
         )  # fmt: skip
+        parted = _parted(images.read(clips))
+        if parted.any():
+            tree = tree.opened(parted)
+            nodes = tree.upload()
         materials = frozenset(material[np.isfinite(position).all(axis=1)].astype(int).tolist())
-        return Run(points, tree, nodes, own, facing, clips, materials, self._seen[points.triangle][order])
+        return Run(points, tree, nodes, own, facing, clips, materials, self._seen[points.triangle])
 
     def _shade(self, frame: Frame, technique: Technique, run: Run) -> None:
         def place(hits: Hits, records: Records) -> frozenset[int]:
@@ -204,6 +206,12 @@ class PointRuns:
         self._lit.release()
         self._surfaces = self._seen = self._key = None
         self._moved = False
+
+
+def _parted(clips: np.ndarray) -> np.ndarray:
+    """(leaves,) whether something stands on the piece of a point, on either side."""
+    lines = clips.reshape(-1, 4)[:, 1::2]
+    return (lines < NOTHING_STANDS).any(axis=1).reshape(-1, 2).any(axis=1)
 
 
 def _keys(frame: Frame) -> tuple[tuple, tuple]:

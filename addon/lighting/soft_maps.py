@@ -108,6 +108,7 @@ class SoftMaps(PointMaps):
 
     def __init__(self):
         super().__init__()
+        self.service.layers = False
         self._drawn: tuple[tuple, Maps] | None = None
         self._kept: dict[str, images.Image] = {}
 

@@ -5,7 +5,7 @@ drawing the maps. Which of maps and rays costs less: maps_or_rays.py.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..frame.picture import Frame
 from ..frame.settings import Settings
 from ..frame.technique import Param, Service, Technique
 from ..gfx import images, passes
+from ..gfx.library import Program
 from ..gfx.struct import Block, Struct
 from ..scene import acceleration
 from ..scene.geometry import Draw
@@ -192,6 +193,24 @@ def ray_bindings(
     return textures, {"offset_size": frame.offset_size}
 
 
+@dataclass(frozen=True)
+class Layer:
+    """Something on a material's surface that casts shadows beside it: drawn into depth maps with the mesh, which it
+    rises `height` metres above, by a program like that of casters with textures and constants beside theirs."""
+
+    program: Program
+    textures: dict[str, images.Image]
+    constants: dict[str, object]
+    height: float
+
+
+class Layers:
+    """Layers by material (frame.shared), set before light is asked for."""
+
+    def __init__(self):
+        self.of: dict[int, Layer] = {}
+
+
 def drawn_by_lot(frame: Frame, stopped: frozenset[int] = frozenset()) -> list[Draw]:
     """Casters that let some light pass, without the materials `stopped`."""
     compiled = frame.materials.compiled
@@ -207,7 +226,7 @@ def by_rays(
     wanted = frame.settings.value("accumulated_maps", SHADOWS_BY)
     if wanted == BY_MAPS or frame.settings.draft or acceleration.too_many(frame.snapshot):
         return False
-    if drawn_by_lot(frame):  # maps ask the material itself; rays know it by cells
+    if drawn_by_lot(frame) or frame.shared(Layers).of:  # maps ask the material itself; rays know it by cells
         return False
     asked = views()
     if not asked or wanted == BY_RAYS:
@@ -280,17 +299,27 @@ def traced_shadows(frame: Frame) -> Maps:
 class DepthMapService:
     """Draws depth maps for any technique that needs visibility from points or directions."""
 
+    layers = True  # are drawn; where maps are filtered, which know one caster a texel, not
+
     def __init__(self):
         self._atlas = depth_maps.Atlas()
 
-    def alpha_casters(self, frame: Frame) -> depth_maps.AlphaCasters:
-        """What lets some light pass, and how to draw it."""
+    def alpha_casters(self, frame: Frame, layers: bool = False) -> depth_maps.AlphaCasters:
+        """What lets some light pass, and how to draw it; with what covers surfaces as `layers`."""
         materials, draws = frame.materials, drawn_by_lot(frame)
         programs = {
             index: (passes.get(materials.caster_program(index)), materials.bindings(index, frame.geometry.instances))
             for index in {draw.material for draw in draws}
         }
-        return depth_maps.AlphaCasters(draws, programs)
+        covers = []
+        found = frame.shared(Layers).of if layers else {}
+        for draw in (one for one in frame.geometry.draws if one.material in found):
+            layer = found[draw.material]
+            bindings = materials.bindings(draw.material, frame.geometry.instances)
+            bindings["textures"] |= layer.textures
+            higher = replace(draw, low=draw.low - layer.height, high=draw.high + layer.height)
+            covers.append((higher, passes.get(layer.program), bindings, layer.constants))
+        return depth_maps.AlphaCasters(draws, programs, tuple(covers))
 
     def draw(self, frame: Frame, technique: Technique, views: list, resolution: int) -> Maps:
         """Draw the views, to be asked point by point, once `drawing` is exhausted."""
@@ -300,10 +329,10 @@ class DepthMapService:
 
     def _in_parts(self, frame: Frame, technique: Technique, views: list, cells) -> Iterator[None]:
         """Draws the views; yields now and then where a window waits."""
+        alpha = self.alpha_casters(frame, self.layers)
         drawn = depth_maps.draw_views(
-            self._atlas, views, cells, frame.geometry, self.alpha_casters(frame), frame.sample,
-            lasting=not frame.settings.draft,
-        )  # fmt: skip
+            self._atlas, views, cells, frame.geometry, alpha, frame.sample, lasting=not frame.settings.draft
+        )
         frame.count(technique, "maps", len(views))
         texels = 0
         for (_, _, side), sent in zip(cells, drawn):

@@ -28,12 +28,14 @@ class OwnSurface:
     `point.incoming` meets the surface (position, normals, attributes), or returns false where the ray passes. It may
     read the varyings and, besides those of the material, `textures`, whose images MaterialSet.own_images holds. The
     programs that draw the camera's view, views of lights and depth maps call it and write the depth of the point.
-    `shell`: what is drawn are prisms over the mesh's triangles (scene/shells.py) instead of these.
+    `shell`: what is drawn are prisms over the mesh's triangles (scene/shells.py) instead of these. `lets_pass`: the
+    surface itself may let light pass, so that a depth map asks the material, too.
     """
 
     glsl: str
     textures: tuple[tuple[str, str], ...] = ()  # as of gfx.library.Program
     shell: bool = False
+    lets_pass: bool = True
 
 
 @dataclass(frozen=True)

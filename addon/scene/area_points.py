@@ -27,6 +27,7 @@ import numpy as np
 
 from ..sampling.sequence import bits
 from ..snapshot.scene import Instance
+from .point_tree import arranged, parting
 from .traced_triangles import coverage, world_triangles
 
 PLASTIC = 1.3247179572447460  # the real root of x^3 = x + 1
@@ -133,25 +134,47 @@ def spread(surfaces: Surfaces, count: int, run: int) -> AreaPoints:
     rest[whole] = False
     left = np.where(rest, weights, 0.0)
     discs = min(max(round(count * left.sum() / total), int(left.any())), count - len(whole)) if len(whole) else count
-    first = _pieces(surfaces, areas, weights, whole, count - discs, run)
-    return first.joined(_discs(areas, left, rate, discs, run))
+    number = _numbers(weights[whole], count - discs, run)
+    return _ordered(surfaces, areas, whole, number, _discs(areas, left, rate, discs, run), run)
 
 
-def _pieces(
-    surfaces: Surfaces, areas: np.ndarray, weights: np.ndarray, whole: np.ndarray, count: int, run: int
+def _numbers(weights: np.ndarray, count: int, run: int) -> np.ndarray:
+    """How many of `count` pieces each triangle has: one, and more by what it has beyond a point's share."""
+    more = np.maximum(weights - weights.sum() / max(count, 1), 0.0)
+    more = more if more.any() else weights
+    return 1 + np.bincount(_marked(more, count - len(weights), run), minlength=len(weights))
+
+
+def _ordered(
+    surfaces: Surfaces, areas: np.ndarray, whole: np.ndarray, number: np.ndarray, discs: AreaPoints, run: int
 ) -> AreaPoints:
-    """`count` points for pieces of the triangles `whole`, one each at least."""
-    # Beyond the first, by what a triangle has more than a point's share.
-    more = np.maximum(weights[whole] - weights[whole].sum() / max(count, 1), 0.0)
-    more = more if more.any() else weights[whole]
-    extra = _marked(more, count - len(whole), run)
-    triangle = np.repeat(whole, 1 + np.bincount(extra, minlength=len(whole)))
-    piece = _cut(surfaces.corners, triangle, run)
+    """Points for `number` (W,) pieces of the triangles `whole` and for discs, in the order of a tree's leaves."""
+    corners = surfaces.corners[whole]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    position, normal, _ = discs.placed(surfaces)
+    leaves = np.concatenate([number, np.ones(len(discs), int)])
+    order = arranged(
+        np.concatenate([corners.mean(axis=1), position]),
+        np.concatenate([across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None], normal]),
+        np.concatenate([np.zeros((len(whole), 3)), discs.sides(surfaces)]),
+        leaves,
+    )
+    first = np.zeros(len(order), int)
+    first[order] = np.cumsum(leaves[order]) - leaves[order]
+    count = int(leaves.sum())
+    found = AreaPoints(
+        np.zeros(count, int), np.zeros((count, 2)), np.ones(count), np.zeros(count), np.full((count, 3, 2), np.nan)
+    )
+    for name in ("triangle", "share", "density"):
+        getattr(found, name)[first[len(whole) :]] = getattr(discs, name)
+    own, leaf, piece = _cut(corners, first[: len(whole)], number)
     a, b, c = piece.transpose(1, 0, 2)
-    v, w = (bits(np.arange(count) + run * count, dimension)[:, None] / 2.0**32 for dimension in (0, 1))
+    v, w = (bits(leaf + run * count, dimension)[:, None] / 2.0**32 for dimension in (0, 1))
     root = np.sqrt(v)
-    share = (1 - root) * a + root * (1 - w) * b + root * w * c
-    return AreaPoints(triangle, share, np.ones(count), areas[triangle], piece)
+    found.triangle[leaf], found.piece[leaf] = whole[own], piece
+    found.share[leaf] = (1 - root) * a + root * (1 - w) * b + root * w * c
+    found.areas[:] = areas[found.triangle]
+    return found
 
 
 def _discs(areas: np.ndarray, weights: np.ndarray, rate: np.ndarray, count: int, run: int) -> AreaPoints:
@@ -177,17 +200,18 @@ def _marked(weights: np.ndarray, count: int, run: int) -> np.ndarray:
     return np.clip(np.searchsorted(edges, marks * edges[-1], side="right") - 1, 0, max(len(weights) - 1, 0))
 
 
-def _cut(corners: np.ndarray, triangle: np.ndarray, run: int) -> np.ndarray:
-    """(N, 3, 2) pieces of triangles: as many of each as its number stands in `triangle` (N,), in order."""
-    number, first, count = np.unique(triangle, return_index=True, return_counts=True)
-    place = np.zeros((len(number), 3, 2))
+def _cut(corners: np.ndarray, first: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces of triangles (W, 3, 3), `count` of each for leaves from `first` on: whose (N,), for which leaf (N,), and
+    their corners (N, 3, 2). Leaves are parted where nodes of a heap are, each node of one triangle's leaves a piece."""
+    own = np.arange(len(corners))
+    place = np.zeros((len(own), 3, 2))
     place[:] = (0, 0), (1, 0), (0, 1)
-    found = np.zeros((len(triangle), 3, 2))
-    while len(number):
+    found = []
+    while len(own):
         done = count == 1
-        found[first[done]] = place[done]
-        number, first, count, place = number[~done], first[~done], count[~done], place[~done]
-        world = corners[number]
+        found.append((own[done], first[done], place[done]))
+        own, first, count, place = own[~done], first[~done], count[~done], place[~done]
+        world = corners[own]
         at = (
             world[:, :1]
             + place[..., :1] * (world[:, 1:2] - world[:, :1])
@@ -195,13 +219,12 @@ def _cut(corners: np.ndarray, triangle: np.ndarray, run: int) -> np.ndarray:
         )
         longest = np.linalg.norm(at - np.roll(at, -1, axis=1), axis=2).argmax(axis=1)
         a, b, c = (place[np.arange(len(place)), (longest + k) % 3] for k in range(3))
-        # Of an odd number, the larger half lies here or there in turn.
-        half = (count + (first + run) % 2) // 2
+        half = parting(first, count)
         middle = a + (b - a) * (half / np.maximum(count, 1))[:, None]
         place = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-        number, first = np.concatenate([number, number]), np.concatenate([first, first + half])
+        own, first = np.concatenate([own, own]), np.concatenate([first, first + half])
         count = np.concatenate([half, count - half])
-    return found
+    return tuple(np.concatenate(parts) for parts in zip(*found)) if found else (first, first, place)
 
 
 def _share_of(piece: np.ndarray) -> np.ndarray:

@@ -7,9 +7,10 @@ become one, until one is left. Then every node takes over grandchildren, the lar
 
 Nodes and leaves that a ray through the scene may expect to visit (sums of their boxes' areas over the root's), here, in
 a tree that is split by the surface area heuristic, and in one of equal halves of the Morton order, which needs no
-addresses: `window_interior` 9 and 4, 9 and 4, 34 and 10; `soft_shadow_garden` 2 and 2, 3 and 2, 15 and 4.
+addresses: `window_interior` 9 and 4, 9 and 4, 34 and 10; `soft_shadow_garden` 2 and 2, 3 and 2, 15 and 4. In blocks, a
+million triangles of a bumpy sheet: 21.4 and 2.47, where all of them together have 21.3 and 2.45.
 
-Cost: 1.5 to 2 us per box. Coincident boxes are paired at random but always the same.
+Cost: 1.5 to 2 us per box, about 1 of more than MOST_AT_ONCE. Coincident boxes are paired at random but always the same.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from ..kernels.morton import morton_codes
 LEAF = 4  # boxes
 WIDTH = 4  # children
 REACH = 10  # boxes to either side, in Morton order
-# More boxes than this are paired in blocks of the order, one thread each, until one of LEFT remains; closer together, so
-# that the best pair is likely to be near.
+# More boxes than this are paired in blocks of the order, one thread each, until one of LEFT remains; many are close
+# together in it, so that the best pair is likely to be near.
 MOST_AT_ONCE, BLOCK, LEFT, REACH_IN_BLOCKS = 1 << 17, 1 << 15, 16, 5
 MOST_THREADS = 8
 MOST_CLUSTERED = 4_000_000  # boxes: above, time and memory count for more

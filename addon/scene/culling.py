@@ -3,7 +3,8 @@
 On every GPU a shadow map costs vertices and calls before it costs texels. Three exact savings, in order of effect:
 draws outside of the view or behind all receivers are left out; neighbouring groups of instances become one call; and
 of closed meshes that the light stands outside of, only the faces towards the light are drawn: the surface nearest to
-the light, which is all that a depth map keeps, is always one of them.
+the light, which is all that a depth map keeps, is always one of them. So are those of shells of relief that any viewer
+stands outside of: rays look for the surface where they come in.
 """
 
 from __future__ import annotations
@@ -67,6 +68,21 @@ class Boxes:
         """(D,) whether `point` lies outside of the box, by more than rounding."""
         margin = 2e-3 * np.linalg.norm(self.half, axis=1)[:, None]
         return (np.abs(point - self.centre) > self.half + margin).any(axis=1)
+
+
+def entered(draws: list[Draw], boxes: Boxes, rows: np.ndarray) -> frozenset[int]:
+    """Materials of which a projection with `rows` x, y, w, q shows shells alone, and stands outside of all of them."""
+    if not any(draw.prisms for draw in draws):
+        return frozenset()
+    x, y, w, q = np.asarray(rows, np.float64)
+    if np.dot(np.cross(x[:3], y[:3]), q[:3] - w[:3]) < 0.0:  # a picture turned around: back faces are front faces
+        return frozenset()
+    shown = np.array([draw.prisms for draw in draws], bool)
+    if w[:3].any():
+        planes = np.stack([x, y, w])
+        shown &= boxes.without(np.linalg.lstsq(planes[:, :3], -planes[:, 3], rcond=None)[0])
+    material = np.array([draw.material for draw in draws])
+    return frozenset(material.tolist()) - frozenset(material[~shown].tolist())
 
 
 @dataclass(frozen=True)

@@ -481,4 +481,4 @@ def relief_surface(compiled: CompiledMaterial) -> OwnSurface:
         ]
     lines += ["}", '#include "surface/relief.glsl"']
     text = '#include "surface/shell.glsl"\n' + "\n".join(lines) + "\n"
-    return OwnSurface(text, (("RGBA32F", "shell_corners"),), shell=True)
+    return OwnSurface(text, (("RGBA32F", "shell_corners"),), shell=True, lets_pass=compiled.casts_by_lot)

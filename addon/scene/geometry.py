@@ -57,6 +57,7 @@ class Draw:
     low: np.ndarray  # (3,) bounds relative to the render origin
     high: np.ndarray
     closed: bool = False  # casters only: every mesh in it bounds a volume and faces outwards
+    prisms: bool = False  # a shell (shells.py) of objects that are not mirrored: back faces show where rays leave it
 
     @property
     def triangles(self) -> int:
@@ -340,6 +341,7 @@ class SceneGeometry:
     def _set_bounds(self) -> None:
         """Make the draws with the bounds of the instances that each covers."""
         self.draws, self.opaque_casters = [], []
+        materials = self.placed[2]
         for covered, material, batch, first, count, caster in self._plan:
             low = self._low[covered].min(axis=0) - self.origin
             high = self._high[covered].max(axis=0) - self.origin
@@ -347,7 +349,8 @@ class SceneGeometry:
                 one_sided = bool(self._shell[covered].all() and not self._mirrored[covered].any())
                 self.opaque_casters.append(Draw(material, batch, first, count, low, high, one_sided))
             else:
-                self.draws.append(Draw(material, batch, first, count, low, high))
+                prisms = _in_shell(materials[material]) and not self._mirrored[covered].any()
+                self.draws.append(Draw(material, batch, first, count, low, high, prisms=prisms))
         self.boxes, self.caster_boxes = Boxes.of(self.draws), Boxes.of(self.opaque_casters)
         self.caster_triangles = np.array([draw.triangles for draw in self.opaque_casters], float)
 

@@ -1,4 +1,4 @@
-"""An upper tree over instances whose meshes have trees of their own: which those are, where they stand, records of them.
+"""An upper tree over instances whose meshes have trees of their own: which those are, where they stand, and records.
 
 A mesh of which so many copies are shown that expanding them would be many triangles is kept once, in its own space. A
 ray that reaches the box of an instance goes on in there (shaders/trace/hierarchy.glsl), by the inverse of its matrix.

@@ -519,9 +519,15 @@ def _caster_program(compiled: CompiledMaterial) -> Program:
             ("INT", "glass_blocks"),
             ("INT", "channel_asked"),
         ),
-        defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point")),
+        defines=(*PROJECTION_DEFINES, *_own_defines(compiled, "light_point"), *_whole_defines(compiled)),
         **_shared(compiled),
     )
+
+
+def _whole_defines(compiled: CompiledMaterial) -> tuple[tuple[str, str], ...]:
+    """Casters that light does not pass where their own surface is need not be asked for their closures there."""
+    own = compiled.own_surface
+    return (("CASTS_WHOLE", ""),) if own is not None and not own.lets_pass else ()
 
 
 def caster_like(compiled: CompiledMaterial) -> Program:

@@ -42,8 +42,8 @@ class NodeBoxes:
         return self.low[0].min(axis=0), self.high[0].max(axis=0)
 
     def around(self, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """At most so many boxes, (B, 3), that hold all leaves: those of the children of one level's nodes, of the lowest
-        one that has so few, and of leaves above it."""
+        """At most so many boxes, (B, 3), that hold all leaves: those of the children of one level's nodes, of the
+        lowest one that has so few, and of leaves above it."""
         nodes, found = np.zeros(1, np.int64), []
         slots = np.arange(WIDTH)
         while True:

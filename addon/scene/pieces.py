@@ -33,6 +33,16 @@ def halved(
     return np.concatenate([*done, corners]), np.concatenate([*numbers, triangle])
 
 
+def areas_and_normals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Areas of triangles, 0 where they are not finite, and unit normals."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    double = np.linalg.norm(across, axis=1)
+    finite = np.isfinite(double)
+    return np.where(finite, double / 2, 0.0), np.where(
+        finite[:, None], across / np.maximum(double, 1e-300)[:, None], 0.0
+    )
+
+
 def octahedral(normal: np.ndarray) -> np.ndarray:
     """(N, 2) numbers in -1..1 of unit vectors; octahedral_decode in shaders/lib/math.glsl."""
     flat = normal / np.maximum(np.abs(normal).sum(axis=1, keepdims=True), 1e-30)

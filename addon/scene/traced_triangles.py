@@ -1,8 +1,8 @@
 """What rays meet, triangle by triangle: corners, and what leaves of the hierarchy hold of their looks.
 
 Whether a ray passes a triangle is one number, which holds the opacity of both sides, or where to look for that place by
-place (opacity_maps.py), and which rays it is about. Instances of one kind look the same, so that all their triangles are
-made together.
+place (opacity_maps.py), and which rays it is about. Instances of one kind look the same, so that all their triangles
+are made together.
 
 Cost: numpy over all triangles of all instances, some 0.3 us each.
 """
@@ -158,7 +158,8 @@ def mean_emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[t
 
 
 def _shine(look: np.ndarray, of_triangle: np.ndarray, known: TriangleEmission, mirrored: bool) -> None:
-    """Put what EmissionMaps found of an instance's triangles, `known`, into their rows of `look`, as mean_emission does."""
+    """Put what EmissionMaps found of an instance's triangles, `known`, into their rows of `look`, as mean_emission
+    does."""
     own = np.flatnonzero(known.measured)
     front, behind = known.mean[own, 0], known.mean[own, 1]
     lit, lit_behind = front.any(axis=1), behind.any(axis=1)

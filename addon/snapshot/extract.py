@@ -41,6 +41,7 @@ from .scene import (
     World,
 )
 from .shading import ShadingTable
+from .smoke import read_smoke
 from .volumes import read_volumes
 from .world import constant_world, read_world, sun_of
 
@@ -93,10 +94,16 @@ def take(
     notes += walk_notes
     links = _links(places, light_places)
     notes += links.notes
-    meshes, instances, mesh_notes, stats = _meshes(*_at_a_place(places, notes), shading, cache, depsgraph, links)
+    places, placed = _at_a_place(places, notes)
+    smoke = np.array([place.source.facts.smoke for place in places], bool)
+    domains, domain_places = [place for place in places if place.source.facts.smoke], placed[smoke]
+    if domains:
+        places, placed = [place for place in places if not place.source.facts.smoke], placed[~smoke]
+    meshes, instances, mesh_notes, stats = _meshes(places, placed, shading, cache, depsgraph, links)
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, links)
     volumes = read_volumes(depsgraph, shading, cache, notes, shown)
+    volumes += read_smoke(domains, domain_places, shading, cache, notes)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]

@@ -73,6 +73,7 @@ class ObjectFacts:
     own: Own
     caustics_caster: bool
     shadow_catcher: bool
+    smoke: bool  # a gas domain of a fluid simulation, whose mesh is not drawn
     linked: bool  # it, or its instancer, has collections of light linking
     asset: str
     group: str
@@ -143,6 +144,7 @@ def walk(
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
+                        smoke=_is_smoke(owner),
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
                         asset=_topmost(owner),
@@ -252,6 +254,11 @@ def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
     return Visibility(*flags)
 
 
+def _is_smoke(owner) -> bool:
+    domains = (one for one in owner.modifiers if one.type == "FLUID" and one.fluid_type == "DOMAIN")
+    return any(one.domain_settings is not None and one.domain_settings.domain_type == "GAS" for one in domains)
+
+
 def _is_linked(owner) -> bool:
     linking = getattr(owner, "light_linking", None)
     return linking is not None and bool(linking.receiver_collection or linking.blocker_collection)
@@ -262,13 +269,8 @@ def _object_notes(owner, kind: str, name: str, final: bool) -> tuple[Note, ...]:
     said = []
     if _is_linked(owner):
         said.append("light linking counts for light that reaches surfaces straight; bounced light follows none.")
-    if kind in _DRAWN:
-        if owner.is_shadow_catcher and not final:
-            said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
-        for modifier in owner.modifiers:
-            domain = getattr(modifier, "domain_settings", None)
-            if domain is not None and modifier.fluid_type == "DOMAIN" and domain.domain_type == "GAS":
-                said.append("smoke and fire are not drawn; only the domain's surface is.")
+    if kind in _DRAWN and owner.is_shadow_catcher and not final:
+        said.append("is a shadow catcher, which the viewport draws as an ordinary surface.")
     return tuple(Note(f"Object '{name}'", text) for text in said)
 
 

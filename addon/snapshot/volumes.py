@@ -48,7 +48,7 @@ def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], sh
         found.append(
             VolumeInstance(name, volume, matrix, material, visibility_of(owner), key, density, owner.lightgroup)
         )
-    for key in set(cache.volumes) - used:
+    for key in {key for key in cache.volumes if key.startswith("volume ")} - used:
         del cache.volumes[key]
     return tuple(found)
 

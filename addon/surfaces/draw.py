@@ -12,7 +12,7 @@ from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..gfx.struct import Block
-from ..scene.culling import calls
+from ..scene.culling import calls, entered
 from ..scene.joint_draws import Joint, JointDraws
 from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
 from ..scene.view import VIEW
@@ -225,6 +225,7 @@ def _submit(
     seen = geometry.boxes.seen(rows) if left is None else geometry.boxes.seen(rows) & left
     material = None
     unseen = {k for k, one in enumerate(frame.materials.compiled) if one.bounds_alone}
+    from_outside = entered(geometry.draws, geometry.boxes, rows)
     for call in calls(geometry.draws, np.flatnonzero(seen)):
         if call.draw.material in unseen or (materials is not None and call.draw.material not in materials):
             continue
@@ -242,9 +243,13 @@ def _submit(
                 bindings["textures"] |= stand_in[1]
                 shown |= stand_in[2]
             shader.bind(**bindings, constants={"first_instance": call.first, **constants, **shown})
+            if from_outside:
+                passes.set_culling("BACK" if material in from_outside else "NONE")
         shader.set_constant("first_instance", call.first)
         passes.draw(shader, call.draw.batch, call.count)
         frame.count(technique, "triangles", call.triangles)
+    if from_outside:
+        passes.set_culling("NONE")
 
 
 def _submit_joint(frame: Frame, technique: Technique, joint: Joint, constants: dict, view: Block, rows) -> None:

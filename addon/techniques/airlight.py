@@ -9,15 +9,16 @@ balance heuristic: the first ends the singularity at a lamp in fog and keeps to 
 media. V are rays of the hierarchy, T is that of media.py. What media emit is integrated in closed form.
 
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
-spread their light over opacity to pixels whose rays end equally far away. Others take a quarter as many at every pixel,
-and converge. Light of several bounces, one walk a pixel and sample, is smooth, and spread below MANY samples
-(in pictures of at least WIDE pixels a side).
+spread their light, divided by what lamps would send without shadows, to pixels whose rays end equally far away.
+Others take a quarter as many at every pixel, and converge. Light of several bounces, one walk a pixel and sample, is
+smooth, and spread over opacity below MANY samples (in pictures of at least WIDE pixels a side). At each stop walks look
+for places along a lamp's rays, and at the surface that one of these ends at, beside those that they meet by chance.
 
 | cost | per sample |
 |---|---|
-| passes | 1, and 1 at full size where it is spread |
-| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights |
-| memory | 3 images; 2 of a quarter where it is spread |
+| passes | 1, and 2 at full size where it is spread |
+| rays | `rays` per pixel (4 times as many in a quarter of the pixels), shared by all lights; 6 a stop of walks |
+| memory | 3 images; 1 and 2 of a quarter where it is spread |
 
 Sources: Kulla & Fajardo, "Importance sampling techniques for path tracing in participating media", EGSR 2012; Veach &
 Guibas 1995 (balance heuristic).
@@ -25,7 +26,8 @@ Guibas 1995 (balance heuristic).
 In mirrors and behind glass (shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass
 more for each round of them.
 
-Bias: in pictures below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is.
+Bias: below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is. Penumbrae
+of round lamps on surfaces that walks meet are those of points in a ball.
 Phase functions of several shaders mixed at one place are one of their mean anisotropy. Mirrors and glass show single
 scattering alone, none in drafts and rough lobes, and no beams.
 """
@@ -130,24 +132,41 @@ def _defines(stride: int, kinds: int, world: bool) -> tuple[tuple[str, str], ...
     return ("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
 
 
+GUIDE_TEXTURE = ("RGBA32F", "airlight_guide")
+
+
+@cache
+def guide_program(kinds: int) -> Program:
+    """Finds what lamps of these kinds would send without shadows, at every pixel."""
+    return passes.fullscreen_program(
+        "airlight's guide",
+        "media/guide.frag.glsl",
+        textures=(*MEDIA_TEXTURES, ("RGBA32F", "surface_position")),
+        blocks=((VIEW, "film_view"), (lights.SOURCES, "sources")),
+        constants=(("INT", "light_count"), ("INT", "glass_blocks")),
+        defines=(("LIGHT_KINDS", str(kinds)),),
+        outputs=(("VEC4", "out_guide"),),
+    )
+
+
 SPREAD, SPREAD_ON_SURFACES = (
     passes.fullscreen_program(
-        f"airlight spread{', on surfaces' if on_surfaces else ''}",
+        f"airlight spread{', on surfaces' if on_surfaces else ', guided'}",
         "media/spread.frag.glsl",
         textures=(
             ("RGBA32F", "surface_position"), ("RGBA32F", "coarse_direct"), ("RGBA32F", "coarse_emission"),
             *ATTENUATION_TEXTURES,
-            *((("RGBA32F", "surface_diffuse"),) if on_surfaces else ()),
+            ("RGBA32F", "surface_diffuse") if on_surfaces else GUIDE_TEXTURE,
         ),
         blocks=((VIEW, "film_view"),),
         constants=(("IVEC2", "shown_pixel"),),
-        defines=(("STRIDE", str(COARSE)), *((("ON_SURFACES", "1"),) if on_surfaces else ())),
+        defines=(("STRIDE", str(COARSE)), ("ON_SURFACES" if on_surfaces else "GUIDED", "1")),
         outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
     )
     for on_surfaces in (False, True)
 )  # fmt: skip
 PROGRAMS = tuple(made(stride, -1, True) for made in (airlight_program, indirect_program) for stride in (1, COARSE))
-PROGRAMS = (*PROGRAMS, at_hits_program(-1, True, True))
+PROGRAMS = (*PROGRAMS, at_hits_program(-1, True, True), guide_program(-1))
 
 
 @dataclass(frozen=True)
@@ -282,6 +301,17 @@ class Airlight(Technique):
         passes.fullscreen(program, images.Target(found), **bindings)
         yield
         read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
+        if spread is SPREAD:
+            found += (images.pool.take(*frame.size, "RGBA32F"),)
+            program = guide_program(self._lit.kinds)
+            bound = bindings["textures"] | read
+            passes.fullscreen(
+                program, images.Target(found[2:]), textures={name: bound[name] for _, name in program.textures},
+                blocks={name: bindings["blocks"][name] for _, name in program.blocks},
+                constants={"light_count": self._lit.rows, "glass_blocks": 0},
+            )  # fmt: skip
+            read["airlight_guide"] = found[2]
+            frame.count(self, "passes")
         passes.fullscreen(
             spread, target, blend="ADDITIVE_PREMULT",
             textures={

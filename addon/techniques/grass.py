@@ -8,17 +8,19 @@ J. Konttinen, S. Pattanaik, "Real-time rendering of realistic-looking grass", GR
 
 The mesh is the ground; what is drawn is the plane on top of the blades, `height` above it along its normals. Tiles
 lie along the object's X and Y axes. Lamps, the world and meshes that shine light it in one loop (lighting/loop.py),
-with shadows of other things where the blade is; indirect light takes its albedo under a uniform sky.
+with shadows of other things where the blade is; indirect light takes its albedo under a uniform sky. In depth maps it is
+a layer (lighting/visibility.py): blades as the light sees them, which shadow everything but grass.
 
 | cost | |
 |---|---|
 | surface pass, per pixel of grass and sample | 1 view of four, 1 texel: up to 12 fetches of rings, 9 of the patch |
 | light loop, per light and pixel of grass | 20 fetches of pictures, up to 5 of rings |
+| depth maps, per texel of grass | as the surface pass; where grass is shown, lamps have maps and no rays |
 | memory | 32 bytes for each texel and view: 7 MiB for 64 x 64 and 57 views |
 
 Bias: colours are interpolated between sampled directions; pictures of two views are hardly alike, so that blades
-dissolve into each other as the view moves. Left out: wind, shadows that grass casts on other things, what reflections
-and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and blades nearer than
+dissolve into each other as the view moves. Left out: wind, shadows of grass in filtered (soft) maps and for rays, what
+reflections and indirect light see of blades (they meet the ground), sides of a field where its mesh ends, and blades nearer than
 five times their height, which need geometry. A flat-shaded mesh leaves gaps in the plane on top: shade it smooth.
 """
 
@@ -40,6 +42,7 @@ from ..gfx.library import Program
 from ..grass.patch import Patch, PatchError, kept
 from ..grass.table import Field, table_of
 from ..lighting.grass import TABLE, GrassTable
+from ..lighting.visibility import Layer, Layers
 from ..materials.estimate import srgb_decode
 from ..snapshot.scene import Material, Snapshot
 from ..surfaces.draw import StandIns
@@ -58,6 +61,27 @@ def grass_program(surface: Program) -> Program:
         textures=(*surface.textures, TABLE), constants=(*surface.constants, ("INT", "grass_entry")),
         defines=(*surface.defines, ("OWN_CLOSURES", "")),
         snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
+    )  # fmt: skip
+
+
+@cache
+def grass_caster(caster: Program) -> Program:
+    """The program that draws blades into depth maps, of one that draws a material that lets light pass."""
+    glsl = '#include "grass/surface.glsl"\n'
+    others = tuple(one for one in caster.snippets if one[0] != "generated/own_surface")
+    # Vectors first: each begins at a multiple of 16 bytes, and there are 128.
+    constants = sorted((*caster.constants, ("INT", "grass_entry")), key=lambda one: one[0] != "VEC4")
+    own = (
+        ("OWN_CLOSURES", ""),
+        ("CASTS_WHOLE", ""),
+        ("LAYER_CASTER", "4.0"),
+        ("GRASS_SAMPLE", "sample_index"),
+        ("GRASS_SEED", "0"),
+    )
+    return replace(
+        caster, name=f"{caster.name} grass", vertex="grass/surface.vert.glsl",
+        textures=(*caster.textures, TABLE), constants=tuple(constants),
+        defines=(*caster.defines, *own), snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
     )  # fmt: skip
 
 
@@ -83,6 +107,11 @@ class Grass(Technique):
             "height", "Height", 0.0,
             "Height of the longest blades; 0: the patch's own, scaled with the tile",
             0.0, 1000.0, "DISTANCE", scope=MATERIAL,
+        ),
+        Param(
+            "varied", "Vary Tiles", False,
+            "Shift the tile at random from place to place, so that repeats cannot be seen in large fields",
+            scope=MATERIAL,
         ),
         Param(
             "density", "Density", 1.0,
@@ -133,7 +162,7 @@ class Grass(Technique):
             tuple(id(one.patch) for one in fields),
             tuple(
                 (
-                    one.size, one.height, one.density, one.map_size,
+                    one.size, one.height, one.density, one.map_size, one.varied,
                     _map_key(frame.snapshot, frame.snapshot.materials[material]),
                 )
                 for one, material in zip(fields, entries)
@@ -143,10 +172,12 @@ class Grass(Technique):
             self._table = (key, images.upload(table_of(fields), TABLE[0]))
             self._patches = [one.patch for one in fields]  # their ids stay theirs
         table = self._table[1]
-        stand_ins = frame.shared(StandIns)
+        stand_ins, layers = frame.shared(StandIns), frame.shared(Layers)
         for material, entry in entries.items():
             program = grass_program(frame.materials.surface_program(material))
             stand_ins.of[material] = (program, {TABLE[1]: table}, {"grass_entry": entry})
+            caster = grass_caster(frame.materials.caster_program(material))
+            layers.of[material] = Layer(caster, {TABLE[1]: table}, {"grass_entry": entry}, fields[entry].height)
         frame.shared(OwnPoint).needed = True
         frame.provide(GrassTable(table))
         frame.count(self, "patches", len({id(one.patch) for one in fields}))
@@ -197,7 +228,8 @@ def _field(snapshot: Snapshot, material: Material) -> Field:
     size = own_value(material.own, Grass, "size") or patch.size
     height = own_value(material.own, Grass, "height") or patch.height * size / patch.size
     density, reach = (own_value(material.own, Grass, name) for name in ("density", "map_size"))
-    return Field(patch, size, height, density, _density_map(snapshot, material), reach)
+    varied = bool(own_value(material.own, Grass, "varied"))
+    return Field(patch, size, height, density, _density_map(snapshot, material), reach, varied)
 
 
 def _field_key(snapshot: Snapshot, material: Material) -> Hashable:

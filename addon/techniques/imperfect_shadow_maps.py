@@ -42,6 +42,7 @@ from ..frame.technique import Param, Technique
 from ..gfx import geometry, images, passes
 from ..gfx.library import Program
 from ..lighting.virtual_lights import BoundGather, Gather, VirtualLightSet
+from ..scene import acceleration
 from ..scene.surface_points import RUNS, TEXELS, SurfacePoints
 from ..snapshot.scene import Snapshot
 from .multires_radiosity import LEVELS, NEAR_BOUNCES, MultiresRadiosity, regions
@@ -212,6 +213,9 @@ class ImperfectShadowMaps(MultiresRadiosity):
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return False
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        return super().skip(snapshot, settings) or acceleration.too_many_copies(snapshot)
 
     def begin(self, frame: Frame) -> None:
         super().begin(frame)

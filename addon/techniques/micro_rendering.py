@@ -1,10 +1,10 @@
 """Micro-rendering: indirect light from lit points of all surfaces, drawn into a small picture at each place.
 
 Points are spread over all surfaces by area, each for its own piece of a triangle, shaded with their own materials and
-lit by all lamps, the world and emissive meshes (lighting/point_runs.py). A tree over them has rectangles in place of
-flat groups of points (scene/point_tree.py). Every place that gathers walks the tree and draws what it sees of it into a
-micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py). Pixels of the
-buffer are equal shares of what the surface reflects, so light is a plain mean:
+lit by all lamps, the world and emissive meshes (lighting/point_runs.py). A tree over them has triangles or rectangles
+in place of flat groups of points (scene/point_tree.py). Every place that gathers walks the tree and draws what it sees
+of it into a micro-buffer of its hemisphere, down to groups as large as `threshold` pixels (lighting/micro_buffers.py).
+Pixels of the buffer are equal shares of what the surface reflects, so light is a plain mean:
 
     E / pi = mean over pixels of the radiance of the node in front       a lobe: mean of weight(ray) x that radiance
 
@@ -18,7 +18,7 @@ normals.
 
 | cost | with n points, a region or pixel that gathers, K x K pixels |
 |---|---|
-| fetches, rays | 2 per visited node, some 10 to 30 K^2 log n; 2 n rays for each point of a light source, else none |
+| fetches, rays | 2 per visited node, some 10 K^2 if triangles are large; 2 n rays for each point of a light source |
 | bytes | 4 K^2 for each place of a dispatch, 16 MiB at most; 330 a point |
 | passes | 4 x `levels` + 2, and for each bounce 4; the tree in parts on Mesa (docs/micro_rendering.md) |
 
@@ -50,6 +50,7 @@ from ..lighting.micro_buffers import (
     buffer_bindings,
 )
 from ..lighting.point_runs import PointRuns, Run
+from ..scene import acceleration
 from ..scene.seen import SEES
 from ..scene.view import VIEW
 from ..snapshot.scene import Snapshot
@@ -148,6 +149,9 @@ class MicroRendering(MultiresRadiosity):
 
     def claims(self, snapshot: Snapshot, settings: Settings) -> bool:
         return False
+
+    def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
+        return super().skip(snapshot, settings) or acceleration.too_many_copies(snapshot)
 
     def programs(self, snapshot: Snapshot, settings: Settings) -> tuple[Program, ...]:
         return (SEES, *micro_buffers.PROGRAMS, REFLECTED)

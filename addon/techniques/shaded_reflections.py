@@ -16,7 +16,7 @@ sample, so a pane shows both its reflection and the view.
 | rays | 1 per pixel that still has one, 1 to lights, 2 to 4 for light of other surfaces |
 | passes | 4, and 1 for each material that was met (masked by depth) |
 | readback | one flag for each material of the scene |
-| bytes per pixel | 250 while it runs, of the pool |
+| bytes per pixel | 258 while it runs, of the pool |
 
 Rougher lobes than `roughness` see means (instant_radiosity.py), and so do drafts, pictures whose indirect light is not
 by virtual lights of that technique, and scenes above 4 million triangles.
@@ -67,7 +67,7 @@ from .instant_radiosity import NEAR_CONSTANTS, GatherBindings
 WORLD_DIRECTIONS = 8  # drawn per sample, shared by all hits
 EMISSIVE_POINTS = 4
 GLASS_POINTS = 2.0  # that traced_refraction draws on emissive surfaces
-STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"))
+STATE = (("RGBA32F", "ray_origin"), ("RGBA32F", "ray_direction"), ("RGBA32F", "met_path"), ("R32F", "ray_travelled"))
 REACH = (
     ("INT", "mirrors"),
     ("INT", "interfaces"),
@@ -82,11 +82,14 @@ ORDERS = ("direct", "indirect")
 
 @cache
 def scatter_program(onward: bool) -> Program:
-    before = ("met_direction", "met_path", "hit_place", "hit_passed") if onward else ()
+    before = ("met_origin", "met_direction", "met_path", "hit_place", "hit_passed") if onward else ()
     return passes.fullscreen_program(
         "rays onward" if onward else "rays of lobes",
         "hits/scatter.frag.glsl",
-        textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *(("RGBA32F", name) for name in before)),
+        textures=(
+            *SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *(("RGBA32F", name) for name in before),
+            *((("R32F", "met_travelled"),) if onward else ()),
+        ),
         blocks=((VIEW, "film_view"),),
         constants=(
             *REACH,
@@ -96,8 +99,10 @@ def scatter_program(onward: bool) -> Program:
             ("FLOAT", "first_rays"),
         ),
         defines=(("ONWARD", "1"),) if onward else (),
-        outputs=(("VEC4", "out_origin"), ("VEC4", "out_direction"), ("VEC4", "out_path")),
-    )
+        outputs=(
+            ("VEC4", "out_origin"), ("VEC4", "out_direction"), ("VEC4", "out_path"), ("FLOAT", "out_travelled"),
+        ),
+    )  # fmt: skip
 
 
 def _outputs(transmission: bool, orders: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
@@ -254,7 +259,8 @@ class ShadedReflections(Technique):
                 yield
                 if number + 1 < rounds:
                     before = {
-                        "met_direction": rays.colors[1], "met_path": rays.colors[2],
+                        "met_origin": rays.colors[0], "met_direction": rays.colors[1], "met_path": rays.colors[2],
+                        "met_travelled": rays.colors[3],
                         "hit_place": records.images["hit_place"], "hit_passed": records.images["hit_passed"],
                     }  # fmt: skip
                     bound = closure_bindings(closures)
@@ -269,7 +275,7 @@ class ShadedReflections(Technique):
 
     @staticmethod
     def _take(frame: Frame) -> images.Target:
-        return images.Target(tuple(images.pool.take(*frame.size, "RGBA32F") for _ in STATE))
+        return images.Target(tuple(images.pool.take(*frame.size, layout) for layout, _ in STATE))
 
     def _scatter(self, frame: Frame, rays, reach, number, depth, surfaces, before) -> None:
         """Rays of the lobes of `surfaces`, into `rays`."""

@@ -40,7 +40,14 @@ void main()
   Instance instance = instance_read(instance_flat.x);
   SurfacePoint point = surface_point(safe_normalize(light_point.xyz - light_point.w * world_position), instance);
   point.ray = RAY_SHADOW;
-#ifdef OWN_SURFACE
+#ifdef OWN_CLOSURES
+  OwnHit own;
+  if (!own_hit(point, instance, own) || own.bare) {
+    discard;
+  }
+  gl_FragDepth = projected_depth(point.position, PROJECTION);
+  q = dot(row_q, vec4(point.position, 1.0)) / dot(row_w, vec4(point.position, 1.0));
+#elif defined(OWN_SURFACE)
   if (!own_surface(point, instance)) {
     discard;
   }
@@ -49,6 +56,7 @@ void main()
   q_dx = gradient.x;
   q_dy = gradient.y;
 #endif
+#ifndef CASTS_WHOLE
   point.refracts = glass_blocks != 0;  // what it lets through is a lobe then, and no transparency
   uvec3 bits = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(instance_flat.x) * 9781u));
   bits = hash3(uvec3(bits.x, uint(gl_PrimitiveID), uint(sample_index)));
@@ -60,5 +68,10 @@ void main()
   if (to_unit(bits.x) < passing) {
     discard;
   }
+#endif
+#ifdef LAYER_CASTER
+  out_depth = vec4(LAYER_CASTER + max(q, 0.0));  // w alone is written
+#else
   out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn at random
+#endif
 }

@@ -5,6 +5,10 @@
 #include "grass/table.glsl"
 
 #define CREST_LENGTH 6.0  // by the height
+#ifndef GRASS_SAMPLE
+#define GRASS_SAMPLE film_view.sample_index
+#define GRASS_SEED film_view.seed
+#endif
 
 struct OwnHit {
   bool bare;       // no blade stands here: the material's own surface shows
@@ -17,8 +21,8 @@ struct OwnHit {
 // A number of this sample and pixel, stratified over the samples.
 float grass_roll(int purpose)
 {
-  uvec2 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(purpose) + uint(film_view.seed) * 64u)).xy;
-  return shuffled(film_view.sample_index, salt);
+  uvec2 salt = hash3(uvec3(uvec2(gl_FragCoord.xy), uint(purpose) + uint(GRASS_SEED) * 64u)).xy;
+  return shuffled(GRASS_SAMPLE, salt);
 }
 
 float grass_cell(ivec2 cell)
@@ -42,6 +46,31 @@ float grass_clumps(vec2 place)
 float grass_length(float below, float rise, float bend)
 {
   return 2.0 * below / (rise + sqrt(rise * rise + 2.0 * bend * below));
+}
+
+// Repeats show where the same tile lies beside itself. A triangular lattice has a shift of the tile at each of its vertices,
+// and a place takes one of the three around it, with a probability that falls fast with the distance (the lattice of Heitz &
+// Neyret, "High-Performance By-Example Noise using a Histogram-Preserving Blending Operator", 2018). `squares`: the sum of
+// squared probabilities.
+vec2 grass_variation(vec2 place, float roll, out float squares)
+{
+  const float scale = 1.5;  // edges of the lattice in a tile, about
+  const float sharpness = 4.0;
+  vec2 skewed = scale * vec2(place.x - 0.57735027 * place.y, 1.15470054 * place.y);
+  ivec2 base = ivec2(floor(skewed));
+  vec2 f = skewed - floor(skewed);
+  float rest = 1.0 - f.x - f.y;
+  bool lower = rest > 0.0;
+  vec3 weight = lower ? vec3(rest, f.y, f.x) : vec3(-rest, 1.0 - f.y, 1.0 - f.x);
+  weight = pow(max(weight, vec3(1e-4)), vec3(sharpness));
+  weight /= weight.x + weight.y + weight.z;
+  squares = dot(weight, weight);
+  ivec2 first = base + (lower ? ivec2(0) : ivec2(1));
+  ivec2 second = base + (lower ? ivec2(0, 1) : ivec2(1, 0));
+  ivec2 third = base + (lower ? ivec2(1, 0) : ivec2(0, 1));
+  ivec2 vertex = (roll < weight.x) ? first : ((roll < weight.x + weight.y) ? second : third);
+  uvec3 bits = hash3(uvec3(uvec2(vertex + ivec2(1 << 20)), 91u));
+  return vec2(to_unit(bits.x), to_unit(bits.y));
 }
 
 bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
@@ -85,6 +114,11 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
     seen = vec3(safe_normalize(vec3(seen.xy, 0.0)).xy * sqrt(1.0 - steepest * steepest), steepest);
   }
   vec2 shift = (1.0 - ring.w) * g.slope * (taken.xy / taken.z - seen.xy / seen.z);
+  float tile_squares = 1.0;
+  if (grass_texel(g.entry + GRASS_VARIED).x > 0.5) {
+    // By where the blades' mean height is seen, which stays as the view moves.
+    shift += grass_variation(uv - (1.0 - ring.w) * g.slope * seen.xy / seen.z, grass_roll(55), tile_squares);
+  }
   // Between texels that are larger than pixels one is drawn as bilinear interpolation weighs them; smaller ones the pixel's
   // own filter mixes.
   float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
@@ -118,7 +152,7 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
-  float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike);
+  float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike) * inversesqrt(tile_squares);
   hit.contrast = contrast * smoothstep(0.5, 2.0, tile_pixels);
   hit.place = float(place);
   hit.albedo = grass_decoded(g, shown, picture, g.lights, hit.contrast);
@@ -130,6 +164,7 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   return true;
 }
 
+#ifndef CASTS_WHOLE
 void own_closures(inout Closures c, SurfacePoint point, OwnHit hit)
 {
   if (!hit.bare) {
@@ -153,3 +188,4 @@ void own_store(SurfacePoint point, OwnHit hit)
     out_emission = vec4(0.0, 0.0, 0.0, 1.0);
   }
 }
+#endif

@@ -21,4 +21,8 @@ void main()
 #endif
   copy_attributes();
   gl_Position = instance_seen(instance) ? project(world_position, PROJECTION) : vec4(2.0, 2.0, 2.0, 1.0);
+#ifdef CASTS_WHOLE
+  // Maps of directions begin at the highest vertex of the scene, above which blades stand.
+  gl_Position.z = max(gl_Position.z, -gl_Position.w);
+#endif
 }

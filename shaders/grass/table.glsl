@@ -4,19 +4,21 @@
 // 1: side of the tile and height of the blades, m; how much taller they are than the patch's own tile is; density;
 // 2: F_max, height over side of the patch's own tile, rings of views, rings of lights; from 3 on eight rings of views
 // (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights;
-// 16: first row of a map of the density, its width and height in texels, and the side in metres of the square it covers, 0: none.
+// 16: first row of a map of the density, its width and height in texels, and the side in metres of the square it covers, 0: none;
+// 17: 1 where places show the tile shifted at random.
 // A patch: PICTURE texels for each view and light, and one light more, the uniform sky (coefficients of luma, of chroma, mean
 // colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many that begin
 // with the correlation of its pictures with those of neighbouring views, and among neighbouring lights; then PLACE texels for
 // each view and place. How they are decoded: addon/grass/compression.py.
 #include "lib/math.glsl"
 
-#define GRASS_ENTRY 17
+#define GRASS_ENTRY 18
 #define GRASS_PICTURE 5
 #define GRASS_PLACE 4
 #define GRASS_VIEW_RINGS 3
 #define GRASS_LIGHT_RINGS 11
 #define GRASS_MAP 16
+#define GRASS_VARIED 17
 #define GRASS_MOST_RINGS 8
 #define GRASS_GAMMA 2.2
 

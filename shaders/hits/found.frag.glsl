@@ -14,9 +14,17 @@ float share_of_ray(float lobe_density, float light_density)
   return (lobe_density > 0.0) ? power_share(lobe_density, light_density) : 0.0;
 }
 
+// How much thinner samples of the last lobe's lights lie at the end of a ray than those of where it starts, behind glass.
+float thinned(float travelled, float further)
+{
+  float ratio = 1.0 + travelled / max(further, 1e-30);
+  return (travelled > 0.0) ? ratio * ratio : 1.0;
+}
+
 // What a ray finds before `limit` in lights and the world. `beyond`: behind glass that a lobe's ray has met, where samples
 // of lamps do not reach that glass blocks.
-vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe_density, float limit, bool with_world)
+vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe_density, float travelled, float limit,
+                 bool with_world)
 {
   vec3 sum = vec3(0.0);
   if (with_world && limit >= 1e29 && (bent ? world_transmission : world_glossy) != 0) {
@@ -30,7 +38,7 @@ vec3 light_found(vec3 origin, vec3 direction, bool bent, bool beyond, float lobe
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && (light.flags & (bent ? LIGHT_TRANSMISSION : LIGHT_GLOSSY)) != 0) {
       bool asked = !beyond || (light.flags & LIGHT_GLASS_BLOCKS) == 0;
-      sum += radiance * (asked ? share_of_ray(lobe_density, light.rate * density) : 1.0);
+      sum += radiance * (asked ? share_of_ray(lobe_density, light.rate * density * thinned(travelled, hit_distance)) : 1.0);
     }
   }
   return sum;
@@ -56,17 +64,19 @@ void main()
   vec4 passed = hit_passed_fetch(pixel);
   float limit = (met.w != 0.0) ? dot(met.xyz - start, along.xyz) : 1e29;
   bool glossy = path_is_glossy(code);
+  float travelled = ray_travelled_fetch(pixel).x;
   vec3 sum = vec3(0.0);
   // A transparent film has a hole where clear glass shows the world: in alpha, how large.
   bool hole = ray_number > 0 && met.w == 0.0 && path_is_clear(code);
   if (ray_number > 0) {
     bool beyond = path_is_bent(code) && path_mirrors(code) > 0;
-    sum += light_found(start, along.xyz, path_is_bent(code), beyond, along.w, limit, !hole);
+    sum += light_found(start, along.xyz, path_is_bent(code), beyond, along.w, travelled, limit, !hole);
   }
   if (met.w != 0.0 && along.w >= 0.0) {
     vec2 others = (ray_number > 0 || !glossy) ? emissive.zw : emissive.xy;  // power, and points in a sample
     vec3 emission = surface_emission_fetch(pixel).rgb;
-    float share = (along.w > 0.0 && others.x > 0.0) ? power_share(along.w, others.y * passed.w / others.x) : 1.0;
+    float points = others.y * passed.w / max(others.x, 1e-30) * thinned(travelled, limit);
+    float share = (along.w > 0.0 && others.x > 0.0) ? power_share(along.w, points) : 1.0;
     sum += emission * share;
   }
   vec4 light = vec4(path.rgb * passed.rgb * sum, hole ? dot(path.rgb, vec3(1.0 / 3.0)) : 0.0);

@@ -1,5 +1,5 @@
 // Rays of the lobes that surfaces have kept: mirrored up to `shaded_roughness`, or bent. Of what the camera sees, or, with
-// ONWARD, of what rays have met.
+// ONWARD, of what rays have met. `travelled`: how far light samples of the last lobe were from where the ray starts, m.
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/refraction.glsl"
@@ -11,6 +11,7 @@ void main()
   out_origin = vec4(0.0);
   out_direction = vec4(0.0);
   out_path = vec4(0.0);
+  out_travelled = 0.0;
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 tint = surface_tint_fetch(pixel);
   if (surface_position_fetch(pixel).w == 0.0 || max_component(tint.rgb) <= 0.0) {
@@ -55,6 +56,7 @@ void main()
     // the surface that the camera sees are of another number, and its lobe counts as several rays (light/direct.frag.glsl).
     if (mirrored > 0 && density == 0.0 && dot(direction, surface.normal) < 0.0) {
       density = met_direction_fetch(pixel).w * ((ray_number == 1) ? first_rays : 1.0);
+      out_travelled = met_travelled_fetch(pixel).x + distance(met_origin_fetch(pixel).xyz, s.position);
     }
 #endif
     weight *= (dot(direction, s.geometric_normal) < 0.0 || surface_is_edited(s)) ? 1.0 : 0.0;

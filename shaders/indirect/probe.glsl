@@ -1,5 +1,8 @@
 // Pixels from whose view points are found that light the picture: one in each cell of a grid, another in every sample.
-// Those that show glass stand for what is straight behind it. A program includes indirect/path.glsl before.
+// Those that show glass stand for what is straight behind it, and those that show metal for what is mirrored there: a
+// virtual light sends to all sides what its probe saw of it, and of two mirrors one sees highlights of lamps in the other
+// that nothing else sees. A program includes indirect/path.glsl before.
+#define MOST_MIRRORS 4  // one behind another, that a probe looks at
 
 struct Probe {
   bool receives;
@@ -7,6 +10,12 @@ struct Probe {
   vec3 normal;
   vec3 geometric_normal;
 };
+
+// Whether what a surface mirrors is most of what it sends on.
+bool is_metal(vec3 diffuse, vec3 straight)
+{
+  return luminance(straight) > luminance(diffuse);
+}
 
 Probe probe_read(int index)
 {
@@ -20,18 +29,39 @@ Probe probe_read(int index)
   probe.position = s.position;
   probe.normal = s.normal;
   probe.geometric_normal = s.geometric_normal;
-  if (probe.receives && s.kind == LOBE_REFRACTION) {
+  bool glass = s.kind == LOBE_REFRACTION;
+  if (probe.receives && (glass || (s.kind <= FRESNEL_F82 && is_metal(s.diffuse, s.glossy_weight * s.glossy_tint)))) {
     vec3 onward = (film_view.eye.w > 0.5) ? -film_view.backward.xyz : safe_normalize(s.position - film_view.eye.xyz);
-    vec3 beyond = (dot(onward, s.geometric_normal) < 0.0) ? -s.geometric_normal : s.geometric_normal;
-    ivec2 hit;
-    vec3 origin = ray_origin(s.position, beyond);
-    float t = trace_nearest(origin, onward, 1e29, bits.z + uint(film_view.sample_index), hit);
-    probe.receives = t < 1e29;
-    if (probe.receives) {
+    uint salt = bits.z + uint(film_view.sample_index);
+    vec3 beside = s.geometric_normal;
+    if (glass) {
+      beside *= (dot(onward, s.geometric_normal) < 0.0) ? -1.0 : 1.0;
+    }
+    else {
+      uvec3 roll = hash3(uvec3(uint(index), salt, uint(film_view.seed)));
+      vec3 ignored;
+      onward = lobe_sample(lobe_begin(s, -onward), vec2(to_unit(roll.x), to_unit(roll.y)), ignored);
+      probe.receives = may_mirror(s, onward);
+      beside = side_of_ray(s, onward);
+    }
+    for (int step = 0; step < MOST_MIRRORS && probe.receives; step++) {
+      ivec2 hit;
+      vec3 origin = ray_origin(probe.position, beside);
+      float t = trace_nearest(origin, onward, 1e29, salt, hit);
+      probe.receives = t < 1e29;
+      if (!probe.receives) {
+        break;
+      }
       probe.position = origin + t * onward;
       probe.normal = triangle_normal(hit);
       probe.normal *= (dot(probe.normal, onward) > 0.0) ? -1.0 : 1.0;
-      probe.geometric_normal = probe.normal;
+      probe.geometric_normal = beside = probe.normal;
+      Reflection met = mean_reflection(hit);
+      if (glass || !is_metal(met.diffuse, met.straight)) {
+        break;
+      }
+      onward = reflect(onward, probe.normal);
+      probe.receives = step + 1 < MOST_MIRRORS;
     }
   }
   return probe;

@@ -20,6 +20,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   if (!shadow_find(light.first_view, light.view_count, position, normal, r)) {
     return 1.0;
   }
+  r.layers = LAYERS_SHADE(pixel);
   vec2 corner = floor(r.texel - 0.5);
   int blocking = 0;
   bool by_lot = false;
@@ -27,7 +28,7 @@ float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
   float highest = 0.0;
   for (int k = 0; k < 4; k++) {
     vec2 cell = clamp(corner + vec2(k & 1, k >> 1), vec2(0.0), vec2(r.rectangle.z - 1.0));
-    vec4 caster = depth_maps_fetch(ivec2(r.rectangle.xy + cell));
+    vec4 caster = shadow_caster(r, ivec2(r.rectangle.xy + cell));
     vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
     float above = max(behind.x, behind.y);
     by_lot = by_lot || caster.w > 1.5;

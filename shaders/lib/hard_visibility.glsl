@@ -4,5 +4,5 @@
 
 float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
-  return shadow_visibility(light.first_view, light.view_count, position, normal);
+  return shadow_visibility(light.first_view, light.view_count, position, normal, LAYERS_SHADE(pixel));
 }

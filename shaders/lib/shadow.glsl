@@ -8,8 +8,16 @@
 // The uniform block `sources` (addon/sources/lights.py) lists in `view[]`, per view, rows x, y, w, q and the rectangle
 // (origin, size) in the atlas `depth_maps`.
 
-#define VIEW_TEXELS 5
+// Where a layer (grass) is nearest to the light, w is LAYER_CASTER and its depth measure, and the rest is that of the caster
+// behind it, 0 if there is none. It shadows what lies beside it; its own surface, which shows its own shadows, passes it over.
 
+#define VIEW_TEXELS 5
+#define LAYER_CASTER 4.0
+#ifdef GRASS
+#define LAYERS_SHADE(pixel) (lobe_kind(surface_lobe_fetch(pixel)) != SURFACE_GRASS)
+#else
+#define LAYERS_SHADE(pixel) false
+#endif
 
 // A receiver as the first view that contains it sees it.
 struct ShadowReceiver {
@@ -21,6 +29,7 @@ struct ShadowReceiver {
   float q;
   vec2 gradient;  // of q on the receiver's plane, per texel
   float slack;  // difference in q from its plane that is no difference
+  bool layers;  // whether layers shadow it
 };
 
 // Difference in q that is none, from a plane with this gradient per texel: rasterisers snap vertices to 1/256 texel, 3 %
@@ -36,7 +45,7 @@ float shadow_slack(float q, vec2 gradient)
 // where nothing was drawn.
 vec2 shadow_behind(ShadowReceiver r, vec4 caster, vec2 offset)
 {
-  if (caster.w <= 0.0) {
+  if (caster.w <= 0.0 || (caster.w >= LAYER_CASTER && caster.x == 0.0)) {
     return vec2(-1e30);
   }
   float height = caster.x - r.q;
@@ -44,8 +53,16 @@ vec2 shadow_behind(ShadowReceiver r, vec4 caster, vec2 offset)
   return height + vec2(dot(caster.yz, offset) - slack, dot(r.gradient, offset) - r.slack);
 }
 
+// The caster in a texel of the atlas, as it counts for a receiver.
+vec4 shadow_caster(ShadowReceiver r, ivec2 texel)
+{
+  vec4 caster = depth_maps_fetch(texel);
+  return (r.layers && caster.w > LAYER_CASTER) ? vec4(caster.w - LAYER_CASTER, 0.0, 0.0, 2.0) : caster;
+}
+
 bool shadow_find(int first_view, int view_count, vec3 position, vec3 normal, out ShadowReceiver r)
 {
+  r.layers = false;
   vec4 p = vec4(position, 1.0);
   vec3 t1;
   vec3 t2;
@@ -121,13 +138,13 @@ vec2 shadow_beside(ShadowReceiver r, vec3 normal)
   vec2 down = shadow_outward(r, normal);
   down = (dot(r.gradient, down) > 0.0) ? -down : down;
   vec2 beside = clamp(floor(r.texel + down), vec2(0.0), vec2(r.rectangle.z - 1.0));
-  return shadow_behind(r, depth_maps_fetch(ivec2(r.rectangle.xy + beside)), r.texel - beside - 0.5);
+  return shadow_behind(r, shadow_caster(r, ivec2(r.rectangle.xy + beside)), r.texel - beside - 0.5);
 }
 
 // Whether the caster in a texel of the view (from its corner) stands between light and receiver.
 bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
 {
-  vec4 caster = depth_maps_fetch(ivec2(r.rectangle.xy + cell));
+  vec4 caster = shadow_caster(r, ivec2(r.rectangle.xy + cell));
   vec2 behind = shadow_behind(r, caster, r.texel - cell - 0.5);
   if (shadow_unsure(r, caster, behind)) {
     behind = shadow_beside(r, normal);
@@ -135,11 +152,12 @@ bool shadow_blocked(ShadowReceiver r, vec2 cell, vec3 normal)
   return min(behind.x, behind.y) > 0.0;
 }
 
-float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal)
+float shadow_visibility(int first_view, int view_count, vec3 position, vec3 normal, bool layers)
 {
   ShadowReceiver r;
   if (!shadow_find(first_view, view_count, position, normal, r)) {
     return 1.0;
   }
+  r.layers = layers;
   return shadow_blocked(r, min(floor(r.texel), vec2(r.rectangle.z - 1.0)), normal) ? 0.0 : 1.0;
 }

@@ -7,7 +7,7 @@
 float light_visibility(Light light, ivec2 pixel, vec3 position, vec3 normal)
 {
   if (light.radius <= near_share * length(light.centre - position)) {
-    return shadow_visibility(light.first_view, light.view_count, position, normal);
+    return shadow_visibility(light.first_view, light.view_count, position, normal, LAYERS_SHADE(pixel));
   }
   vec3 direction;
   float density;

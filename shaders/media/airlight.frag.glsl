@@ -94,7 +94,8 @@ void main()
 #else
     float own = shuffled(film_view.sample_index, salt.xy);
 #endif
-    Around around = around_row(i, ray.origin, ray.direction, begin, end);
+    vec2 lamp_turn = vec2(scrambled(film_view.bits_x, salt.y), scrambled(film_view.bits_y, salt.z));
+    Around around = around_row(i, lamp_turn, ray.origin, ray.direction, begin, end);
     vec3 own_sum = vec3(0.0);
     for (int n = 0; n < places; n++) {
       // Both ways to draw take turns, each stratified by itself; a single place draws which.
@@ -124,6 +125,7 @@ void main()
       uint own_salt = seed + uint(i * 64 + n);
       uvec3 turn = hash3(salt + uint(n) * 3u);
       vec2 u = vec2(scrambled(film_view.bits_x, turn.x), scrambled(film_view.bits_y, turn.y));
+      u = (i >= light_count || around.round_lamp) ? u : lamp_turn;
       Asked asked = ask_scattered(i, bins.media[k], position, -ray.direction, u, own_salt);
       own_sum += weight * asked_arriving(asked, position, own_salt);
     }

@@ -1,11 +1,13 @@
 // Light that media scatter after other bounces, and that they bring to surfaces: one walk of up to `bounces` steps for each.
 //
 // The first walk starts at a place on the view ray, the second at the surface, whose irradiance it finds (of what media
-// scatter; light of other surfaces is not its matter). At each step a ray goes on by the phase function or the cosine, to a
-// place in media or to a surface, drawn by what media let pass; there one row of lights, drawn evenly, is asked. As on the
-// view ray, half of the places in media are drawn around that row's point: near a lamp others would be fireflies.
+// scatter; light of other surfaces is not its matter). Each asks one row of lights, drawn evenly. At each stop it looks once
+// for a place in media that the row lights: drawn along rays of the lamp (media/from_lamps.glsl) or by the phase function or
+// cosine and around the lamp, weighted by the balance heuristic. Then it goes on by phase function or cosine, to a place in
+// media drawn by what they let pass, or to a surface, where the row is asked.
 #include "lib/gbuffer.glsl"
 #include "media/arriving.glsl"
+#include "media/from_lamps.glsl"
 #include "media/view_ray.glsl"
 #include "media/dither.glsl"
 
@@ -33,7 +35,7 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
 #endif
   Light light = light_read(number);
   float density;
-  asked = ask_light(light, position, density);
+  asked = ask_light(light, position, u, density);
   float lobe = max(dot(normal, asked.direction), 0.0) / PI;
   asked.found *= lobe;
 #ifdef WORLD_LIT
@@ -44,79 +46,193 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
   return asked;
 }
 
-// What a ray brings back that sets out with this weight. `media_only`: a surface that it meets first ends it.
-vec3 walk(vec3 position, vec3 direction, vec3 weight, bool media_only, inout uint seed)
+// What a walk does, one after the other: find a surface that the lamp lights, once; and at each stop look for a place in media
+// that it lights, look at that surface, and go on to the next stop.
+#define FIND_LIT 0
+#define LOOK 1
+#define LOOK_AT_LIT 2
+#define GO_ON 3
+#define AIMED 0.25  // of steps that go on to places by the rays of the lamp
+
+// A place that a walk has come to: in media, or on a surface of albedo 1.
+struct Stop {
+  vec3 position;
+  vec3 onwards;  // where its light goes to
+  uint inside;   // media; 0: on a surface
+  float lobe;    // anisotropy
+  vec3 normal;
+  vec3 face;     // geometric normal
+};
+
+float stop_density(Stop stop, vec3 way)
+{
+  if (stop.inside == 0u) {
+    return (dot(way, stop.face) > 0.0) ? max(dot(way, stop.normal), 0.0) / PI : 0.0;
+  }
+  return phase_henyey_greenstein(stop.lobe, -dot(way, stop.onwards));
+}
+
+vec3 stop_draw(Stop stop, vec2 u)
+{
+  return (stop.inside == 0u) ? cosine_direction(stop.normal, u) : -phase_direction(stop.lobe, stop.onwards, u);
+}
+
+// What light it sends on of what comes along -way.
+vec3 stop_sends(Stop stop, vec3 way, float density, uint seed)
+{
+  if (stop.inside == 0u) {
+    return vec3(density);
+  }
+  return media_scattered(stop.inside, stop.position, -way, stop.onwards, seed);
+}
+
+// What a walk brings back that sets out from a stop with this weight, of row `number` of lights. `media_only`: a surface that
+// it meets first ends it.
+vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, vec2 first_turn, inout uint seed)
 {
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < bounces; i++) {
-    ivec2 hit;
-    float limit = trace_nearest(position, direction, 1e29, seed, hit);
-    Bins bins = media_bins(position, direction, limit, seed);
-    sum += weight * bins.emitted;
-    bool in_media = bins.total > 0.0 && bins.count > 0;
-    bool at_surface = hit.x >= 0 && !(media_only && i == 0);
-    float passing = dot(bins.end, vec3(1.0 / 3.0));
-    float chance = !in_media ? 0.0 : (at_surface ? clamp(1.0 - passing, 0.1, 0.9) : 1.0);
-    bool scattered = media_random(seed) < chance;
-    if (!scattered && !at_surface) {
-      break;
-    }
-    int number = min(int(media_random(seed) * float(ROWS_ASKED)), ROWS_ASKED - 1);
-    vec2 ask_turn = vec2(media_random(seed), media_random(seed));
+  LampRays rays = lamp_rays(number, ask_turn);
+  bool lit_exists = false;
+  vec3 lit = vec3(0.0);  // the surface where a ray of the lamp ends
+  int task = rays.shadow ? FIND_LIT : LOOK;
+  int bounce = 0;
+  for (int i = 0; i < 3 * bounces + 1 && bounce < bounces; i++) {
+    int doing = task;
+    bool first_surface = !(media_only && bounce == 0);
+    task = (doing == FIND_LIT) ? LOOK : ((doing == LOOK) ? (lit_exists && first_surface ? LOOK_AT_LIT : GO_ON)
+                                                        : ((doing == LOOK_AT_LIT) ? GO_ON : LOOK));
     vec2 turn = vec2(media_random(seed), media_random(seed));
-    vec3 next;
-    vec3 bounced;
+#ifdef WORLD_LIT
+    // Of the world another row at each stop: its rows are the last ones.
+    int first = light_count - int(world_rows + 0.5);
+    float lot = media_random(seed);
+    if (number >= first) {
+      number = min(first + int(lot * float(ROWS_ASKED - first)), ROWS_ASKED - 1);
+      ask_turn = vec2(media_random(seed), media_random(seed));
+    }
+#endif
+    vec3 from = stop.position;
+    float wanted = -1.0;
+    vec3 way;
+    bool more = doing == GO_ON && bounce + 1 < bounces;
+    float aimed = !rays.exist ? 0.0 : ((doing == LOOK) ? 0.5 : (more ? AIMED : 0.0));  // share along rays of the lamp
+    if (doing == FIND_LIT) {
+      from = rays.source;
+      way = lamp_rays_way(rays, turn);
+    }
+    else if (doing == LOOK_AT_LIT || media_random(seed) < aimed) {
+      vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(rays, from, vec3(turn, media_random(seed)));
+      wanted = length(offset);
+      way = offset / max(wanted, 1e-30);
+    }
+    else {
+      way = stop_draw(stop, (doing == GO_ON && bounce == 0) ? first_turn : turn);
+    }
+    float lobe = (doing == FIND_LIT) ? 1.0 : stop_density(stop, way);
+    if (!(lobe > 0.0) || wanted == 0.0) {
+      if (doing == GO_ON) {
+        break;
+      }
+      continue;
+    }
+    ivec2 hit;
+    float limit = trace_nearest(from, way, 1e29, seed, hit);
+    if (doing == FIND_LIT) {
+      lit_exists = hit.x >= 0;
+      lit = from + limit * way;
+      continue;
+    }
+    vec3 passed = weight * stop_sends(stop, way, lobe, seed);
+    Bins bins = media_bins(from, way, limit, seed);
+    bool in_media = bins.total > 0.0 && bins.count > 0;
+    bool at_surface = hit.x >= 0 && first_surface;
+    float chance = !in_media ? 0.0 : (at_surface ? clamp(1.0 - dot(bins.end, vec3(1.0 / 3.0)), 0.1, 0.9) : 1.0);
+    chance = (doing == LOOK) ? 1.0 : chance;
+    bool found_aim = doing != LOOK_AT_LIT && wanted > 0.0;
+    bool scattered = (doing == LOOK || found_aim) ? in_media : (doing == GO_ON && media_random(seed) < chance);
     Asked asked = ask_nothing();
-    vec3 onwards = -direction;
+    vec3 position = from;
+    vec3 arrives = vec3(0.0);
+    int k = -1;
+    float t = wanted;
+    if (doing == GO_ON) {
+      sum += found_aim ? vec3(0.0) : passed / (lobe * (1.0 - aimed)) * bins.emitted;
+      if (!scattered && (found_aim || !at_surface)) {
+        break;
+      }
+    }
     if (scattered) {
-      int k;
-      float t;
-      Around around = around_row(number, position, direction, bins.from[0], bins.to[bins.count - 1]);
+      Around around = around_row(number, ask_turn, from, way, bins.from[0], bins.to[bins.count - 1]);
+      around.exists = around.exists && doing == LOOK;
       float v = media_random(seed);
-      if (around.exists && v < 0.5) {
-        t = around_draw(around, 2.0 * v);
+      if (wanted > 0.0 || (around.exists && v < 0.5)) {
+        t = (wanted > 0.0) ? wanted : around_draw(around, 2.0 * v);
         k = bins_find(bins, t);
-        if (k < 0) {
-          break;  // between media
-        }
       }
       else {
         t = bins_draw(bins, around.exists ? 2.0 * v - 1.0 : v, k);
       }
-      float density = bins_density(bins, k, t);
-      density = around.exists ? 0.5 * (density + around_density(around, t)) : density;
-      weight *= bin_passing(bins, k, t) / max(density * chance, 1e-30);
-      position += t * direction;
-      uint inside = bins.media[k];
-      if (number >= 0) {
-        asked = ask_scattered(number, inside, position, onwards, ask_turn, seed);
+      if (k < 0) {  // between media, or behind a surface
+        if (doing == LOOK) {
+          continue;
+        }
+        break;
       }
-      float g = media_lobe(inside, position, seed);
-      next = -phase_direction(g, onwards, turn);
-      float lobe = phase_henyey_greenstein(g, dot(-next, onwards));
-      bounced = media_scattered(inside, position, -next, onwards, seed) / max(lobe, 1e-30);
+      float density = bins_density(bins, k, t);
+      density = lobe * chance * (around.exists ? 0.5 * (density + around_density(around, t)) : density);
+      density = (aimed > 0.0) ? mix(density, lamp_rays_density(rays, from, way, t), aimed) : density;
+      position += t * way;
+      arrives = passed * bin_passing(bins, k, t) / max(density, 1e-30);
+      if (doing == LOOK) {
+        asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
+      }
+      else {
+        weight = arrives;
+        arrives = vec3(0.0);
+        stop.inside = bins.media[k];
+        stop.lobe = media_lobe(stop.inside, position, seed);
+        stop.onwards = -way;
+      }
     }
-    else {
-      weight *= bins.end / (1.0 - chance) * mean_albedo(hit);
+    else if (doing != LOOK && at_surface && (doing == GO_ON || abs(limit - wanted) < 1e-3 * wanted)) {
       vec3 normal = triangle_normal(hit);
-      normal = (dot(normal, direction) > 0.0) ? -normal : normal;
-      position = ray_origin(position + limit * direction, normal);
+      normal = (dot(normal, way) > 0.0) ? -normal : normal;
+      position = ray_origin(position + limit * way, normal);
+      vec3 bounced = passed * bins.end * mean_albedo(hit);
+      float going = lobe * (1.0 - chance) * (1.0 - aimed);
       if (number >= 0) {
         asked = ask_surface(number, position, normal, ask_turn);
+        float from_lamp = 0.0;
+        if (rays.shadow) {
+          vec3 offset = position - rays.source;
+          float squared = max(dot(offset, offset), 1e-30);
+          vec3 arriving = offset * inversesqrt(squared);
+          asked.direction = -arriving;
+          asked.reach = sqrt(squared);
+          from_lamp = lamp_rays_share(rays, arriving) * abs(dot(normal, arriving)) / squared;
+          from_lamp *= limit * limit / max(-dot(normal, way), 1e-6);
+        }
+        arrives = bounced / max(going + from_lamp, 1e-30);  // balance heuristic
       }
-      next = cosine_direction(normal, turn);
-      bounced = vec3(1.0);
+      if (doing == GO_ON) {
+        weight = bounced / going;
+        stop.inside = 0u;
+        stop.normal = normal;
+        stop.face = normal;
+      }
     }
-    sum += weight * float(ROWS_ASKED) * asked_arriving(asked, position, seed);
-    weight *= bounced;
-    direction = next;
-    // Faint walks end at random (Russian roulette).
-    float left = max_component(weight);
-    float survives = (i < 2) ? 1.0 : clamp(left, 0.0, 1.0);
-    if (!(left > 0.0) || media_random(seed) >= survives) {
-      break;
+    sum += arrives * float(ROWS_ASKED) * asked_arriving(asked, position, seed);
+    if (doing == GO_ON) {
+      stop.position = position;
+      bounce++;
+      // Faint walks end at random (Russian roulette).
+      float left = max_component(weight);
+      float survives = (bounce <= 2) ? 1.0 : clamp(left, 0.0, 1.0);
+      if (!(left > 0.0) || media_random(seed) >= survives) {
+        break;
+      }
+      weight /= survives;
     }
-    weight /= survives;
   }
   return sum;
 }
@@ -143,31 +259,47 @@ void main()
 #endif
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   Surface s = SURFACE_READ(pixel);
+  int number = min(int(shuffled(film_view.sample_index, salt.zx) * float(ROWS_ASKED)), ROWS_ASKED - 1);
   // One walk after the other, so that the program holds it once.
   for (int which = 0; which < 2; which++) {
     bool from_surface = which == 1;
-    vec3 position = ray.origin;
-    vec3 next = vec3(0.0, 0.0, 1.0);
+    vec2 ask_turn = vec2(media_random(seed), media_random(seed));
+    Stop stop;
+    stop.position = ray.origin;
+    stop.onwards = -ray.direction;
+    stop.inside = 0u;
+    stop.lobe = 0.0;
+    stop.normal = s.normal;
+    stop.face = s.geometric_normal;
     vec3 weight = vec3(0.0);
     if (!from_surface && bins.total > 0.0 && bins.count > 0) {
+      LampRays rays = lamp_rays(number, ask_turn);
+      Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], bins.to[bins.count - 1]);
+      float v = shuffled(film_view.sample_index, salt.yz);
       int k;
-      float t = bins_draw(bins, shuffled(film_view.sample_index, salt.yz), k);
-      position += t * ray.direction;
-      float g = media_lobe(bins.media[k], position, seed);
-      next = -phase_direction(g, -ray.direction, u);
-      float lobe = phase_henyey_greenstein(g, dot(next, ray.direction));
-      weight = bin_passing(bins, k, t) / max(bins_density(bins, k, t), 1e-30);
-      weight *= media_scattered(bins.media[k], position, -next, -ray.direction, seed) / max(lobe, 1e-30);
-    }
-    if (from_surface && ray.hit && max_component(s.diffuse) > 0.0) {
-      next = cosine_direction(s.normal, u);
-      if (dot(next, s.geometric_normal) > 0.0) {
-        position = ray_origin(s.position, s.geometric_normal);
-        weight = (STRIDE > 1) ? vec3(1.0) : s.diffuse;
+      float t;
+      if (near.exist && v < 0.5) {
+        t = near_draw(near, 2.0 * v);
+        k = bins_find(bins, t);
+      }
+      else {
+        t = bins_draw(bins, near.exist ? 2.0 * v - 1.0 : v, k);
+      }
+      if (k >= 0) {
+        float density = bins_density(bins, k, t);
+        density = near.exist ? 0.5 * (density + near_density(near, t)) : density;
+        stop.position += t * ray.direction;
+        stop.inside = bins.media[k];
+        stop.lobe = media_lobe(stop.inside, stop.position, seed);
+        weight = bin_passing(bins, k, t) / max(density, 1e-30);
       }
     }
+    if (from_surface && ray.hit && max_component(s.diffuse) > 0.0) {
+      stop.position = ray_origin(s.position, s.geometric_normal);
+      weight = (STRIDE > 1) ? vec3(1.0) : s.diffuse;
+    }
     if (max_component(weight) > 0.0) {
-      vec3 found = finite_sum(walk(position, next, weight, from_surface, seed));
+      vec3 found = finite_sum(walk(stop, weight, number, ask_turn, from_surface, u, seed));
       if (from_surface) {
         out_surface.rgb = found;
       }

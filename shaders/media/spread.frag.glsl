@@ -1,11 +1,13 @@
 // Light of media at every STRIDE-th pixel brought to all pixels: the mean over 4 x 4 of the known ones around, which have
 // all 16 numbers of the dither among them, of those whose ray ends about as far away and is hidden about as much.
 //
-// What is spread is light over opacity, which is known at each pixel: outlines of media and their detail stay sharp.
+// What is spread is light over what is known at each pixel: opacity, so that outlines of media and their detail stay sharp,
+// and with GUIDED what lamps would send without shadows (guide.frag.glsl), so that peaks around them stay where they are.
 #include "media/media.glsl"
 #include "media/view_ray.glsl"
 
 #define REACH 2.0
+#define UNGUIDED 1e-4  // share of light that is spread over opacity alone: some comes where no lamp shines
 
 float overlap(float place, float middle)
 {
@@ -27,6 +29,10 @@ void main()
   vec4 emission = vec4(0.0);
   float total = 0.0;
   float known_opacity = 0.0;
+#ifdef GUIDED
+  vec3 guides = vec3(0.0);
+  ivec2 last = airlight_guide_size() - 1;
+#endif
   for (int y = -2; y <= 2; y++) {
     for (int x = -2; x <= 2; x++) {
       ivec2 known = corner + ivec2(x, y);
@@ -40,11 +46,23 @@ void main()
       direct += weight * found;
       emission += weight * second;
       known_opacity += weight * second.w;
+#ifdef GUIDED
+      guides += weight * airlight_guide_fetch(min(other * STRIDE + shown_pixel, last)).rgb;
+#endif
       total += weight;
     }
   }
   float share = (known_opacity > 0.0) ? opacity / known_opacity : 0.0;
+#ifdef GUIDED
+  vec3 here = mix(airlight_guide_fetch(pixel).rgb, guides * share, UNGUIDED);
+  out_direct = vec4(direct.rgb * here / max(guides, vec3(1e-37)), 0.0);
+  if (!(max_component(guides) > 0.0)) {  // what lamps' rims send and no place of the guide has met stays where it is
+    ivec2 nearest = clamp(ivec2(floor(middle + 0.5)), ivec2(0), size - 1);
+    out_direct.rgb = coarse_direct_fetch(nearest).rgb * opacity / max(coarse_emission_fetch(nearest).w, 1e-30);
+  }
+#else
   out_direct = vec4(direct.rgb * share, 0.0);
+#endif
 #ifdef ON_SURFACES
   out_emission = vec4(emission.rgb / max(total, 1e-30) * surface_diffuse_fetch(pixel).rgb, 0.0);
 #else

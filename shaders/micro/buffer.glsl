@@ -16,6 +16,9 @@
 #define ROUND 0.2  // of the size of a flat group that is drawn as one disc: up to there a bent one is drawn as a ball
 #define ITSELF 1e-3  // half lengths of a piece within which what is seen of it is where one looks from
 #define SEAM 1e-4    // half lengths by which pieces overlap, so that rounding leaves no gap
+#define LONG 2.0      // pixels that what is flat and seen from aside may be long
+#define DISC_AREA 1.4 // of the square of a flat group's disc: PI / COVER^2 of addon/scene/point_tree.py
+#define LEVEL 2e-3  // radii that a node must rise above the plane of the place: less is rounding
 #define SAME_SURFACE 0.7  // cosine between normals, from which on a disc whose radius reaches here is this surface
 
 vec4 node_texel(int index)
@@ -90,9 +93,9 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
   vec3 axis = octahedral_decode(shape.xy);
   float squared = shape.w * shape.w;
   float off_plane = dot(to_node, axis);
-  bool flat_group = node < leaf_count && shape.w > 0.0;
-  vec4 sides = (flat_group || node >= leaf_count) ? node_texel(3 * node + 2) : vec4(0.0);
-  bool piece = node >= leaf_count && sides.w > 0.0;
+  bool piece = shape.z < 0.0;
+  bool flat_group = node < leaf_count && !piece && shape.w > 0.0;
+  vec4 sides = (flat_group || piece) ? node_texel(3 * node + 2) : vec4(0.0);
   vec3 along = octahedral_decode(sides.xy);
   vec3 across = cross(axis, along);
   // A smooth surface bends away below the disc beside it.
@@ -118,10 +121,17 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
     }
     if (depth > nearest && inside && dot(ray, f.plane) > 0.0) {
       bool behind = cosine > 0.0;
-      bool dark = piece && beyond_clips(node, behind, vec2(dot(off, along), dot(off, across)));
+      bool dark = piece && node >= leaf_count && beyond_clips(node, behind, vec2(dot(off, along), dot(off, across)));
       micro_store(corner + pixel, depth, dark ? 0 : node, behind);
     }
   }
+}
+
+// How far a node reaches above its middle along `up`: a slab of half the height `thick` within a ball.
+float rise(vec3 axis, vec3 up, float radius, float thick)
+{
+  float cosine = dot(axis, up);
+  return min(radius * sqrt(max(1.0 - cosine * cosine, 0.0)) + max(thick, 0.0) * abs(cosine), radius);
 }
 
 void micro_clear(ivec2 corner)
@@ -155,7 +165,15 @@ void micro_fill(MicroFrame f, ivec2 corner)
       vec4 ball = node_texel(3 * k);
       vec3 to_node = ball.xyz - f.place;
       bool down = false;
-      if (dot(to_node, f.normal) + ball.w > 0.0 && dot(to_node, f.plane) + ball.w > 0.0) {
+      float height = min(dot(to_node, f.normal), dot(to_node, f.plane));
+      bool above = height > -ball.w;
+      if (above && height < ball.w) {  // what lies in the plane of the place does not rise above it
+        vec4 shape = node_texel(3 * k + 1);
+        vec3 axis = octahedral_decode(shape.xy);
+        above = min(dot(to_node, f.normal) + rise(axis, f.normal, ball.w, shape.z),
+                    dot(to_node, f.plane) + rise(axis, f.plane, ball.w, shape.z)) > LEVEL * ball.w;
+      }
+      if (above) {
         float squared = dot(to_node, to_node);
         float sine = ball.w * ball.w / max(squared, 1e-30);
         ivec2 low = ivec2(0);
@@ -186,9 +204,16 @@ void micro_fill(MicroFrame f, ivec2 corner)
           micro_store(corner + pixel, sqrt(squared), k, dot(to_node, octahedral_decode(shape.xy)) > 0.0);
         }
         else if (seen || centre_test == 0) {
-          // A ball in place of an edge between walls lets light pass beside it.
+          // A ball in place of an edge between walls lets light pass beside it; what is flat counts by its solid angle.
           vec4 shape = node_texel(3 * k + 1);
-          down = k < leaf_count && (!small_enough || (shape.w < 0.0 && reach > ROUND * detail));
+          bool bent = shape.w < 0.0;
+          bool drawable = small_enough && !(bent && reach > ROUND * detail);
+          if (k < leaf_count && !bent && !small_enough && reach < LONG * detail) {
+            float area = (shape.z < 0.0) ? -shape.z * shape.w : DISC_AREA * shape.w * shape.w;
+            float slant = abs(dot(to_node, octahedral_decode(shape.xy))) * max(dot(to_node, f.normal), 0.0);
+            drawable = area * slant * side * side <= PI * (detail * detail / 0.6561) * squared * squared;
+          }
+          down = k < leaf_count && !drawable;
           if (!down) {
             drawn = k;
             drawn_low = low;

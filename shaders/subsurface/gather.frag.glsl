@@ -52,11 +52,13 @@ float pixel_width_at(vec3 position)
 }
 
 // Mean of what arrives at pixels of the object within `extent`, by the profile in the window; taps on a spiral, denser inwards.
+// `beyond`: the share of the profile that lies outside of the picture.
 Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, float object, float extent, float range,
-                    float pixel_size, float translucency)
+                    float pixel_size, float translucency, out vec3 beyond)
 {
   Arriving sum;
   sum.direct = sum.indirect = sum.whole = vec3(0.0);
+  beyond = vec3(0.0);
   vec3 tangent;
   vec3 bitangent;
   orthonormal_basis(normal, tangent, bitangent);
@@ -70,6 +72,7 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
     float angle = turn + GOLDEN * float(k);
     ivec2 pixel;
     if (!pixel_seen(position + r * (cos(angle) * tangent + sin(angle) * bitangent), pixel)) {
+      beyond += profile_radial(profile, r) * (near_window(r, range) * (r + inner));
       continue;
     }
     float away = r;
@@ -84,13 +87,16 @@ Arriving near_light(ivec2 here, vec3 position, vec3 normal, Profile profile, flo
     float weight = near_window(away, range) * (r + inner) * (r / max(away, 1e-20));
     arriving_pixel(sum, pixel, translucency, profile_radial(profile, away) * weight);
   }
+  beyond /= max(beyond + sum.whole, vec3(1e-20));
   return sum;
 }
 
 // Light from points of the object within reach. `whole` of what faces as the pixel does and lies beyond the window: the
-// integral of the profile there. `behind`: of what faces away, all of it, which no pixel near stands for.
+// integral of the profile there. `beside`: of what lies in the window and outside of the picture. `behind`: of what faces
+// away, all of it, which no pixel near stands for.
 struct Far {
   Arriving ahead;
+  Arriving beside;
   Arriving behind;
   float chord;  // mean length of lines through the object from here, m
 };
@@ -104,16 +110,17 @@ vec3 walk_through(float r, vec3 free_path, vec3 absorption)
 }
 
 // Cycles finds places of Burley's profile by lines along the surface's normal and two tangents, and counts what it finds by its
-// distance from x over that from the line's foot: of bent surfaces more than the profile says. Its mean over the lines
-// (1/2, 1/4, 1/4 of them, weighted by the square of each one's density).
+// distance from x over that from the line's foot: of bent surfaces more than the profile says. What stands for 1/r then: a mean
+// over the lines (1/2, 1/4, 1/4 of them, weighted by the square of each one's density).
 float burley_lines(vec3 path, vec3 face, vec3 normal, vec3 tangent, vec3 bitangent, float least)
 {
   vec3 density = vec3(0.5, 0.25, 0.25) * abs(vec3(dot(face, normal), dot(face, tangent), dot(face, bitangent)));
   density *= density;
   vec3 along = vec3(dot(path, normal), dot(path, tangent), dot(path, bitangent));
   float squared = dot(path, path);
-  vec3 foot = sqrt(max(vec3(squared) - along * along, vec3(least * least)));
-  return sqrt(squared) * dot(density, vec3(1.0) / foot) / max(dot(density, vec3(1.0)), 1e-12);
+  vec3 foot = sqrt(max(vec3(squared) - along * along, vec3(0.0)));
+  foot = mix(foot, vec3(0.5 * least), lessThan(foot, vec3(least)));  // the mean of 1/foot over a disc
+  return dot(density, vec3(1.0) / max(foot, vec3(1e-20))) / max(dot(density, vec3(1.0)), 1e-12);
 }
 
 void far_add(inout Arriving sum, ivec2 texel, float translucency, vec3 weight)
@@ -128,6 +135,7 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
 {
   Far far;
   far.ahead.direct = far.ahead.indirect = far.ahead.whole = vec3(0.0);
+  far.beside = far.ahead;
   far.behind = far.ahead;
   float reach = profile_reach(profile);
   vec3 tangent;
@@ -154,11 +162,19 @@ Far far_light(vec3 position, vec3 normal, Profile profile, vec4 object, float ra
         float nearness = front / (r * r + object.z * object.z);
         chords += nearness * shape.z;
         chord_weight += nearness;
-        vec3 weight = profile_radial(profile, r) * (cell.w / (2.0 * PI * max(r, 0.25 * object.z)));
+        // Within `core` 1/r is taken for its mean over the disc around the nearest point of the face's plane.
+        float core = 0.25 * object.z;
+        float height = abs(dot(cell.xyz - position, face));
+        float per = (r < core) ? 2.0 / (core + height) : 1.0 / r;
         if (kind == PROFILE_BURLEY) {
-          weight *= burley_lines(cell.xyz - position, face, normal, tangent, bitangent, 0.25 * object.z);
+          per = burley_lines(cell.xyz - position, face, normal, tangent, bitangent, core);
         }
+        vec3 weight = profile_radial(profile, r) * (cell.w * per / (2.0 * PI));
         far_add(far.ahead, texel, min(shape.w, translucency), weight * front * (1.0 - near_window(r, range)));
+        ivec2 pixel;
+        if (r < range && !pixel_seen(cell.xyz, pixel)) {
+          far_add(far.beside, texel, min(shape.w, translucency), weight * front * near_window(r, range));
+        }
         if (kind == PROFILE_WALK) {
           weight *= mix(vec3(1.0), walk_through(r, free_path, absorption), clamp(0.5 - 0.5 * facing, 0.0, 1.0));
         }
@@ -215,7 +231,9 @@ void main()
     // Without points, or where they lie too far apart to know more than pixels do, all is taken from these.
     bool has_points = reach > max(RANGE * object.z, 2.0 * width) && object.y > 0.5 && points_lit != 0;
     float range = has_points ? RANGE * object.z : 1e3 * reach;
-    Arriving near = near_light(pixel, position, normal, profile, code, min(range, reach), range, width, translucency);
+    vec3 beyond;
+    Arriving near =
+        near_light(pixel, position, normal, profile, code, min(range, reach), range, width, translucency, beyond);
     vec3 found = step(vec3(1e-20), near.whole);
     direct = mix(own.direct, near.direct / max(near.whole, vec3(1e-20)), found);
     indirect = mix(own.indirect, near.indirect / max(near.whole, vec3(1e-20)), found);
@@ -224,6 +242,9 @@ void main()
       vec3 outside = max(vec3(1.0) - inside, vec3(0.0));
       Far far = far_light(position, normal, profile, object, range, kind, free_path, absorption, translucency);
       chord = far.chord;
+      vec3 beside = beyond * step(vec3(1e-20), far.beside.whole);
+      direct = mix(direct, far.beside.direct / max(far.beside.whole, vec3(1e-20)), beside);
+      indirect = mix(indirect, far.beside.indirect / max(far.beside.whole, vec3(1e-20)), beside);
       vec3 spare = LITTLE * outside + vec3(1e-12);
       vec3 whole = far.ahead.whole + spare;
       vec3 scale = outside;

@@ -16,6 +16,7 @@
 #define FEWEST_STEPS 8.0  // fewer miss rims that a ray of light grazes, and light leaks past them
 #define FLAT_STEPS 3.0    // where all of the relief is a plane
 #define OVERLAP 0.02  // pixels
+#define NEAR_ENOUGH 0.01  // pixels, and a tenth of it of the range of heights: a crossing that is narrowed down no further
 
 // Height of the relief, m, over a place of the triangle whose first corner `corner` is.
 float relief_height(SurfacePoint corner, Shell s, vec2 b)
@@ -134,7 +135,8 @@ bool own_surface(inout SurfacePoint point, Instance instance)
     f0 *= side;
     f1 *= side;
     float kept = 0.0;
-    for (int k = 0; k < int(more.x + 0.5); k++) {
+    float near = min(NEAR_ENOUGH * width, 0.1 * NEAR_ENOUGH * range);
+    for (int k = 0; k < int(more.x + 0.5) && min(f0, -f1) > near; k++) {
       float gap = f0 - f1;
       float part = (search == SEARCH_BISECTION || gap < 1e-30) ? 0.5 : f0 / gap;
       float t = t0 + (t1 - t0) * part;

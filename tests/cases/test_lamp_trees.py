@@ -194,3 +194,15 @@ def test_plain_lamps_have_no_maps(stage, lamp):
     chain(tree, emission, "Color", ("ShaderNodeBlackbody", 0, "", {}), ("ShaderNodeGamma", 0, "Color", {"Gamma": 2.0}))
     stage.render()
     assert stage.renderer.frame.lamp_maps.image is None  # run once, and the same all around
+
+
+def test_a_lamps_influence_is_left_to_eevee(stage, beside):
+    """Cycles has none of these factors, and neither has Candela."""
+    stage.floor(material=stage.principled(Base_Color=(0.5, 0.5, 0.5, 1)))
+    stage.camera_above()
+    light = stage.light("AREA").data
+    before = beside(1, (8, 8), 0, 1)
+    for kind in ("diffuse", "specular", "transmission", "volume"):
+        setattr(light, f"{kind}_factor", 0.0)
+    for first, second in zip(before, beside(1, (8, 8), 0, 1)):
+        assert first["combined"].any() and np.array_equal(first["combined"], second["combined"])

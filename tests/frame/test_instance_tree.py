@@ -1,4 +1,4 @@
-"""Instances below an upper tree: rays meet what they meet where all triangles are expanded, and what brute force finds."""
+"""Instances below an upper tree: rays meet what they meet where all is expanded, and what brute force finds."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,8 @@ void main()
   vec3 direction = sent_fetch(ivec2(1, ray)).xyz;
   ivec2 hit;
   float t = trace_nearest(origin, direction, 1e30, 0u, hit);
-  mat4 rays = mat4(vec4(direction, t * 0.999), vec4(direction, t * 1.001), vec4(-direction, 1e-9), vec4(direction, 1e-9));
+  vec4 no_ray = vec4(direction, 1e-9);
+  mat4 rays = mat4(vec4(direction, t * 0.999), vec4(direction, t * 1.001), no_ray, no_ray);
   uint clear = clear_bundle(origin, rays, 3u);
   vec4 facts = vec4(t, -1.0, -1.0, float(clear));
   vec4 normal = vec4(0.0);
@@ -68,7 +69,7 @@ def turned(rng) -> np.ndarray:
 def matrices(rng, kind: str, count: int) -> list[np.ndarray]:
     """Where instances stand, within a few metres of ORIGIN, by how they are scaled."""
     found = []
-    for k in range(count):
+    for _ in range(count):
         matrix = np.eye(4)
         scales = {
             "rigid": np.ones(3), "stretched": rng.uniform(0.2, 3.0, 3), "flat": np.array([1.0, 1.0, 1e-3]),

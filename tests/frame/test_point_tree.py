@@ -120,23 +120,43 @@ def test_every_triangle_of_few_has_a_piece():
     assert points.placed(shown)[2].sum() == pytest.approx(shown.areas().sum())
 
 
-def test_rectangles_of_groups_end_where_a_turned_wall_does():
-    """No group of pieces reaches over the rim of a turned rectangle, and most of them are drawn as rectangles."""
+def tree_of(shown, count, run=0):
+    points = spread(shown, count, run)
+    return points, fitted(np.arange(count), *points.placed(shown), points.pieces(shown), points.sides(shown))
+
+
+def test_groups_of_a_turned_wall_are_its_halves_halved():
+    """All groups of one triangle's points are drawn as the triangle that they cover; of both as the rectangle."""
     turn = np.array([[np.cos(0.6), np.sin(0.6), 0], [-np.sin(0.6), np.cos(0.6), 0], [0, 0, 1.0]])
     shown = surfaces((np.array(square()) * (2, 1, 1)) @ turn)
-    points = spread(shown, 512, 0)
-    pieces, (position, normal, areas) = points.pieces(shown), points.placed(shown)
-    order = split(pieces.mean(axis=1), normal, points.sides(shown))
-    tree = fitted(order, position, normal, areas, pieces, points.sides(shown))
-    groups = np.arange(1, 512)
-    assert tree.flat[1:16].all()  # those of 32 points and more, rags at their rims
+    _, tree = tree_of(shown, 512, run=1)  # of run 0 one triangle has a point of the other
+    assert tree.flat[1] and tree.piece[2:].all()
+    np.testing.assert_allclose(tree.disc[2:] * tree.half[2:, 1], tree.area[2:], rtol=1e-9)
     across = np.cross(tree.axis, tree.along)
-    for a in (-1, 1):
-        for b in (-1, 1):
-            corner = tree.centre + a * tree.half[:, :1] * tree.along + b * tree.half[:, 1:] * across
-            back = corner[groups] @ turn.T
-            over = np.maximum(np.maximum(-back, back - (2, 1, 0)), 0)
-            assert over.max() < 1e-9
+    corners = (
+        tree.centre - tree.disc[:, None] * tree.along,
+        tree.centre + tree.disc[:, None] * tree.along,
+        tree.centre + tree.half[:, :1] * tree.along + tree.half[:, 1:] * across,
+    )
+    for corner in corners:
+        back = corner[2:] @ turn.T
+        assert np.maximum(np.maximum(-back, back - (2, 1, 0)), 0).max() < 1e-9
+
+
+@pytest.mark.parametrize("run", [0, 3])
+def test_groups_of_a_triangle_with_any_number_of_points_are_pieces_of_it(run):
+    """Beside others of other sizes: where a heap parts its leaves, there the triangle is cut."""
+    shown = surfaces(
+        np.concatenate([square(), np.array(square(1.0)) * (0.7, 0.6, 1), np.array(square(2.0)) * (0.3, 1, 1)])
+    )
+    points, tree = tree_of(shown, 512, run)
+    assert points.placed(shown)[2].sum() == pytest.approx(shown.areas().sum())
+    for node in range(1, 512):
+        level = node.bit_length() - 1
+        below = points.triangle[(node << 9 >> level) - 512 : ((node + 1) << 9 >> level) - 512]
+        if (below == below[0]).all():
+            assert tree.piece[node]
+            assert tree.disc[node] * tree.half[node, 1] == pytest.approx(tree.area[node], rel=1e-6)
 
 
 def test_runs_do_not_repeat_each_other():

@@ -212,6 +212,26 @@ def test_other_things_cast_shadows_on_it(stage):
     assert shown[:, 20:].max() == 0.0 and shown[:, :10].mean() > 0.02
 
 
+def test_it_casts_shadows_beside_it(stage, tmp_path):
+    """Leaves that all lie on top, 0.1 m high, where x < 0; a sun at 45 degrees: soil is dark up to x = 0.1."""
+    image = bpy.data.images.new("Half", 64, 64, float_buffer=True, is_data=True)
+    grown = np.ones((64, 64, 4), np.float32)
+    grown[:, 32:, :3] = 0.0
+    image.pixels.foreach_set(grown.ravel())
+    ground(stage, flat_patch(tmp_path / "flat.grass", 1.0), density_map=image, map_size=0.8)
+    sun(stage, 45, 180)
+    towards(stage, 0, 0, 0.8)
+    camera = stage.scene.camera
+    camera.rotation_euler = (0, 0, 0)
+    shown = stage.render(8, (64, 64))["combined"][..., 0].mean(axis=0)
+    lit = 0.5 / np.pi * 3.0 * np.sqrt(0.5)
+    x = (np.arange(64) + 0.5) / 80 - 0.4
+    np.testing.assert_allclose(shown[x > 0.13], lit, rtol=0.02)
+    assert shown[(x > 0.02) & (x < 0.08)].max() < 0.05 * lit
+    grass = ALBEDO[0] / np.pi * 3.0 * np.sqrt(0.5)
+    np.testing.assert_allclose(shown[x < -0.05], grass, rtol=0.05)  # it shows its own shadows alone
+
+
 def test_in_a_hollow_nothing_is_seen_below_the_ground(stage):
     """A bowl of three metres' radius seen at a slant, where rays meet rising ground ahead. With lengths as on flat
     ground 5 % of the pixels lie more than a centimetre below it, and 9 % are dark."""

@@ -68,6 +68,20 @@ def test_a_half_lit_plane_has_the_profile_of_an_edge(stage):
     assert found[:, 0] + found[::-1, 0] == pytest.approx(1.0, abs=0.015)
 
 
+@pytest.mark.parametrize("turn", [0.0, np.pi])
+def test_light_enters_beside_the_picture_too(stage, turn):
+    """The camera sees the shadow up to its edge; what is lit, or dark, lies outside."""
+    slab(stage, scattering(stage, scale=0.5), half=1.5)
+    blocker = stage.blocker((-50, -50), (0, 50), 1.0)
+    blocker.rotation_euler = (0, 0, turn)
+    stage.light("SUN", energy=np.pi, angle=0.0)
+    stage.camera_above(0.5).location.x = -0.25
+    x = places((32, 32))[0][0] / 8.0 - 0.25
+    expected = diffusion.burley(0.5 * PATH).edge(x if turn == 0.0 else -x)
+    found = shown(stage.render(16)).mean(axis=0) / COLOR
+    assert found[:, 0] == pytest.approx(expected, abs=0.03)
+
+
 @pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
 def test_each_method_means_what_it_means_in_cycles(stage, method):
     slab(stage, scattering(stage, method, scale=0.1 if method == "RANDOM_WALK" else 1.0))
@@ -147,6 +161,20 @@ def test_a_thin_sheet_glows_where_it_is_lit_from_behind(stage):
     stage.camera_above(2.0)
     ours, cycles = shown(stage.render(16)), shown(stage.render(128, engine="CYCLES"))
     assert ours.mean(axis=(0, 1)) == pytest.approx(cycles.mean(axis=(0, 1)), rel=0.1)
+
+
+@pytest.mark.parametrize("thickness", [0.05, 0.2])
+def test_light_through_a_thin_slab_is_the_integral_of_the_profile(stage, thickness):
+    """Cycles finds the far side by lines along the normal: 2 pi r R(r) over their distances, r to the far side."""
+    stage.rectangle((-2, -2), (2, 2), material=scattering(stage, scale=1.0))
+    stage.scene.objects[-1].modifiers.new("Solidify", "SOLIDIFY").thickness = thickness
+    stage.light("SUN", turn=(np.pi, 0, 0), energy=np.pi)
+    stage.camera_above(1.0)
+    profile = diffusion.burley(PATH)
+    away = (np.arange(40000) + 0.5) * 1e-4
+    far = np.hypot(away, thickness)
+    expected = (profile.at(far) * 2.0 * np.pi * far).sum() * 1e-4
+    assert shown(stage.render(16))[..., 0].mean() / COLOR[0] == pytest.approx(expected, rel=0.03)
 
 
 @pytest.mark.parametrize("light", ["world", "sun", "emissive"])

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from addon.frame.ledger import RAN, SKIPPED
+from addon.lighting import depth_maps
+from addon.surfaces import draw
 from bench import relief as figures
 from bench import relief_scenes
 from tests.techniques.conftest import places
@@ -438,6 +440,27 @@ def test_a_mirror_shows_the_relief(stage):
     assert mesh.max() > 0.05
     # What the cone casts on itself rays do not see: the half that looks away from the sun is dark without.
     assert np.abs(relief - mesh).mean() < 0.25 * np.abs(flat - mesh).mean()
+
+
+def test_back_faces_of_shells_show_nothing_from_outside(stage, monkeypatch):
+    """What is left out of a shell that is seen from outside changes no pixel, mirrored objects included."""
+
+    def shown():
+        stage.clear()
+        material = height_material(stage, cone, 0.8)
+        stage.card(material, 0, 1)
+        mirrored = stage.card(material, 0, 1)
+        mirrored.location, mirrored.scale = (2.2, 0.0, 0.0), (-1.0, 1.0, 1.0)
+        stage.light("SUN", turn=(0.4, 0.7, 0), angle=0.0)
+        stage.camera((0.5, -5.0, 3.0), (np.radians(58), 0, 0), 0.6)
+        return stage.render(2, (48, 32))
+
+    left_out = shown()
+    for module in (depth_maps, draw):
+        monkeypatch.setattr(module, "entered", lambda draws, boxes, rows: frozenset())
+    drawn = shown()
+    for name in ("combined", "depth", "normal"):
+        np.testing.assert_array_equal(left_out[name], drawn[name])
 
 
 def test_a_wall_before_it_and_behind_it(stage):

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..energy import fresnel_dielectric
 from ..estimate import Estimate, Interface, Summary, constant
 from .entry import Approximation, Choice, Entry, Expression, Socket
 
@@ -34,8 +35,12 @@ SUBSURFACE_REACH = {"BURLEY": 0.24, "RANDOM_WALK": 3.0, "RANDOM_WALK_SKIN": 0.6,
 THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not drawn.")
 
 
-# A dielectric at the usual indices reflects a tenth of what comes from all sides; the rest passes.
-PASSING = constant(0.9)
+def _passing(sockets: dict[str, Estimate]) -> Estimate:
+    """What a face of glass lets pass of light straight on its way, at 45 degrees. Of what a pane's two faces mirror to
+    and fro between them a part passes, too, so that both let (1 - R) / (1 + R) pass; most things of glass have two."""
+    ior = max(float(sockets["IOR"].mean[0]), 1e-5)
+    face = float(fresnel_dielectric(np.float64(np.sqrt(0.5)), max(ior, 1.0 / ior)))
+    return constant(np.sqrt((1.0 - face) / (1.0 + face)))
 
 
 def _colored(name: str):
@@ -71,7 +76,7 @@ def _transparent(sockets: dict[str, Estimate]) -> Summary:
 def _glass(sockets: dict[str, Estimate]) -> Summary:
     color = _colored("Color")(sockets)
     return Summary(
-        transparency=color * PASSING, glossy=True, tinted=not color.grey,
+        transparency=color * _passing(sockets), glossy=True, tinted=not color.grey,
         glass=_interface(sockets, color, mirrors_color=True),
     )  # fmt: skip
 
@@ -97,7 +102,7 @@ def _principled(sockets: dict[str, Estimate]) -> Summary:
     if transmission.high.any():
         through = alpha * metallic.complement() * transmission
         root = _colored("Base Color")(sockets).map(lambda value: value**0.5)
-        transparency += through * root * PASSING
+        transparency += through * root * _passing(sockets)
         tinted = not root.grey
         if not thin:
             glass = _interface(sockets, root, float(through.mean.mean()))

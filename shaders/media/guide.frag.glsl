@@ -1,0 +1,63 @@
+// Light of lamps that media would scatter once towards the eye if nothing cast shadows and nothing were lost on the way to
+// the places: where it peaks, by few places at even steps. What spreads light over pixels (spread.frag.glsl) divides by it.
+//
+// All pixels draw the same numbers, so that what the grids' cells make of them cancels in that.
+#include "media/asking.glsl"
+#include "media/view_ray.glsl"
+
+#define AROUND_PLACES 12  // around a lamp
+#define FAR_PLACES 2     // of lights at infinity
+
+void main()
+{
+  out_guide = vec4(0.0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ViewRay ray = view_ray(surface_position_fetch(pixel), gl_FragCoord.xy);
+  uint seed = roll_of(ivec2(0), film_view.sample_index, film_view.seed, 46).x;
+  Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
+  if (!(bins.total > 0.0) || bins.count == 0) {
+    return;
+  }
+  float begin = bins.from[0];
+  float end = bins.to[bins.count - 1];
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < light_count; i++) {
+    Light light = light_read(i);
+    bool round_ = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
+    bool far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
+    for (int n = 0; n < (far ? FAR_PLACES : AROUND_PLACES); n++) {
+      // Points that stand for all of the lamp; of a round one, at their mean distance from its middle.
+      float v = (float(n) + 0.5) / float(far ? FAR_PLACES : AROUND_PLACES);
+      vec2 u = vec2(fract(5.0 * v), fract(0.618034 * float(n)));
+      Light part = light;
+      part.point = round_ ? vec3(0.85 * light.radius, 0.0, 0.0) : light.point;
+      part = light_at(part, u);
+      int k;
+      float t;
+      float density;
+      if (far) {
+        t = bins_draw(bins, v, k);
+        density = bins_density(bins, k, t) * float(FAR_PLACES);
+      }
+      else {
+        Around around = around_row(i, u, ray.origin, ray.direction, begin, end);
+        if (!around.exists) {
+          continue;
+        }
+        t = around_draw(around, v);
+        k = bins_find(bins, t);
+        density = around_density(around, t) * float(AROUND_PLACES);
+      }
+      if (k < 0) {
+        continue;  // between media
+      }
+      vec3 position = ray.origin + t * ray.direction;
+      vec3 direction;
+      float per_steradian;
+      vec3 found = light_sample(part, position, direction, per_steradian);
+      found *= media_scattered(bins.media[k], position, -direction, -ray.direction, seed);
+      sum += found * bin_passing(bins, k, t) / max(density, 1e-30);
+    }
+  }
+  out_guide = vec4((is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z)) ? sum : vec3(0.0), 0.0);
+}
