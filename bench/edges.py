@@ -170,44 +170,53 @@ def _count(thing) -> int:
 
 
 UNION_FAMILIES = ("grid", "far background", "stacked blockers")
-RECEIVERS, ACROSS = 200, 16
+RECEIVERS, PLACES = 1500, 1024
 
 
 def union(options) -> str:
     """RMS of the share of the lamp's area that some receivers see."""
     from addon import engine
     from addon.gfx import images
-    from addon.lighting import silhouettes
+    from addon.sampling import sequence
 
     rows = [("union", *UNION_FAMILIES)]
     errors: dict[str, list[float]] = {}
     for family in UNION_FAMILIES:
         scene, expected = soft_scenes.build(family), None
+        free = soft.direct(scene, soft.Entrant("free", PWB), options.size, shadows=False)[0]
+        reached = soft.lit(free).reshape(-1)  # what turns away from the lamp has a share of nothing
         for mode in ("BOXES", "PRODUCT", "SUM"):
             soft.direct(scene, soft.Entrant(mode, PWB, (("union", mode),)), options.size)
             renderer = engine.session(scene, "final").renderer
             own = next(one for one in renderer.techniques if one.name == PWB)
             receivers = images.read(own.tiles._kept["receivers"]).reshape(-1, 4)
             found = images.read(own.tiles._kept["seen_share"]).reshape(-1)
-            valid = np.flatnonzero(receivers[:, 3] != 0)
+            emitter = renderer.frame.emitters[0]
+            valid = np.flatnonzero((receivers[:, 3] != 0) & reached)
             chosen = valid[np.linspace(0, len(valid) - 1, RECEIVERS).astype(int)]
             if expected is None:
-                emitter = renderer.frame.emitters[0]
-                grid = (np.arange(ACROSS) + 0.5) / ACROSS * 2 - 1
-                points = [emitter.centre + x * emitter.u[:3] + y * emitter.v[:3] for x in grid for y in grid]
-                corners = own._casters.corners
-                expected = np.array([
-                    np.mean([not silhouettes.crossings(corners, p, s).any() for s in points])
-                    for p in receivers[chosen, :3].astype(float)
-                ])  # fmt: skip
+                places = 2.0 * sequence.points(0, PLACES, "union", 1) - 1.0
+                lamp = emitter.centre + places[:, :1] * emitter.u[:3] + places[:, 1:] * emitter.v[:3]
+                expected = np.array([_seen(own._casters.corners, p, lamp) for p in receivers[chosen, :3].astype(float)])
             errors.setdefault(mode, []).append(float(np.sqrt(((found[chosen] - expected) ** 2).mean())))
     names = {"BOXES": "boxes", "PRODUCT": "product", "SUM": "plain sum"}
     rows += [(names[mode], *(f"{error:.4f}" for error in found)) for mode, found in errors.items()]
     ratios = [boxes / max(product, 1e-9) for boxes, product in zip(errors["BOXES"], errors["PRODUCT"])]
     rows.append(("boxes : product", *(f"{ratio:.2f}" for ratio in ratios)))
-    return (
-        f"### Unions at {RECEIVERS} receivers, against all triangles at {ACROSS**2} places of the lamp\n\n{show(rows)}"
-    )
+    title = f"### Unions at {RECEIVERS} receivers, against all triangles at {PLACES} places of the lamp"
+    return f"{title}\n\n{show(rows)}"
+
+
+def _seen(corners: np.ndarray, receiver: np.ndarray, places: np.ndarray) -> float:
+    """Share of places (S, 3) that no triangle (T, 3, 3) hides from a receiver."""
+    a, b, c = np.moveaxis(corners.astype(np.float64) - receiver, 1, 0)
+    ways = (places - receiver).T
+    sides = np.stack([np.cross(a, b) @ ways >= 0, np.cross(b, c) @ ways >= 0, np.cross(c, a) @ ways >= 0])
+    inside = sides.all(axis=0) | ~sides.any(axis=0)
+    normal = np.cross(b - a, c - a)
+    at_start = -(normal * a).sum(axis=1, keepdims=True)
+    crossed = inside & ((at_start >= 0) != (at_start + normal @ ways >= 0))
+    return float(1.0 - crossed.any(axis=0).mean())
 
 
 WIRES, SEGMENTS = 60, 162
