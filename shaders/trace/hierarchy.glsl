@@ -445,13 +445,13 @@ vec3 triangle_emission(ivec2 hit, vec3 direction, out vec3 normal)
   int k = HIT_SLOT(hit);
   normal = triangle_normal(hit);
   float material = leaf_texel(base + MATERIAL_TEXEL)[k];
-  float side = material - floor(material + 0.5);
+  float way = material - floor(material + 0.5);
 #ifdef INSTANCED
   if (HIT_RECORD(hit) != 0) {
-    side *= node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).z;
+    way *= node_texel(HIT_RECORD(hit) * NODE_TEXELS + 3).z;
   }
 #endif
-  bool dark = side * dot(normal, direction) > 0.0;
+  bool dark = way * dot(normal, direction) > 0.0;
   return dark ? vec3(0.0) : vec3(leaf_texel(base + 10)[k], leaf_texel(base + 11)[k], leaf_texel(base + 12)[k]);
 }
 
