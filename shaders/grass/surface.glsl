@@ -68,8 +68,8 @@ vec2 grass_variation(vec2 place, float roll, out float squares)
   ivec2 first = base + (lower ? ivec2(0) : ivec2(1));
   ivec2 second = base + (lower ? ivec2(0, 1) : ivec2(1, 0));
   ivec2 third = base + (lower ? ivec2(1, 0) : ivec2(0, 1));
-  ivec2 vertex = (roll < weight.x) ? first : ((roll < weight.x + weight.y) ? second : third);
-  uvec3 bits = hash3(uvec3(uvec2(vertex + ivec2(1 << 20)), 91u));
+  ivec2 corner = (roll < weight.x) ? first : ((roll < weight.x + weight.y) ? second : third);
+  uvec3 bits = hash3(uvec3(uvec2(corner + ivec2(1 << 20)), 91u));
   return vec2(to_unit(bits.x), to_unit(bits.y));
 }
 
