@@ -135,8 +135,8 @@ bool own_surface(inout SurfacePoint point, Instance instance)
     f0 *= side;
     f1 *= side;
     float kept = 0.0;
-    float close = min(NEAR_ENOUGH * width, 0.1 * NEAR_ENOUGH * range);
-    for (int k = 0; k < int(more.x + 0.5) && min(f0, -f1) > close; k++) {
+    float enough = min(NEAR_ENOUGH * width, 0.1 * NEAR_ENOUGH * range);
+    for (int k = 0; k < int(more.x + 0.5) && min(f0, -f1) > enough; k++) {
       float gap = f0 - f1;
       float part = (search == SEARCH_BISECTION || gap < 1e-30) ? 0.5 : f0 / gap;
       float t = t0 + (t1 - t0) * part;
