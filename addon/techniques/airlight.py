@@ -24,9 +24,8 @@ Sources: Kulla & Fajardo 2012; Veach & Guibas 1995 (balance heuristic). In mirro
 (shaded_reflections.py) rays of lobes ask the same of the way to what they meet: one pass more for each round of them.
 
 Bias: below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is. Penumbrae
-of round lamps on surfaces that walks meet are those of points in a ball.
-Phase functions of several shaders mixed at one place are one of their mean anisotropy. Mirrors and glass show single
-scattering alone, none in drafts and rough lobes, and no beams.
+of round lamps where walks end are those of points in a ball. Phase functions mixed at one place are one of their mean
+anisotropy. Mirrors and glass show single scattering alone, none in drafts and rough lobes, and no beams.
 """
 
 from __future__ import annotations
