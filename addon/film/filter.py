@@ -118,6 +118,7 @@ def program(count: int, pixels: int, dimmed: tuple[int, ...] = ()) -> Program:
     )  # fmt: skip
 
 
+WORLD_SEEN = "radiance.environment"
 PROGRAMS = tuple(program(count, pixels) for count in (1, MOST_IMAGES) for pixels in range(FARTHEST + 1))
 
 
@@ -132,7 +133,7 @@ def add(
     count = -(-len(seen) // MOST_IMAGES)
     for part in range(count):
         names = tuple(seen)[part::count]
-        dimmed = () if through is None else tuple(_dimmed(name) for name in names)
+        dimmed = () if through is None else tuple(_dimmed(name, WORLD_SEEN in seen) for name in names)
         passes.fullscreen(
             program(len(names), reach(width), dimmed),
             frame.target(*names),
@@ -146,8 +147,9 @@ def add(
     return count
 
 
-def _dimmed(name: str) -> int:
-    """What media do to the image that is added to this sum."""
+def _dimmed(name: str, world_apart: bool) -> int:
+    """What media do to the image that is added to this sum. `world_apart`: the world has a sum of its own, and with it
+    what covers it."""
     if name == "surface.normal_sum" or name.removeprefix("film.") in named(MEDIUM):
         return CLEAR
-    return COVERED if name in ("radiance.environment", TOGETHER) else DIMMED
+    return COVERED if name == WORLD_SEEN or (name == TOGETHER and not world_apart) else DIMMED

@@ -42,6 +42,7 @@ from ..gfx.library import Program
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..surfaces.draw import refracts
+from .catcher import has_catchers
 from .point_costs import PointCosts, costs_of, count_of
 from .together import SUM, terms
 
@@ -100,7 +101,15 @@ def points_of_sample(frame: Frame, points: int) -> int:
     """How many of the picture's `points` of the film a sample shows: one where all of them would show the same."""
     if all_alike(frame):
         return 1
-    return costs(frame).count(count_of(points, frame.settings.samples))
+    asked = count_of(points, frame.settings.samples)
+    return costs(frame).count(asked) if by_costs(frame) else asked
+
+
+def by_costs(frame: Frame) -> bool:
+    """Whether the number of points may follow what they cost here. The three pictures of shadow catchers
+    (film/catcher.py) show other objects at the same points, and slices of a picture are drawn by several devices."""
+    sliced = frame.settings.samples_to_draw != frame.settings.samples
+    return not (all_alike(frame) or has_catchers(frame.snapshot) or sliced)
 
 
 def costs(frame: Frame) -> PointCosts:

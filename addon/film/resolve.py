@@ -65,7 +65,11 @@ RESOLVE = (
 def resolve(frame: Frame) -> images.Image:
     """Draw the picture into film.combined. Needs a plan with a film."""
     target = frame.target(COMBINED)
-    paths = tuple(path.name for path in LIGHT_PATHS if path.image in frame.images and held_apart(frame, path))
+    paths = tuple(
+        path.name
+        for path in LIGHT_PATHS
+        if path.image in frame.shown or (path.image in frame.images and held_apart(frame, path))
+    )
     with shown_sum(frame, "diffuse_indirect") as indirect:
         textures = {name: frame.to_show(f"radiance.{name}") for name in paths}
         if "diffuse_indirect" in paths:

@@ -90,6 +90,9 @@ def given() -> Device | None:
 
 
 def _of(values: dict) -> Device:
+    missing = [field.name for field in fields(Device) if field.name not in values]
+    if missing:
+        raise ValueError(f"figures of {', '.join(missing)} are missing: measure again with this version")
     device = Device(**{field.name: float(values[field.name]) for field in fields(Device)})
     if not all(0.0 < value < 1e12 for value in asdict(device).values()):
         raise ValueError("figures must be nanoseconds above 0")

@@ -138,8 +138,9 @@ def _for_images(program: Program, bindings: dict) -> Shader:
             return get(program)
     bound = (*read.values(), *blocks.values())
     beside = {name: image for one in bound for name, image in one.beside.items() if name not in read}
-    if len(program.textures) + len(beside) > MOST_TEXTURES:
-        beside = {}
+    room = MOST_TEXTURES - len(program.textures)
+    if len(beside) > room:  # the first ones are those that can be spared least
+        beside = dict(list(beside.items())[: max(room, 0)])
     if beside:
         bindings["textures"] = {**read, **beside}
     defines = tuple(one for image in read.values() for one in image.defines)

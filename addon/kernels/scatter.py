@@ -19,6 +19,8 @@ SCATTER = Program(
     group=(64, 1, 1),
 )
 
+ACROSS = 1 << 16  # threads along x: devices bound the groups along an axis
+
 
 def scatter(into: images.Image, numbers: np.ndarray, entries: np.ndarray) -> None:
     """Put `entries` (K, texels, 4) into a list at entry `numbers` (K,), which differ, below 2^24."""
@@ -27,7 +29,9 @@ def scatter(into: images.Image, numbers: np.ndarray, entries: np.ndarray) -> Non
     count, texels = entries.shape[:2]
     rows = np.zeros((count, texels + 1, 4), np.float32)
     rows[:, :texels], rows[:, texels, 0] = entries, numbers
+    threads = count * texels
     passes.compute(
-        SCATTER, (count * texels, 1), textures={"entries": images.upload_list(rows.reshape(-1, 4))},
-        images={"into": into}, constants={"count": count, "texels": texels},
+        SCATTER, (min(threads, ACROSS), -(-threads // ACROSS)),
+        textures={"entries": images.upload_list(rows.reshape(-1, 4))}, images={"into": into},
+        constants={"count": count, "texels": texels},
     )  # fmt: skip

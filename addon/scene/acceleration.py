@@ -155,6 +155,7 @@ class Trees:
     def __init__(self, world: Tree, tiles: np.ndarray = NO_TILES, copies: Sequence[Copies] = (), origin=(0, 0, 0)):
         """`tiles`: texels of OpacityMaps that opacity codes tell of; `origin`: what places are relative to."""
         self.world, self.moved = world, False
+        self.asked: tuple[Instance, ...] | None = None  # instances of the last snapshot that was asked for these
         tiles = np.pad(tiles, ((0, -len(tiles) % LEAF_TEXELS), (0, 0)))
         self._first_leaf = len(tiles) // LEAF_TEXELS
         own = [world, *(one.tree for one in copies)]
@@ -287,7 +288,7 @@ class HierarchyCache:
         look = snapshot.meshes, materials, path, maps, glow
         trees = self._kept.get(key)
         if trees is None and not settings.whole:
-            trees = self._moved(key, look, origin, settings.draft)
+            trees = self._moved(key, look, origin, settings.draft, snapshot.instances)
         if trees is None or (trees.moved and not settings.draft and (settings.whole or not trees.lasts())):
             trees = self._built(shown, key[1], look, origin)
         if self._kept.get(key) is not trees:
@@ -296,6 +297,7 @@ class HierarchyCache:
             self._kept = dict([*self._kept.items()][-most:]) | {key: trees}
         if trees.hierarchy.instances != shown:  # else the same object: what was made of it still stands
             trees.hierarchy = replace(trees.hierarchy, instances=shown)
+        trees.asked = snapshot.instances
         return trees.hierarchy
 
     def _built(self, shown: tuple[Instance, ...], rest: tuple, look: tuple, origin: np.ndarray) -> Trees:
@@ -305,11 +307,18 @@ class HierarchyCache:
         expanded, kinds = parted(
             some, meshes, lambda one: (*maps.kind_of(one), glow.kind_of(one), rays_met(one, path)), LARGEST
         )  # fmt: skip
+        in_trees = (*expanded, *(some[own[0]] for own in kinds.values()))
+        if sum(meshes[one.mesh].triangle_count for one in in_trees) > LARGEST:
+            # What opacity and emission tell apart between instances would be too many trees: all have the first one's.
+            expanded, kinds = parted(some, meshes, lambda one: (one.mesh, one.materials, rays_met(one, path)), LARGEST)
         number = {id(one): k for k, one in enumerate(shown)} if kinds else {}
         copies, used = [], {}
         for kind, own in kinds.items():
-            named = (kind, meshes[some[own[0]].mesh].version, *rest[2:5])
-            tree = used[named] = self._meshes.get(named) or _tree_of_mesh(some[own[0]], look)
+            first = some[own[0]]
+            slots = {*first.materials, 0}  # faces without a material have the first one
+            looks = tuple(self._looks[1][slot] for slot in sorted(slots) if slot < len(self._looks[1]))
+            named = (kind, meshes[first.mesh].version, looks, *rest[3:5])
+            tree = used[named] = self._meshes.get(named) or _tree_of_mesh(first, look)
             if tree.triangles:
                 own = [some[k] for k in own]
                 copies.append(Copies(tree, own, [number[id(one)] for one in own], *tree.boxes.around(MOST_BOXES)))
@@ -319,21 +328,21 @@ class HierarchyCache:
         self._meshes = dict([*self._meshes.items()][-MOST_MESHES:]) | used
         return trees
 
-    def _moved(self, key: tuple, look: tuple, origin: np.ndarray, draft: bool) -> Trees | None:
+    def _moved(self, key: tuple, look: tuple, origin: np.ndarray, draft: bool, instances) -> Trees | None:
         """The trees of the same instances, of which a few have moved since; None if there are none."""
         shown, rest = key
         meshes, materials, path, maps, glow = look
         for other, trees in self._kept.items():
             old = other[0]
-            if other[1] != rest or len(old) != len(shown):
-                continue
+            if other[1] != rest or len(old) != len(shown) or trees.asked is instances:
+                continue  # or another set of this picture's, whose images are in use
             moved = [k for k, (a, b) in enumerate(zip(shown, old)) if a is not b]
             if any((shown[k].mesh, shown[k].materials) != (old[k].mesh, old[k].materials) for k in moved):
                 continue
             own = () if trees.upper is None else set(trees.upper.numbers.tolist())
             copies = {k: shown[k] for k in moved if k in own}
-            expanded = [k for k in moved if k not in own and meshes[shown[k].mesh].triangle_count]
             place = {id(one): k for k, one in enumerate(trees.hierarchy.expanded)}
+            expanded = [k for k in moved if id(old[k]) in place]  # others have no triangle that a ray meets
             counts = np.array([meshes[one.mesh].triangle_count for one in trees.hierarchy.expanded], np.int64)
             numbers = [place[id(old[k])] for k in expanded]
             if 2 * counts[numbers].sum() > max(len(trees.world.place), 1):

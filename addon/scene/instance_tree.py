@@ -120,27 +120,30 @@ def parted(
 ) -> tuple[list[Instance], dict[object, list[int]]]:
     """Instances whose triangles are expanded in world space, and the numbers of those whose meshes have trees of their
     own, by kind. Where more than `most` triangles would be expanded, all copies share trees."""
-    times = Counter(one.mesh for one in shown)
+    times = Counter((one.mesh, one.materials) for one in shown)
     least = OWN_TREE
     if kept(times, meshes) > most:
         least = 1
-    many = {mesh for mesh, count in times.items() if (count - 1) * meshes[mesh].triangle_count >= least}
+    many = {one for one, count in times.items() if (count - 1) * meshes[one[0]].triangle_count >= least}
     if not many:
         return list(shown), {}
-    numbers = [k for k, one in enumerate(shown) if one.mesh in many]
+    numbers = [k for k, one in enumerate(shown) if (one.mesh, one.materials) in many]
     kinds: dict[object, list[int]] = {}
+    points = set()  # no ray meets what is scaled to a point
     for k, fits in zip(numbers, inverses([shown[k] for k in numbers])):
         if fits:
             kinds.setdefault(kind_of(shown[k]), []).append(k)
+        elif not np.abs(shown[k].matrix[:3, :3]).max() > 1e-15:
+            points.add(k)
     kinds = {
         kind: some for kind, some in kinds.items()
         if (len(some) - 1) * meshes[shown[some[0]].mesh].triangle_count >= least
     }  # fmt: skip
-    own = {k for some in kinds.values() for k in some}
+    own = {k for some in kinds.values() for k in some} | points
     return [one for k, one in enumerate(shown) if k not in own], kinds
 
 
-def kept(times: dict[str, int], meshes: dict[str, Mesh], least: int = OWN_TREE) -> int:
-    """Triangles that lie in trees where meshes are shown so many `times`."""
-    counts = ((meshes[mesh].triangle_count, count) for mesh, count in times.items())
+def kept(times: dict[tuple, int], meshes: dict[str, Mesh], least: int = OWN_TREE) -> int:
+    """Triangles that lie in trees where meshes, each with some materials, are shown so many `times`."""
+    counts = ((meshes[mesh].triangle_count, count) for (mesh, _), count in times.items())
     return sum(triangles if (count - 1) * triangles >= least else count * triangles for triangles, count in counts)

@@ -402,9 +402,9 @@ class Snapshot:
     @cached_property
     def triangle_count(self) -> int:
         """Triangles of all instances together."""
-        return sum(self.meshes[mesh].triangle_count * count for mesh, count in self.times_shown.items())
+        return sum(self.meshes[mesh].triangle_count * count for (mesh, _), count in self.times_shown.items())
 
     @cached_property
-    def times_shown(self) -> Counter[str]:
-        """How many instances each mesh has."""
-        return Counter(instance.mesh for instance in self.instances)
+    def times_shown(self) -> Counter[tuple[str, tuple[int, ...]]]:
+        """How many instances each mesh has with the same materials."""
+        return Counter((instance.mesh, instance.materials) for instance in self.instances)

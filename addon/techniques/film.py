@@ -55,7 +55,7 @@ SUMS = {
     "surface.normal_sum": ("out_normal", "World-space shading normal; alpha: hits"),
     TOGETHER: ("out_together", "Light of all paths that nobody looks at apart; alpha: coverage"),
 }
-EMISSION, WORLD_SEEN = "radiance.emission", "radiance.environment"
+EMISSION, WORLD_SEEN = "radiance.emission", film_filter.WORLD_SEEN
 LIGHT = tuple(path for path in LIGHT_PATHS if path.origin != SEEN)  # what techniques add to in each sample
 
 
@@ -204,7 +204,7 @@ class Film(Technique):
             emission = {EMISSION if EMISSION in self._held else TOGETHER: frame.images[shining.image]}
             frame.count(self, "passes", film_filter.add(frame, emission, frame.film_offset(frame.sample), 1.0))
         frame.count(self, "points", count)
-        if frame.is_first and asked > 1 and not film_points.all_alike(frame):
+        if frame.is_first and asked > 1 and film_points.by_costs(frame):
             frame.chose(self, "points", film_points.costs(frame).why(asked))
         if count > 1:
             yield

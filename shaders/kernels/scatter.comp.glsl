@@ -2,7 +2,7 @@
 // that holds its number.
 void main()
 {
-  int i = int(gl_GlobalInvocationID.x);
+  int i = int(gl_GlobalInvocationID.x) + 65536 * int(gl_GlobalInvocationID.y);
   if (i >= count * texels) {
     return;
   }
