@@ -150,6 +150,9 @@ class ShadowsByLight(PointMaps):
             return False
         if frame.geometry.triangles > edge_costs.MOST_TRIANGLES:
             return False
+        # Of what a shader finds within a shell (relief), edges and cards know the mesh below it alone.
+        if any(frame.materials.compiled[draw.material].own_surface for draw in drawn_stochastically(frame)):
+            return False
         self._edges.find_casters(frame)
         self._providers[PLAIN].begin(frame)
         return True

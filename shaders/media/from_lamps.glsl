@@ -10,6 +10,7 @@ struct LampRays {
   vec3 apex;  // where all rays begin; behind a round lamp with a cone
   bool shadow;
   vec3 source;  // a point of the lamp, from where what it lights is looked for
+  vec3 face;    // normal of the mesh there; 0: no mesh
   vec3 axis;
   float cosine;  // of the cone; -1: everywhere; 0: by the cosine, before an area lamp
   bool by_cosine;
@@ -25,6 +26,7 @@ LampRays lamp_rays(int number, vec2 u)
   rays.by_cosine = false;
   rays.shadow = false;
   rays.source = vec3(0.0);
+  rays.face = vec3(0.0);
   if (number < 0 || number >= light_count) {
     return rays;
   }
@@ -33,6 +35,7 @@ LampRays lamp_rays(int number, vec2 u)
   bool round_lamp = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);
   rays.apex = round_lamp ? light.centre : light.point;
   rays.source = round_lamp ? light.centre + light.point : light.point;
+  rays.face = LIGHT_IS(light, LIGHT_SURFACE) ? light.axis : vec3(0.0);
   rays.shadow = rays.exist && (light.flags & LIGHT_SHADOW) != 0;
   if (LIGHT_IS(light, LIGHT_RECTANGLE) || LIGHT_IS(light, LIGHT_ELLIPSE)) {
     rays.axis = light.axis;

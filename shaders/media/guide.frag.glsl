@@ -27,7 +27,8 @@ void main()
     bool far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
     for (int n = 0; n < (far ? FAR_PLACES : AROUND_PLACES); n++) {
       // Points that stand for all of the lamp; of a round one, at their mean distance from its middle.
-      float v = (float(n) + 0.5) / float(far ? FAR_PLACES : AROUND_PLACES);
+      float places = float(far ? FAR_PLACES : AROUND_PLACES);
+      float v = (float(n) + 0.5) / places;
       vec2 u = vec2(fract(5.0 * v), fract(0.618034 * float(n)));
       Light part = light;
       part.point = round_ ? vec3(0.85 * light.radius, 0.0, 0.0) : light.point;
@@ -35,22 +36,22 @@ void main()
       int k;
       float t;
       float density;
-      if (far) {
-        t = bins_draw(bins, v, k);
-        density = bins_density(bins, k, t) * float(FAR_PLACES);
+      // Of places beside a lamp every other one goes where the media are: a thin plume lies between those around the lamp.
+      Around around = around_row(i, u, ray.origin, ray.direction, begin, end);
+      bool beside = around.exists && !far;
+      float half_way = (float(n / 2) + 0.5) / (0.5 * places);
+      if (beside && (n & 1) == 0) {
+        t = around_draw(around, half_way);
+        k = bins_find(bins, t);
       }
       else {
-        Around around = around_row(i, u, ray.origin, ray.direction, begin, end);
-        if (!around.exists) {
-          continue;
-        }
-        t = around_draw(around, v);
-        k = bins_find(bins, t);
-        density = around_density(around, t) * float(AROUND_PLACES);
+        t = bins_draw(bins, beside ? half_way : v, k);
       }
       if (k < 0) {
         continue;  // between media
       }
+      density = bins_density(bins, k, t);
+      density = (beside ? 0.5 * (density + around_density(around, t)) : density) * places;
       vec3 position = ray.origin + t * ray.direction;
       vec3 direction;
       float per_steradian;

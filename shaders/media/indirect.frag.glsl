@@ -117,8 +117,8 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     bool more = doing == GO_ON && bounce + 1 < bounces;
     float aimed = !rays.exist ? 0.0 : ((doing == LOOK) ? 0.5 : (more ? AIMED : 0.0));  // share along rays of the lamp
     if (doing == FIND_LIT) {
-      from = rays.source;
       way = lamp_rays_way(rays, turn);
+      from = ray_origin(rays.source, (dot(way, rays.face) < 0.0) ? -rays.face : rays.face);
     }
     else if (doing == LOOK_AT_LIT || media_random(seed) < aimed) {
       vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(rays, from, vec3(turn, media_random(seed)));
@@ -136,8 +136,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       continue;
     }
     ivec2 hit;
-    float limit = trace_nearest(from, way, 1e29, seed, hit);
-    if (doing == FIND_LIT) {
+    bool from_source = doing == FIND_LIT;  // this ray is the shadow ray of what it finds
+    float limit = trace_layers(from, way, 1e29, 0.0, seed, from_source && glass_blocks != 0, from_source, hit);
+    if (from_source) {
       lit_exists = hit.x >= 0;
       lit = from + limit * way;
       continue;
@@ -199,7 +200,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       normal = (dot(normal, way) > 0.0) ? -normal : normal;
       position = ray_origin(position + limit * way, normal);
       vec3 bounced = passed * bins.end * mean_albedo(hit);
-      float going = lobe * (1.0 - chance) * (1.0 - aimed);
+      // As GO_ON draws from this stop, whichever of the two has come here.
+      float by_lamp = (rays.exist && bounce + 1 < bounces) ? AIMED : 0.0;
+      float going = lobe * (1.0 - chance) * (1.0 - by_lamp);
       if (number >= 0) {
         asked = ask_surface(number, position, normal, ask_turn);
         float from_lamp = 0.0;
@@ -209,6 +212,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
           vec3 arriving = offset * inversesqrt(squared);
           asked.direction = -arriving;
           asked.reach = sqrt(squared);
+          asked.shadow = asked.shadow && doing == GO_ON;  // the lamp's own ray has come here
           from_lamp = lamp_rays_share(rays, arriving) * abs(dot(normal, arriving)) / squared;
           from_lamp *= limit * limit / max(-dot(normal, way), 1e-6);
         }

@@ -50,7 +50,7 @@ void main()
 #ifdef GUIDED
       // Shares of light, each as good as the next one: a peak among them must not outweigh all, nor a share of nothing.
       vec3 there = airlight_guide_fetch(min(other * STRIDE + shown_pixel, last)).rgb;
-      vec3 trust = weight / max(there + here, vec3(1e-37));
+      vec3 trust = weight / max(there + here, vec3(1e-20));
       guided += trust * found.rgb;
       guides += trust * there;
 #endif
@@ -59,11 +59,10 @@ void main()
   }
   float share = (known_opacity > 0.0) ? opacity / known_opacity : 0.0;
 #ifdef GUIDED
-  out_direct = vec4(guided * here / max(guides, vec3(1e-37)), 0.0);
-  if (!(max_component(guides) > 0.0)) {  // what no place of the guide has met stays where it is
-    ivec2 nearest = clamp(ivec2(floor(middle + 0.5)), ivec2(0), size - 1);
-    out_direct.rgb = coarse_direct_fetch(nearest).rgb * opacity / max(coarse_emission_fetch(nearest).w, 1e-30);
-  }
+  // What no place of the guide has met stays where it is.
+  ivec2 nearest = clamp(ivec2(floor(middle + 0.5)), ivec2(0), size - 1);
+  vec3 stays = coarse_direct_fetch(nearest).rgb * opacity / max(coarse_emission_fetch(nearest).w, 1e-30);
+  out_direct = vec4(mix(stays, guided * here / max(guides, vec3(1e-30)), greaterThan(guides, vec3(0.0))), 0.0);
 #else
   out_direct = vec4(direct.rgb * share, 0.0);
 #endif
