@@ -31,7 +31,7 @@ normals with spherical caps", HPG 2023; Turquin, "Practical multiple scattering 
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +89,20 @@ def fresnel_dielectric(cosine: np.ndarray, ior: float) -> np.ndarray:
     a = (g - cosine) / (g + cosine + 1e-300)
     b = ((g + cosine) * cosine - 1.0) / ((g - cosine) * cosine + 1.0)
     return np.where(squared > 0.0, 0.5 * a * a * (1.0 + b * b), 1.0)
+
+
+@cache
+def pane_passing(ior: float) -> tuple[float, float]:
+    """What a face of glass lets pass of light that goes straight on: on its way from lamps, and from all sides.
+
+    From most lamps it comes at some 45 degrees. Rays to them see both faces of a pane, each of which mirrors R, and
+    what is mirrored to and fro between them passes, too: (1 - R) / (1 + R) in all; a face is taken for half of a pane,
+    as most things of glass have two. Rays of paths are mirrored themselves where a face stops them: it passes 1 - R.
+    """
+    ior = max(ior, 1.0 / max(ior, 1e-5))
+    face = float(fresnel_dielectric(np.float64(np.sqrt(0.5)), ior))
+    cosines = np.sqrt((np.arange(256) + 0.5) / 256)
+    return float(np.sqrt((1.0 - face) / (1.0 + face))), float(1.0 - fresnel_dielectric(cosines, ior).mean())
 
 
 def ior_from_f0(f0: float) -> float:

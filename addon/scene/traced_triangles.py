@@ -14,6 +14,7 @@ from itertools import groupby
 import numpy as np
 
 from ..materials.compiled import CompiledMaterial
+from ..materials.energy import pane_passing
 from ..snapshot.scene import Instance, Mesh
 from .emission_maps import EmissionMaps, TriangleEmission
 from .opacity_maps import OpacityMaps, TriangleOpacity
@@ -100,7 +101,17 @@ def mean_code(material: CompiledMaterial, rays: int = ALL_RAYS) -> float:
         return float(_codes(rays, np.ones(2), False, False))
     stopped, whole = _stopped(material, rays)
     opacity = 1.0 if whole else min(material.opacity, 1.0 - 1.0 / SIDE_STEPS)  # some ray may pass, however few
-    return float(_codes(stopped, np.full(2, opacity), False, material.glass is not None))
+    return float(_codes(stopped, _of_glass(material, opacity), False, material.glass is not None))
+
+
+def _of_glass(material: CompiledMaterial, opacity: np.ndarray | float) -> np.ndarray:
+    """(..., 2) opacity of two sides that are alike. Those of glass have the places of opacity for rays from lamps and
+    for others, whose light comes from all sides."""
+    both = np.stack([np.asarray(opacity, float)] * 2, axis=-1)
+    if material.glass is not None:
+        from_lamps, evenly = pane_passing(material.glass.ior)
+        both[..., 1] = 1.0 - (1.0 - both[..., 1]) * evenly / from_lamps
+    return both
 
 
 def opaque_code() -> float:
@@ -118,7 +129,8 @@ def _stopped(material: CompiledMaterial, rays: int) -> tuple[int, bool]:
 def _codes(stopped: int, sides: np.ndarray, mirrored: bool, glass: bool, tile=0) -> np.ndarray:
     """What decides whether rays pass triangles, as shaders/trace/hierarchy.glsl reads it: coverage (..., 2) of front
     and back by which they pass at random, or, where it is not 0, the `tile` (...) that tells it for each place, and
-    which rays that is about; negative where rays may also be bent. `mirrored`: corners run the other way round."""
+    which rays that is about; negative where rays may also be bent: then the first side is for rays from lamps and the
+    second one for others. `mirrored`: corners run the other way round."""
     steps = np.rint(np.clip(sides[..., ::-1] if mirrored else sides, 0.0, 1.0) * SIDE_STEPS)
     even = (stopped * (SIDE_STEPS + 1) + steps[..., 0]) * (SIDE_STEPS + 1) + steps[..., 1]
     # Twice a whole number: beyond 2^24 every second one is a float.
@@ -142,7 +154,10 @@ def _refine(
         if not whole:
             own = np.flatnonzero(known.measured & (of_triangle == number))
             glass = material.glass is not None
-            look[own, 0] = _codes(stopped, known.sides[own], mirrored, glass, known.tile[own])
+            sides = known.sides[own]
+            if glass:  # turned again where `mirrored` turns them
+                sides = _of_glass(material, sides.mean(axis=-1))[..., :: -1 if mirrored else 1]
+            look[own, 0] = _codes(stopped, sides, mirrored, glass, known.tile[own])
 
 
 def mean_emission(material: CompiledMaterial, mirrored: bool = False) -> tuple[tuple[float, float, float], float]:

@@ -167,7 +167,9 @@ vec4 opacity_of_four(int leaf, vec4 t, float limit, vec3 origin, vec3 direction,
   vec4 stopped = floor(abs(code) / (SIDES * SIDES));
   vec4 sides = abs(code) - stopped * (SIDES * SIDES);
   vec4 front = floor(sides / SIDES);
-  vec4 covered = mix(sides - SIDES * front, front, greaterThan(facing, vec4(0.0)));
+  vec4 behind = sides - SIDES * front;
+  vec4 covered = mix(behind, front, greaterThan(facing, vec4(0.0)));
+  covered = mix(covered, shadow ? front : behind, lessThan(code, vec4(0.0)));  // glass
   vec4 opacity = min(covered * (1.0001 / (SIDES - 1.0)), vec4(1.0));
 #ifdef OPACITY_TILES
   if (max(max(stopped.x, stopped.y), max(stopped.z, stopped.w)) >= MAPPED) {

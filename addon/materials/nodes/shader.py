@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..energy import fresnel_dielectric
+from ..energy import pane_passing
 from ..estimate import Estimate, Interface, Summary, constant
 from .entry import Approximation, Choice, Entry, Expression, Socket
 
@@ -36,11 +36,8 @@ THIN_FILM = Approximation("Thin Film Thickness", 0.0, "The thin film is not draw
 
 
 def _passing(sockets: dict[str, Estimate]) -> Estimate:
-    """What a face of glass lets pass of light straight on its way, at 45 degrees. Of what a pane's two faces mirror to
-    and fro between them a part passes, too, so that both let (1 - R) / (1 + R) pass; most things of glass have two."""
-    ior = max(float(sockets["IOR"].mean[0]), 1e-5)
-    face = float(fresnel_dielectric(np.float64(np.sqrt(0.5)), max(ior, 1.0 / ior)))
-    return constant(np.sqrt((1.0 - face) / (1.0 + face)))
+    """What a face of glass lets pass of light from lamps that goes straight on."""
+    return constant(pane_passing(float(sockets["IOR"].mean[0]))[0])
 
 
 def _colored(name: str):
