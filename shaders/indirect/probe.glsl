@@ -39,6 +39,9 @@ Probe probe_read(int index)
       beside *= (dot(onward, s.geometric_normal) < 0.0) ? -1.0 : 1.0;
     }
     else {
+#ifdef HAS_SURFACE_EDIT
+      s.edit = vec4(0.0);  // what an edit bends is seen here alone
+#endif
       uvec3 roll = hash3(uvec3(uint(index), salt, uint(film_view.seed)));
       vec3 ignored;
       onward = lobe_sample(lobe_begin(s, -onward), vec2(to_unit(roll.x), to_unit(roll.y)), ignored);
