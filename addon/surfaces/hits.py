@@ -397,7 +397,8 @@ class Hits:
                     self._flagged = False
                 return possible
         self._flag_met(frame, records)
-        return set(np.flatnonzero(images.read(records.met)[:MET_ROWS]).tolist())
+        # Beyond the scene's materials the image holds what others left there, where a driver clears late.
+        return possible & set(np.flatnonzero(images.read(records.met)[:MET_ROWS]).tolist())
 
     def _flag_met(self, frame: Frame, records: Records) -> None:
         """Write flags of the materials of these records."""
