@@ -80,5 +80,5 @@ def foreseen(snapshot: Snapshot, points: int, samples: int, indirect: bool) -> l
     asked = count_of(points, samples)
     if asked == 1:
         return []
-    triangles = sum(snapshot.meshes[one.mesh].triangle_count for one in snapshot.instances)
-    return [f"Film points: {costs_of(snapshot.film.width * snapshot.film.height, triangles, indirect).why(asked)}"]
+    costs = costs_of(snapshot.film.width * snapshot.film.height, snapshot.triangle_count, indirect)
+    return [f"Film points: {costs.why(asked)}"]

@@ -5,9 +5,9 @@
     alpha    = coverage - what of the world shows through clear glass (Film > Transparent Glass)
 
 summed over the light paths of the table (frame/light_paths.py) that the picture has, and the sum of those that it does
-not hold apart (film/together.py). With a transparent film the world
-shows in its own pass only. While a viewport has few samples, indirect diffuse light is shown filtered
-(film/neighbours.py); the sums stay as they are. One pass, a fetch for each light path.
+not hold apart (film/together.py). With a transparent film the world shows in its own pass only. While a viewport has
+few samples, indirect diffuse light is shown filtered (film/neighbours.py); the sums stay as they are. One pass, a fetch
+for each light path.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..frame.run import Frame
+from ..frame.picture import Frame
 from ..gfx import images, passes
 from ..gfx.library import Program
 from ..scene.view import VIEW

@@ -12,6 +12,7 @@
 // triangle (receiver, centre, point), weights as seen from the receiver, and counters in planes are ours.
 #include "lib/math.glsl"
 #include "edges/light.glsl"
+#include "edges/edge_record.glsl"
 #include "edges/samples.glsl"
 #ifdef CARDS
 #include "edges/cards.glsl"
@@ -30,11 +31,6 @@
 #define HIT(number) half_hit |= hidden_pair(number, own_pattern, edge);
 #endif
 #define ADD(number) next = (plane[number] ^ turn) & carry; plane[number] ^= carry; carry = next;
-
-vec4 edge_texel(int index)
-{
-  return edge_records_fetch(ivec2(index & 2047, index >> 11));
-}
 
 uint word_of(int index)
 {
@@ -172,13 +168,13 @@ void main()
     all.x = (1u << uint(POINTS & 31)) - 1u;
   }
   uvec2 seen = all;
-  int own_pattern = ((pixel.x & 3) + 4 * (pixel.y & 3)) % edge_light.pattern_count;
+  int own_pattern = pattern_of(pixel);
   vec3 p = receiver.xyz;
   vec3 c = towards_centre(p);
   LightFrame f = light_frame(c);
-  bool facing = edge_light.shape != IN_PLANE;
-  vec3 half_u = facing ? f.u : edge_light.half_u.xyz;
-  vec3 half_v = facing ? f.v : edge_light.half_v.xyz;
+  vec3 half_u;
+  vec3 half_v;
+  light_axes(f, half_u, half_v);
   LightWindow window = light_window(c, half_u, half_v);
   if (receiver.w != 0.0) {
     int start = int(floor(centre_count_fetch(pixel).x + 0.5));
@@ -207,15 +203,7 @@ void main()
         if (beyond_window(window, a, b)) {
           continue;
         }
-#ifdef STANDARD
-        int weight = -int(v1.w);
-#else
-        int code = int(v0.w);
-        int first = code - 3 * (code / 3) - 1;
-        int second = code / 3 - 1;
-        int weight = ((plane_side(edge_texel(record + 2), p) >= 0.0) ? first : -first)
-                     + ((plane_side(edge_texel(record + 3), p) >= 0.0) ? second : -second);
-#endif
+        int weight = edge_weight(record, v0, v1, p);
         if (weight == 0) {
           continue;
         }

@@ -9,17 +9,13 @@
 // closed form, the box without order and weights from the receiver are ours.
 #include "lib/math.glsl"
 #include "edges/light.glsl"
+#include "edges/edge_record.glsl"
 #include "edges/samples.glsl"
 #include "edges/penumbra.glsl"
 
 #define LEAST_AREA 1e-4  // of a quarter: rounding of areas is less
 #define NO_BORDER 1e-4
 #define COUNT_BIAS 24.0
-
-vec4 edge_texel(int index)
-{
-  return edge_records_fetch(ivec2(index & 2047, index >> 11));
-}
 
 uint word_of(int index)
 {
@@ -51,7 +47,7 @@ void main()
   vec3 half_u = rectangle_u;
   vec3 half_v = rectangle_v;
   vec3 plane = edge_light.axis.xyz;
-  if (edge_light.shape != 0) {
+  if (edge_light.shape != IN_PLANE) {
     // A square of the disc's area that faces the receiver.
     LightFrame f = light_frame(c);
     half_u = f.u * 0.886227;
@@ -59,7 +55,7 @@ void main()
     plane = f.axis;
   }
   float height = dot(c, plane);
-  bool lit_side = light_at_infinity() || edge_light.shape != 0 || height < 0.0;
+  bool lit_side = light_at_infinity() || edge_light.shape != IN_PLANE || height < 0.0;
   if (receiver.w != 0.0 && lit_side) {
     vec3 to_x = half_u / max(dot(half_u, half_u), 1e-30);
     vec3 to_y = half_v / max(dot(half_v, half_v), 1e-30);
@@ -114,14 +110,7 @@ void main()
           if (abs(n_centre) > edge_light.size.x * length(cross(a, b))) {
             continue;
           }
-          int code = int(v0.w);
-          int one = code - 3 * (code / 3) - 1;
-          int two = code / 3 - 1;
-          int weight = ((plane_side(edge_texel(record + 2), p) >= 0.0) ? one : -one)
-                       + ((plane_side(edge_texel(record + 3), p) >= 0.0) ? two : -two);
-#ifdef STANDARD
-          weight = -int(v1.w);
-#endif
+          int weight = edge_weight(record, v0, v1, p);
           if (weight == 0) {
             continue;
           }

@@ -36,6 +36,20 @@ LightFrame light_frame(vec3 to_centre)
   return f;
 }
 
+// Half axes of what holds the points.
+void light_axes(LightFrame f, out vec3 half_u, out vec3 half_v)
+{
+  bool facing = edge_light.shape != IN_PLANE;
+  half_u = facing ? f.u : edge_light.half_u.xyz;
+  half_v = facing ? f.v : edge_light.half_v.xyz;
+}
+
+// Neighbouring pixels take other patterns of points.
+int pattern_of(ivec2 pixel)
+{
+  return ((pixel.x & 3) + 4 * (pixel.y & 3)) % edge_light.pattern_count;
+}
+
 // Of a point in space: shapes from BALL_DISC on.
 vec3 light_offset(LightFrame f, vec3 t)
 {

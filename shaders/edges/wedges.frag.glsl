@@ -2,12 +2,8 @@
 // edges/depth_complexity.comp.glsl, counters in digits of base 64.
 #include "lib/math.glsl"
 #include "edges/light.glsl"
+#include "edges/edge_record.glsl"
 #include "edges/samples.glsl"
-
-vec4 edge_texel(int index)
-{
-  return edge_records_fetch(ivec2(index & 2047, index >> 11));
-}
 
 // Digits of points `first` to first + 3.
 float hidden_digits(int first, bool side, float n_centre, vec2 normal, vec2 k0, vec2 k1, vec2 q, int own_pattern)
@@ -35,13 +31,13 @@ void main()
   if (receiver.w == 0.0) {
     return;
   }
-  int own_pattern = ((pixel.x & 3) + 4 * (pixel.y & 3)) % edge_light.pattern_count;
+  int own_pattern = pattern_of(pixel);
   vec3 p = receiver.xyz;
   vec3 c = towards_centre(p);
   LightFrame f = light_frame(c);
-  bool facing = edge_light.shape != IN_PLANE;
-  vec3 half_u = facing ? f.u : edge_light.half_u.xyz;
-  vec3 half_v = facing ? f.v : edge_light.half_v.xyz;
+  vec3 half_u;
+  vec3 half_v;
+  light_axes(f, half_u, half_v);
   int record = 4 * int(flat_edge + 0.5);
   vec4 v0 = edge_texel(record);
   vec4 v1 = edge_texel(record + 1);
@@ -49,11 +45,7 @@ void main()
   vec3 b = v1.xyz - p;
   vec3 n = cross(a, b);
   float n_centre = centre_side(a, b, c);
-  int code = int(v0.w);
-  int one = code - 3 * (code / 3) - 1;
-  int two = code / 3 - 1;
-  int weight = ((plane_side(edge_texel(record + 2), p) >= 0.0) ? one : -one)
-               + ((plane_side(edge_texel(record + 3), p) >= 0.0) ? two : -two);
+  int weight = edge_weight(record, v0, v1, p);
   if (abs(n_centre) > edge_light.size.x * length(n) || weight == 0) {
     return;
   }
