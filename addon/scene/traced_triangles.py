@@ -131,7 +131,8 @@ def _codes(stopped: int, sides: np.ndarray, mirrored: bool, glass: bool, tile=0)
     and back by which they pass at random, or, where it is not 0, the `tile` (...) that tells it for each place, and
     which rays that is about; negative where rays may also be bent: then the first side is for rays from lamps and the
     second one for others. `mirrored`: corners run the other way round."""
-    steps = np.rint(np.clip(sides[..., ::-1] if mirrored else sides, 0.0, 1.0) * SIDE_STEPS)
+    sides = sides[..., ::-1] if mirrored and not glass else sides
+    steps = np.rint(np.clip(sides, 0.0, 1.0) * SIDE_STEPS)
     even = (stopped * (SIDE_STEPS + 1) + steps[..., 0]) * (SIDE_STEPS + 1) + steps[..., 1]
     # Twice a whole number: beyond 2^24 every second one is a float.
     tiled = (MAPPED + stopped) * (SIDE_STEPS + 1) ** 2 + 2 * (2 * np.asarray(tile) + mirrored)
@@ -154,9 +155,7 @@ def _refine(
         if not whole:
             own = np.flatnonzero(known.measured & (of_triangle == number))
             glass = material.glass is not None
-            sides = known.sides[own]
-            if glass:  # turned again where `mirrored` turns them
-                sides = _of_glass(material, sides.mean(axis=-1))[..., :: -1 if mirrored else 1]
+            sides = _of_glass(material, known.sides[own].mean(axis=-1)) if glass else known.sides[own]
             look[own, 0] = _codes(stopped, sides, mirrored, glass, known.tile[own])
 
 

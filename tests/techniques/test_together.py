@@ -91,14 +91,7 @@ def test_a_picture_of_all_that_needs_no_light_sums_nothing(stage):
     assert TOGETHER not in same_picture(stage, COLORS | {"radiance.emission", "radiance.environment"})
 
 
-def test_media_dim_the_sum(stage):
-    stage.scene.candela.use_denoise = False
-    stage.scene.candela.bounces = 0
-    stage.floor(half=2.0)
-    stage.rectangle((-1, -1), (0, 1), 0.7, material=stage.principled(Transmission_Weight=1.0, Roughness=0.0))
-    stage.light("SUN")
-    stage.camera((0, -3, 2.5), (0.9, 0, 0))
-    stage.scene.render.film_transparent = stage.scene.cycles.film_transparent_glass = True
+def absorbing_box(stage):
     fog = stage.material("ShaderNodeVolumeAbsorption", Density=0.2)
     nodes, links = fog.node_tree.nodes, fog.node_tree.links
     shader, output = (next(n for n in nodes if n.type == kind) for kind in ("VOLUME_ABSORPTION", "OUTPUT_MATERIAL"))
@@ -107,7 +100,31 @@ def test_media_dim_the_sum(stage):
     corners = [(x, y, z) for z in (-0.5, 2) for y in (-2, 2) for x in (-2, 2)]
     sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     stage.mesh(corners, sides, material=fog)
+
+
+def test_media_dim_the_sum(stage):
+    stage.scene.candela.use_denoise = False
+    stage.scene.candela.bounces = 0
+    stage.floor(half=2.0)
+    stage.rectangle((-1, -1), (0, 1), 0.7, material=stage.principled(Transmission_Weight=1.0, Roughness=0.0))
+    stage.light("SUN")
+    stage.camera((0, -3, 2.5), (0.9, 0, 0))
+    stage.scene.render.film_transparent = stage.scene.cycles.film_transparent_glass = True
+    absorbing_box(stage)
     assert same_picture(stage) >= {TOGETHER, "film.transmission_direct"}
+
+
+def test_fog_covers_once_with_the_world_apart_or_not(stage):
+    absorbing_box(stage)
+    stage.camera((0, -3, 1), (np.pi / 2, 0, 0))
+    stage.scene.render.film_transparent = True
+    stage.scene.candela.use_denoise = False
+    name = "radiance.environment"
+    alone, _, _ = drawn(stage, frozenset())
+    apart, _, _ = drawn(stage, frozenset({name}))
+    middle = alone["film.combined"][..., 3][SIZE[1] // 2, SIZE[0] // 2]
+    assert middle == pytest.approx(1.0 - np.exp(-0.2 * (1.0 - 0.8) * 4.0), rel=0.01)  # what the node's grey lets pass
+    np.testing.assert_allclose(apart["film.combined"][..., 3], alone["film.combined"][..., 3], atol=1e-5)
 
 
 def test_a_path_that_is_not_held_is_an_error(stage):
