@@ -144,7 +144,7 @@ def walk(
                         terminator=owner.shadow_terminator_geometry_offset,
                         own=own_settings(owner),
                         caustics_caster=getattr(getattr(owner, "cycles", None), "is_caustics_caster", False),
-                        smoke=_is_smoke(owner),
+                        smoke=domain_of(owner) is not None,
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
                         asset=_topmost(owner),
@@ -254,9 +254,13 @@ def _visibility_of(flags: tuple[bool, ...]) -> Visibility:
     return Visibility(*flags)
 
 
-def _is_smoke(owner) -> bool:
-    domains = (one for one in owner.modifiers if one.type == "FLUID" and one.fluid_type == "DOMAIN")
-    return any(one.domain_settings is not None and one.domain_settings.domain_type == "GAS" for one in domains)
+def domain_of(owner):
+    """Settings of the gas domain of a fluid simulation that an object is; None of others."""
+    for modifier in owner.modifiers:
+        settings = modifier.domain_settings if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" else None
+        if settings is not None and settings.domain_type == "GAS":
+            return settings
+    return None
 
 
 def _is_linked(owner) -> bool:

@@ -13,19 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from .cache import SnapshotCache, next_version
-from .instances import Place
+from .instances import Place, domain_of
 from .scene import Note, Volume, VolumeInstance
 
 GRIDS = ("density", "flame", "temperature", "heat")  # attributes of Cycles, one number a cell
-
-
-def domain_of(owner):
-    """Settings of the gas domain that an object is; None of others."""
-    for modifier in owner.modifiers:
-        settings = modifier.domain_settings if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" else None
-        if settings is not None and settings.domain_type == "GAS":
-            return settings
-    return None
 
 
 def read_smoke(

@@ -75,7 +75,7 @@ def grass_caster(caster: Program) -> Program:
     own = (
         ("OWN_CLOSURES", ""),
         ("CASTS_WHOLE", ""),
-        ("LAYER_CASTER", "4.0"),
+        ("LAYER", ""),
         ("GRASS_SAMPLE", "sample_index"),
         ("GRASS_SEED", "0"),
     )

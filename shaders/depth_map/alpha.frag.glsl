@@ -5,6 +5,7 @@
 #include "lib/instance.glsl"
 #include "generated/material"
 #include "surface/point.glsl"
+#include "depth_map/layer.glsl"
 
 #ifdef OWN_SURFACE
 // The change of q per texel on the plane through a place, and q there: the place is not on its triangle.
@@ -69,7 +70,7 @@ void main()
     discard;
   }
 #endif
-#ifdef LAYER_CASTER
+#ifdef LAYER
   out_depth = vec4(LAYER_CASTER + max(q, 0.0));  // w alone is written
 #else
   out_depth = vec4(q, q_dx, q_dy, 2.0);  // above 1: drawn at random

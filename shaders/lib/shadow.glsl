@@ -12,7 +12,7 @@
 // behind it, 0 if there is none. It shadows what lies beside it; its own surface, which shows its own shadows, passes it over.
 
 #define VIEW_TEXELS 5
-#define LAYER_CASTER 4.0
+#include "depth_map/layer.glsl"
 #ifdef GRASS
 #define LAYERS_SHADE(pixel) (lobe_kind(surface_lobe_fetch(pixel)) != SURFACE_GRASS)
 #else

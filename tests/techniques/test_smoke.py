@@ -28,8 +28,10 @@ def stands_in(monkeypatch):
     """Makes objects whose name begins with "Domain" gas domains of given settings."""
 
     def put(settings):
-        monkeypatch.setattr(instances, "_is_smoke", lambda owner: owner.name.startswith("Domain"))
-        monkeypatch.setattr(smoke, "domain_of", lambda owner: settings)
+        for module in (instances, smoke):
+            monkeypatch.setattr(
+                module, "domain_of", lambda owner: settings if owner.name.startswith("Domain") else None
+            )
 
     return put
 
