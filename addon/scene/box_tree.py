@@ -162,9 +162,7 @@ def _clustered(low: np.ndarray, high: np.ndarray) -> _Binary:
     return _Binary(some.children[:root], some.area[:root], some.boxes[:root])
 
 
-def _pairs(
-    axes: list[np.ndarray], chances: tuple[np.ndarray, np.ndarray], reach: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(axes: list[np.ndarray], chances: tuple[np.ndarray, np.ndarray], reach: int) -> tuple[np.ndarray, np.ndarray]:
     """Clusters that are each other's nearest: numbers of the first and the second of each pair."""
     count = len(axes[0])
     nearest, best = np.full(count, np.inf, np.float32), np.zeros(count, np.int64)
