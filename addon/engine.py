@@ -17,7 +17,6 @@ import bpy
 import numpy as np
 
 from . import final, main_loop, viewport
-from .film.catcher import has_catchers
 from .frame import slices
 from .frame.bands import QueueLimit, samples_in_parts
 from .frame.picture import Frame
@@ -249,7 +248,7 @@ class CandelaEngine(bpy.types.RenderEngine):
         keep = None
         if taken is not None:
             keep = partial(taken.__setitem__, layer.name)
-        catches, moments = has_catchers(snapshot) and not self.is_preview, self._moments
+        catches, moments = snapshot.has_catchers and not self.is_preview, self._moments
         if catches and (taken is not None or given or settings.is_slice):
             raise ValueError("A picture with shadow catchers cannot be rendered in slices: render it whole.")
         if moments is not None and eye:  # seen through the eye's camera at the frame itself

@@ -9,6 +9,7 @@ import sys
 from bench import (
     again,
     ages,
+    beside,
     caustics,
     costs,
     counted,
@@ -45,6 +46,7 @@ from bench import (
 VERBS = {
     "run": run,
     "again": again,
+    "beside": beside,
     "growth": growth,
     "direct": direct,
     "indirect": indirect,

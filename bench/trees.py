@@ -278,31 +278,31 @@ def million(size: float):
 
 
 class Timed:
-    """Seconds in calls of HierarchyCache.get."""
+    """Seconds in calls of HierarchyCache.get, and of the processor's time, which a busy machine changes less."""
 
     def __init__(self):
         from addon.gfx import images
         from addon.scene.acceleration import HierarchyCache
 
-        self.seconds = 0.0
+        self.seconds = np.zeros(2)
         original = HierarchyCache.get
 
         def get(cache, *arguments):
             for measured in ("measured_materials", "opacity_maps", "emission_maps"):  # no part of it
                 getattr(arguments[0], measured)
             images.finish()
-            started = time.perf_counter()
+            started = time.perf_counter(), time.process_time()
             found = original(cache, *arguments)
             images.finish()
-            self.seconds += time.perf_counter() - started
+            self.seconds += np.subtract((time.perf_counter(), time.process_time()), started)
             return found
 
         HierarchyCache.get = get
 
-    def take(self) -> float:
+    def take(self) -> tuple[float, float]:
         """Since the last time."""
-        seconds, self.seconds = self.seconds, 0.0
-        return seconds
+        seconds, self.seconds = self.seconds, np.zeros(2)
+        return tuple(seconds.tolist())
 
 
 def moves(size: float) -> list[tuple[str, ...]]:
@@ -319,8 +319,8 @@ def moves(size: float) -> list[tuple[str, ...]]:
     timed, cache = Timed(), SnapshotCache()
     settings = replace(settings_of(scene, viewport=True), samples=1)
 
-    def step(renderer, draft: bool) -> tuple[float, float, float]:
-        """Seconds of reading the scene, of the rest of the picture, and of the hierarchy in it."""
+    def step(renderer, draft: bool) -> tuple[float, ...]:
+        """Seconds of reading the scene, of the rest of the picture, and, both ways, of the hierarchy in it."""
         timed.take()
         started = time.perf_counter()
         snapshot = take(bpy.context.evaluated_depsgraph_get(), cache, 64, 48)
@@ -329,14 +329,19 @@ def moves(size: float) -> list[tuple[str, ...]]:
         renderer.advance(frame)
         renderer.show(frame)
         images.finish()
-        return read - started, time.perf_counter() - read, timed.take()
+        return read - started, time.perf_counter() - read, *timed.take()
 
     first = Renderer(make_registry)
     step(first, False)  # compiles
     first.release()
     cache = SnapshotCache()
     renderer = Renderer(make_registry)
-    rows = [("what happens", "reading the scene, ms", "the rest of the picture, ms", "of which the hierarchy, ms")]
+    rows = [
+        (
+            "what happens", "reading the scene, ms", "the rest of the picture, ms", "of which the hierarchy, ms",
+            "of the processor, ms",
+        )
+    ]  # fmt: skip
 
     def said(name: str, seconds: tuple[float, ...]) -> None:
         rows.append((name, *(f"{1e3 * one:.0f}" if one >= 0.01 else f"{1e3 * one:.1f}" for one in seconds)))

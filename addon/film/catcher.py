@@ -37,10 +37,6 @@ SURE = 0.5  # share of a pixel from which on its own light is enough to know wha
 LEAST = 0.01  # share of a pixel below which nothing is known of what covers it
 
 
-def has_catchers(snapshot: Snapshot) -> bool:
-    return any(one.shadow_catcher for one in snapshot.instances)
-
-
 def over_nothing(snapshot: Snapshot) -> Snapshot:
     """The scene of `all`, on a transparent film: pictures then say what they cover."""
     return replace(snapshot, film=replace(snapshot.film, transparent=True))

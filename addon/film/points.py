@@ -42,7 +42,6 @@ from ..gfx.library import Program
 from ..scene.materials import may_be_glossy
 from ..scene.view import VIEW
 from ..surfaces.draw import refracts
-from .catcher import has_catchers
 from .point_costs import PointCosts, costs_of, count_of
 from .together import SUM, terms
 
@@ -109,7 +108,7 @@ def by_costs(frame: Frame) -> bool:
     """Whether the number of points may follow what they cost here. The three pictures of shadow catchers
     (film/catcher.py) show other objects at the same points, and slices of a picture are drawn by several devices."""
     sliced = frame.settings.samples_to_draw != frame.settings.samples
-    return not (all_alike(frame) or has_catchers(frame.snapshot) or sliced)
+    return not (all_alike(frame) or frame.snapshot.has_catchers or sliced)
 
 
 def costs(frame: Frame) -> PointCosts:

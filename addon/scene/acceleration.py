@@ -82,19 +82,20 @@ class Tree:
     """Triangles (T, 3, 3) with their looks (T, 8) in the leaves of one tree, on the CPU's side."""
 
     def __init__(self, corners: np.ndarray, look: np.ndarray):
-        shown = np.flatnonzero(_shown(corners, look))
+        count, shown = len(corners), np.flatnonzero(_shown(corners, look))
         self.triangles = len(shown)
-        low, high = _bounds(corners[shown])
+        if self.triangles < len(corners):
+            corners, look = corners[shown], look[shown]
+        low, high = _bounds(corners)
         shape = box_tree.build(low, high)
-        self.place = np.full(len(corners), -1)  # of each triangle among the slots of the leaves; -1: left out
+        self.place = np.full(count, -1)  # of each triangle among the slots of the leaves; -1: left out
         self.place[shown] = shape.place
         self.low = np.full((shape.leaf_count * LEAF, 3), EMPTY, np.float32)  # of the triangle in each slot
         self.high = -self.low
         self.low[shape.place], self.high[shape.place] = low, high
-        slots = np.zeros((max(shape.leaf_count, 1) * LEAF, LEAF_TEXELS), np.float32)  # zero edges: never hit
-        slots[shape.place] = _entries(corners[shown], look[shown])
-        # (L, LEAF_TEXELS, LEAF)
-        self.leaves = np.ascontiguousarray(slots.reshape(-1, LEAF, LEAF_TEXELS).transpose(0, 2, 1))
+        # Zero edges are never hit.
+        self.leaves = np.zeros((max(shape.leaf_count, 1), LEAF_TEXELS, LEAF), np.float32)
+        self.leaves[shape.place // LEAF, :, shape.place % LEAF] = _entries(corners, look)
         self.boxes = NodeBoxes(shape, *_of_leaves(self.low, self.high))
         self.cost = self.boxes.cost()  # when it was built
 
@@ -118,14 +119,18 @@ class Tree:
 
 def _shown(corners: np.ndarray, look: np.ndarray) -> np.ndarray:
     """(T,) which triangles some ray can meet."""
-    return np.isfinite(corners.reshape(-1, 9)).all(axis=1) & ~is_empty(look[:, 0])
+    shown = ~is_empty(look[:, 0])
+    if not np.isfinite(corners).all():  # of each alone takes ten times as long
+        shown &= np.isfinite(corners.reshape(-1, 9)).all(axis=1)
+    return shown
 
 
 def _entries(corners: np.ndarray, look: np.ndarray) -> np.ndarray:
     """(T, LEAF_TEXELS) what a leaf holds of each triangle."""
     entries = np.empty((len(corners), LEAF_TEXELS), np.float32)
-    entries[:, :3] = corners[:, 0]
-    entries[:, 3:6], entries[:, 6:9] = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    entries[:, :9] = corners.reshape(-1, 9)
+    entries[:, 3:6] -= entries[:, :3]
+    entries[:, 6:9] -= entries[:, :3]
     entries[:, 9:] = look
     return entries
 

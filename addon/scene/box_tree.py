@@ -91,8 +91,11 @@ def _unit(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The boxes moved and scaled into the unit cube, so that areas neither over- nor underflow."""
     if not len(low):
         return low, high
-    corner = low.min(axis=0).astype(np.float64)
-    extent = max(float((high.max(axis=0) - corner).max()), 1e-300)
+    corner, top = (
+        np.array([joined(box[:, axis]) for axis in range(3)], np.float64)  # along an axis of three numpy is slow
+        for box, joined in ((low, np.min), (high, np.max))
+    )
+    extent = max(float((top - corner).max()), 1e-300)
     return tuple(((box - corner) / extent).astype(np.float32) for box in (low, high))
 
 
@@ -112,8 +115,9 @@ class _Clusters:
         self.children = np.full((total, 2), -1, np.int64)
         self.area, self.boxes = np.zeros(total, np.float32), np.ones(total, np.int64)
         self.area[: self.count] = _area(low, high)
-        # Who is chosen of several that are equally close.
-        self.chance = np.random.default_rng(1).random(self.count + 64, np.float32)
+        # Who is chosen of several that are equally close: what areas are multiplied by, and what is added.
+        chance = np.random.default_rng(1).random(self.count + 64, np.float32)
+        self.chances = 1.0 + 1e-3 * chance, 1e-20 * chance
         self.axes = [np.ascontiguousarray(corners[:, axis]) for corners in (low, high) for axis in range(3)]
 
     def joined(
@@ -121,7 +125,7 @@ class _Clusters:
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Pair nodes `number` with boxes `axes` until at most `left` remain; new nodes are numbered from `made` on."""
         while len(number) > left:
-            first, second = _pairs(axes, self.chance, reach)
+            first, second = _pairs(axes, self.chances, reach)
             new = np.arange(made, made + len(first))
             made += len(first)
             self.children[new, 0], self.children[new, 1] = number[first], number[second]
@@ -158,7 +162,7 @@ def _clustered(low: np.ndarray, high: np.ndarray) -> _Binary:
     return _Binary(some.children[:root], some.area[:root], some.boxes[:root])
 
 
-def _pairs(axes: list[np.ndarray], chances: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(axes: list[np.ndarray], chances: tuple[np.ndarray, np.ndarray], reach: int) -> tuple[np.ndarray, np.ndarray]:
     """Clusters that are each other's nearest: numbers of the first and the second of each pair."""
     count = len(axes[0])
     nearest, best = np.full(count, np.inf, np.float32), np.zeros(count, np.int64)
@@ -167,12 +171,12 @@ def _pairs(axes: list[np.ndarray], chances: np.ndarray, reach: int) -> tuple[np.
         low = [np.minimum(corner[:-step], corner[step:]) for corner in axes[:3]]
         high = [np.maximum(corner[:-step], corner[step:]) for corner in axes[3:]]
         x, y, z = (b - a for a, b in zip(low, high))
-        chance = chances[step : step + count - step]
-        common = (x * y + y * z + z * x) * (1.0 + 1e-3 * chance) + 1e-20 * chance
-        closer = common < nearest[:-step]
-        nearest[:-step][closer], best[:-step][closer] = common[closer], own[step:][closer]
-        closer = common < nearest[step:]
-        nearest[step:][closer], best[step:][closer] = common[closer], own[:-step][closer]
+        factor, added = (chance[step : step + count - step] for chance in chances)
+        common = (x * y + y * z + z * x) * factor + added
+        for mine, others in ((slice(None, -step), slice(step, None)), (slice(step, None), slice(None, -step))):
+            closer = common < nearest[mine]
+            np.copyto(nearest[mine], common, where=closer)
+            np.copyto(best[mine], own[others], where=closer)
     left = np.flatnonzero((best[best] == own) & (own < best))
     if not len(left):  # nobody is chosen back: neighbours, so that there is an end
         left = own[: count // 2 * 2 : 2]

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,6 +46,11 @@ class Boxes:
     def of(cls, draws: list[Draw]) -> Boxes:
         return cls.between([draw.low for draw in draws], [draw.high for draw in draws])
 
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        """(7, D) centre, 1 and half axes."""
+        return np.concatenate([self.centre.T, np.ones((1, len(self.centre))), self.half.T])
+
     def seen(self, rows: np.ndarray, least_q: float = -np.inf) -> np.ndarray:
         """(D,) whether a projection with `rows` x, y, w, q may see the box before the depth measure `least_q`.
 
@@ -52,16 +58,13 @@ class Boxes:
         half axes: nothing is lost against testing all corners.
         """
         forms = SIDES @ rows  # w, w - x, w + x, w - y, w + y
-        middle = forms[:, :3] @ self.centre.T + forms[:, 3:]
-        reach = np.abs(forms[:, :3]) @ self.half.T
-        most = middle + reach
-        seen = most[1:].min(axis=0) >= 0
-        seen &= most[0] > 0
+        most = np.concatenate([forms, np.abs(forms[:, :3])], axis=1) @ self._columns
+        seen = (most.min(axis=0) >= 0) & (most[0] > 0)
         if math.isfinite(least_q):
             # By more than what float32 and the slack of the comparison could mistake.
             before = rows[3] - least_q * (1.0 - 1e-3) * rows[2]
-            farthest = self.centre @ before[:3] + self.half @ np.abs(before[:3]) + before[3]
-            seen &= (farthest >= 0) | (middle[0] <= reach[0])
+            ends = np.array([(*before, *np.abs(before[:3])), (*forms[0], *-np.abs(forms[0, :3]))]) @ self._columns
+            seen &= (ends[0] >= 0) | (ends[1] <= 0)  # some of it nearer, or beside the eye
         return seen
 
     def without(self, point: np.ndarray) -> np.ndarray:

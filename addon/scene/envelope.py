@@ -10,24 +10,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..snapshot.scene import Mesh
-
 NOISE = 4e-6  # of a triangle's size, below which float32 says nothing
 AT_ONCE = 1 << 16  # triangles, so that what is computed of them stays in the cache
 
 
-def normal_envelope(mesh: Mesh) -> np.ndarray:
-    """(C, 2) float32 in local metres, by corner: the least that the triangle reaches above it along the normals of its
-    three corners, and below it. Both are 0 at most corners. A corner of two triangles has one of their values."""
-    out = np.zeros((len(mesh.corner_vertices), 2), np.float32)
-    for first in range(0, mesh.triangle_count, AT_ONCE):
-        corners = mesh.triangle_corners[first : first + AT_ONCE]
-        places = mesh.positions[mesh.corner_vertices[corners]]
-        edges = [places[:, k] - places[:, 0] for k in (1, 2)]
-        least = NOISE * np.maximum(*(np.abs(edge).max(axis=1) for edge in edges))
+def normal_envelope(places: np.ndarray, normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(C, 2) float32 in local metres, by corner: the least that its triangle reaches above it along the normals of its
+    three corners, and below it. Both are 0 at most corners. A corner of two triangles has one of their values. Corners
+    have `places` and `normals` (C, 3); `triangles` (T, 3) are numbers of corners."""
+    out = np.zeros((len(places), 2), np.float32)
+    for first in range(0, len(triangles), AT_ONCE):
+        corners = triangles[first : first + AT_ONCE]
+        start = places[corners[:, 0]]
+        edges = [places[corners[:, k]] - start for k in (1, 2)]
+        least = NOISE * np.maximum(*(_longest(edge) for edge in edges))
         above, below = [], []  # by normal, and within by corner
         for k in range(3):
-            normal = mesh.corner_normals[corners[:, k]]
+            normal = normals[corners[:, k]]
             one, other = (np.einsum("tc,tc->t", normal, edge) for edge in edges)
             top, bottom = np.maximum(np.maximum(one, other), 0.0), np.minimum(np.minimum(one, other), 0.0)
             above.append((top, top - one, top - other))
@@ -37,3 +36,9 @@ def normal_envelope(mesh: Mesh) -> np.ndarray:
                 reach = np.minimum(np.minimum(of_corner[0], of_corner[1]), of_corner[2])
                 out[corners[:, k], side] = np.where(reach > least, reach, 0.0)
     return out
+
+
+def _longest(edges: np.ndarray) -> np.ndarray:
+    """(T,) the largest coordinate of (T, 3), with any sign: along an axis of three numpy is slow."""
+    x, y, z = np.abs(edges).T
+    return np.maximum(np.maximum(x, y), z)

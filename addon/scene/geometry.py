@@ -432,10 +432,12 @@ def _draws_of(parts: list[tuple[int, Mesh, tuple[int, ...]]], materials: list[Co
     vertex_start = np.cumsum([0] + [len(mesh.positions) for _, mesh, _ in parts])
     triangle_material = np.concatenate([mesh.triangle_materials(slots) for _, mesh, slots in parts])
     corners = np.concatenate([mesh.triangle_corners + start for (_, mesh, _), start in zip(parts, corner_start)])
+    places = np.concatenate([mesh.positions[mesh.corner_vertices] for _, mesh, _ in parts])
+    normals = np.concatenate([mesh.corner_normals for _, mesh, _ in parts])
     surface_vertices = gfx_geometry.vertex_buffer(
-        position=np.concatenate([mesh.positions[mesh.corner_vertices] for _, mesh, _ in parts]),
-        normal=np.concatenate([mesh.corner_normals for _, mesh, _ in parts]),
-        envelope=np.concatenate([normal_envelope(mesh) for _, mesh, _ in parts]),
+        position=places,
+        normal=normals,
+        envelope=normal_envelope(places, normals, corners),
         local_instance=np.concatenate([np.full(len(mesh.corner_vertices), k, np.int32) for k, mesh, _ in parts]),
     )
     surfaces = []

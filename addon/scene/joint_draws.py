@@ -136,9 +136,11 @@ def _made(geometry: SceneGeometry, materials: MaterialSet, together: list[bool])
         base = np.zeros(size, np.int32)
         base[mesh.triangle_corners] = bases[of_triangle][:, None]
         numbers = np.arange(k, k + count, dtype=np.int32)
-        corners["position"].append(np.tile(mesh.positions[mesh.corner_vertices], (count, 1)))
+        places = mesh.positions[mesh.corner_vertices]
+        corners["position"].append(np.tile(places, (count, 1)))
         corners["normal"].append(np.tile(mesh.corner_normals, (count, 1)))
-        corners["envelope"].append(np.tile(normal_envelope(mesh), (count, 1)))
+        envelope = normal_envelope(places, mesh.corner_normals, mesh.triangle_corners)
+        corners["envelope"].append(np.tile(envelope, (count, 1)))
         corners["local_instance"].append((numbers[:, None] + base[None]).reshape(-1))
         for leader in np.unique(leaders[of_triangle[joins[of_triangle]]]).tolist():
             own = mesh.triangle_corners[joins[of_triangle] & (leaders[of_triangle] == leader)]

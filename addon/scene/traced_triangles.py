@@ -38,9 +38,8 @@ def world_triangles(
     glow: EmissionMaps,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that rays of `path` (a name of Visibility), or from their ends to lights, can meet: corners
-    (T, 3, 3) float32 relative to `origin`, and (T, 8) opacity (_codes), mean emitted radiance, number of the material
-    (with the side that emits, mean_emission) and packed corner normals."""
-    corners, looks = [], []
+    (T, 3, 3) float32 relative to `origin`, and (T, 8) float32 opacity (_codes), mean emitted radiance, number of the
+    material (with the side that emits, mean_emission) and packed corner normals."""
     look = {
         (rays, mirrored): np.array([
             (mean_code(m, rays), *radiance, k + side)
@@ -51,6 +50,8 @@ def world_triangles(
         for mirrored in (False, True)
     }  # fmt: skip
     shown = [one for one in instances if is_met(one, path) and meshes[one.mesh].triangle_count]
+    total = sum(meshes[one.mesh].triangle_count for one in shown)
+    corners, looks, made = np.empty((total, 3, 3), np.float32), np.empty((total, 8), np.float32), 0
     # Of instances with equal kinds all triangles look the same.
     matrices_of_all = np.array([one.matrix[:3] for one in shown], float).reshape(-1, 3, 4)
     turns = np.linalg.det(matrices_of_all[:, :, :3])
@@ -74,14 +75,15 @@ def world_triangles(
             matrices = matrices_of_all[own]
             turned, moved = matrices[:, :, :3], (matrices[:, :, 3] - origin).astype(np.float32)
             world = mesh.positions @ turned.transpose(0, 2, 1).astype(np.float32) + moved[:, None]
-            corners.append(world[:, mesh.corner_vertices[mesh.triangle_corners]].reshape(-1, 3, 3))
             normals = _packed_normals(mesh.corner_normals @ cofactors_of_all[own].transpose(0, 2, 1))
-            of_copies = np.broadcast_to(look_of_triangle, (len(matrices), *look_of_triangle.shape))
-            looks.append(np.concatenate([of_copies, normals[:, mesh.triangle_corners]], axis=2).reshape(-1, 8))
+            count, triangles = len(matrices), mesh.triangle_count
+            new = slice(made, made + count * triangles)
+            corners[new].reshape(count, triangles, 3, 3)[:] = world[:, mesh.corner_vertices[mesh.triangle_corners]]
+            look_of_copies = looks[new].reshape(count, triangles, 8)
+            look_of_copies[..., :5], look_of_copies[..., 5:] = look_of_triangle, normals[:, mesh.triangle_corners]
+            made = new.stop
         first_of_kind += len(copies)
-    if not corners:
-        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 8))
-    return np.concatenate(corners).astype(np.float32, copy=False), np.concatenate(looks)
+    return corners, looks
 
 
 def is_met(instance: Instance, path: str) -> bool:
@@ -185,6 +187,7 @@ def _shine(look: np.ndarray, of_triangle: np.ndarray, known: TriangleEmission, m
 
 def coverage(codes: np.ndarray, maps: OpacityMaps) -> np.ndarray:
     """(N,) mean of the two sides' opacity, of what world_triangles says of (N,) triangles."""
+    codes = codes.astype(np.float64)  # whole numbers: exact in single precision, too
     sides = np.abs(codes) % (SIDE_STEPS + 1) ** 2
     mean = (sides // (SIDE_STEPS + 1) + sides % (SIDE_STEPS + 1)) / (2 * SIDE_STEPS)
     tiled = np.abs(codes) >= MAPPED * (SIDE_STEPS + 1) ** 2
@@ -208,8 +211,14 @@ def _cofactors(matrices: np.ndarray) -> np.ndarray:
 
 def _packed_normals(normals: np.ndarray) -> np.ndarray:
     """(..., 3) of any length as (...) numbers: octahedral coordinates side by side; unpacked in shaders/trace."""
-    flat = normals / np.maximum(np.abs(normals).sum(axis=-1, keepdims=True), 1e-30)
-    folded = (1.0 - np.abs(flat[..., 1::-1])) * np.where(flat[..., :2] >= 0.0, 1.0, -1.0)
-    square = np.where(flat[..., 2:] >= 0.0, flat[..., :2], folded)
-    steps = np.floor((square * 0.5 + 0.5) * NORMAL_STEPS + 0.5)
-    return np.nan_to_num(steps[..., 0] + (NORMAL_STEPS + 1) * steps[..., 1])
+    x, y, z = (normals[..., axis] for axis in range(3))
+    size = np.maximum(np.abs(x) + np.abs(y) + np.abs(z), 1e-30)
+    x, y, front = x / size, y / size, z >= 0.0
+    steps = [
+        np.floor((np.where(front, one, (1.0 - np.abs(other)) * np.where(one >= 0.0, 1.0, -1.0)) * 0.5 + 0.5)
+                 * NORMAL_STEPS + 0.5)
+        for one, other in ((x, y), (y, x))
+    ]  # fmt: skip
+    packed = steps[0] + (NORMAL_STEPS + 1) * steps[1]
+    packed[np.isnan(packed)] = 0.0
+    return packed

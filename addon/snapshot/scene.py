@@ -395,6 +395,11 @@ class Snapshot:
         return any(one.visibility.shadow for one in self.instances)
 
     @cached_property
+    def has_catchers(self) -> bool:
+        """Whether any instance is a shadow catcher."""
+        return True in {one.shadow_catcher for one in self.instances}
+
+    @cached_property
     def own_values(self) -> tuple[tuple[str, tuple], ...]:
         """What has been set of techniques' parameters on objects and materials, by key."""
         return tuple((one.key, one.own) for one in (*self.instances, *self.materials) if one.own)
