@@ -50,7 +50,7 @@ _settings_of_type: dict[str, tuple] = {}
 WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
 
 
-FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # Cycles has the fine table of dielectric layers (energy.py)
+FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # finer tables (energy.py), and rough diffuse (shaders/lib/brdf.glsl)
 INLINES = bpy.app.version >= (5, 0, 0)  # Blender dissolves groups itself before Cycles sees the tree
 
 
