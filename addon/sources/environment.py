@@ -28,7 +28,7 @@ WORLD = Struct(
     ("vec4", "map_options"),  # x = 1 for a transparent film
 )
 LARGEST_GRID = (256, 512)
-LEAST_BAKED = 256  # rows
+LEAST_BAKED = 512  # rows
 SMALLEST_GRID = (32, 64)  # for guiding, even where the image is smaller
 GUIDE_ROWS, GUIDE_COLUMNS = 16, 32
 
