@@ -2,8 +2,10 @@
 
 A file lists candela by vertical and horizontal angle. Blender means watts of a lamp that shines alike in all
 directions, so candela are turned by 4 pi / 177.83, the efficacy of daylight (D65). Between angles the profile is
-interpolated by Catmull-Rom splines along both, and is not negative; outside of the vertical angles that the file has
-there is no light. Type C files measure vertical angles from straight down (-Z); types A and B lie on their side.
+interpolated by Catmull-Rom splines along both, and is not negative; outside of the angles that the file has there is no
+light. Type C files measure vertical angles from straight down (-Z). Types A and B lie on their side; they are placed as
+Cycles places them, by angles alone: 90 degrees further, of type B with the two angles changed for one another, so that
+B fills half of the round only. A lamp of these types is turned by hand, in both engines alike.
 
 The table has half a degree a texel: columns over 0 to 360 degrees of the horizontal angle, rows over 0 to 180 of the
 vertical one. Source of the format: ANSI/IESNA LM-63.
@@ -37,24 +39,27 @@ class Profile:
 
 
 @lru_cache(maxsize=32)
-def profile_pixels(profile: Profile) -> tuple[np.ndarray, str]:
-    """(HEIGHT, WIDTH, 4) float32, grey, and what has to be said about it."""
+def profile_pixels(profile: Profile, fades: bool = False) -> tuple[np.ndarray, str]:
+    """(HEIGHT, WIDTH, 4) float32, grey, and what has to be said about it. `fades`: whether splines end as if there was
+    no light beyond the first and last angle, as in Blender before 5.0; else as if it went on."""
     try:
-        vertical, horizontal, watts, kind = _measured(profile.text)
+        vertical, horizontal, watts = _measured(profile.text)
     except (ValueError, IndexError):
         text = "the light profile is missing or cannot be read; the node gives 100 times its strength, as in Cycles."
         return np.full((HEIGHT, WIDTH, 4), UNREADABLE, np.float32), text
-    asked = np.linspace(0.0, 180.0, HEIGHT)
-    rows = np.stack([_along(vertical, line, asked, wraps=False) for line in watts])
-    table = np.stack([_along(horizontal, column, np.linspace(0, 360, WIDTH), wraps=True) for column in rows.T])
-    table = np.maximum(table, 0.0)
-    table[(asked < vertical[0]) | (asked > vertical[-1])] = 0.0
-    remark = "" if kind == TYPE_C else "light profiles of the types A and B may be turned; use one of type C."
-    return np.repeat(table[..., None], 4, axis=2).astype(np.float32), remark
+    rows, columns = np.linspace(0.0, 180.0, HEIGHT), np.linspace(0.0, 360.0, WIDTH)
+    closed = horizontal[0] < 1e-4 and horizontal[-1] > 359.9999
+    # Beyond a pole the profile comes back; where the round is closed, it goes on.
+    ends = [1 if vertical[0] < 1e-4 else None, len(vertical) - 2 if vertical[-1] > 179.9999 else None]
+    around = [len(horizontal) - 2, 1] if closed else [None, None]
+    table = np.stack([_along(vertical, line, rows, *ends, -1, fades) for line in watts])
+    table = np.stack([_along(horizontal, line, columns, *around, -2, fades) for line in table.T])
+    table *= _inside(rows, vertical, (0.0, 180.0))[:, None] * _inside(columns, horizontal, (0.0, 360.0))
+    return np.repeat(np.maximum(table, 0.0)[..., None], 4, axis=2).astype(np.float32), ""
 
 
-def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Vertical angles (V) and horizontal ones from 0 to 360 (H), degrees, watts (H, V), type. Raises ValueError."""
+def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertical angles (V) and horizontal ones (H), degrees as of the table, watts (H, V). Raises ValueError."""
     tilt = re.search(r"^\s*TILT\s*=\s*(\S+).*$", text, re.MULTILINE)
     if tilt is None:
         raise ValueError("no TILT line")
@@ -70,54 +75,58 @@ def _measured(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     horizontal = np.array(numbers[start + count : start + count + lines])
     values = np.array(numbers[start + count + lines : start + count + lines + count * lines])
     watts = values.reshape(lines, count) * factor
-    if kind == TYPE_C:
-        return *_around(vertical, horizontal, watts), kind
-    return *_on_its_side(vertical, horizontal, watts, kind), kind
+    if kind == TYPE_A:
+        if horizontal[0] != 0.0:
+            horizontal, watts = -horizontal[::-1], watts[::-1]
+        horizontal, watts = _mirrored(horizontal, watts)
+        return vertical + 90.0, horizontal + 180.0, watts
+    if kind == TYPE_B:
+        across, watts = _mirrored(vertical, watts.T)
+        up, watts = _mirrored(horizontal, watts.T)
+        return up + 90.0, across + 90.0, watts.T
+    return _around(vertical, horizontal, watts)
+
+
+def _mirrored(angles, values):
+    """Angles (N) that begin at 0, and values (N, ...), continued to the other side of it; others as they are."""
+    if angles[0] != 0.0:
+        return angles, values
+    return np.concatenate([-angles[:0:-1], angles]), np.concatenate([values[:0:-1], values])
 
 
 def _around(vertical, horizontal, watts):
     """Of type C: horizontal angles of a quadrant or half are mirrored to the whole round."""
     if horizontal[0] == 90.0:
         horizontal = horizontal - 90.0
-    if horizontal[0] != 0.0:
-        raise ValueError("horizontal angles that do not begin at 0")
     if len(horizontal) == 1:
         return vertical, np.array([0.0, 360.0]), np.repeat(watts, 2, axis=0)
     for edge in (90.0, 180.0):
         if horizontal[-1] == edge:
             horizontal = np.concatenate([horizontal, 2 * edge - horizontal[-2::-1]])
             watts = np.concatenate([watts, watts[-2::-1]])
-    if horizontal[-1] < 360.0:
+    gap, steps = 360.0 - horizontal[-1], np.diff(horizontal)
+    if horizontal[0] == 0.0 and np.abs(steps[[0, -1]] - gap).min() < 1e-4:  # the file leaves out the first one's like
         horizontal, watts = np.append(horizontal, 360.0), np.concatenate([watts, watts[:1]])
     return vertical, horizontal, watts
 
 
-def _on_its_side(vertical, horizontal, watts, kind: int):
-    """Of types A and B: a grid about a horizontal axis, whose halves are mirrored, as one of type C about that axis."""
-    if kind == TYPE_B:
-        vertical, horizontal, watts = horizontal, vertical, watts.T
-    if horizontal[-1] != 90.0 or vertical[-1] != 90.0:
-        raise ValueError("angles that do not end at 90")
-    if horizontal[0] == 0.0:
-        horizontal, watts = np.concatenate([-horizontal[:0:-1], horizontal]), np.concatenate([watts[:0:-1], watts])
-    if vertical[0] == 0.0:
-        vertical = np.concatenate([-vertical[:0:-1], vertical])
-        watts = np.concatenate([watts[:, :0:-1], watts], axis=1)
-    return vertical + 90.0, np.append(horizontal + 90.0, 360.0), np.concatenate([watts, watts[:1]])
+def _inside(asked: np.ndarray, angles: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """1 between the first and the last of the angles, 0 beyond them, where nothing shines, and half between both: so
+    what is read between texels has its right mean. Not at `ends`, which have nothing beyond them."""
+    known = (asked >= angles[0]) & (asked <= angles[-1])
+    edge = ((asked == angles[0]) & (angles[0] != ends[0])) | ((asked == angles[-1]) & (angles[-1] != ends[1]))
+    return known - 0.5 * edge
 
 
-def _along(angles: np.ndarray, values: np.ndarray, asked: np.ndarray, wraps: bool) -> np.ndarray:
-    """Catmull-Rom spline through values at angles, as if those were evenly spaced."""
+def _along(angles, values, asked, before: int | None, after: int | None, last: int, fades: bool) -> np.ndarray:
+    """Catmull-Rom spline through values at angles, as if those were evenly spaced. `before`, `after`: numbers of the
+    values that stand beyond the first and the last angle. None: nothing does; the spline then ends as `fades` says, or
+    with the first value before, and after with value number `last` (Cycles takes the last one of vertical angles, that
+    before it of horizontal ones)."""
     k = np.clip(np.searchsorted(angles, asked, side="right") - 1, 0, len(angles) - 2)
     t = np.clip((asked - angles[k]) / np.maximum(angles[k + 1] - angles[k], 1e-9), 0.0, 1.0)
-    last = len(angles) - 1
-
-    def value(at: np.ndarray) -> np.ndarray:
-        if wraps:  # the last one is the first
-            return values[np.where(at < 0, last - 1, np.where(at > last, 1, at))]
-        low = values[1] if angles[0] < 0.1 else 0.0  # beyond a pole the profile comes back
-        high = values[last - 1] if angles[-1] > 179.9 else 0.0
-        return np.where(at < 0, low, np.where(at > last, high, values[np.clip(at, 0, last)]))
-
-    a, b, c, d = (value(k + shift) for shift in (-1, 0, 1, 2))
+    first = (0.0 if fades else values[0]) if before is None else values[before]
+    final = (0.0 if fades else values[last]) if after is None else values[after]
+    padded = np.concatenate([[first], values, [final]])
+    a, b, c, d = (padded[k + shift] for shift in range(4))
     return 0.5 * (d + 3 * (b - c) - a) * t**3 + (a - 2.5 * b + 2 * c - 0.5 * d) * t**2 + 0.5 * (c - a) * t + b

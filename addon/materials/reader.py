@@ -50,7 +50,8 @@ _settings_of_type: dict[str, tuple] = {}
 WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
 
 
-FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # Cycles has the fine table of dielectric layers (energy.py)
+FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # finer tables (energy.py), and rough diffuse (shaders/lib/brdf.glsl)
+NUMBERS = {"FLOAT", "VECTOR", "COLOR"}
 INLINES = bpy.app.version >= (5, 0, 0)  # Blender dissolves groups itself before Cycles sees the tree
 
 
@@ -199,7 +200,8 @@ class _Reading:
     def source(self, place: _Place, node, socket) -> Input:
         """What an input socket reads. Follows groups, reroutes, muted nodes.
 
-        Where a chain ends at nothing, the value stands of the last group's socket on the way, or the socket's own.
+        Where a chain ends at nothing, the value stands of the last group's socket on the way, or the socket's own. What
+        a muted node holds counts for nothing, and before Blender 5.0 for zero.
         Where a group's socket has another kind than what is plugged in, the value is converted on the way; before
         Blender 5.0 links are, too, so a `Convert` node is put in between.
         """
@@ -213,7 +215,9 @@ class _Reading:
             passed.add(step)
             link = self._link_into(place.tree, socket)
             if link is None:
-                if socket.node.bl_idname != "NodeReroute" or not INLINES:
+                if socket.node.mute and not INLINES and _kind(asked) in NUMBERS:
+                    return Input(_kind(asked), _converted(0.0, "FLOAT", _kind(asked)))
+                if not (INLINES and (socket.node.mute or socket.node.bl_idname == "NodeReroute")):
                     held = (socket, len(conversions))
                 return self._held(asked, *held, conversions)
             node, output = link.from_node, link.from_socket
@@ -294,7 +298,7 @@ class _Reading:
             self.pending.append((key, place, node))
         link, kind = (key, output.identifier), _kind(output)
         for wanted in conversions[::-1]:
-            if wanted != kind and {wanted, kind} <= {"FLOAT", "VECTOR", "COLOR"}:
+            if wanted != kind and {wanted, kind} <= NUMBERS:
                 converter = f"{link[0]} . {link[1]} > {wanted}"
                 inputs = {"Value": Input(kind, None, link)}
                 self.nodes[converter] = Node(

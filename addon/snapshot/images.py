@@ -27,6 +27,7 @@ from .scene import Image, Note
 # Byte images in these colour spaces need no decoding; sRGB is decoded after filtering, as in Cycles.
 _LINEAR_SPACES = ("Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data", "Utility - Raw", "scene_linear")
 # Cycles before Blender 5.1: bytes have straight alpha and floats premultiplied alpha, whatever their alpha mode says.
+PROFILES_FADE = bpy.app.version < (5, 0)  # see materials/ies.py
 BYTES_ARE_STRAIGHT = FLOATS_ARE_PREMULTIPLIED = bpy.app.version < (5, 1)
 MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not there
 
@@ -73,7 +74,7 @@ class ImageTable:
     def key_of_profile(self, profile: Profile, label: str) -> str:
         """Image.key of the table of an IES Texture, which depends on the file's text alone."""
         key = profile.name
-        pixels, remark = profile_pixels(profile)
+        pixels, remark = profile_pixels(profile, PROFILES_FADE)
         if remark:
             self.notes.append(Note(f"Node '{label}'", remark))
         if key not in self.images:

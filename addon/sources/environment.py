@@ -28,6 +28,7 @@ WORLD = Struct(
     ("vec4", "map_options"),  # x = 1 for a transparent film
 )
 LARGEST_GRID = (256, 512)
+LEAST_BAKED = 512  # rows
 SMALLEST_GRID = (32, 64)  # for guiding, even where the image is smaller
 GUIDE_ROWS, GUIDE_COLUMNS = 16, 32
 
@@ -205,7 +206,7 @@ def _between_cells(cells: np.ndarray, directions: np.ndarray) -> np.ndarray:
 
 
 def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
-    """Radiance image (H, W, 3) finite and linear, and the mapping to it, which is a rotation (3, 3)."""
+    """Radiance image (H, W, 3) finite and linear, and the mapping to it, which turns or mirrors (3, 3)."""
     if world.image is None:
         return np.ones((1, 1, 3)), np.eye(3)
     pixels = _finite(world.image.pixels[..., :3].astype(np.float64))
@@ -213,11 +214,12 @@ def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
         pixels = np.where(pixels < 0.04045, pixels / 12.92, ((np.maximum(pixels, 0) + 0.055) / 1.055) ** 2.4)
     mapping = np.eye(3, 4) if world.mapping is None else np.asarray(world.mapping, np.float64)
     linear, offset = mapping[:, :3], mapping[:, 3]
-    scale = np.cbrt(np.linalg.det(linear))
+    scale = np.cbrt(abs(np.linalg.det(linear)))
     if scale > 0 and not offset.any() and np.allclose(linear @ linear.T, np.eye(3) * scale**2, atol=1e-5 * scale**2):
         return pixels, linear / scale
     # A sheared or shifted mapping is baked once into an image of the world itself.
-    height, width = pixels.shape[:2]
+    height = max(len(pixels), LEAST_BAKED)
+    width = max(pixels.shape[1], 2 * LEAST_BAKED)
     v, u = np.mgrid[0:height, 0:width]
     latitude, azimuth = ((v + 0.5) / height - 0.5) * np.pi, (0.5 - (u + 0.5) / width) * 2 * np.pi
     direction = np.stack(
@@ -225,9 +227,21 @@ def _pixels(world: World) -> tuple[np.ndarray, np.ndarray]:
     )
     mapped = direction @ linear.T + offset
     mapped /= np.maximum(np.linalg.norm(mapped, axis=-1, keepdims=True), 1e-20)
-    column = (0.5 - np.arctan2(mapped[..., 1], mapped[..., 0]) / (2 * np.pi)) * width
-    row = (0.5 + np.arcsin(np.clip(mapped[..., 2], -1, 1)) / np.pi) * height
-    return pixels[np.clip(row.astype(int), 0, height - 1), column.astype(int) % width], np.eye(3)
+    column = 0.5 - np.arctan2(mapped[..., 1], mapped[..., 0]) / (2 * np.pi)
+    row = 0.5 + np.arcsin(np.clip(mapped[..., 2], -1, 1)) / np.pi
+    return _between(pixels, row, column), np.eye(3)
+
+
+def _between(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """Pixels (H, W, C), interpolated at rows and columns from 0 to 1; columns wrap around."""
+    height, width = pixels.shape[:2]
+    y, x = row * height - 0.5, column * width - 0.5
+    low, left = np.floor(y).astype(int), np.floor(x).astype(int)
+    up, right = (y - low)[..., None], (x - left)[..., None]
+    below, above = (np.clip(low + one, 0, height - 1) for one in (0, 1))
+    west, east = left % width, (left + 1) % width
+    lower = pixels[below, west] * (1 - right) + pixels[below, east] * right
+    return lower * (1 - up) + (pixels[above, west] * (1 - right) + pixels[above, east] * right) * up
 
 
 def _finite(pixels: np.ndarray) -> np.ndarray:

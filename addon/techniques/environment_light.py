@@ -129,6 +129,9 @@ def no_environment_light(snapshot: Snapshot) -> str | None:
         return "the world is hidden from all surfaces"
     if not snapshot.instances:
         return "the scene has no surface"
+    fog = world.medium  # it fills all space, and what shines from infinitely far passes all of it
+    if fog is not None and fog.even and (fog.absorption + fog.scattering > 0).all():
+        return "the world's fog lets none of its light through"
     return None
 
 

@@ -17,9 +17,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 
+from ..film import clamping, together
 from ..film import filter as film_filter
 from ..film import points as film_points
-from ..film import together
 from ..film.point_costs import count_of
 from ..film.resolve import COMBINED, resolve
 from ..frame.light_paths import LIGHT_PATHS, SEEN, TOGETHER
@@ -143,6 +143,7 @@ class Film(Technique):
     params = (
         film_points.POINTS,
         repeated_light.EDGES,
+        *clamping.LIMITS.values(),
     )
     reads = SURFACES
     finishes = tuple(path.image for path in LIGHT)
@@ -160,7 +161,8 @@ class Film(Technique):
 
     def looks_at(self, settings: Settings) -> tuple[str, ...]:
         # A viewport at rest shows its first samples filtered (film/neighbours.py).
-        return () if settings.whole or settings.draft else ("radiance.diffuse_indirect", "color.diffuse")
+        filtered = () if settings.whole or settings.draft else ("radiance.diffuse_indirect", "color.diffuse")
+        return (*filtered, *clamping.CLAMPED) if clamping.limits(settings, self) else filtered
 
     def begin(self, frame: Frame) -> None:
         self._paths, self._pixel_paths = film_points.lit_paths(frame), film_points.pixel_paths(frame)
@@ -168,6 +170,7 @@ class Film(Technique):
         self._apart = tuple(path for path in self._paths if path in apart)
         self._summed = tuple(path for path in self._paths if path not in apart and path in shown)
         self._held = together.collected(frame)
+        self._limits = clamping.limits(frame.settings, self)
         light = (tuple(f"film.{path}" for path in paths) for paths in (self._apart, self._pixel_paths))
         for names in (self._held, *light):  # apart: a target has at most six images
             if names:
@@ -202,7 +205,8 @@ class Film(Technique):
         shining = frame.service(MediaEmission)
         if shining is not None:
             emission = {EMISSION if EMISSION in self._held else TOGETHER: frame.images[shining.image]}
-            frame.count(self, "passes", film_filter.add(frame, emission, frame.film_offset(frame.sample), 1.0))
+            with clamping.clamped(emission, self._limits) as shown:
+                frame.count(self, "passes", film_filter.add(frame, shown, frame.film_offset(frame.sample), 1.0))
         frame.count(self, "points", count)
         if frame.is_first and asked > 1 and film_points.by_costs(frame):
             frame.chose(self, "points", film_points.costs(frame).why(asked))
@@ -322,11 +326,14 @@ class Film(Technique):
         for service in map(frame.service, film_points.AT_POINTS):
             if service is not None:
                 service.add(frame, surfaces, offset, share)
-        if media is None:
-            frame.count(self, "passes", film_filter.add(frame, seen, offset, share))
-            return
-        with media.passing(frame, surfaces, self._lights, self._light_count) as through:
-            frame.count(self, "passes", 1 + film_filter.add(frame, seen, offset, share, through))
+        with ExitStack() as stack:
+            if self._limits:
+                seen = stack.enter_context(clamping.clamped(seen, self._limits))
+            through = None
+            if media is not None:
+                through = stack.enter_context(media.passing(frame, surfaces, self._lights, self._light_count))
+            drawn = len(self._limits) + (media is not None) + film_filter.add(frame, seen, offset, share, through)
+            frame.count(self, "passes", drawn)
 
     def _not_black(self, frame: Frame, lights_seen: bool) -> frozenset[str]:
         """Those of SUMS and of the sums of light in which something may be seen."""

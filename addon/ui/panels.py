@@ -174,6 +174,8 @@ class CANDELA_RENDER_PT_film(_CandelaPanel, bpy.types.Panel):
             column.prop(cycles, "film_exposure", text="Exposure")
         column.prop(context.scene.candela, "film_points")
         column.prop(context.scene.candela, "film_edges")
+        column.prop(context.scene.candela, "film_clamp_direct")
+        column.prop(context.scene.candela, "film_clamp_indirect")
 
 
 class CANDELA_RENDER_PT_motion_blur(_CandelaPanel, bpy.types.Panel):

@@ -28,7 +28,7 @@ vec3 rough_albedo(vec3 albedo, float weight, float roughness)
 {
   float average = oren_nayar_average(roughness);
   vec3 rho = clamp(albedo / weight, vec3(0.0), vec3(1.0));
-  return albedo * average / (vec3(1.0) - rho * (1.0 - average));
+  return albedo * average * (vec3(1.0) + oren_nayar_tint(rho) * (1.0 - average) / (vec3(1.0) - rho * (1.0 - average)));
 }
 
 vec3 surface_albedo(Surface s, float mu)

@@ -10,6 +10,14 @@
 
 // Energy-preserving Oren-Nayar after Fujii, with the multiple-scattering term of the improved model. That term depends on
 // the colour: the albedo without the weight of a mix and what a layer leaves.
+
+// What light that is scattered among the facets keeps of its colour beside the first time: Cycles before 5.3 took the
+// colour once too often.
+vec3 oren_nayar_tint(vec3 rho)
+{
+  return energy_is_fine() ? rho : rho * rho;
+}
+
 float oren_nayar_albedo_term(float c)
 {
   c = clamp(c, 0.0, 1.0);
@@ -46,7 +54,7 @@ vec3 diffuse_reflection(vec3 albedo, float weight, float roughness, vec3 normal,
   float light_term = PI * a + b * oren_nayar_albedo_term(nl);
   float average = oren_nayar_average(sigma);
   vec3 rho = clamp(albedo / weight, vec3(0.0), vec3(1.0));
-  vec3 multiple = rho * rho * (average / (PI * max(1.0 - average, 1e-6))) / max(vec3(1.0) - rho * (1.0 - average), vec3(1e-6));
+  vec3 multiple = oren_nayar_tint(rho) * (average / (PI * max(1.0 - average, 1e-6))) / max(vec3(1.0) - rho * (1.0 - average), vec3(1e-6));
   return albedo * (nl * (a + b * t)) + albedo * multiple * (nl * (1.0 - view_term) * (1.0 - light_term));
 }
 

@@ -16,7 +16,8 @@
 #define LAYER_NODES 16.0
 #define FINE_NODES 32.0
 
-// Whether the tables are those of Cycles 5.3 and later: the dielectric layer has more nodes there, at sqrt(mu).
+// Whether the tables are those of Cycles 5.3 and later: the dielectric layer has more nodes there, at sqrt(mu). Rough
+// diffuse surfaces differ, too.
 bool energy_is_fine()
 {
   return energy_table_size().y > 64;

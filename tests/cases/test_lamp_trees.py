@@ -28,6 +28,17 @@ TILT=NONE
 """
 
 
+def on_its_side(kind, angles, across):
+    """A profile of type A (3) or B (2): 0 to 90 degrees, mirrored, or -90 to 90."""
+    values = [[100 + 40 * k + 7 * (k * n % 5) * n for n in range(len(angles))] for k in range(len(across))]
+    words = [" ".join(map(str, row)) for row in (angles, across, *values)]
+    head = f"1 -1 3 {len(angles)} {len(across)} {kind} 2 0 0 0"
+    return "\n".join(["IESNA91", "TILT=NONE", head, "1 1 100", *words]) + "\n"
+
+
+QUARTER, HALF = (0, 30, 60, 90), (-90, -40, 0, 50, 90)
+
+
 @pytest.fixture
 def lamp(stage):
     """A function that makes a lamp above a floor, and gives its tree and a function that adds a node linked to it."""
@@ -152,6 +163,20 @@ def test_light_profile(lamp, beside, tmp_path, kind, text, settings, file):
         chosen = {"mode": "INTERNAL", "ies": block}
     chain(tree, emission, "Strength", ("ShaderNodeTexIES", 0, "", {**chosen, "Strength": 0.5}))
     same(*beside(16, (32, 32), 0, 64))
+
+
+@pytest.mark.parametrize("kind", [2, 3], ids="BA")
+@pytest.mark.parametrize(("angles", "across"), [(QUARTER, QUARTER), (HALF, HALF), (HALF, QUARTER[:3])])
+def test_profiles_that_lie_on_their_side(lamp, beside, kind, angles, across):
+    tree, emission = lamp("POINT", turn=(2.9, 0.3, 0.5), shadow_soft_size=0.0)  # half of these shine up only
+    block = bpy.data.texts.new("profile")
+    block.write(on_its_side(kind, angles, across))
+    profile = ("ShaderNodeTexIES", 0, "", {"mode": "INTERNAL", "ies": block, "Strength": 0.03})
+    chain(tree, emission, "Strength", profile)
+    # Means, since light ends abruptly where the file's angles do.
+    own, cycles = (one["combined"][..., 0].reshape(8, 4, 8, 4).mean((1, 3)) for one in beside(8, (32, 32), 0, 32))
+    assert cycles.max() > 0.1
+    agree(own, cycles)
 
 
 def test_a_lamp_that_is_seen_in_a_mirror_shows_its_tree(stage, beside):

@@ -131,6 +131,19 @@ def test_a_muted_node_hands_its_input_through(material):
     assert follow(read(material)[0], "Color").key == "Paint"
 
 
+def test_what_a_muted_node_holds_counts_for_nothing(material):
+    """The socket that it feeds keeps its own value; before Blender 5.0 it gets zero."""
+    tree = Tree(material.node_tree)
+    gamma = tree.add("ShaderNodeGamma", Color=(0.1, 0.2, 0.9, 1.0))
+    shader = tree.add("ShaderNodeBsdfDiffuse", Color=(0.6, 0.5, 0.4, 1.0))
+    tree.link(gamma, 0, shader, "Color")
+    tree.surface(shader)
+    gamma.mute = True
+    socket = follow(read(material)[0]).inputs["Color"]
+    expected = (0.6, 0.5, 0.4) if bpy.app.version >= (5, 0) else (0.0, 0.0, 0.0)
+    assert socket.link is None and socket.value[:3] == pytest.approx(expected)
+
+
 def test_a_muted_link_leaves_the_constant(material):
     tree = Tree(material.node_tree)
     shader = tree.add("ShaderNodeBsdfDiffuse", Roughness=0.5)

@@ -529,6 +529,15 @@ def test_fog_in_a_scene_without_any_mesh(stage):
     assert stage.render(2, size=(8, 8))["volume_direct"].min() > 0
 
 
+def test_endless_fog_lets_no_light_of_the_world_through(stage):
+    """Nor does it leave noise about nothing, half of it below zero."""
+    fog(stage, (1, 1, 1), Density=0.05)
+    stage.floor()
+    stage.camera_above()
+    assert not stage.render(4, (16, 16), bounces=0)["combined"][..., :3].any()
+    assert stage.ledger.row("environment_light").reason == "the world's fog lets none of its light through"
+
+
 def test_a_lamp_in_endless_fog_is_seen_as_far_as_it_is(stage):
     stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.2)
     stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.4)

@@ -336,7 +336,5 @@ ENTRIES = (
         (("Fac", "FLOAT"),),
         PROFILE_SOURCE,
         image=True,
-        # Whoever reads the file says so where it is of those types.
-        setting_approximations=(("mode", (), "Light profiles of the types A and B may be turned."),),
     ),
 )
