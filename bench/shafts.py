@@ -8,6 +8,8 @@ truth's peak. Times are what the ledger tells of the stage, of one sample.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from bench import markdown, media_scenes, shaft_truth
@@ -89,6 +91,12 @@ def prepared(name: str):
     return scene
 
 
+@cache
+def truth_of(name: str, matrix: tuple[float, ...], angle: float, size: int) -> np.ndarray:
+    """(size, size) radiance; `matrix`: the camera's, row by row."""
+    return TRUTHS[name](np.array(matrix).reshape(4, 4), angle, size)
+
+
 def profiles(name: str, rays: int, samples: int = SAMPLES, size: int = SIZE):
     """(size,) of the beams and of their truth across the picture, and both pictures."""
     from addon.compare.reference import render_passes
@@ -96,8 +104,7 @@ def profiles(name: str, rays: int, samples: int = SAMPLES, size: int = SIZE):
     scene = prepared(name)
     scene.candela.volume_caustics_rays = rays
     shown = render_passes(scene, "CANDELA", samples, 1, size=(size, size), bounces=1).images["volume_indirect"][..., 0]
-    camera = scene.camera
-    truth = TRUTHS[name](np.array(camera.matrix_world), camera.data.angle, size)
+    truth = truth_of(name, tuple(np.array(scene.camera.matrix_world).ravel()), scene.camera.data.angle, size)
     low, high = (round(share * size) for share in ROWS.get(name, BELOW))
     return shown[low:high].mean(axis=0), truth[low:high].mean(axis=0), shown, truth
 
