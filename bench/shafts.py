@@ -16,7 +16,8 @@ from bench import markdown, media_scenes, shaft_truth
 from bench.shaft_truth import Fog
 
 COMMAND = "python -m bench media --shafts --page"
-SIZE, SAMPLES, TRACED = 64, 16, 20_000
+SIZE, SAMPLES, TRACED = 48, 4, 20_000
+SIDES, SCREENS = (32, 64, 128), (64, 128, 256)  # of the rays' square and of the picture, for costs
 HEAD = ("scene", "rays", "profile, % of peak", "energy")
 CUBE = np.full(3, -2.0), np.full(3, 2.0)
 SPOT = 1 / (4 * np.pi)  # W/sr of a watt
@@ -131,10 +132,10 @@ def page(pictures=None) -> str:
     """The tables of profiles and of costs."""
     rows = [HEAD]
     for name in TRUTHS:
-        for rays in (96, 192, 384):
+        for rays in SIDES:
             seen, truth, shown, expected = profiles(name, rays)
             error, energy = figures(seen, truth)
-            rows.append((name if rays == 96 else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
+            rows.append((name if rays == SIDES[0] else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
             print(*rows[-1], sep="  ", flush=True)
         if pictures is not None:
             from bench.media import _save
@@ -142,11 +143,10 @@ def page(pictures=None) -> str:
             both = (np.repeat(image[..., None], 3, axis=2) for image in (shown, expected))
             _save(pictures / f"shaft {name}.png".replace(" ", "_"), *both)
     text = f"{SIZE} x {SIZE} pixels, {SAMPLES} samples, beams alone.\n\n{markdown.table(rows)}"
-    sides, screens = (64, 128, 256, 512), (64, 128, 256)
-    costs = [("rays", *(f"{screen}² pixels" for screen in screens))]
+    costs = [("rays", *(f"{screen}² pixels" for screen in SCREENS))]
     scene = prepared("W1 glass ball")
-    for side in sides:
-        costs.append((f"{side}²", *(f"{stage_milliseconds(scene, side, screen):.0f}" for screen in screens)))
+    for side in SIDES:
+        costs.append((f"{side}²", *(f"{stage_milliseconds(scene, side, screen):.0f}" for screen in SCREENS)))
         print(*costs[-1], sep="  ", flush=True)
     lamps = [("lamps", "ms")]
     for count in (1, 2, 4):
@@ -155,8 +155,8 @@ def page(pictures=None) -> str:
             copy = first.copy()
             scene.collection.objects.link(copy)
             copy.location.x += 0.4 * sum(one.type == "LIGHT" for one in scene.objects)
-        lamps.append((str(count), f"{stage_milliseconds(scene, 128, 128):.0f}"))
+        lamps.append((str(count), f"{stage_milliseconds(scene, 64, 64):.0f}"))
         print(*lamps[-1], sep="  ", flush=True)
     text += "\n\nMilliseconds of the stage, one sample of W1 on a software GPU, by rays and by pixels:\n\n"
-    text += markdown.table(costs) + "\n\nand by lamps, 128² rays each, 128² pixels:\n\n" + markdown.table(lamps)
+    text += markdown.table(costs) + "\n\nand by lamps, 64² rays each, 64² pixels:\n\n" + markdown.table(lamps)
     return text
