@@ -138,8 +138,8 @@ def test_a_medium_that_only_shines_lights_a_floor_as_lamps_do(stage):
     places = (np.indices((40, 40, 40)).reshape(3, -1).T + 0.5) / 40 * (high - low) + low
     squared = (places**2).sum(axis=1)
     irradiance = (2.0 * places[:, 2] / squared**1.5).mean() * np.prod(high - low)
-    middle = seen["diffuse_direct"][6:10, 6:10, :3].mean()
-    assert middle == pytest.approx(0.5 * irradiance / np.pi, rel=0.05)
+    middle = seen["diffuse_direct"][6:10, 6:10, :3].mean()  # without the surface's colour, as in files
+    assert middle == pytest.approx(irradiance / np.pi, rel=0.05)
     assert not seen["diffuse_indirect"][..., :3].any()
 
 
