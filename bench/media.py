@@ -36,6 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--page", action="store_true", help="write the tables into docs/media.md, scene by scene")
     parser.add_argument("--motion", type=int, default=0, metavar="FRAMES", help="frames of a moving lamp instead")
     parser.add_argument("--shafts", action="store_true", help="volume caustics beside light tracing instead")
+    parser.add_argument("--costs", action="store_true", help="with --shafts: their times, too")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -49,7 +50,7 @@ def command(options: argparse.Namespace) -> int:
         from bench import shafts
 
         mark = MOTION if options.motion else shafts.COMMAND
-        text = motion(options.motion) if options.motion else shafts.page(options.pictures)
+        text = motion(options.motion) if options.motion else shafts.page(options.pictures, options.costs)
         print(text)
         if options.page:
             markdown.put_between(PAGE, mark, text)

@@ -17,7 +17,8 @@ from bench.shaft_truth import Fog
 
 COMMAND = "python -m bench media --shafts --page"
 SIZE, SAMPLES, TRACED = 48, 4, 20_000
-SIDES, SCREENS = (32, 64, 128), (64, 128, 256)  # of the rays' square and of the picture, for costs
+RAYS = 32, 64  # a side of the lamp's square
+SIDES, SCREENS = (32, 64, 128), (64, 128, 256)  # of rays and of the picture, for costs
 HEAD = ("scene", "rays", "profile, % of peak", "energy")
 CUBE = np.full(3, -2.0), np.full(3, 2.0)
 SPOT = 1 / (4 * np.pi)  # W/sr of a watt
@@ -128,14 +129,14 @@ def stage_milliseconds(scene, rays: int, size: int, samples: int = 2) -> float:
     return float(np.median(times[1:]))
 
 
-def page(pictures=None) -> str:
-    """The tables of profiles and of costs."""
+def page(pictures=None, with_costs: bool = False) -> str:
+    """The table of profiles, and on a machine that is idle those of costs."""
     rows = [HEAD]
     for name in TRUTHS:
-        for rays in SIDES:
+        for rays in RAYS:
             seen, truth, shown, expected = profiles(name, rays)
             error, energy = figures(seen, truth)
-            rows.append((name if rays == SIDES[0] else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
+            rows.append((name if rays == RAYS[0] else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
             print(*rows[-1], sep="  ", flush=True)
         if pictures is not None:
             from bench.media import _save
@@ -143,11 +144,16 @@ def page(pictures=None) -> str:
             both = (np.repeat(image[..., None], 3, axis=2) for image in (shown, expected))
             _save(pictures / f"shaft {name}.png".replace(" ", "_"), *both)
     text = f"{SIZE} x {SIZE} pixels, {SAMPLES} samples, beams alone.\n\n{markdown.table(rows)}"
-    costs = [("rays", *(f"{screen}² pixels" for screen in SCREENS))]
+    return text + costs() if with_costs else text
+
+
+def costs() -> str:
+    """The tables of the stage's time by rays, pixels and lamps."""
+    rows = [("rays", *(f"{screen}² pixels" for screen in SCREENS))]
     scene = prepared("W1 glass ball")
     for side in SIDES:
-        costs.append((f"{side}²", *(f"{stage_milliseconds(scene, side, screen):.0f}" for screen in SCREENS)))
-        print(*costs[-1], sep="  ", flush=True)
+        rows.append((f"{side}²", *(f"{stage_milliseconds(scene, side, screen):.0f}" for screen in SCREENS)))
+        print(*rows[-1], sep="  ", flush=True)
     lamps = [("lamps", "ms")]
     for count in (1, 2, 4):
         while sum(one.type == "LIGHT" for one in scene.objects) < count:
@@ -157,6 +163,6 @@ def page(pictures=None) -> str:
             copy.location.x += 0.4 * sum(one.type == "LIGHT" for one in scene.objects)
         lamps.append((str(count), f"{stage_milliseconds(scene, 64, 64):.0f}"))
         print(*lamps[-1], sep="  ", flush=True)
-    text += "\n\nMilliseconds of the stage, one sample of W1 on a software GPU, by rays and by pixels:\n\n"
-    text += markdown.table(costs) + "\n\nand by lamps, 64² rays each, 64² pixels:\n\n" + markdown.table(lamps)
+    text = "\n\nMilliseconds of the stage, one sample of W1 on a software GPU, by rays and by pixels:\n\n"
+    text += markdown.table(rows) + "\n\nand by lamps, 64² rays each, 64² pixels:\n\n" + markdown.table(lamps)
     return text
