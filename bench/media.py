@@ -36,6 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--page", action="store_true", help="write the tables into docs/media.md, scene by scene")
     parser.add_argument("--motion", type=int, default=0, metavar="FRAMES", help="frames of a moving lamp instead")
     parser.add_argument("--shafts", action="store_true", help="volume caustics beside light tracing instead")
+    parser.add_argument("--costs", action="store_true", help="with --shafts: their times, too")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -49,7 +50,7 @@ def command(options: argparse.Namespace) -> int:
         from bench import shafts
 
         mark = MOTION if options.motion else shafts.COMMAND
-        text = motion(options.motion) if options.motion else shafts.page(options.pictures)
+        text = motion(options.motion) if options.motion else shafts.page(options.pictures, options.costs)
         print(text)
         if options.page:
             markdown.put_between(PAGE, mark, text)
@@ -67,6 +68,7 @@ def command(options: argparse.Namespace) -> int:
 
 def measured(scene, name: str, options) -> list[tuple[str, ...]]:
     """Rows of the table for the open scene."""
+    from addon.compare.metrics import compare_radiance
     from addon.compare.reference import render_passes
 
     def render(engine: str, samples: int, seed: int, denoised: bool = False):
@@ -78,6 +80,10 @@ def measured(scene, name: str, options) -> list[tuple[str, ...]]:
     first, second = (render("CYCLES", options.reference, seed).images for seed in (1, 2))
     mean = {key: (first[key] + second[key]) / 2 for key in first}
     half = {key: (first[key] - second[key]) / 2 for key in first}
+    truth = mean["combined"][..., :3]
+    noise = compare_radiance("combined", truth, truth, half["combined"][..., :3]).floor
+    width, height = options.size
+    scene_name = f"{name} ({width} x {height}, {options.reference}, {noise:.4f})"
     rows = []
     entrants = [("Candela", "CANDELA", 1, False), ("Candela", "CANDELA", 16, False)]
     entrants += [("Cycles", "CYCLES", 16, False)]
@@ -94,7 +100,7 @@ def measured(scene, name: str, options) -> list[tuple[str, ...]]:
         for path in ("combined", "volume_direct", "volume_indirect"):
             alone = engine == "BLENDER_EEVEE" or denoised
             figures += _figures(seen.images, mean, half, path) if path == "combined" or not alone else ("", "")
-        rows.append((f"{name} ({options.reference})" if not rows else "", label, str(samples), *figures))
+        rows.append((scene_name if not rows else "", label, str(samples), *figures))
     if options.pictures:
         _save(options.pictures / f"{name.replace(' ', '_')}.png", picture["combined"], mean["combined"])
     return rows
@@ -201,10 +207,10 @@ def kept(document: str, added: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
 
 def page(rows: list[tuple[str, ...]], options) -> str:
     """The table, and what it is of."""
-    width, height = options.size
-    text = f"""Pictures of {width} x {height} pixels, {options.bounces} bounces in all engines but EEVEE, against two
-renders by Cycles of as many samples as stand behind the scene's name, whose noise is taken off the errors (relMSE).
-Candela and EEVEE draw on a software GPU. EEVEE has no such bounces: its bias is partly that.
+    text = f"""{options.bounces} bounces in all engines but EEVEE, against the mean of two renders by Cycles. Behind
+the scene's name: pixels, samples of each of the two, and the relMSE of their mean by its own noise, which is taken off
+the errors; what is below it says little. Candela and EEVEE draw on a software GPU. EEVEE has no such bounces: its bias
+is partly that.
 
 """
     return text + markdown.table([HEAD, *rows])

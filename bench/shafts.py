@@ -8,13 +8,17 @@ truth's peak. Times are what the ledger tells of the stage, of one sample.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from bench import markdown, media_scenes, shaft_truth
 from bench.shaft_truth import Fog
 
 COMMAND = "python -m bench media --shafts --page"
-SIZE, SAMPLES, TRACED = 64, 16, 20_000
+SIZE, SAMPLES, TRACED = 48, 4, 20_000
+RAYS = 32, 64  # a side of the lamp's square
+SIDES, SCREENS = (32, 64, 128), (64, 128, 256)  # of rays and of the picture, for costs
 HEAD = ("scene", "rays", "profile, % of peak", "energy")
 CUBE = np.full(3, -2.0), np.full(3, 2.0)
 SPOT = 1 / (4 * np.pi)  # W/sr of a watt
@@ -89,6 +93,12 @@ def prepared(name: str):
     return scene
 
 
+@cache
+def truth_of(name: str, matrix: tuple[float, ...], angle: float, size: int) -> np.ndarray:
+    """(size, size) radiance; `matrix`: the camera's, row by row."""
+    return TRUTHS[name](np.array(matrix).reshape(4, 4), angle, size)
+
+
 def profiles(name: str, rays: int, samples: int = SAMPLES, size: int = SIZE):
     """(size,) of the beams and of their truth across the picture, and both pictures."""
     from addon.compare.reference import render_passes
@@ -96,8 +106,7 @@ def profiles(name: str, rays: int, samples: int = SAMPLES, size: int = SIZE):
     scene = prepared(name)
     scene.candela.volume_caustics_rays = rays
     shown = render_passes(scene, "CANDELA", samples, 1, size=(size, size), bounces=1).images["volume_indirect"][..., 0]
-    camera = scene.camera
-    truth = TRUTHS[name](np.array(camera.matrix_world), camera.data.angle, size)
+    truth = truth_of(name, tuple(np.array(scene.camera.matrix_world).ravel()), scene.camera.data.angle, size)
     low, high = (round(share * size) for share in ROWS.get(name, BELOW))
     return shown[low:high].mean(axis=0), truth[low:high].mean(axis=0), shown, truth
 
@@ -120,14 +129,14 @@ def stage_milliseconds(scene, rays: int, size: int, samples: int = 2) -> float:
     return float(np.median(times[1:]))
 
 
-def page(pictures=None) -> str:
-    """The tables of profiles and of costs."""
+def page(pictures=None, with_costs: bool = False) -> str:
+    """The table of profiles, and on a machine that is idle those of costs."""
     rows = [HEAD]
     for name in TRUTHS:
-        for rays in (96, 192, 384):
+        for rays in RAYS:
             seen, truth, shown, expected = profiles(name, rays)
             error, energy = figures(seen, truth)
-            rows.append((name if rays == 96 else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
+            rows.append((name if rays == RAYS[0] else "", f"{rays}²", f"{100 * error:.1f}", f"{energy:.3f}"))
             print(*rows[-1], sep="  ", flush=True)
         if pictures is not None:
             from bench.media import _save
@@ -135,12 +144,16 @@ def page(pictures=None) -> str:
             both = (np.repeat(image[..., None], 3, axis=2) for image in (shown, expected))
             _save(pictures / f"shaft {name}.png".replace(" ", "_"), *both)
     text = f"{SIZE} x {SIZE} pixels, {SAMPLES} samples, beams alone.\n\n{markdown.table(rows)}"
-    sides, screens = (64, 128, 256, 512), (64, 128, 256)
-    costs = [("rays", *(f"{screen}² pixels" for screen in screens))]
+    return text + costs() if with_costs else text
+
+
+def costs() -> str:
+    """The tables of the stage's time by rays, pixels and lamps."""
+    rows = [("rays", *(f"{screen}² pixels" for screen in SCREENS))]
     scene = prepared("W1 glass ball")
-    for side in sides:
-        costs.append((f"{side}²", *(f"{stage_milliseconds(scene, side, screen):.0f}" for screen in screens)))
-        print(*costs[-1], sep="  ", flush=True)
+    for side in SIDES:
+        rows.append((f"{side}²", *(f"{stage_milliseconds(scene, side, screen):.0f}" for screen in SCREENS)))
+        print(*rows[-1], sep="  ", flush=True)
     lamps = [("lamps", "ms")]
     for count in (1, 2, 4):
         while sum(one.type == "LIGHT" for one in scene.objects) < count:
@@ -148,8 +161,8 @@ def page(pictures=None) -> str:
             copy = first.copy()
             scene.collection.objects.link(copy)
             copy.location.x += 0.4 * sum(one.type == "LIGHT" for one in scene.objects)
-        lamps.append((str(count), f"{stage_milliseconds(scene, 128, 128):.0f}"))
+        lamps.append((str(count), f"{stage_milliseconds(scene, 64, 64):.0f}"))
         print(*lamps[-1], sep="  ", flush=True)
-    text += "\n\nMilliseconds of the stage, one sample of W1 on a software GPU, by rays and by pixels:\n\n"
-    text += markdown.table(costs) + "\n\nand by lamps, 128² rays each, 128² pixels:\n\n" + markdown.table(lamps)
+    text = "\n\nMilliseconds of the stage, one sample of W1 on a software GPU, by rays and by pixels:\n\n"
+    text += markdown.table(rows) + "\n\nand by lamps, 64² rays each, 64² pixels:\n\n" + markdown.table(lamps)
     return text

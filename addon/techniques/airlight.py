@@ -94,8 +94,9 @@ def airlight_program(stride: int, kinds: int, world: bool) -> Program:
 
 
 @cache
-def indirect_program(stride: int, kinds: int, world: bool) -> Program:
-    """Finds the light that media scatter after other bounces, and that they bring to surfaces."""
+def indirect_program(stride: int, kinds: int, world: bool, shining: bool = True) -> Program:
+    """Finds the light that media scatter after other bounces, and that they bring to surfaces. `shining`: and apart
+    from it what comes there straight from media that shine."""
     return passes.fullscreen_program(
         f"airlight after bounces, stride {stride}",
         "media/indirect.frag.glsl",
@@ -104,8 +105,11 @@ def indirect_program(stride: int, kinds: int, world: bool) -> Program:
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
         constants=(*CONSTANTS, ("INT", "bounces")),
-        defines=_defines(stride, kinds, world),
-        outputs=(("VEC4", "out_indirect"), ("VEC4", "out_surface")),
+        defines=(*_defines(stride, kinds, world), *((("SHINING", "1"),) if shining else ())),
+        outputs=tuple(
+            ("VEC4", name)
+            for name in ("out_indirect", "out_surface", "out_straight", "out_straight_surface")[: 4 if shining else 2]
+        ),
     )  # fmt: skip
 
 
@@ -200,6 +204,7 @@ class Airlight(Technique):
         Write("radiance.volume_indirect", "RGBA32F", "Light that media scatter after other bounces", True),
         Write("radiance.volume_emission", "RGBA32F", "Light that media emit"),
         Write("radiance.diffuse_indirect", "RGBA32F", "Light that media scatter onto diffuse surfaces", True),
+        Write("radiance.diffuse_direct", "RGBA32F", "Light that diffuse surfaces receive from media that shine", True),
     )
 
     def __init__(self):
@@ -235,11 +240,13 @@ class Airlight(Technique):
         )  # fmt: skip
         frame.count(self, "light samples", lit.rows)
         bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
-        if bounces and media.media.scatters:
+        if bounces and (media.media.scatters or media.media.emits):
             self._reflectance.update(frame)
+            shining = media.media.emits
             names = "radiance.volume_indirect", "radiance.diffuse_indirect"
+            names += ("radiance.volume_direct", "radiance.diffuse_direct") if shining else ()
             yield from self._add(
-                frame, indirect_program(COARSE if coarse_after else 1, kinds, world), names,
+                frame, indirect_program(COARSE if coarse_after else 1, kinds, world, shining), names,
                 SPREAD_ON_SURFACES if coarse_after else None,
                 textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
                 blocks=blocks,
@@ -283,17 +290,17 @@ class Airlight(Technique):
         )  # fmt: skip
         frame.count(technique, "passes")
 
-    def _add(self, frame: Frame, program: Program, names: tuple[str, str], spread: Program | None, **bindings):
-        """Draw a program's two outputs into sums, where it is asked at few pixels spread over all."""
-        target = frame.target(*names)
-        frame.count(self, "passes", 1 + (spread is not None))
+    def _add(self, frame: Frame, program: Program, names: tuple[str, ...], spread: Program | None, **bindings):
+        """Draw a program's outputs into sums, where it is asked at few pixels spread over all, two by two."""
+        frame.count(self, "passes", 1 + (len(names) // 2 if spread is not None else 0))
         if spread is None:
+            target = frame.target(*names)
             for band in frame.bands(self, names[0]):
                 passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
                 yield
             return
         size = tuple(-(-side // COARSE) for side in frame.size)
-        found = tuple(images.pool.take(*size, "RGBA32F") for _ in range(2))
+        found = tuple(images.pool.take(*size, "RGBA32F") for _ in names)
         passes.fullscreen(program, images.Target(found), **bindings)
         yield
         read = {name: frame.images[name.replace("_", ".", 1)] for _, name in spread.textures if "surface" in name}
@@ -308,14 +315,15 @@ class Airlight(Technique):
             )  # fmt: skip
             read["airlight_guide"] = found[2]
             frame.count(self, "passes")
-        passes.fullscreen(
-            spread, target, blend="ADDITIVE_PREMULT",
-            textures={
-                **read, "coarse_direct": found[0], "coarse_emission": found[1],
-                **{name: bindings["textures"][name] for _, name in ATTENUATION_TEXTURES},
-            },
-            blocks={"film_view": frame.view_block}, constants={"shown_pixel": bindings["constants"]["shown_pixel"]},
-        )  # fmt: skip
+        for k in range(0, len(names), 2):
+            passes.fullscreen(
+                spread, frame.target(*names[k : k + 2]), blend="ADDITIVE_PREMULT",
+                textures={
+                    **read, "coarse_direct": found[k], "coarse_emission": found[k + 1],
+                    **{name: bindings["textures"][name] for _, name in ATTENUATION_TEXTURES},
+                },
+                blocks={"film_view": frame.view_block}, constants={"shown_pixel": bindings["constants"]["shown_pixel"]},
+            )  # fmt: skip
         for image in found:
             images.pool.give(image)
 

@@ -91,7 +91,7 @@ Around around_row(int number, vec2 u, vec3 origin, vec3 direction, float begin, 
   vec3 point = origin;
   float size = 0.0;
   around.round_lamp = false;
-  if (number < light_count) {
+  if (number >= 0 && number < light_count) {
     Light light = light_at(light_read(number), u);
     far = LIGHT_IS(light, LIGHT_SUN) || LIGHT_IS(light, LIGHT_DIRECTION);
     around.round_lamp = LIGHT_IS(light, LIGHT_POINT) || LIGHT_IS(light, LIGHT_SPHERE);

@@ -87,10 +87,12 @@ vec3 stop_sends(Stop stop, vec3 way, float density, uint seed)
 }
 
 // What a walk brings back that sets out from a stop with this weight, of row `number` of lights. `media_only`: a surface that
-// it meets first ends it.
-vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, vec2 first_turn, inout uint seed)
+// it meets first ends it. `straight`: what comes straight from media that shine, as light of lamps does.
+vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, vec2 first_turn, inout uint seed,
+          out vec3 straight)
 {
   vec3 sum = vec3(0.0);
+  straight = vec3(0.0);
   LampRays rays = lamp_rays(number, ask_turn);
   bool lit_exists = false;
   vec3 lit = vec3(0.0);  // the surface where a ray of the lamp ends
@@ -157,7 +159,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     int k = -1;
     float t = wanted;
     if (doing == GO_ON) {
-      sum += found_aim ? vec3(0.0) : passed / (lobe * (1.0 - aimed)) * bins.emitted;
+      vec3 shines = found_aim ? vec3(0.0) : passed / (lobe * (1.0 - aimed)) * bins.emitted;
+      straight += (bounce == 0) ? shines : vec3(0.0);
+      sum += (bounce == 0) ? vec3(0.0) : shines;
       if (!scattered && (found_aim || !at_surface)) {
         break;
       }
@@ -184,10 +188,10 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       density = (aimed > 0.0) ? mix(density, lamp_rays_density(rays, from, way, t), aimed) : density;
       position += t * way;
       arrives = passed * bin_passing(bins, k, t) / max(density, 1e-30);
-      if (doing == LOOK) {
+      if (doing == LOOK && number >= 0) {
         asked = ask_scattered(number, bins.media[k], position, -way, ask_turn, seed);
       }
-      else {
+      else if (doing != LOOK) {
         weight = arrives;
         arrives = vec3(0.0);
         stop.inside = bins.media[k];
@@ -261,6 +265,10 @@ void main()
   out_indirect.w = min(ray.limit, 1e18);
   out_surface.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
 #endif
+#ifdef SHINING
+  out_straight = out_indirect;
+  out_straight_surface = out_surface;
+#endif
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   Surface s = SURFACE_READ(pixel);
   int number = min(int(shuffled(film_view.sample_index, salt.zx) * float(ROWS_ASKED)), ROWS_ASKED - 1);
@@ -303,13 +311,23 @@ void main()
       weight = (STRIDE > 1) ? vec3(1.0) : s.diffuse;
     }
     if (max_component(weight) > 0.0) {
-      vec3 found = finite_sum(walk(stop, weight, number, ask_turn, from_surface, u, seed));
+      vec3 straight;
+      vec3 found = finite_sum(walk(stop, weight, number, ask_turn, from_surface, u, seed, straight));
       if (from_surface) {
         out_surface.rgb = found;
       }
       else {
         out_indirect.rgb = found;
       }
+#ifdef SHINING
+      straight = finite_sum(straight);
+      if (from_surface) {
+        out_straight_surface.rgb = straight;
+      }
+      else {
+        out_straight.rgb = straight;
+      }
+#endif
     }
   }
 }

@@ -126,6 +126,23 @@ def test_a_medium_shines_as_the_integral_of_what_it_emits(stage):
     assert seen == pytest.approx(np.array([3, 2, 1]) / 0.5 * (1 - np.exp(-1.0)), rel=1e-3)
 
 
+@pytest.mark.slow
+def test_a_medium_that_only_shines_lights_a_floor_as_lamps_do(stage):
+    stage.camera_above(span=1.0)
+    stage.floor(material=stage.diffuse(0.5))
+    made = volume(stage, "ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0, 0, 0),
+                  Scatter_Coefficients=(0, 0, 0), Emission_Coefficients=(2.0, 2.0, 2.0))  # fmt: skip
+    low, high = np.array([0.5, -0.5, 0.5]), np.array([1.5, 0.5, 1.5])
+    box(stage, made, low, high)
+    seen = stage.render(64, size=(16, 16), bounces=1)
+    places = (np.indices((40, 40, 40)).reshape(3, -1).T + 0.5) / 40 * (high - low) + low
+    squared = (places**2).sum(axis=1)
+    irradiance = (2.0 * places[:, 2] / squared**1.5).mean() * np.prod(high - low)
+    middle = seen["diffuse_direct"][6:10, 6:10, :3].mean()  # without the surface's colour, as in files
+    assert middle == pytest.approx(irradiance / np.pi, rel=0.05)
+    assert not seen["diffuse_indirect"][..., :3].any()
+
+
 def airlight(origin, direction, far, light, intensity, scattering, extinction, steps=20001):
     """Single scattering of an isotropic point light in even isotropic fog, by quadrature in the angle."""
     along = (light - origin) @ direction
