@@ -139,7 +139,12 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   float level = max(1.0 - rise * rise, 1e-6);
   float falling = curvature * level * g.height;
   if (falling > 0.0 && rise * rise < 2.0 * falling) {
-    float part = below / g.height;
+    // All rays above one place of the crest ask for what stands there, so that what covers one of them covers those below.
+    vec2 crown = (rise / (curvature * level)) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
+    ivec2 cell = ivec2(fract(texel / float(g.side) - crown) * float(g.side));
+    cell = clamp(cell, ivec2(0), ivec2(g.side - 1));
+    int there = grass_places(g) + GRASS_PLACE * ((picture * g.side + cell.y) * g.side + cell.x);
+    float part = 1.0 - clamp(grass_texel(there).w, 0.0, 1.0);
     float slope = taken.z * g.taller / length(vec3(taken.xy, taken.z * g.taller));
     float steep = rise * rise / falling;
     if (part * part * part > 0.8 * slope * steep * steep * rise / falling) {
