@@ -46,10 +46,11 @@ def command(options: argparse.Namespace) -> int:
 
     register()
     known = {"compression": compression, "pictures": pictures, "outline": outline, "shadows": shadows, "time": times}
-    text = "\n\n".join(known[part](options) for part in options.parts)
-    print(text)
-    if options.page:
-        markdown.put_between(PAGE, COMMAND, text)
+    for part in options.parts:
+        text = known[part](options)
+        print(f"{text}\n", flush=True)
+        if options.page:
+            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
     return 0
 
 
@@ -217,9 +218,9 @@ def pictures(options: argparse.Namespace) -> str:
 
 
 HILL = 5.0  # m, radius of a cylinder along x whose top is the origin
-HILL_ROWS, HILL_COLUMNS = range(-9, 12), range(-4, 4)  # tiles on it
-OUTLINE_SIZE, OUTLINE_WIDTH = (256, 64), 1.6  # pixels as large as the meadow's texels
-LOOKING_DOWN = (2.0, 10.0, 20.0)  # degrees
+HILL_ROWS, HILL_COLUMNS = range(-9, 12), range(-3, 3)  # tiles on it
+OUTLINE_SIZE, OUTLINE_WIDTH = (128, 64), 0.8  # two tiles; pixels as large as the meadow's texels
+LOOKING_DOWN = (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0)  # degrees; each has another row of the tile on the crest
 
 
 def hill(patch: bool) -> None:
@@ -283,15 +284,15 @@ def outline_of(engine: str, samples: int, down: float, to: Path | None) -> np.nd
 
 def outline(options: argparse.Namespace) -> str:
     found = {}
-    for patch, engine, samples in ((True, "CANDELA", 64), (False, "CYCLES", 64)):
+    for patch, engine in ((True, "CANDELA"), (False, "CYCLES")):
         for down in LOOKING_DOWN:
             hill(patch)
-            found[engine, down] = outline_of(engine, samples, down, options.pictures)
+            found[engine, down] = outline_of(engine, 32, down, options.pictures)
     rows = [["seen from above by", "mean, mm", "Cycles", "ratio", "deviation, mm", "Cycles", "ratio"]]
-    for down in LOOKING_DOWN:
-        mine, true = found["CANDELA", down], found["CYCLES", down]
-        rows.append([f"{down:.0f} degrees"])
-        for a, b in ((mine.mean(), true.mean()), (mine.std(), true.std())):
+    for label, angles in (*((f"{down:.0f} degrees", (down,)) for down in LOOKING_DOWN), ("all", LOOKING_DOWN)):
+        mine, true = (np.stack([found[engine, down] for down in angles]) for engine in ("CANDELA", "CYCLES"))
+        rows.append([label])
+        for a, b in ((mine.mean(), true.mean()), (mine.std(axis=1).mean(), true.std(axis=1).mean())):
             rows[-1] += [f"{1000 * a:.1f}", f"{1000 * b:.1f}", f"{a / b:.2f}"]
     return f"**Outline of a hill of 5 m above its ground**\n\n{markdown.table(rows)}"
 

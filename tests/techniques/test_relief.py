@@ -435,7 +435,7 @@ def test_a_mirror_shows_the_relief(stage):
         stage.light("SUN", turn=(0, -1.1, 0), angle=0.0)
         stage.camera((0, -4.11, 2), (np.pi - 0.6, 0, 0), 0.45)
         image = stage.render(16, (48, 48), bounces=1)["combined"][..., 0]
-        said[mode] = any("no outline" in note.text for note in latest().notes)
+        said[mode] = any("without outline" in note.text for note in latest().notes)
         return image
 
     said = {}
