@@ -15,7 +15,6 @@ from addon.grass.compression import LUMA
 from addon.grass.directions import Rings
 from addon.grass.generate import field_of
 from addon.techniques.grass import SHIPPED
-from bench import grass as figures
 
 MEADOW = Recipe(0.4, 0.1, 1300, 3)  # of the shipped patch
 ALBEDO = np.array([0.1, 0.3, 0.05])
@@ -295,15 +294,6 @@ def test_flat_ground_has_no_outline_of_its_own(stage):
     sun(stage, 40, 20)
     towards(stage, 80, 10, 1.0)
     assert stage.render(1, (32, 32))["combined"][..., 3].min() == 1.0
-
-
-def test_the_outline_of_a_hill_is_that_of_blades(registered):
-    found = {}
-    for engine in ("CANDELA", "CYCLES"):
-        figures.hill(engine == "CANDELA")
-        found[engine] = figures.outline_of(engine, 16, 11.0, None)
-    assert found["CANDELA"].mean() == pytest.approx(found["CYCLES"].mean(), rel=0.05)
-    assert found["CANDELA"].std() > 0.5 * found["CYCLES"].std()  # figures of more places: docs/grass.md
 
 
 def test_far_away_it_is_the_tiles_mean(stage):
