@@ -7,6 +7,9 @@ so that a second run takes seconds.
 Pictures: the shipped patch beside the field of blades that it was made of, by Cycles: means and contrast (standard
 deviation of luminance over a row of the picture, or over a tile) for one sun. Time: Candela's second render of the same
 view, of the patch and of instanced blades.
+
+Outline: a hill against nothing, by the patch and by blades that stand on it: mean and deviation of how high
+the outline of the coverage stands above the ground's own.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ BLADES = (1, 4)  # times as many in a tile
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--parts", nargs="*", default=["compression", "pictures", "shadows", "time"])
+    parser.add_argument("--parts", nargs="*", default=["compression", "pictures", "outline", "shadows", "time"])
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what both showed as PNG")
     parser.add_argument("--page", action="store_true", help="write the tables into docs/grass.md")
 
@@ -42,11 +45,12 @@ def command(options: argparse.Namespace) -> int:
     from addon import register
 
     register()
-    known = {"compression": compression, "pictures": pictures, "shadows": shadows, "time": times}
-    text = "\n\n".join(known[part](options) for part in options.parts)
-    print(text)
-    if options.page:
-        markdown.put_between(PAGE, COMMAND, text)
+    known = {"compression": compression, "pictures": pictures, "outline": outline, "shadows": shadows, "time": times}
+    for part in options.parts:
+        text = known[part](options)
+        print(f"{text}\n", flush=True)
+        if options.page:
+            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
     return 0
 
 
@@ -169,6 +173,21 @@ def both(view, tiles: int, size=SIZE, to: Path | None = None) -> list[np.ndarray
     return found
 
 
+def over_meadow() -> None:
+    camera((0, -5.0, 1.7), (math.radians(70), 0, 0), angle=0.95)
+
+
+def varied_meadow(tiles: int) -> np.ndarray:
+    """The meadow by Candela with shifted tiles."""
+    import bpy
+
+    clear()
+    field(True, tiles)
+    bpy.data.materials["Soil"].candela.grass_varied = True
+    over_meadow()
+    return shown("CANDELA", 64)[0]
+
+
 def pictures(options: argparse.Namespace) -> str:
     rows = [["seen from", "mean / Cycles", "contrast / Cycles"]]
     for polar, azimuth in HELD_OUT:
@@ -176,22 +195,106 @@ def pictures(options: argparse.Namespace) -> str:
             lambda polar=polar, azimuth=azimuth: seen_from(polar, azimuth, 0.8), 14, (64, 64), options.pictures
         )
         rows.append([f"{polar:.0f} degrees", f"{mine.mean() / true.mean():.3f}", f"{mine.std() / true.std():.3f}"])
-    mine, true = both(lambda: camera((0, -5.0, 1.7), (math.radians(70), 0, 0), angle=0.95), 24, SIZE, options.pictures)
+    mine, true = both(over_meadow, 24, SIZE, options.pictures)
+    varied = varied_meadow(24)
     height, width = mine.shape
     up = np.tan(0.95 / 2) * (2 * (np.arange(height) + 0.5) - height) / width
     polar = 70.0 + np.degrees(np.arctan(up))  # of the view along each row, from straight down
-    meadow = [["rows seen from", "mean / Cycles", "farthest row", "contrast / Cycles"]]
+    meadow = [
+        ["rows seen from", "mean / Cycles", "farthest row", "contrast / Cycles", "tiles varied: mean", "contrast"]
+    ]
     for low, high in ((40, 60), (60, 70), (70, 75), (75, 80), (80, 82)):
         own = (polar >= low) & (polar < high)
         if own.any():
             row_means = mine[own].mean(axis=1) / true[own].mean(axis=1)
             contrast = mine[own].std(axis=1).mean() / true[own].std(axis=1).mean()
             farthest = row_means[np.abs(row_means - 1).argmax()]
-            whole = mine[own].mean() / true[own].mean()
-            meadow.append([f"{low} to {high} degrees", f"{whole:.3f}", f"{farthest:.3f}", f"{contrast:.3f}"])
+            meadow.append([f"{low} to {high} degrees", f"{mine[own].mean() / true[own].mean():.3f}", f"{farthest:.3f}"])
+            meadow[-1] += [f"{contrast:.3f}", f"{varied[own].mean() / true[own].mean():.3f}"]
+            meadow[-1] += [f"{varied[own].std(axis=1).mean() / true[own].std(axis=1).mean():.3f}"]
     first = f"**A tile from directions that were not sampled, sun at 40 degrees**\n\n{markdown.table(rows)}"
     second = f"**A meadow from 1.7 m, by polar angle of its rows, sun at 40 degrees**\n\n{markdown.table(meadow)}"
     return f"{first}\n\n{second}"
+
+
+HILL = 5.0  # m, radius of a cylinder along x whose top is the origin
+HILL_ROWS, HILL_COLUMNS = range(-9, 12), range(-3, 3)  # tiles on it
+OUTLINE_SIZE, OUTLINE_WIDTH = (128, 64), 0.8  # two tiles; pixels as large as the meadow's texels
+LOOKING_DOWN = (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0)  # degrees; each has another row of the tile on the crest
+
+
+def hill(patch: bool) -> None:
+    """Grass on a part of a cylinder, from the patch or of blades, each tile of which stands on its middle's tangent."""
+    import bpy
+
+    from addon.grass.generate import field_of
+
+    clear()
+    field(patch, 1)
+    bpy.data.objects.remove(bpy.data.objects["Ground"])
+    size, scene = recipe().size, bpy.context.scene
+    if not patch:
+        for copy in [one for one in scene.objects if one.instance_collection]:
+            bpy.data.objects.remove(copy)
+        field_of(recipe(), scene, range(1), ground=False)
+        (first,) = (one for one in scene.objects if one.instance_collection)
+        for row in HILL_ROWS:
+            angle = (row + 0.5) * size / HILL
+            for column in HILL_COLUMNS:
+                copy = first.copy()
+                copy.rotation_euler = (-angle, 0.0, 0.0)
+                back = 0.5 * size  # from the tile's middle to its corner, along the slope
+                y, z = HILL * math.sin(angle), HILL * (math.cos(angle) - 1.0)
+                copy.location = (column * size, y - back * math.cos(angle), z + back * math.sin(angle))
+                scene.collection.objects.link(copy)
+        bpy.data.objects.remove(first)
+    angles = np.linspace(HILL_ROWS[0] * size / HILL, (HILL_ROWS[-1] + 1) * size / HILL, 48)
+    sides = (HILL_COLUMNS[0] * size, (HILL_COLUMNS[-1] + 1) * size)
+    places = [(x, HILL * math.sin(a), HILL * (math.cos(a) - 1.0)) for a in angles for x in sides]
+    mesh = bpy.data.meshes.new("Hill")
+    mesh.from_pydata(places, [], [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(len(angles) - 1)])
+    mesh.shade_smooth()
+    mesh.materials.append(bpy.data.materials["Soil"])
+    scene.collection.objects.link(bpy.data.objects.new("Hill", mesh))
+    scene.render.film_transparent = True
+
+
+def outline_of(engine: str, samples: int, down: float, to: Path | None) -> np.ndarray:
+    """Metres of the picture's outline above that of the ground, by column, seen from `down` degrees above."""
+    import bpy
+
+    from addon.compare.reference import render_passes
+
+    angle = math.radians(down)
+    seen_from(90.0 - down, -90.0, OUTLINE_WIDTH)
+    bpy.context.scene.camera.location.y += HILL * math.sin(angle)
+    bpy.context.scene.camera.location.z += HILL * (math.cos(angle) - 1.0)
+    done = render_passes(bpy.context.scene, engine, samples, 1, size=OUTLINE_SIZE, bounces=0)
+    covered = done.images["combined"][..., 3]
+    if to:
+        from addon.compare.png import png
+
+        to.mkdir(parents=True, exist_ok=True)
+        shown = np.repeat(covered[::-1, :, None], 3, axis=2)
+        (to / f"outline_{engine.lower()}_{down:.0f}.png").write_bytes(png(np.uint8(255 * shown.clip(0, 1))))
+    height = OUTLINE_SIZE[1]
+    top = height - (covered[::-1] > 0.5).argmax(axis=0)  # rows below the outline
+    return (top - 0.5 * height) * OUTLINE_WIDTH / OUTLINE_SIZE[0]
+
+
+def outline(options: argparse.Namespace) -> str:
+    found = {}
+    for patch, engine in ((True, "CANDELA"), (False, "CYCLES")):
+        for down in LOOKING_DOWN:
+            hill(patch)
+            found[engine, down] = outline_of(engine, 32, down, options.pictures)
+    rows = [["seen from above by", "mean, mm", "Cycles", "ratio", "deviation, mm", "Cycles", "ratio"]]
+    for label, angles in (*((f"{down:.0f} degrees", (down,)) for down in LOOKING_DOWN), ("all", LOOKING_DOWN)):
+        mine, true = (np.stack([found[engine, down] for down in angles]) for engine in ("CANDELA", "CYCLES"))
+        rows.append([label])
+        for a, b in ((mine.mean(), true.mean()), (mine.std(axis=1).mean(), true.std(axis=1).mean())):
+            rows[-1] += [f"{1000 * a:.1f}", f"{1000 * b:.1f}", f"{a / b:.2f}"]
+    return f"**Outline of a hill of 5 m above its ground**\n\n{markdown.table(rows)}"
 
 
 PATH_FINE = 16  # texels of the map in a tile

@@ -58,6 +58,8 @@ COARSE = 0.04  # of the range of heights, see above
 MARGIN = 0.02  # of the range, above and below what was found
 THINNEST = 5e-5  # of the extent of a mesh
 APART = 8  # instances of a kind whose range is looked at
+MIRRORING = ("Anisotropic", "Metallic", "Glass", "Refraction", "Principled")  # after ShaderNodeBsdf
+SHARP = 0.15  # roughness up to which an outline in a mirror can be told
 MOST_IMAGES = 11  # of a material, beside the list of the shell and what programs add
 
 
@@ -72,6 +74,18 @@ def mode_of(material) -> str:
         return BUMP
     mode = own_of(material.own, "mode")
     return mode if mode != AUTO or material.graph.displacement_method != "BUMP" else BUMP
+
+
+def _mirrors(graph) -> bool:
+    """Whether a tree has a node that shows sharp reflections of other things."""
+    return any(
+        node.type.removeprefix("ShaderNodeBsdf") in MIRRORING
+        and (rough := node.inputs.get("Roughness")) is not None
+        and rough.link is None
+        and isinstance(rough.value, (int, float))
+        and rough.value < SHARP
+        for node in graph.nodes.values()
+    )
 
 
 @dataclass(frozen=True)
@@ -223,6 +237,9 @@ class Displacement:
                 text = f"Relief has room for {MOST_IMAGES} images; the material's vertices are moved instead."
                 notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))
                 mode = MESH
+            if mode == RELIEF and any(_mirrors(snapshot.materials[index].graph) for index in snapshot.used_materials):
+                text = "Mirrors and glass show its relief without outline and shadow: subdivide its mesh for both."
+                notes.append(Note(f"Material '{compiled.name}'", text, compiled.name))
             self.modes[k] = mode
         self.notes = tuple(notes)
 

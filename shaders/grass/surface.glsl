@@ -4,7 +4,6 @@
 // and depth are of one blade, and the mean over samples is the interpolation. Contrast and parallax: docs/grass.md.
 #include "grass/table.glsl"
 
-#define CREST_LENGTH 6.0  // by the height
 #ifndef GRASS_SAMPLE
 #define GRASS_SAMPLE film_view.sample_index
 #define GRASS_SEED film_view.seed
@@ -131,16 +130,26 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   GrassPlace shown = grass_place(g, place);
   float below = (1.0 - clamp(shown.mean.w, 0.0, 1.0)) * g.height;
 
-  // On a crest the ray climbs out of the grass again before it meets what it would have met on flat ground.
+  // On a crest the ground falls away from the ray, which climbs out of the grass again if it has met fewer blades by then than
+  // the picture's ray had when it met this one. How many stand in the way grows as the square of how far below the tips.
   vec3 ahead = safe_normalize(toward - up * dot(toward, up));
   vec2 steps = window_steps(ahead, point.geometric_normal);
   vec3 bend = steps.x * dFdx(world_normal) + steps.y * dFdy(world_normal);
   float curvature = dot(bend, ahead) / max(length(world_normal), 1e-20);
   float level = max(1.0 - rise * rise, 1e-6);
-  // Of gentle hills, where it would run far through grass before that, the curvature here says nothing about there.
-  bool crest = 2.0 * rise < CREST_LENGTH * g.height * curvature;
-  if (crest && below > rise * rise / (2.0 * curvature * level)) {
-    return false;
+  float falling = curvature * level * g.height;
+  if (falling > 0.0 && rise * rise < 2.0 * falling) {
+    // All rays above one place of the crest ask for what stands there, so that what covers one of them covers those below.
+    vec2 crown = (rise / (curvature * level)) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
+    ivec2 cell = ivec2(fract(texel / float(g.side) - crown) * float(g.side));
+    cell = clamp(cell, ivec2(0), ivec2(g.side - 1));
+    int there = grass_places(g) + GRASS_PLACE * ((picture * g.side + cell.y) * g.side + cell.x);
+    float part = 1.0 - clamp(grass_texel(there).w, 0.0, 1.0);
+    float slope = taken.z * g.taller / length(vec3(taken.xy, taken.z * g.taller));
+    float steep = rise * rise / falling;
+    if (part * part * part > 0.8 * slope * steep * steep * rise / falling) {
+      return false;
+    }
   }
 
   // In a hollow the ground rises ahead, and the ray meets what stands there sooner than on flat ground.
