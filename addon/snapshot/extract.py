@@ -81,7 +81,7 @@ def take(
     """
     start = time.perf_counter()
     scene = depsgraph.scene_eval
-    notes: list[Note] = []
+    notes: list[Note] = _simplified(scene)
     working_space.follow(getattr(getattr(bpy.data, "colorspace", None), "working_space", working_space.REC709))
     if view is None:
         camera = camera or scene.camera
@@ -126,6 +126,18 @@ def take(
     )
     snapshot.sync_stats["seconds"] = time.perf_counter() - start
     return snapshot if around is None else with_motion(snapshot, *around)
+
+
+def _simplified(scene) -> list[Note]:
+    """What of Simplify is left out."""
+    cycles = getattr(scene, "cycles", None)  # there while the Cycles add-on is enabled
+    if scene.render.use_simplify and (
+        getattr(cycles, "use_camera_cull", False) or getattr(cycles, "use_distance_cull", False)
+    ):
+        return [
+            Note("Simplify", "what is outside of the view or far away is drawn all the same: culling is Cycles' own.")
+        ]
+    return []
 
 
 def _at_a_place(places: list[Place], notes: list[Note]) -> tuple[list[Place], np.ndarray]:

@@ -68,3 +68,11 @@ def test_the_snapshot_names_its_scene_and_says_what_it_cost(stage):
     assert snapshot.scene_name == stage.scene.name
     assert snapshot.sync_stats["meshes_read"] == 1
     assert snapshot.sync_stats["seconds"] > 0
+
+
+@pytest.mark.parametrize("setting", ["use_camera_cull", "use_distance_cull"])
+def test_culling_of_simplify_is_said_to_be_left_out(stage, setting):
+    setattr(stage.scene.cycles, setting, True)
+    assert not stage.take().notes
+    stage.scene.render.use_simplify = True
+    assert [note.subject for note in stage.take().notes] == ["Simplify"]
