@@ -8,13 +8,6 @@ STRESS ?= 2000
 VULKAN_TESTS := tests/gfx tests/kernels tests/materials/test_energy.py tests/materials/test_nodes.py tests/techniques/test_furnace.py tests/techniques/test_direct_light.py tests/techniques/test_film.py
 # Two processes: while one compiles shaders or runs Python, the other draws. More would only share a software GPU.
 PARALLEL := -n 2 --dist worksteal
-# Processes that draw thousands of scenes with a software driver grow until it fails (tests/conftest.py): each part has
-# new ones.
-define in_parts
-$(PYTHON) -m pytest $(PARALLEL) -m "$(1)" tests/techniques/test_[a-l]*
-$(PYTHON) -m pytest $(PARALLEL) -m "$(1)" tests/techniques/test_[m-z]*
-$(PYTHON) -m pytest $(PARALLEL) -m "$(1)" --ignore=tests/techniques
-endef
 
 ENVIRONMENT := $(if $(filter 5.2,$(BLENDER)),.venv,.venv-$(BLENDER))
 PYTHON := $(ENVIRONMENT)/bin/python
@@ -41,11 +34,11 @@ samples: ## write the sample scenes anew, with Blender 4.5, so that every suppor
 	.venv-4.5/bin/python sample_blends/make.py
 
 test: environment ## every test that needs no window
-	$(call in_parts,not window and not timing)
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing"
 	$(PYTHON) -m pytest -m timing
 
 test-fast: environment ## the tests that take seconds
-	$(call in_parts,not window and not timing and not slow)
+	$(PYTHON) -m pytest $(PARALLEL) -m "not window and not timing and not slow"
 	$(PYTHON) -m pytest -m "timing and not slow"
 
 test-vulkan: ## tests of what drivers do differently, with Blender 5.3 on Vulkan, and a picture of both backends compared

@@ -8,12 +8,6 @@ import pytest
 # Choices between methods do not depend on the clock of the machine that tests.
 os.environ.setdefault("CANDELA_DEVICE", "software")
 
-# For the processes that this one starts. Mesa's software rasteriser lets LLVM put code and its constants where the
-# process has room, and reaches the one from the other by 32 bits: more than 2 GiB apart, the process dies. The region
-# that both are in grew to 2.4 GiB within a tenth of the suite, and with these two to 1.6.
-os.environ.setdefault("MALLOC_MMAP_MAX_", "0")
-os.environ.setdefault("MALLOC_ARENA_MAX", "1")
-
 
 @pytest.fixture(scope="session")
 def gpu_context():

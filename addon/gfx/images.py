@@ -197,6 +197,12 @@ def _framebuffers() -> _Framebuffers:
     return _lasting if context.is_only_one() else _Framebuffers()
 
 
+def lasts() -> bool:
+    """Whether the current GPU context is one that goes on drawing after this picture, as far as that is known."""
+    own = getattr(_thread, "framebuffers", None)
+    return own is _lasting if own is not None else context.is_only_one()
+
+
 @contextmanager
 def passing_context():
     """For work in a GPU context that may end afterwards: framebuffers made inside are freed at the end."""

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import gpu
 
-from . import context
+from . import context, images
 from .context import on_picture, on_release
 from .device import loads_beat_fetches
 from .struct import Struct
@@ -136,13 +136,22 @@ def resolve(name: str, snippets: dict[str, str]) -> tuple[str, list[tuple[str, i
     return "\n".join(lines) + "\n", origin
 
 
+@dataclass
+class _Kept:
+    """What the driver holds of a program, which outlives its Shader until it may be freed."""
+
+    handle: object
+    lasts: bool = False  # drawn in a context that lasts
+
+
 class Shader:
     """A compiled program. `bind` sets everything it declares; forgetting a name or adding one is an error."""
 
     def __init__(self, program: Program):
         self.program = program
         self.handle = _compile(program)
-        weakref.finalize(self, _dropped.append, self.handle).atexit = False
+        self.kept = _Kept(self.handle)
+        weakref.finalize(self, _dropped.append, self.kept).atexit = False
         self.used = 0  # the last picture that asked for it
         handle, loaded = self.handle, program.loaded
         # By kind and name, how each is set; one that the driver dropped is not set again.
@@ -224,7 +233,10 @@ MOST_PROGRAMS = 128  # kept for later; a picture of usual scenes has 30 to 120
 _shaders: dict[Program, Shader] = {}
 # Handles of shaders that are no more. Python may collect garbage in any thread, and Blender 4.5 ends with a
 # segmentation fault where a thread without a GPU context frees a program: they wait here for one that draws.
-_dropped: list = []
+# Those that a lasting context has drawn wait for such a one. Freed by another one they are put aside for it, and when
+# Mesa (22.3, where drivers do not share programs) gets to them there, it takes away what is bound without remembering:
+# a later draw ends with a segmentation fault.
+_dropped: list[_Kept] = []
 compile_count = 0  # how many programs this process compiled; tests assert on its growth
 compile_seconds = 0.0  # what that took
 
@@ -238,6 +250,7 @@ def get(program: Program) -> Shader:
         shader = _shaders[program] = Shader(program)
         compile_seconds += time.perf_counter() - started
     shader.used = context.pictures
+    shader.kept.lasts |= images.lasts()
     return shader
 
 
@@ -267,9 +280,14 @@ def _free_old() -> None:
 
 
 def _free_dropped() -> None:
-    if _dropped:
-        gpu.shader.unbind()  # the last one that drew may be among them
-        _dropped.clear()
+    if not _dropped:
+        return
+    gpu.shader.unbind()  # the last one that drew may be among them
+    lasts = images.lasts()
+    for _ in range(len(_dropped)):  # others may come to the end meanwhile
+        one = _dropped.pop(0)
+        if one.lasts and not lasts:
+            _dropped.append(one)
 
 
 @on_release

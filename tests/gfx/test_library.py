@@ -146,6 +146,49 @@ def test_a_program_that_goes_in_another_thread_is_freed_in_one_that_draws(gpu_co
     assert not library._dropped
 
 
+def test_a_program_that_goes_in_a_final_renders_context_is_freed_where_it_was_drawn(gpu_context):
+    """Mesa ends with a segmentation fault otherwise, some draws later."""
+    import bpy
+
+    from addon.gfx import images, passes
+
+    def drawn(name):
+        program = passes.fullscreen_program(
+            name, "generated/main", outputs=(("VEC4", "out_color"),),
+            snippets=(("generated/main", f"void main() {{ out_color = vec4({len(name)}.0); }}"),),
+        )  # fmt: skip
+        passes.fullscreen(program, target)
+        return program
+
+    class Other(bpy.types.RenderEngine):
+        bl_idname, bl_label, bl_use_gpu_context = "CANDELA_OTHER", "Other", True
+
+        def render(self, depsgraph):
+            with images.passing_context():
+                del library._shaders[goes]
+                library._free_dropped()
+                waiting.append(len(library._dropped))
+
+    library._free_dropped()
+    waiting, target = [], images.Target((images.create(4, 4, "RGBA32F"),))
+    bpy.ops.wm.read_factory_settings()
+    bpy.utils.register_class(Other)
+    try:
+        render = bpy.context.scene.render
+        render.engine, render.resolution_x, render.resolution_y = Other.bl_idname, 16, 16
+        for _ in range(3):
+            goes, stays = drawn("other"), drawn("same")
+            images.read(target.colors[0])
+            bpy.ops.render.render()
+            images.read(target.colors[0])
+            drawn(stays.name)
+            assert images.read(target.colors[0])[0, 0, 0] == len(stays.name)
+    finally:
+        bpy.utils.unregister_class(Other)
+    library._free_dropped()
+    assert waiting == [1, 2, 3] and not library._dropped
+
+
 def test_a_program_that_failed_is_tried_again(gpu_context):
     for _ in range(2):
         with pytest.raises(ShaderError):
