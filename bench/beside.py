@@ -96,19 +96,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> int:
+    if not (options.checkout / "addon").is_dir():
+        print(f"{options.checkout} is no working tree of Candela: make one by `git worktree add`.", file=sys.stderr)
+        return 2
     versions = Version(options.checkout.resolve()), Version(ROOT)
-    rows = [
-        (
-            "scene",
-            "other, s of processor",
-            "this, s",
-            "ratio",
-            "ratio of seconds",
-            "other, ms a draft",
-            "this, ms",
-            "ratio",
-        )
-    ]
+    rows = [("scene", "other, s of processor", "this, s", "ratio", "ratio of seconds",
+             "other, ms a draft", "this, ms", "ratio")]  # fmt: skip
     slower = []
     for name in options.scenes:
         scene = SCENES / f"{name}.blend"

@@ -33,10 +33,11 @@ SAMPLES_OF_CYCLES = 192
 HELD_OUT = ((10.0, 40.0), (30.0, 200.0), (50.0, 100.0), (68.0, 310.0), (80.0, 10.0))  # degrees
 FIELD = 6  # tiles from the middle to a side, for times
 BLADES = (1, 4)  # times as many in a tile
+PARTS = ("compression", "pictures", "outline", "shadows", "time")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--parts", nargs="*", default=["compression", "pictures", "outline", "shadows", "time"])
+    parser.add_argument("--parts", nargs="*", choices=PARTS, default=PARTS)
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what both showed as PNG")
     parser.add_argument("--page", action="store_true", help="write the tables into docs/grass.md")
 
@@ -45,9 +46,9 @@ def command(options: argparse.Namespace) -> int:
     from addon import register
 
     register()
-    known = {"compression": compression, "pictures": pictures, "outline": outline, "shadows": shadows, "time": times}
+    made = dict(zip(PARTS, (compression, pictures, outline, shadows, times), strict=True))
     for part in options.parts:
-        text = known[part](options)
+        text = made[part](options)
         print(f"{text}\n", flush=True)
         if options.page:
             markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)

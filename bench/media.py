@@ -10,6 +10,7 @@ each, against more samples of each frame: error of a frame, and what is new in i
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> int:
+    if options.costs and not options.shafts:
+        print("--costs is about --shafts: give both.", file=sys.stderr)
+        return 2
     import bpy
 
     import addon

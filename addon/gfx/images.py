@@ -199,8 +199,7 @@ def _framebuffers() -> _Framebuffers:
 
 def lasts() -> bool:
     """Whether the current GPU context is one that goes on drawing after this picture, as far as that is known."""
-    own = getattr(_thread, "framebuffers", None)
-    return own is _lasting if own is not None else context.is_only_one()
+    return _framebuffers() is _lasting
 
 
 @contextmanager

@@ -250,7 +250,7 @@ def get(program: Program) -> Shader:
         shader = _shaders[program] = Shader(program)
         compile_seconds += time.perf_counter() - started
     shader.used = context.pictures
-    shader.kept.lasts |= images.lasts()
+    shader.kept.lasts = shader.kept.lasts or images.lasts()
     return shader
 
 
