@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .compression import LUMA
 from .patch import MOST_LUMA, MOST_RINGS, Patch
 
 WIDTH = 2048  # texels a row
-ENTRY, PICTURE, PLACE = 18, 5, 4  # texels
-VIEW_RINGS, LIGHT_RINGS, MAP, VARIED = 3, 11, 16, 17
+ENTRY, PICTURE, PLACE = 19, 5, 4  # texels
+VIEW_RINGS, LIGHT_RINGS, MAP, VARIED, HEIGHT_MAP = 3, 11, 16, 17, 18
 MOST_MAP = 256  # texels along a side of a density map
 ALIGNED = 16  # rows: the number of the first one is exact in a half float
 
@@ -24,7 +25,8 @@ ALIGNED = 16  # rows: the number of the first one is exact in a half float
 class Field:
     """How a material shows a patch. `size` of the tile and `height` of the blades in metres, `density` 0..1, and what
     it is multiplied by: `density_map` (H, W), row 0 at the lowest y, over a square of `map_size` metres; None for 1.
-    `varied`: places show the tile shifted at random (shaders/grass/surface.glsl)."""
+    `height_map`: the same for the height. `varied`: places show the tile shifted at random (grass/surface.glsl).
+    `tiles`: along the unit of a UV map, whose square the maps then cover; 0 where the object's axes place tiles."""
 
     patch: Patch
     size: float
@@ -33,6 +35,8 @@ class Field:
     density_map: np.ndarray | None = None
     map_size: float = 0.0
     varied: bool = False
+    height_map: np.ndarray | None = None
+    tiles: float = 0.0
 
 
 def table_of(fields: Sequence[Field]) -> np.ndarray:
@@ -50,12 +54,14 @@ def table_of(fields: Sequence[Field]) -> np.ndarray:
     head = np.zeros((first * WIDTH, 4), np.float32)
     for k, field in enumerate(fields):
         head[k * ENTRY : (k + 1) * ENTRY] = _entry(field, begins[id(field.patch)])
-        if field.density_map is not None:
-            shown = reduced(field.density_map)
+        for texel, values in ((MAP, field.density_map), (HEIGHT_MAP, field.height_map)):
+            if values is None:
+                continue
+            shown = reduced(values)
             taken = _aligned(-(-shown.size // WIDTH))
             parts.append(np.zeros((taken * WIDTH, 4), np.float32))
             parts[-1][: shown.size, 0] = shown.ravel()
-            head[k * ENTRY + MAP] = rows, shown.shape[1], shown.shape[0], field.map_size
+            head[k * ENTRY + texel] = rows, shown.shape[1], shown.shape[0], field.map_size
             rows += taken
     return np.concatenate([head, *parts]).reshape(-1, WIDTH, 4)
 
@@ -80,15 +86,31 @@ def _entry(field: Field, row: int) -> np.ndarray:
     slope = patch.height / patch.size
     rows = np.zeros((ENTRY, 4))
     rows[0] = row, patch.texels, patch.views.number, patch.lights.number
-    rows[1] = field.size, field.height, field.height / field.size / slope, field.density
+    rows[1] = field.size, field.height, field.density, 0.0
     rows[2] = patch.white, slope, len(patch.views.polar), len(patch.lights.polar)
-    rows[VARIED, 0] = field.varied
+    rows[VARIED, :2] = field.varied, field.tiles
     mean = patch.mean_heights()
     for start, rings, most in ((VIEW_RINGS, patch.views, MOST_RINGS[0]), (LIGHT_RINGS, patch.lights, MOST_RINGS[1])):
         for k, (polar, count, first) in enumerate(list(zip(rings.polar, rings.counts, rings.firsts))[:most]):
-            own = float(mean[first : first + count].mean()) if rings is patch.views else 0.0
+            own = float(mean[first : first + count].mean()) if rings is patch.views else float(k)
             rows[start + k] = polar, count, first, own
     return rows
+
+
+def powers(patch: Patch) -> np.ndarray:
+    """(V, MOST_RINGS - 1) p for each pair of rings of lights: a view's mean over them runs as i / (i + v)^p with the
+    cosines i of light and v of view; 0 as a plane's, 1 as that of leaves which scatter once. What rises towards the
+    normal, as light from behind the viewer does, has no such law and is 0."""
+    lights, means = patch.lights, patch.picture_mean[:, :-1] @ LUMA
+    rings = [means[:, first : first + count].mean(axis=1) for first, count in zip(lights.firsts, lights.counts)]
+    cosines = np.cos(np.radians(lights.polar))
+    seen = patch.views.vectors[:, 2]
+    found = np.zeros((patch.views.number, MOST_RINGS[1] - 1))
+    for k in range(len(rings) - 1):
+        (a, b), (i, j) = rings[k : k + 2], cosines[k : k + 2]
+        higher = np.log(np.maximum(b / j, 1e-9) / np.maximum(a / i, 1e-9))
+        found[:, k] = np.clip(higher / np.log((i + seen) / (j + seen)), 0.0, 1.5)
+    return found
 
 
 def _places(patch: Patch) -> np.ndarray:
@@ -116,4 +138,6 @@ def _pictures(patch: Patch) -> np.ndarray:
     rows[..., 4, :3], rows[..., 4, 3] = patch.ratio, patch.excess
     about = np.zeros((len(rows), 1, PICTURE, 4), np.float32)
     about[:, 0, 0, 0], about[:, 0, 0, 1] = patch.view_alike, patch.light_alike
+    about[:, 0, 0, 2] = patch.views.vectors[:, 2]
+    about[:, 0, 1, : MOST_RINGS[1] - 1] = powers(patch)
     return np.concatenate([rows, about], axis=1).reshape(-1, 4)

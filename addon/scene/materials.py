@@ -20,6 +20,7 @@ from ..materials.energy import energy_texture
 from ..materials.reader import FINE_LAYERS
 from ..materials.working_space import current
 from ..snapshot.scene import Note, Snapshot
+from . import uv_placed
 from .geometry import SceneGeometry
 from .projection import PROJECTION_CONSTANTS, PROJECTION_DEFINES
 from .textures import upload_texture
@@ -80,12 +81,12 @@ class MaterialSet:
         for material in snapshot.materials:
             versions = tuple((node.image, _version(snapshot, node.image)) for node in material.graph.nodes.values())
             cached = self._cache.get(material.key)
-            key = material.graph, versions, current().name
+            by_map = uv_placed.asks(material.own)
+            key = material.graph, versions, current().name, by_map
             if cached is None or cached[0] != key:
-                cached = (
-                    key,
-                    compile_material(material.name, material.graph, snapshot.images, lean=to_hold(True, False)),
-                )
+                lean = to_hold(True, False)
+                compiled = compile_material(material.name, material.graph, snapshot.images, lean=lean)
+                cached = key, uv_placed.with_map(compiled) if by_map else compiled
             cache[material.key] = cached
             compiled = cached[1]
             self.compiled.append(compiled)

@@ -7,9 +7,10 @@ things stand in the grass, its outline is of blades, and any number of them take
 J. Konttinen, S. Pattanaik, "Real-time rendering of realistic-looking grass", GRAPHITE 2005; Shah's thesis, 2007.
 
 The mesh is the ground; what is drawn is the plane on top of the blades, `height` above it along its normals. Tiles
-lie along the object's X and Y axes. Lamps, the world and meshes that shine light it in one loop (lighting/loop.py),
-with shadows of other things where the blade is; indirect light takes its albedo under a uniform sky. In depth maps it
-is a layer (lighting/visibility.py): blades as the light sees them, which shadow everything but grass.
+lie along the object's X and Y axes, or by a UV map, whose gradients say how the tile lies and how large it is.
+Lamps, the world and meshes that shine light it in one loop (lighting/loop.py), with shadows of other things where
+the blade is; indirect light takes its albedo under a uniform sky. In depth maps it is a layer
+(lighting/visibility.py): blades as the light sees them, which shadow everything but grass.
 
 | cost | |
 |---|---|
@@ -45,28 +46,31 @@ from ..grass.table import Field, table_of
 from ..lighting.grass import TABLE, GrassTable
 from ..lighting.visibility import Layer, Layers
 from ..materials.estimate import srgb_decode
+from ..scene import uv_placed
 from ..snapshot.scene import Material, Snapshot
 from ..surfaces.draw import StandIns
 
 NONE, MEADOW, FILE = "NONE", "MEADOW", "FILE"
+AXES, UV = "AXES", uv_placed.UV
+MAPS = "density_map", "height_map"
 SHIPPED = Path(__file__).resolve().parent.parent / "grass" / "meadow.grass"
 
 
 @cache
-def grass_program(surface: Program) -> Program:
-    """The program that draws a material's surface, for grass on it."""
+def grass_program(surface: Program, uv: int = -1) -> Program:
+    """The program that draws a material's surface, for grass on it; `uv`: its attribute that places tiles."""
     glsl = '#include "grass/surface.glsl"\n'
     others = tuple(one for one in surface.snippets if one[0] != "generated/own_surface")
     return replace(
         surface, name=f"{surface.name} grass", vertex="grass/surface.vert.glsl",
         textures=(*surface.textures, TABLE), constants=(*surface.constants, ("INT", "grass_entry")),
-        defines=(*surface.defines, ("OWN_CLOSURES", "")),
+        defines=(*surface.defines, ("OWN_CLOSURES", ""), *_placed(uv)),
         snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
     )  # fmt: skip
 
 
 @cache
-def grass_caster(caster: Program) -> Program:
+def grass_caster(caster: Program, uv: int = -1) -> Program:
     """The program that draws blades into depth maps, of one that draws a material that lets light pass."""
     glsl = '#include "grass/surface.glsl"\n'
     others = tuple(one for one in caster.snippets if one[0] != "generated/own_surface")
@@ -78,12 +82,17 @@ def grass_caster(caster: Program) -> Program:
         ("LAYER", ""),
         ("GRASS_SAMPLE", "sample_index"),
         ("GRASS_SEED", "0"),
+        *_placed(uv),
     )
     return replace(
         caster, name=f"{caster.name} grass", vertex="grass/surface.vert.glsl",
         textures=(*caster.textures, TABLE), constants=tuple(constants),
         defines=(*caster.defines, *own), snippets=(("generated/own_surface", glsl), *others), writes_depth=True,
     )  # fmt: skip
+
+
+def _placed(uv: int) -> tuple[tuple[str, str], ...]:
+    return (("GRASS_UV", str(uv)),) if uv >= 0 else ()
 
 
 class Grass(Technique):
@@ -110,6 +119,25 @@ class Grass(Technique):
             0.0, 1000.0, "DISTANCE", scope=MATERIAL,
         ),
         Param(
+            "height_map", "Height Map", "",
+            "Image that the height is multiplied by",
+            scope=MATERIAL, image=True,
+        ),
+        Param(
+            "placement", "Placement", AXES,
+            "What tiles and maps lie along",
+            scope=MATERIAL,
+            items=(
+                (AXES, "Object Axes", 0, "X and Y axes of the object: ground"),
+                (UV, "UV Map", 1, "The active UV map of the mesh, where it has one: any surface"),
+            ),
+        ),
+        Param(
+            "tiles", "Tiles", 10.0,
+            "Tiles along each side of the UV map's square, for placement by UV map",
+            0.001, 100000.0, scope=MATERIAL,
+        ),
+        Param(
             "varied", "Vary Tiles", False,
             "Shift the tile at random from place to place, so that repeats cannot be seen in large fields",
             scope=MATERIAL,
@@ -121,13 +149,13 @@ class Grass(Technique):
         ),
         Param(
             "density_map", "Density Map", "",
-            "Image that the density is multiplied by, seen from above",
+            "Image that the density is multiplied by",
             scope=MATERIAL, image=True,
         ),
         Param(
             "map_size", "Map Size", 10.0,
-            "Side length of the density map's square, around the object's origin along its X and Y axes; beyond it "
-            "the image's rim goes on",
+            "Side length of the square that maps cover around the object's origin, for placement by its axes; beyond "
+            "it the image's rim goes on",
             0.001, 100000.0, "DISTANCE", scope=MATERIAL,
         ),
     )  # fmt: skip
@@ -164,7 +192,7 @@ class Grass(Technique):
             tuple(
                 (
                     one.size, one.height, one.density, one.map_size, one.varied,
-                    _map_key(frame.snapshot, frame.snapshot.materials[material]),
+                    one.tiles, _map_keys(frame.snapshot, frame.snapshot.materials[material]),
                 )
                 for one, material in zip(fields, entries)
             ),
@@ -175,9 +203,10 @@ class Grass(Technique):
         table = self._table[1]
         stand_ins, layers = frame.shared(StandIns), frame.shared(Layers)
         for material, entry in entries.items():
-            program = grass_program(frame.materials.surface_program(material))
+            uv = uv_placed.map_of(frame.materials.compiled[material]) if fields[entry].tiles else -1
+            program = grass_program(frame.materials.surface_program(material), uv)
             stand_ins.of[material] = (program, {TABLE[1]: table}, {"grass_entry": entry})
-            caster = grass_caster(frame.materials.caster_program(material))
+            caster = grass_caster(frame.materials.caster_program(material), uv)
             layers.of[material] = Layer(caster, {TABLE[1]: table}, {"grass_entry": entry}, fields[entry].height)
         frame.shared(OwnPoint).needed = True
         frame.provide(GrassTable(table))
@@ -207,15 +236,19 @@ def _file(material: Material) -> Path:
     return Path(name)
 
 
-def _map_key(snapshot: Snapshot, material: Material) -> Hashable:
-    """Of the density map; None without one."""
-    image = snapshot.images.get(dict(material.own_images).get(f"{Grass.name}_density_map"))
+def _map_key(snapshot: Snapshot, material: Material, name: str) -> Hashable:
+    """Of one of MAPS; None without one."""
+    image = snapshot.images.get(dict(material.own_images).get(f"{Grass.name}_{name}"))
     return None if image is None or image.missing else (image.key, image.version)
 
 
-def _density_map(snapshot: Snapshot, material: Material) -> np.ndarray | None:
+def _map_keys(snapshot: Snapshot, material: Material) -> Hashable:
+    return tuple(_map_key(snapshot, material, name) for name in MAPS)
+
+
+def _map(snapshot: Snapshot, material: Material, name: str) -> np.ndarray | None:
     """(H, W) means of the channels, scene-linear for images that are sRGB."""
-    key = _map_key(snapshot, material)
+    key = _map_key(snapshot, material, name)
     if key is None:
         return None
     image = snapshot.images[key[0]]
@@ -230,7 +263,9 @@ def _field(snapshot: Snapshot, material: Material) -> Field:
     height = own_value(material.own, Grass, "height") or patch.height * size / patch.size
     density, reach = (own_value(material.own, Grass, name) for name in ("density", "map_size"))
     varied = bool(own_value(material.own, Grass, "varied"))
-    return Field(patch, size, height, density, _density_map(snapshot, material), reach, varied)
+    shares, heights = (_map(snapshot, material, name) for name in MAPS)
+    tiles = own_value(material.own, Grass, "tiles") if uv_placed.asks(material.own) else 0.0
+    return Field(patch, size, height, density, shares, reach, varied, heights, tiles)
 
 
 def _field_key(snapshot: Snapshot, material: Material) -> Hashable:
@@ -239,4 +274,4 @@ def _field_key(snapshot: Snapshot, material: Material) -> Hashable:
         changed = file.stat().st_mtime_ns
     except (PatchError, OSError):
         return None
-    return str(file), changed, material.own, _map_key(snapshot, material)
+    return str(file), changed, material.own, _map_keys(snapshot, material)

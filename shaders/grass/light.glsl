@@ -9,17 +9,26 @@ struct GrassSeen {
   GrassPlace place;
   int view;
   float contrast;
-  vec3 along;
-  vec3 across;
+  float alike;      // of pictures under neighbouring lights
+  float seen_rise;  // cosines of the view in the tile, of the picture and of the viewer
+  float view_rise;
+  vec3 along_x;
+  vec3 along_y;
 };
 
-GrassSeen grass_see(ivec2 pixel, Surface s)
+// A direction in the tile.
+vec3 grass_turned(GrassSeen seen, Surface s, vec3 direction)
+{
+  return safe_normalize(vec3(dot(direction, seen.along_x), dot(direction, seen.along_y), dot(direction, s.normal)));
+}
+
+GrassSeen grass_see(ivec2 pixel, Surface s, vec3 to_viewer)
 {
   GrassSeen seen;
   seen.exists = s.kind == SURFACE_GRASS;
   vec4 lobe = seen.exists ? surface_lobe_fetch(pixel) : vec4(0.0);
-  float turn = seen.exists ? surface_tint_fetch(pixel).w : 0.0;
-  seen.grass = grass_of(int(lobe.y + 0.5));
+  float axes = seen.exists ? surface_tint_fetch(pixel).w : 0.0;
+  seen.grass = grass_of(seen.exists ? int(lobe.z - float(SURFACE_GRASS) * 2097152.0 + 0.5) : 0);
   int place = int(lobe.x + 0.5);
   seen.place = grass_place(seen.grass, place);
   seen.view = place / (seen.grass.side * seen.grass.side);
@@ -27,8 +36,14 @@ GrassSeen grass_see(ivec2 pixel, Surface s)
   vec3 tangent;
   vec3 bitangent;
   orthonormal_basis(s.normal, tangent, bitangent);
-  seen.along = cos(turn) * tangent + sin(turn) * bitangent;
-  seen.across = cross(s.normal, seen.along);
+  vec2 of_x = grass_unpack(axes);
+  vec2 of_y = grass_unpack(lobe.y);
+  seen.along_x = of_x.x * tangent + of_x.y * bitangent;
+  seen.along_y = of_y.x * tangent + of_y.y * bitangent;
+  vec4 about = grass_texel(grass_picture(seen.grass, seen.view, seen.grass.lights + 1));
+  seen.alike = about.y;
+  seen.seen_rise = about.z;
+  seen.view_rise = clamp(grass_turned(seen, s, to_viewer).z, 0.02, 1.0);
   return seen;
 }
 
@@ -45,18 +60,24 @@ vec3 grass_reflection(GrassSeen seen, Surface s, vec3 direction)
   if (rise <= 0.0) {
     return vec3(0.0);
   }
-  vec3 light = grass_unstretched(g, vec3(dot(direction, seen.along), dot(direction, seen.across), rise));
+  vec3 light = grass_turned(seen, s, direction);
   vec4 low;
   vec4 high;
   float outer = grass_rings(g.entry + GRASS_LIGHT_RINGS, g.light_rings, light, low, high);
   vec3 inside = grass_azimuths(low, light);
   vec3 outside = grass_azimuths(high, light);
-  float alike = grass_texel(grass_picture(g, seen.view, g.lights + 1)).y;
   float squares = grass_squares(outer, inside.z, outside.z);
-  float contrast = seen.contrast * grass_contrast(squares, alike);
-  // What does not depend on the light's cosine is what varies little between lights.
+  float contrast = seen.contrast * grass_contrast(squares, seen.alike);
+  // Leaves that scatter once send i / (i + v), with i and v the cosines of light and view (Lommel and Seeliger); a plane sends i.
+  // Between two rings of lights the picture's mean follows i / (i + v)^p, and what is interpolated, over directions of light and
+  // of view, is how far pictures are from that.
   vec3 near = (1.0 - inside.z) * grass_under(seen, inside.x, contrast) + inside.z * grass_under(seen, inside.y, contrast);
   vec3 far = (1.0 - outside.z) * grass_under(seen, outside.x, contrast) + outside.z * grass_under(seen, outside.y, contrast);
-  vec3 sum = (1.0 - outer) / cos(radians(low.x)) * near + outer / cos(radians(high.x)) * far;
-  return sum * (rise / PI);
+  float cos_low = cos(radians(low.x));
+  float cos_high = cos(radians(high.x));
+  vec4 powers = grass_texel(grass_picture(g, seen.view, g.lights + 1) + 1);
+  float power = dot(powers, vec4(equal(ivec4(0, 1, 2, 3), ivec4(int(low.w + 0.5)))));
+  float law_low = pow((cos_low + seen.seen_rise) / (light.z + seen.view_rise), power);
+  float law_high = pow((cos_high + seen.seen_rise) / (light.z + seen.view_rise), power);
+  return ((1.0 - outer) * law_low / cos_low * near + outer * law_high / cos_high * far) * (rise / PI);
 }

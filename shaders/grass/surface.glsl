@@ -9,11 +9,15 @@
 #define GRASS_SEED film_view.seed
 #endif
 
+#define GRASS_STEPS 12.0    // of a ray down to blades that a map makes lower
+#define GRASS_LOWEST 0.02  // of the height: below it no blades stand
+
 struct OwnHit {
   bool bare;       // no blade stands here: the material's own surface shows
   float place;     // of the patch's table
   float contrast;
-  vec3 along;      // the tile's x axis on the surface
+  vec3 along_x;    // on the surface: how a step changes the place in the tile, as the tile that was rendered would have it
+  vec3 along_y;
   vec3 albedo;
 };
 
@@ -72,12 +76,42 @@ vec2 grass_variation(vec2 place, float roll, out float squares)
   return vec2(to_unit(bits.x), to_unit(bits.y));
 }
 
+// How the place in tiles changes along the surface, per metre. Where a UV map places tiles these are the gradients of its
+// coordinates; they say how the map lies, how large it is, whether it is mirrored and sheared. Without a map, or where it has no
+// area, the object's axes place them.
+vec2 grass_tiles(Grass g, SurfacePoint point, Instance instance, vec3 up, out vec3 along_x, out vec3 along_y)
+{
+#ifdef GRASS_UV
+  if (g.tiles > 0.0) {
+    float width = length(point.position_dx);
+    vec2 change_x = point.attributes_dx[GRASS_UV].xy;
+    vec2 change_y = point.attributes_dy[GRASS_UV].xy;
+    float area = abs(change_x.x * change_y.y - change_x.y * change_y.x);
+    if (area > 1e-6 * (dot(change_x, change_x) + dot(change_y, change_y)) && width > 0.0) {
+      float scale = g.tiles / (width * width);
+      along_x = scale * (change_x.x * point.position_dx + change_y.x * point.position_dy);
+      along_y = scale * (change_x.y * point.position_dx + change_y.y * point.position_dy);
+      along_x -= up * dot(along_x, up);
+      along_y -= up * dot(along_y, up);
+      return g.tiles * point.attributes[GRASS_UV].xy;
+    }
+  }
+#endif
+  vec3 axis_x = safe_normalize(vec3(instance.row0.x, instance.row1.x, instance.row2.x));
+  vec3 axis_y = safe_normalize(vec3(instance.row0.y, instance.row1.y, instance.row2.y));
+  along_x = safe_normalize(axis_x - up * dot(axis_x, up)) / g.size;
+  along_y = cross(up, along_x);
+  vec3 from = point.position - instance_origin(instance);
+  return vec2(dot(from, axis_x), dot(from, axis_y)) / g.size;
+}
+
 bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
 {
   hit.bare = true;
   hit.place = 0.0;
   hit.contrast = 1.0;
-  hit.along = vec3(1.0, 0.0, 0.0);
+  hit.along_x = vec3(1.0, 0.0, 0.0);
+  hit.along_y = vec3(0.0, 1.0, 0.0);
   hit.albedo = vec3(0.0);
   Grass g = grass_of(grass_entry);
   vec3 up = point.normal;
@@ -87,13 +121,29 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
     return false;  // from below
   }
   rise = max(rise, 0.02);
-  vec3 axis_x = safe_normalize(vec3(instance.row0.x, instance.row1.x, instance.row2.x));
-  vec3 axis_y = safe_normalize(vec3(instance.row0.y, instance.row1.y, instance.row2.y));
-  hit.along = safe_normalize(axis_x - up * dot(axis_x, up));
-  vec3 across = cross(up, hit.along);
-  vec3 from = point.position - instance_origin(instance);
-  vec2 uv = vec2(dot(from, axis_x), dot(from, axis_y)) / g.size;
-  vec3 view = grass_unstretched(g, vec3(dot(toward, hit.along), dot(toward, across), rise));
+  vec3 along_x;
+  vec3 along_y;
+  vec2 uv = grass_tiles(g, point, instance, up, along_x, along_y);
+  vec2 ground = vec2(dot(toward, along_x), dot(toward, along_y));
+  float size = inversesqrt(max(length(cross(along_x, along_y)), 1e-20));  // of the tile here, m
+
+  // Where a map makes blades lower the ray goes on to their tips.
+  float height = g.height;
+  float lead = 0.0;
+  if (grass_texel(g.entry + GRASS_HEIGHT_MAP).w > 0.0) {
+    float step = g.height / (rise * GRASS_STEPS);
+    float over = 1.0 - grass_map(g, GRASS_HEIGHT_MAP, uv);
+    for (int k = 1; k <= int(GRASS_STEPS) && over > 0.0; k++) {
+      float before = over;
+      over = 1.0 - float(k) / GRASS_STEPS - grass_map(g, GRASS_HEIGHT_MAP, uv - step * float(k) * ground);
+      lead = step * (float(k) - ((over > 0.0) ? 0.0 : over / min(over - before, -1e-6)));
+    }
+    height = max(g.height - lead * rise, 0.0);
+    uv -= lead * ground;
+  }
+  hit.along_x = along_x * (height / g.slope);
+  hit.along_y = along_y * (height / g.slope);
+  vec3 view = grass_in_tile(g, ground, rise, height);
 
   vec4 low;
   vec4 high;
@@ -120,7 +170,7 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   }
   // Between texels that are larger than pixels one is drawn as bilinear interpolation weighs them; smaller ones the pixel's
   // own filter mixes.
-  float tile_pixels = g.size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
+  float tile_pixels = size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
   float spread = smoothstep(0.75, 1.5, tile_pixels / float(g.side));
   vec2 texel = (uv + shift) * float(g.side) + spread * (vec2(grass_roll(53), grass_roll(54)) - 0.5);
   ivec2 wrapped = ivec2(floor(fract(texel / float(g.side)) * float(g.side)));
@@ -128,7 +178,7 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   int picture = int(number + 0.5);
   int place = (picture * g.side + wrapped.y) * g.side + wrapped.x;
   GrassPlace shown = grass_place(g, place);
-  float below = (1.0 - clamp(shown.mean.w, 0.0, 1.0)) * g.height;
+  float below = (1.0 - clamp(shown.mean.w, 0.0, 1.0)) * height;
 
   // On a crest the ground falls away from the ray, which climbs out of the grass again if it has met fewer blades by then than
   // the picture's ray had when it met this one. How many stand in the way grows as the square of how far below the tips.
@@ -137,15 +187,16 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   vec3 bend = steps.x * dFdx(world_normal) + steps.y * dFdy(world_normal);
   float curvature = dot(bend, ahead) / max(length(world_normal), 1e-20);
   float level = max(1.0 - rise * rise, 1e-6);
-  float falling = curvature * level * g.height;
+  float falling = curvature * level * height;
   if (falling > 0.0 && rise * rise < 2.0 * falling) {
     // All rays above one place of the crest ask for what stands there, so that what covers one of them covers those below.
-    vec2 crown = (rise / (curvature * level)) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
+    vec2 crown = (rise / (curvature * level)) * ground;
     ivec2 cell = ivec2(fract(texel / float(g.side) - crown) * float(g.side));
     cell = clamp(cell, ivec2(0), ivec2(g.side - 1));
     int there = grass_places(g) + GRASS_PLACE * ((picture * g.side + cell.y) * g.side + cell.x);
     float part = 1.0 - clamp(grass_texel(there).w, 0.0, 1.0);
-    float slope = taken.z * g.taller / length(vec3(taken.xy, taken.z * g.taller));
+    float taller = height / (size * g.slope);
+    float slope = taken.z * taller / length(vec3(taken.xy, taken.z * taller));
     float steep = rise * rise / falling;
     if (part * part * part > 0.8 * slope * steep * steep * rise / falling) {
       return false;
@@ -154,10 +205,10 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
 
   // In a hollow the ground rises ahead, and the ray meets what stands there sooner than on flat ground.
   float bend_down = max(-curvature, 0.0) * level;
-  vec2 root = uv - grass_length(below, rise, bend_down) * vec2(dot(toward, hit.along), dot(toward, across)) / g.size;
-  float density = grass_density(g, root * g.size);
-  hit.bare = density < 1.0 && grass_clumps(root * 6.0) >= density;
-  float depth = grass_length(hit.bare ? g.height : below, rise, bend_down);
+  vec2 root = uv - grass_length(below, rise, bend_down) * ground;
+  float density = g.density * grass_map(g, GRASS_MAP, root);
+  hit.bare = height < GRASS_LOWEST * g.height || (density < 1.0 && grass_clumps(root * 6.0) >= density);
+  float depth = lead + grass_length(hit.bare ? height : below, rise, bend_down);
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
@@ -191,9 +242,10 @@ void own_store(SurfacePoint point, OwnHit hit)
     vec3 tangent;
     vec3 bitangent;
     orthonormal_basis(point.normal, tangent, bitangent);
-    float turn = atan(dot(hit.along, bitangent), dot(hit.along, tangent));
-    out_tint = vec4(0.0, 0.0, 0.0, turn);
-    out_lobe = vec4(hit.place, float(grass_entry), float(SURFACE_GRASS) * 2097152.0, hit.contrast);
+    float axes = grass_pack(vec2(dot(hit.along_x, tangent), dot(hit.along_x, bitangent)));
+    vec2 other = vec2(dot(hit.along_y, tangent), dot(hit.along_y, bitangent));
+    out_tint = vec4(0.0, 0.0, 0.0, axes);
+    out_lobe = vec4(hit.place, grass_pack(other), float(SURFACE_GRASS) * 2097152.0 + float(grass_entry), hit.contrast);
     out_emission = vec4(0.0, 0.0, 0.0, 1.0);
   }
 }

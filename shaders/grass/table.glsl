@@ -1,24 +1,27 @@
 // Reads grass patches from `grass_table`, which addon/grass/table.py lays out: half floats, 2048 texels a row.
 //
 // ENTRY texels for each material that shows a patch: 0: first row of the patch, texels along its side, views, lights;
-// 1: side of the tile and height of the blades, m; how much taller they are than the patch's own tile is; density;
+// 1: side of the tile and height of the blades, m; density;
 // 2: F_max, height over side of the patch's own tile, rings of views, rings of lights; from 3 on eight rings of views
-// (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights;
+// (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights (w: their number);
 // 16: first row of a map of the density, its width and height in texels, and the side in metres of the square it covers, 0: none;
-// 17: 1 where places show the tile shifted at random.
+// 17: 1 where places show the tile shifted at random; tiles along the unit of a UV map, 0: along the object's axes;
+// 18: as 16, of a map that the height is multiplied by. On UV maps both cover the unit square.
 // A patch: PICTURE texels for each view and light, and one light more, the uniform sky (coefficients of luma, of chroma, mean
 // colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many that begin
-// with the correlation of its pictures with those of neighbouring views, and among neighbouring lights; then PLACE texels for
+// with the correlation of its pictures with those of neighbouring views, and among neighbouring lights, and the cosine of its
+// polar angle, and then, for each pair of rings of lights, the power of Lommel and Seeliger's law between them; then PLACE texels for
 // each view and place. How they are decoded: addon/grass/compression.py.
 #include "lib/math.glsl"
 
-#define GRASS_ENTRY 18
+#define GRASS_ENTRY 19
 #define GRASS_PICTURE 5
 #define GRASS_PLACE 4
 #define GRASS_VIEW_RINGS 3
 #define GRASS_LIGHT_RINGS 11
 #define GRASS_MAP 16
 #define GRASS_VARIED 17
+#define GRASS_HEIGHT_MAP 18
 #define GRASS_MOST_RINGS 8
 #define GRASS_GAMMA 2.2
 
@@ -28,10 +31,10 @@ struct Grass {
   int side;      // texels
   int views;
   int lights;    // without the sky
-  float size;    // of the tile, m
+  float size;    // of the tile, m, where no UV map says it
   float height;  // of the plane on top, m
-  float taller;  // than the tile that was rendered: what stretches directions
   float density;
+  float tiles;   // along the unit of a UV map; 0: along the object's axes
   float white;
   float slope;   // height over side of the tile that was rendered
   int view_rings;
@@ -56,8 +59,8 @@ Grass grass_of(int entry)
   g.lights = int(a.w + 0.5);
   g.size = b.x;
   g.height = b.y;
-  g.taller = b.z;
-  g.density = b.w;
+  g.density = b.z;
+  g.tiles = grass_texel(g.entry + GRASS_VARIED).y;
   g.white = c.x;
   g.slope = c.y;
   g.view_rings = int(c.z + 0.5);
@@ -71,21 +74,22 @@ float grass_map_texel(int base, ivec2 size, ivec2 texel)
   return grass_texel(base + at.y * size.x + at.x).x;
 }
 
-// Share of the ground that is covered at a place in the object's plane, m from its origin. Beyond the map its rim goes on.
-float grass_density(Grass g, vec2 place)
+// What a map has at a place of the ground, in tiles; 1 without a map. Beyond it its rim goes on.
+float grass_map(Grass g, int which, vec2 place)
 {
-  vec4 map = grass_texel(g.entry + GRASS_MAP);
+  vec4 map = grass_texel(g.entry + which);
   if (map.w <= 0.0) {
-    return g.density;
+    return 1.0;
   }
   int base = int(map.x + 0.5) * 2048;
   ivec2 size = ivec2(map.yz + 0.5);
-  vec2 texel = clamp(place / map.w + 0.5, vec2(0.0), vec2(1.0)) * vec2(size) - 0.5;
+  vec2 at = (g.tiles > 0.0) ? place / g.tiles : place * (g.size / map.w) + 0.5;
+  vec2 texel = clamp(at, vec2(0.0), vec2(1.0)) * vec2(size) - 0.5;
   ivec2 low = ivec2(floor(texel));
   vec2 f = texel - floor(texel);
   float below = mix(grass_map_texel(base, size, low), grass_map_texel(base, size, low + ivec2(1, 0)), f.x);
   float above = mix(grass_map_texel(base, size, low + ivec2(0, 1)), grass_map_texel(base, size, low + ivec2(1, 1)), f.x);
-  return g.density * mix(below, above, f.y);
+  return mix(below, above, f.y);
 }
 
 // The two rings around a direction in the tile's frame, and how far it is from the first to the second.
@@ -123,10 +127,27 @@ vec3 grass_ring_direction(vec4 ring, float number)
   return vec3(sin(polar) * cos(azimuth), sin(polar) * sin(azimuth), cos(polar));
 }
 
-// A direction beside a tile `taller` times as high, as the tile that was rendered would have it.
-vec3 grass_unstretched(Grass g, vec3 direction)
+// What a direction is beside the tile that was rendered. `across_ground`: how far along the tile's axes, in tiles a metre, and
+// `rise`: how far up it goes; blades are `height` m high.
+vec3 grass_in_tile(Grass g, vec2 across_ground, float rise, float height)
 {
-  return safe_normalize(vec3(direction.xy, direction.z / g.taller));
+  return safe_normalize(vec3(across_ground, rise * g.slope / max(height, 1e-20)));
+}
+
+// Two numbers in one that has 24 bits, finest about 0.
+#define GRASS_PACKED 4095.0
+
+float grass_pack(vec2 value)
+{
+  vec2 kept = floor((0.5 + 0.5 * value / (1.0 + abs(value))) * GRASS_PACKED + 0.5);
+  return kept.x + (GRASS_PACKED + 1.0) * kept.y;
+}
+
+vec2 grass_unpack(float held)
+{
+  float y = floor(held / (GRASS_PACKED + 1.0));
+  vec2 kept = vec2(held - (GRASS_PACKED + 1.0) * y, y) * (2.0 / GRASS_PACKED) - 1.0;
+  return kept / max(1.0 - abs(kept), vec2(1e-4));
 }
 
 // What a place shows of all lights: mean and components.

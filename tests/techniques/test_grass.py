@@ -264,6 +264,116 @@ def test_in_a_hollow_nothing_is_seen_below_the_ground(stage):
     assert (light[within] < 0.1 * light[within].mean()).mean() < 0.02
 
 
+# UV maps ------------------------------------------------------------------------------------------------------------
+
+
+def with_map(thing, place):
+    """Give a mesh a UV map of what `place` (matrix of 2 x 3) makes of x, y, 1 at its vertices."""
+    mesh = thing.data
+    layer = mesh.uv_layers.new(name="Map")
+    for loop in mesh.loops:
+        x, y, _ = mesh.vertices[loop.vertex_index].co
+        layer.data[loop.index].uv = np.asarray(place) @ (x, y, 1.0)
+    return thing
+
+
+SIDE = {"size": 0.4, "height": 0.1, "tiles": 5.0}  # of the tile, m, and as many along a map of 2 m
+
+
+def seen(stage, samples=4, size=32):
+    return stage.render(samples, (size, size))["combined"][..., :3]
+
+
+def test_a_map_along_the_axes_shows_what_the_axes_show(stage):
+    """And a mesh without a map, or with one of no area, is placed by the axes, whatever it asks for."""
+    plain = ground(stage, **SIDE)
+    sun(stage, 40, 20)
+    towards(stage, 55, 100, 1.0)
+    expected = seen(stage)
+    own = plain.data.materials[0].candela
+    own.grass_placement = "UV"
+    assert seen(stage) == pytest.approx(expected, abs=1e-6)
+    with_map(plain, [(0, 0, 0.3), (0, 0, 0.3)])
+    assert seen(stage) == pytest.approx(expected, abs=1e-6)
+    plain.data.uv_layers.remove(plain.data.uv_layers[0])
+    with_map(plain, [(0.5, 0, 0), (0, 0.5, 0)])
+    assert np.abs(seen(stage) - expected).mean() < 0.02 * expected.mean()
+
+
+def test_a_turned_map_is_a_turned_object(stage):
+    """Light and view turn in the tile as the map does."""
+    c, s = math.cos(0.7), math.sin(0.7)
+    field = ground(stage, half=6.0, **SIDE)
+    field.rotation_euler.z = 0.7
+    sun(stage, 50, 20)
+    towards(stage, 55, 100, 1.0)
+    expected = seen(stage)
+    stage.scene.collection.objects.unlink(field)
+    with_map(ground(stage, half=6.0, placement="UV", **SIDE), [(0.5 * c, 0.5 * s, 0), (-0.5 * s, 0.5 * c, 0)])
+    assert np.abs(seen(stage) - expected).mean() < 0.02 * expected.mean()
+
+
+def test_a_mirrored_map_mirrors_the_picture(stage):
+    """Map, light and view are mirrored along x: so is the picture."""
+    field = with_map(ground(stage, half=6.0, placement="UV", **SIDE), [(0.5, 0, 0), (0, 0.5, 0)])
+    lamp, camera = sun(stage, 50, 20), towards(stage, 45, 90, 1.0)
+    expected = seen(stage, 16)
+    for thing in (field, lamp, camera):
+        stage.scene.collection.objects.unlink(thing)
+    with_map(ground(stage, half=6.0, placement="UV", **SIDE), [(-0.5, 0, 0), (0, 0.5, 0)])
+    sun(stage, 50, 160)
+    towards(stage, 45, 90, 1.0)
+    found = seen(stage, 16)[:, ::-1]
+    # Which of four views a pixel takes is drawn anew.
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.01)
+    assert np.corrcoef(found.ravel(), expected.ravel())[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("place", [[(0.5, 0, 0), (0, 0.5, 0)], [(-0.25, 0.1, 0.2), (0.3, 0.7, 0)]])
+def test_grass_grows_on_a_wall_as_on_the_ground(stage, tmp_path, place):
+    """A wall, whose map is stretched, sheared and mirrored: depth stays, a Lambertian tile is as bright."""
+    wall = with_map(ground(stage, flat_patch(tmp_path / "flat.grass", 0.5), placement="UV", **SIDE), place)
+    wall.rotation_euler = (math.radians(90), 0, 0)
+    way = Vector((0.3, -1.0, 0.2)).normalized()
+    stage.light("SUN", turn=way.to_track_quat("Z", "Y").to_euler(), energy=3.0, angle=0.0)
+    towards(stage, 90, 270, 0.5)
+    shown = stage.render(2, (8, 8))
+    expected = 3.0 / np.pi * ALBEDO * -way.y
+    assert shown["combined"][..., :3] == pytest.approx(np.broadcast_to(expected, (8, 8, 3)), rel=0.01)
+    assert shown["depth"] == pytest.approx(5.0 - 0.05, abs=1e-3)
+
+
+def test_maps_lie_in_the_square_of_the_uv_map(stage, tmp_path):
+    """Bare where u < 0.5, half as high where v < 0.5: seen from above, the picture's right is -x."""
+    patch = flat_patch(tmp_path / "flat.grass", 1.0)
+    share, height = (bpy.data.images.new(name, 2, 2, float_buffer=True, is_data=True) for name in ("Share", "Height"))
+    share.pixels.foreach_set(np.tile(np.array([0, 0, 0, 1, 1, 1, 1, 1], np.float32), 2))
+    height.pixels.foreach_set(np.repeat(np.array([[0.5] * 3 + [1], [1] * 4], np.float32), 2, axis=0).ravel())
+    for image in (share, height):
+        image.pack()
+    field = ground(stage, patch, half=2.0, placement="UV", density_map=share, height_map=height, **SIDE)
+    with_map(field, [(0.25, 0, 0.5), (0, 0.25, 0.5)])
+    sun(stage, 0, 0)
+    towards(stage, 0, 0, 4.0)
+    depth = stage.render(1, (16, 16))["depth"][..., 0]
+    assert depth[:, 13:] == pytest.approx(5.0, abs=1e-3)
+    assert sorted(float(depth[row, 1]) for row in (1, -2)) == pytest.approx([4.9, 4.95], abs=2e-3)
+
+
+def test_a_lower_height_is_a_lower_field(stage):
+    """A map of one half everywhere is the field of half the height, seen at a slant."""
+    image = bpy.data.images.new("Half", 2, 2, float_buffer=True, is_data=True)
+    image.pixels.foreach_set(np.tile(np.array([0.5, 0.5, 0.5, 1], np.float32), 4))
+    image.pack()
+    field = ground(stage, height=0.1)
+    sun(stage, 50, 20)
+    towards(stage, 60, 100, 1.0)
+    expected = seen(stage)
+    own = field.data.materials[0].candela
+    own.grass_height, own.grass_height_map = 0.2, image
+    assert np.abs(seen(stage) - expected).mean() < 0.02 * expected.mean()
+
+
 # Invariants ----------------------------------------------------------------------------------------------------------
 
 
