@@ -9,9 +9,8 @@ struct GrassSeen {
   GrassPlace place;
   int view;
   float contrast;
-  float alike;      // of pictures under neighbouring lights
-  float seen_rise;  // cosines of the view in the tile, of the picture and of the viewer
-  float view_rise;
+  float alike;  // of pictures under neighbouring lights
+  float rise;   // cosine of the picture's view
   vec3 along_x;
   vec3 along_y;
 };
@@ -22,7 +21,7 @@ vec3 grass_turned(GrassSeen seen, Surface s, vec3 direction)
   return safe_normalize(vec3(dot(direction, seen.along_x), dot(direction, seen.along_y), dot(direction, s.normal)));
 }
 
-GrassSeen grass_see(ivec2 pixel, Surface s, vec3 to_viewer)
+GrassSeen grass_see(ivec2 pixel, Surface s)
 {
   GrassSeen seen;
   seen.exists = s.kind == SURFACE_GRASS;
@@ -42,8 +41,7 @@ GrassSeen grass_see(ivec2 pixel, Surface s, vec3 to_viewer)
   seen.along_y = of_y.x * tangent + of_y.y * bitangent;
   vec4 about = grass_texel(grass_picture(seen.grass, seen.view, seen.grass.lights + 1));
   seen.alike = about.y;
-  seen.seen_rise = about.z;
-  seen.view_rise = clamp(grass_turned(seen, s, to_viewer).z, 0.02, 1.0);
+  seen.rise = about.z;
   return seen;
 }
 
@@ -69,15 +67,14 @@ vec3 grass_reflection(GrassSeen seen, Surface s, vec3 direction)
   float squares = grass_squares(outer, inside.z, outside.z);
   float contrast = seen.contrast * grass_contrast(squares, seen.alike);
   // Leaves that scatter once send i / (i + v), with i and v the cosines of light and view (Lommel and Seeliger); a plane sends i.
-  // Between two rings of lights the picture's mean follows i / (i + v)^p, and what is interpolated, over directions of light and
-  // of view, is how far pictures are from that.
+  // Between two rings of lights the view's mean follows i / (i + v)^p, and what is interpolated is how far pictures are from that.
   vec3 near = (1.0 - inside.z) * grass_under(seen, inside.x, contrast) + inside.z * grass_under(seen, inside.y, contrast);
   vec3 far = (1.0 - outside.z) * grass_under(seen, outside.x, contrast) + outside.z * grass_under(seen, outside.y, contrast);
   float cos_low = cos(radians(low.x));
   float cos_high = cos(radians(high.x));
   vec4 powers = grass_texel(grass_picture(g, seen.view, g.lights + 1) + 1);
   float power = dot(powers, vec4(equal(ivec4(0, 1, 2, 3), ivec4(int(low.w + 0.5)))));
-  float law_low = pow((cos_low + seen.seen_rise) / (light.z + seen.view_rise), power);
-  float law_high = pow((cos_high + seen.seen_rise) / (light.z + seen.view_rise), power);
+  float law_low = pow((cos_low + seen.rise) / (light.z + seen.rise), power);
+  float law_high = pow((cos_high + seen.rise) / (light.z + seen.rise), power);
   return ((1.0 - outer) * law_low / cos_low * near + outer * law_high / cos_high * far) * (rise / PI);
 }

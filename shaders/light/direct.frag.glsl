@@ -71,7 +71,7 @@ void main()
   Surface s = SURFACE_READ(pixel);
   vec3 to_viewer = (film_view.eye.w > 0.5) ? film_view.backward.xyz : safe_normalize(film_view.eye.xyz - s.position);
 #ifdef GRASS
-  GrassSeen grass = grass_see(pixel, s, to_viewer);
+  GrassSeen grass = grass_see(pixel, s);
 #endif
   bool has_diffuse = max_component(s.diffuse) > 0.0;
   bool has_glossy = s.kind != LOBE_REFRACTION && max_component(s.glossy_weight) > 0.0;
