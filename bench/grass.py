@@ -63,12 +63,13 @@ def compression(options: argparse.Namespace) -> str:
     from addon.grass import compression as by
     from addon.grass.generate import Order, read_view, studio, view_file, write_view
 
-    order, folder = Order(), cache_folder() / "grass_views"
+    order, folder = Order(finer=None), cache_folder() / "grass_views"
     missing = [view for view in range(order.views.number) if read_view(order, folder, view) is None]
     if missing:
         with studio(order) as stage:
             for view in missing:
-                write_view(order, folder, view, *stage.render(order.views.vectors[view], order.lights.vectors))
+                found = stage.render(order.views.vectors[view], order.lights.vectors)
+                write_view(order, folder, view, *found, np.zeros((0, 3)))
                 print(view_file(folder, view), flush=True)
     data = np.stack([read_view(order, folder, view)[0] for view in range(order.views.number)])
     white = by.white_of(data)

@@ -87,6 +87,7 @@ class Rings:
 
 VIEWS = Rings((0.0, 15.0, 30.0, 45.0, 60.0, 75.0), (1, 6, 12, 18, 20, 24))
 LIGHTS = Rings((0.0, 35.0, 70.0), (1, 8, 12))
+FINER = VIEWS  # lights of which the tile's mean alone is kept
 GRAZING = 85.0  # of a further ring: most of a meadow is seen from there
 
 

@@ -27,10 +27,11 @@ import numpy as np
 
 from ..snapshot.exr import ExrError, read_exr
 from .blades import COLORS, SOIL, TRANSLUCENT, Recipe, blades_of
-from .directions import LIGHTS, VIEWS, Rings
+from .directions import FINER, LIGHTS, VIEWS, Rings
 from .patch import Patch, PatchError, compressed_patch, read_arrays, save, write_arrays
 
 BOUNCES = 4
+FINER_TEXELS, FINER_SAMPLES = 32, 4  # of pictures of which the mean alone is kept
 GENERATION = 1  # to be raised when the same settings give other pictures
 
 
@@ -45,6 +46,7 @@ class Order:
     samples: int = 16
     luma: int = 8
     chroma: int = 2
+    finer: Rings | None = FINER  # lights of which means alone are kept
 
     def __post_init__(self):
         if not 4 <= self.texels <= 256 or not 1 <= self.samples <= 65536:
@@ -54,6 +56,7 @@ class Order:
     def fingerprint(self) -> str:
         """Equal orders give equal pictures; how they are compressed is no part of it."""
         parts = (GENERATION, asdict(self.recipe), self.texels, self.views, self.lights, self.samples)
+        parts += (self.finer,) if self.finer else ()
         return hashlib.blake2b(repr(parts).encode(), digest_size=12).hexdigest()
 
 
@@ -66,7 +69,9 @@ def generate(order: Order, path: Path) -> Iterator[tuple[int, int]]:
     if missing:
         with studio(order) as stage:
             for view in missing:
-                write_view(order, folder, view, *stage.render(order.views.vectors[view], order.lights.vectors))
+                direction = order.views.vectors[view]
+                means = stage.means(direction, order.finer.vectors if order.finer else np.zeros((0, 3)))
+                write_view(order, folder, view, *stage.render(direction, order.lights.vectors), means)
                 done += 1
                 yield done, order.views.number
     save(patch_of(order, folder), path)
@@ -80,17 +85,18 @@ def generate(order: Order, path: Path) -> Iterator[tuple[int, int]]:
 def patch_of(order: Order, folder: Path) -> Patch:
     """The patch of rendered views."""
 
-    def found(view: int) -> tuple[np.ndarray, np.ndarray]:
+    def found(view: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         content = read_view(order, folder, view)
         if content is None:
             raise PatchError(f"{view_file(folder, view)} is missing or damaged: run again to render that view.")
         return content
 
     heights = np.stack([found(view)[1] for view in range(order.views.number)])
+    finer = np.stack([found(view)[2] for view in range(order.views.number)]) if order.finer else None
     recipe = order.recipe
     return compressed_patch(
         recipe.size, recipe.height, order.views, order.lights, lambda view: found(view)[0], heights, order.luma,
-        order.chroma,
+        order.chroma, order.finer, finer,
     )  # fmt: skip
 
 
@@ -106,25 +112,30 @@ def view_file(folder: Path, view: int) -> Path:
     return folder / f"view_{view:04}.npz"
 
 
-def write_view(order: Order, folder: Path, view: int, pictures: np.ndarray, heights: np.ndarray) -> None:
+def write_view(
+    order: Order, folder: Path, view: int, pictures: np.ndarray, heights: np.ndarray, means: np.ndarray
+) -> None:
     """Raises PatchError, as on a full disk."""
     about = np.frombuffer(order.fingerprint.encode(), np.uint8)
-    write_arrays(view_file(folder, view), {"about": about, "pictures": pictures, "heights": heights})
+    write_arrays(view_file(folder, view), {"about": about, "pictures": pictures, "heights": heights, "means": means})
 
 
-def read_view(order: Order, folder: Path, view: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """(L, N, N, 3) pictures and (N, N) heights, or None where they are missing, damaged or of another order."""
+def read_view(order: Order, folder: Path, view: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """(L, N, N, 3) pictures, (N, N) heights and (M, 3) means under the finer lights, or None where they are missing,
+    damaged or of another order."""
     if not view_file(folder, view).is_file():
         return None
     try:
         arrays = read_arrays(view_file(folder, view))
         pictures, heights = arrays["pictures"], arrays["heights"]
+        means = arrays["means"] if order.finer else np.zeros((0, 3), np.float32)
         own = bytes(arrays["about"]) == order.fingerprint.encode()
     except (PatchError, KeyError):
         return None
     n = order.texels
     fits = pictures.shape == (order.lights.number, n, n, 3) and heights.shape == (n, n)
-    return (pictures, heights) if own and fits and np.isfinite(pictures).all() else None
+    fits = fits and means.shape == (order.finer.number if order.finer else 0, 3)
+    return (pictures, heights, means) if own and fits and np.isfinite(pictures).all() else None
 
 
 # The scene -----------------------------------------------------------------------------------------------------------
@@ -141,7 +152,7 @@ class Studio:
     def render(self, view: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pictures (L, N, N, 3) of a view under each of the lights, pi radiance / irradiance head-on, and heights
         (N, N) in metres above the ground. Unit vectors to the viewer and the light."""
-        recipe, n = self.order.recipe, self.order.texels
+        recipe, n = self.order.recipe, self.scene.render.resolution_x
         away = 4.0 * recipe.height / view[2] + recipe.size
         matrix = np.eye(4)
         matrix[:3, 2] = view
@@ -159,6 +170,19 @@ class Studio:
         if stacked.shape[1:] != (n, n, 3):
             raise PatchError("Cycles rendered a picture of another size than was asked for.")
         return stacked, heights.astype(np.float32)
+
+    def means(self, view: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """(M, 3) means of such pictures, which are small ones."""
+        if not len(lights):
+            return np.zeros((0, 3), np.float32)
+        render, cycles = self.scene.render, self.scene.cycles
+        before = render.resolution_x, cycles.samples
+        render.resolution_x = render.resolution_y = FINER_TEXELS
+        cycles.samples = FINER_SAMPLES
+        found = self.render(view, lights)[0].mean(axis=(1, 2))
+        render.resolution_x = render.resolution_y = before[0]
+        cycles.samples = before[1]
+        return found
 
     def _pictures(self) -> tuple[np.ndarray, np.ndarray]:
         try:
@@ -199,7 +223,8 @@ _KINDS = ("scenes", "objects", "meshes", "cameras", "lights", "materials", "coll
 def build(order: Order, scene: bpy.types.Scene) -> None:
     """The tile with its copies, ground, sun and camera, and the settings of the render."""
     recipe = order.recipe
-    slant = max(math.tan(math.radians(rings.polar[-1])) for rings in (order.views, order.lights))
+    used = [rings for rings in (order.views, order.lights, order.finer) if rings]
+    slant = max(math.tan(math.radians(rings.polar[-1])) for rings in used)
     around = min(math.ceil(recipe.height * slant / recipe.size) + 1, 12)
     field_of(recipe, scene, range(-around, around + 1))
     sun = bpy.data.lights.new("Sun", "SUN")

@@ -44,7 +44,8 @@ class Patch:
     `contrast` (V, P): the same of standard deviations of luminance. `excess` (V, P): of the mean where contrast is
     doubled and what is below 0 is cut off. `light_alike` and `view_alike` (V,): correlation of
     a view's pictures under neighbouring lights, and with those of neighbouring views, moved by their parallax.
-    `heights` (V, N, N): of what is seen, 0 the ground, 1 the top. Row 0 has the smallest y.
+    `heights` (V, N, N): of what is seen, 0 the ground, 1 the top. Row 0 has the smallest y. `finer` (V, M, 3): linear
+    means of the tile under the M lights of `finer_lights`, between those that pictures are of; without them M is 0.
     """
 
     size: float  # m, of the tile's side
@@ -64,6 +65,8 @@ class Patch:
     light_alike: np.ndarray
     view_alike: np.ndarray
     heights: np.ndarray
+    finer_lights: Rings | None = None
+    finer: np.ndarray | None = None
 
     @property
     def texels(self) -> int:
@@ -91,7 +94,7 @@ class Patch:
 
 def compressed_patch(
     size: float, height: float, views: Rings, lights: Rings, pictures, heights: np.ndarray, luma: int = 8,
-    chroma: int = 2,
+    chroma: int = 2, finer_lights: Rings | None = None, finer: np.ndarray | None = None,
 ) -> Patch:  # fmt: skip
     """A patch of pictures: `pictures(view)` gives (L, N, N, 3) linear ones, `heights` (V, N, N) in metres."""
     whole = [np.asarray(pictures(view), np.float32) for view in range(views.number)]
@@ -131,7 +134,19 @@ def compressed_patch(
     below = np.clip(heights / height, 0, 1).astype(np.float32)
     skies = [_seen(np.einsum("l,lyxc->yxc", cells, light) @ LUMA) for light in whole]
     arrays["view_alike"] = views_alike(views, skies, below, height / size).astype(np.float32)
-    return Patch(size, height, views, lights, white, luma, chroma, heights=below, **arrays)
+    return Patch(
+        size,
+        height,
+        views,
+        lights,
+        white,
+        luma,
+        chroma,
+        heights=below,
+        finer_lights=finer_lights,
+        finer=finer,
+        **arrays,
+    )  # fmt: skip
 
 
 def _seen(pictures: np.ndarray) -> np.ndarray:
@@ -176,7 +191,6 @@ def save(patch: Patch, path: Path) -> None:
         "lights": [list(patch.lights.polar), list(patch.lights.counts)],
     }  # fmt: skip
     arrays = {
-        "about": np.frombuffer(json.dumps(about).encode(), np.uint8),
         "mean": _planes(patch.mean * MEAN_STEPS),
         "parts": _planes(patch.parts * PART_STEPS),
         "heights": _planes(patch.heights * HEIGHT_STEPS),
@@ -188,6 +202,10 @@ def save(patch: Patch, path: Path) -> None:
         "light_alike": patch.light_alike.astype("<f4"),
         "view_alike": patch.view_alike.astype("<f4"),
     }
+    if patch.finer_lights is not None:
+        about["finer_lights"] = [list(patch.finer_lights.polar), list(patch.finer_lights.counts)]
+        arrays["finer"] = patch.finer.astype("<f4")
+    arrays["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     write_arrays(path, arrays)
 
 
@@ -244,6 +262,10 @@ def load(path: Path) -> Patch:
         k, v = luma + 2 * chroma, views.number
         small = max(v, lights.number) <= MOST_DIRECTIONS and 2 <= n <= MOST_TEXELS
         rings = len(views.polar) <= MOST_RINGS[0] and len(lights.polar) <= MOST_RINGS[1]
+        finer = about.get("finer_lights")  # patches of earlier versions have none
+        if finer is not None:
+            finer = Rings(tuple(map(float, finer[0])), tuple(map(int, finer[1])))
+            small, rings = small and finer.number <= MOST_DIRECTIONS, rings and len(finer.polar) <= MOST_RINGS[0]
         if not (small and rings and 1 <= luma <= MOST_LUMA and 1 <= chroma <= MOST_CHROMA):
             raise PatchError(f"{path} has more directions, texels or components than can be shown.")
         patch = Patch(
@@ -258,6 +280,7 @@ def load(path: Path) -> Patch:
             _floats(arrays["light_alike"], (v,)),
             _floats(arrays["view_alike"], (v,)),
             _whole(arrays["heights"], (v, n, n)) / HEIGHT_STEPS,
+            finer, None if finer is None else _floats(arrays["finer"], (v, finer.number, 3)),
         )  # fmt: skip
         sizes = np.array([patch.size, patch.height, patch.white])
         if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):

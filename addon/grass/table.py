@@ -15,8 +15,8 @@ from .compression import LUMA
 from .patch import MOST_LUMA, MOST_RINGS, Patch
 
 WIDTH = 2048  # texels a row
-ENTRY, PICTURE, PLACE = 19, 5, 4  # texels
-VIEW_RINGS, LIGHT_RINGS, MAP, VARIED, HEIGHT_MAP = 3, 11, 16, 17, 18
+ENTRY, PICTURE, PLACE = 27, 5, 4  # texels
+VIEW_RINGS, LIGHT_RINGS, MAP, VARIED, HEIGHT_MAP, FINER_RINGS = 3, 11, 16, 17, 18, 19
 MOST_MAP = 256  # texels along a side of a density map
 ALIGNED = 16  # rows: the number of the first one is exact in a half float
 
@@ -46,7 +46,7 @@ def table_of(fields: Sequence[Field]) -> np.ndarray:
     for field in fields:
         if id(field.patch) not in begins:
             begins[id(field.patch)] = rows
-            listed = np.concatenate([_pictures(field.patch), _places(field.patch)])
+            listed = np.concatenate([_pictures(field.patch), _places(field.patch), _finer(field.patch)])
             taken = _aligned(-(-len(listed) // WIDTH))
             parts.append(np.zeros((taken * WIDTH, 4), np.float32))
             parts[-1][: len(listed)] = listed
@@ -86,15 +86,39 @@ def _entry(field: Field, row: int) -> np.ndarray:
     slope = patch.height / patch.size
     rows = np.zeros((ENTRY, 4))
     rows[0] = row, patch.texels, patch.views.number, patch.lights.number
-    rows[1] = field.size, field.height, field.density, 0.0
+    finer = patch.finer_lights
+    rows[1] = field.size, field.height, field.density, 0 if finer is None else len(finer.polar)
     rows[2] = patch.white, slope, len(patch.views.polar), len(patch.lights.polar)
-    rows[VARIED, :2] = field.varied, field.tiles
+    rows[VARIED, :3] = field.varied, field.tiles, 0 if finer is None else finer.number
     mean = patch.mean_heights()
     for start, rings, most in ((VIEW_RINGS, patch.views, MOST_RINGS[0]), (LIGHT_RINGS, patch.lights, MOST_RINGS[1])):
         for k, (polar, count, first) in enumerate(list(zip(rings.polar, rings.counts, rings.firsts))[:most]):
             own = float(mean[first : first + count].mean()) if rings is patch.views else float(k)
             rows[start + k] = polar, count, first, own
+    if finer is not None:
+        rows[FINER_RINGS : FINER_RINGS + len(finer.polar), :3] = np.stack([finer.polar, finer.counts, finer.firsts], 1)
     return rows
+
+
+def _finer(patch: Patch) -> np.ndarray:
+    rows = np.zeros((0 if patch.finer is None else patch.finer[..., 0].size, 4), np.float32)
+    rows[:, :3] = finer_ratios(patch).reshape(-1, 3)
+    return rows
+
+
+def finer_ratios(patch: Patch) -> np.ndarray:
+    """(V, M, 3): the tile's mean under each of the finer lights over what its pictures give there."""
+    if patch.finer is None:
+        return np.zeros((patch.views.number, 0, 3))
+    lights, wanted = patch.lights, patch.finer_lights.vectors
+    numbers, shares = lights.weights(wanted)  # (M, 4)
+    seen, cosines = patch.views.vectors[:, 2, None, None], lights.vectors[:, 2]
+    ring = np.searchsorted(np.array(lights.firsts), numbers[:, 0], side="right") - 1
+    power = powers(patch)[:, np.minimum(ring, MOST_RINGS[1] - 2)][..., None]
+    law = ((cosines[numbers] + seen) / (wanted[:, 2, None] + seen)) ** power
+    share = shares * law * wanted[:, 2, None] / cosines[numbers]  # (V, M, 4)
+    given = np.einsum("vmk,vmkc->vmc", share, patch.picture_mean[:, numbers])
+    return np.clip(patch.finer / np.maximum(given, 1e-8), 0.2, 5.0)
 
 
 def powers(patch: Patch) -> np.ndarray:

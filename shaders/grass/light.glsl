@@ -50,6 +50,24 @@ vec3 grass_under(GrassSeen seen, float light, float contrast)
   return grass_decoded(seen.grass, seen.place, seen.view, int(light + 0.5), contrast);
 }
 
+// The tile's mean under a light, in the tile, over that which pictures give.
+vec3 grass_finer(GrassSeen seen, vec3 light)
+{
+  Grass g = seen.grass;
+  if (g.finer_rings == 0) {
+    return vec3(1.0);
+  }
+  vec4 low;
+  vec4 high;
+  float outer = grass_rings(g.entry + GRASS_FINER_RINGS, g.finer_rings, light, low, high);
+  vec3 inside = grass_azimuths(low, light);
+  vec3 outside = grass_azimuths(high, light);
+  int first = grass_places(g) + GRASS_PLACE * g.views * g.side * g.side + seen.view * g.finer;
+  vec3 near = mix(grass_texel(first + int(inside.x + 0.5)).rgb, grass_texel(first + int(inside.y + 0.5)).rgb, inside.z);
+  vec3 far = mix(grass_texel(first + int(outside.x + 0.5)).rgb, grass_texel(first + int(outside.y + 0.5)).rgb, outside.z);
+  return mix(near, far, outer);
+}
+
 // Radiance for unit irradiance on a plane that faces the light.
 vec3 grass_reflection(GrassSeen seen, Surface s, vec3 direction)
 {
@@ -76,5 +94,6 @@ vec3 grass_reflection(GrassSeen seen, Surface s, vec3 direction)
   float power = dot(powers, vec4(equal(ivec4(0, 1, 2, 3), ivec4(int(low.w + 0.5)))));
   float law_low = pow((cos_low + seen.rise) / (light.z + seen.rise), power);
   float law_high = pow((cos_high + seen.rise) / (light.z + seen.rise), power);
-  return ((1.0 - outer) * law_low / cos_low * near + outer * law_high / cos_high * far) * (rise / PI);
+  vec3 sum = (1.0 - outer) * law_low / cos_low * near + outer * law_high / cos_high * far;
+  return sum * grass_finer(seen, light) * (rise / PI);
 }

@@ -1,20 +1,21 @@
 // Reads grass patches from `grass_table`, which addon/grass/table.py lays out: half floats, 2048 texels a row.
 //
 // ENTRY texels for each material that shows a patch: 0: first row of the patch, texels along its side, views, lights;
-// 1: side of the tile and height of the blades, m; density;
+// 1: side of the tile and height of the blades, m; density; rings of finer lights;
 // 2: F_max, height over side of the patch's own tile, rings of views, rings of lights; from 3 on eight rings of views
 // (polar angle in degrees, azimuths, first view, mean height 0..1), from 11 on five rings of lights (w: their number);
 // 16: first row of a map of the density, its width and height in texels, and the side in metres of the square it covers, 0: none;
-// 17: 1 where places show the tile shifted at random; tiles along the unit of a UV map, 0: along the object's axes;
-// 18: as 16, of a map that the height is multiplied by. On UV maps both cover the unit square.
+// 17: 1 where places show the tile shifted at random; tiles along the unit of a UV map, 0: along the object's axes; finer lights;
+// 18: as 16, of a map that the height is multiplied by. On UV maps both cover the unit square. From 19 on eight rings of lights
+// of which the tile's mean alone is known.
 // A patch: PICTURE texels for each view and light, and one light more, the uniform sky (coefficients of luma, of chroma, mean
 // colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many that begin
 // with the correlation of its pictures with those of neighbouring views, and among neighbouring lights, and the cosine of its
 // polar angle, and then, for each pair of rings of lights, the power of Lommel and Seeliger's law between them; then PLACE texels for
-// each view and place. How they are decoded: addon/grass/compression.py.
+// each view and place; then, for each view and finer light, the mean over that which pictures give. How they are decoded: addon/grass/compression.py.
 #include "lib/math.glsl"
 
-#define GRASS_ENTRY 19
+#define GRASS_ENTRY 27
 #define GRASS_PICTURE 5
 #define GRASS_PLACE 4
 #define GRASS_VIEW_RINGS 3
@@ -22,6 +23,7 @@
 #define GRASS_MAP 16
 #define GRASS_VARIED 17
 #define GRASS_HEIGHT_MAP 18
+#define GRASS_FINER_RINGS 19
 #define GRASS_MOST_RINGS 8
 #define GRASS_GAMMA 2.2
 
@@ -39,6 +41,8 @@ struct Grass {
   float slope;   // height over side of the tile that was rendered
   int view_rings;
   int light_rings;
+  int finer_rings;
+  int finer;
 };
 
 vec4 grass_texel(int index)
@@ -60,7 +64,10 @@ Grass grass_of(int entry)
   g.size = b.x;
   g.height = b.y;
   g.density = b.z;
-  g.tiles = grass_texel(g.entry + GRASS_VARIED).y;
+  g.finer_rings = int(b.w + 0.5);
+  vec4 placed = grass_texel(g.entry + GRASS_VARIED);
+  g.tiles = placed.y;
+  g.finer = int(placed.z + 0.5);
   g.white = c.x;
   g.slope = c.y;
   g.view_rings = int(c.z + 0.5);

@@ -10,9 +10,11 @@ import pytest
 from addon.grass import generate, patch
 from addon.grass.blades import SOIL, Recipe, blades_of
 from addon.grass.directions import Rings
+from addon.grass.table import finer_ratios
 
 FEW_VIEWS, FEW_LIGHTS = Rings((0.0, 45.0), (1, 8)), Rings((0.0, 50.0), (1, 4))
-TINY = generate.Order(Recipe(0.25, 0.1, 60), 16, FEW_VIEWS, FEW_LIGHTS, 4)
+FINER = Rings((0.0, 25.0, 50.0), (1, 3, 4))
+TINY = generate.Order(Recipe(0.25, 0.1, 60), 16, FEW_VIEWS, FEW_LIGHTS, 4, finer=FINER)
 
 
 def run(order, path):
@@ -27,7 +29,7 @@ def tiny(tmp_path_factory):
 
 
 def render(view, light, recipe=TINY.recipe, texels=16, samples=4, change=None):
-    order = generate.Order(recipe, texels, FEW_VIEWS, FEW_LIGHTS, samples)
+    order = generate.Order(recipe, texels, FEW_VIEWS, FEW_LIGHTS, samples, finer=None)
     with generate.studio(order) as stage:
         if change:
             change(stage.scene)
@@ -98,6 +100,11 @@ def test_the_file_has_what_was_rendered(tiny):
     assert shown.mean(axis=(1, 2)) == pytest.approx(pictures.mean(axis=(1, 2)), rel=0.01)
     assert np.sqrt(((shown - pictures) ** 2).mean()) < 0.25 * pictures.mean()
     assert np.abs(made.heights[view] * made.height - heights).max() < 1e-4
+    # Lights of which means alone are kept: where they are lights of pictures, too, as those; between, as rendered.
+    assert made.finer[view, -4:] == pytest.approx(made.picture_mean[view, 1:5], rel=0.05)
+    ratios = finer_ratios(made)
+    assert ratios[:, -4:] == pytest.approx(np.ones((9, 4, 3)), rel=0.05)
+    assert ratios.min() > 0.5 and ratios.max() < 2.0
 
 
 def test_nothing_is_left_in_the_open_file(tiny):
@@ -124,7 +131,7 @@ def test_views_of_other_settings_are_rendered_anew(tmp_path):
     steps = generate.generate(TINY, path)
     next(steps), next(steps)
     steps.close()
-    other = generate.Order(Recipe(0.25, 0.1, 61), 16, FEW_VIEWS, FEW_LIGHTS, 4)
+    other = generate.Order(Recipe(0.25, 0.1, 61), 16, FEW_VIEWS, FEW_LIGHTS, 4, finer=FINER)
     assert next(generate.generate(other, path)) == (0, 9)
     assert next(generate.generate(TINY, path)) == (1, 9)
 

@@ -19,14 +19,17 @@ from addon.techniques.grass import SHIPPED
 MEADOW = Recipe(0.4, 0.1, 1300, 3)  # of the shipped patch
 ALBEDO = np.array([0.1, 0.3, 0.05])
 VIEWS, LIGHTS = Rings((0.0, 50.0, 80.0), (1, 6, 8)), Rings((0.0, 35.0, 70.0), (1, 6, 8))
+FINER = Rings((0.0, 20.0, 60.0), (1, 4, 8))
 
 
-def flat_patch(path, height_seen, albedo=ALBEDO):
+def flat_patch(path, height_seen, albedo=ALBEDO, finer=None):
     """A patch file of a Lambertian plane at `height_seen` (0 the ground, 1 the top) of a tile 0.4 m wide, 0.1 high."""
     cosines = LIGHTS.vectors[:, 2]
     picture = np.broadcast_to(cosines[:, None, None, None] * albedo, (LIGHTS.number, 8, 8, 3))
     heights = np.full((VIEWS.number, 8, 8), 0.1 * height_seen)
-    patches.save(patches.compressed_patch(0.4, 0.1, VIEWS, LIGHTS, lambda view: picture, heights), path)
+    means = None if finer is None else np.broadcast_to(finer(FINER.vectors)[..., None] * albedo, (VIEWS.number, 13, 3))
+    known = {} if finer is None else {"finer_lights": FINER, "finer": means}
+    patches.save(patches.compressed_patch(0.4, 0.1, VIEWS, LIGHTS, lambda view: picture, heights, **known), path)
     return path
 
 
@@ -89,6 +92,21 @@ def test_a_lambertian_tile_under_a_uniform_sky_shows_its_albedo(stage, tmp_path)
     towards(stage, 40, 20, 0.5)
     shown = stage.render(64, (8, 8))["combined"][..., :3].mean(axis=(0, 1))
     assert shown == pytest.approx(ALBEDO, rel=0.03)
+
+
+@pytest.mark.parametrize("light", [(20, 90), (60, 45), (40, 60)])
+def test_between_lights_of_pictures_the_mean_is_the_one_that_was_rendered(stage, tmp_path, light):
+    """A plane that were 1 + x / 2 times as bright where light comes from x, which the pictures do not show."""
+    brighter = flat_patch(tmp_path / "flat.grass", 0.5, finer=lambda way: way[:, 2] * (1.0 + 0.5 * way[:, 0]))
+    ground(stage, brighter)
+    sun(stage, *light)
+    towards(stage, 30, 77, 1.0)
+    polar, azimuth = np.radians(light)
+    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    numbers, weights = FINER.weights(way)
+    brightness = way[2] * (1.0 + 0.5 * weights @ FINER.vectors[numbers, 0])
+    shown = stage.render(2, (8, 8))["combined"][..., :3]
+    assert shown == pytest.approx(np.broadcast_to(3.0 / np.pi * ALBEDO * brightness, shown.shape), rel=0.01)
 
 
 def test_light_from_below_is_none(stage):
