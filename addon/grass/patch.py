@@ -12,7 +12,8 @@ import io
 import json
 import zipfile
 import zlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from .directions import Rings
 SUFFIX = ".grass"
 FORMAT, VERSION = "Candela grass patch", 1
 PART_STEPS, HEIGHT_STEPS, MEAN_STEPS = 2047.0, 4095.0, 4095.0
-PIXEL = 1.0  # texels, standard deviation of the filter at which contrast is compared
+PIXEL, FAR_PIXEL = 1.0, 4.0  # texels, standard deviation of the filter at which contrast is compared, near and far away
 MOST_BYTES = 1 << 30  # of all arrays of a file, unpacked
 MOST_TEXELS, MOST_DIRECTIONS, MOST_RINGS = 256, 1024, (8, 5)
 MOST_LUMA, MOST_CHROMA = 8, 2
@@ -44,6 +45,7 @@ class Patch:
     `contrast` (V, P): the same of standard deviations of luminance. `excess` (V, P): of the mean where contrast is
     doubled and what is below 0 is cut off. `light_alike` and `view_alike` (V,): correlation of
     a view's pictures under neighbouring lights, and with those of neighbouring views, moved by their parallax.
+    `view_alike_far`: where pixels are as wide as eight texels. Patches of earlier versions have neither it nor `finer`.
     `heights` (V, N, N): of what is seen, 0 the ground, 1 the top. Row 0 has the smallest y. `finer` (V, M, 3): linear
     means of the tile under the M lights of `finer_lights`, between those that pictures are of; without them M is 0.
     """
@@ -67,6 +69,7 @@ class Patch:
     heights: np.ndarray
     finer_lights: Rings | None = None
     finer: np.ndarray | None = None
+    view_alike_far: np.ndarray | None = None
 
     @property
     def texels(self) -> int:
@@ -129,31 +132,23 @@ def compressed_patch(
         mean = flat.mean(axis=0)
         doubled = np.maximum(mean + 2.0 * (shown * ratio - mean), 0.0).mean(axis=0)
         made["excess"].append(np.clip(doubled @ LUMA / np.maximum(mean @ LUMA, 1e-8) - 1.0, 0.0, 2.0))
-        made["light_alike"].append(np.mean([_alike(true[a], true[b]) for a, b in pairs]))
+        # Of decoded pictures: what they have lost was alike in none, and it is their mean that loses contrast.
+        made["light_alike"].append(np.mean([_alike(kept_back[a], kept_back[b]) for a, b in pairs]))
     arrays = {name: np.stack(values).astype(np.float32) for name, values in made.items()}
     below = np.clip(heights / height, 0, 1).astype(np.float32)
-    skies = [_seen(np.einsum("l,lyxc->yxc", cells, light) @ LUMA) for light in whole]
-    arrays["view_alike"] = views_alike(views, skies, below, height / size).astype(np.float32)
-    return Patch(
-        size,
-        height,
-        views,
-        lights,
-        white,
-        luma,
-        chroma,
-        heights=below,
-        finer_lights=finer_lights,
-        finer=finer,
-        **arrays,
+    patch = Patch(
+        size, height, views, lights, white, luma, chroma, heights=below, finer_lights=finer_lights, finer=finer,
+        view_alike=np.zeros(views.number), **arrays,
     )  # fmt: skip
+    near, far = views_alike(patch, (PIXEL, FAR_PIXEL)).astype(np.float32)
+    return replace(patch, view_alike=near, view_alike_far=far)
 
 
-def _seen(pictures: np.ndarray) -> np.ndarray:
+def _seen(pictures: np.ndarray, pixel: float = PIXEL) -> np.ndarray:
     """Pictures (..., N, N) as pixels of about two texels show them: what they lose is mostly finer than that."""
     texels = pictures.shape[-1]
     frequency = np.fft.fftfreq(texels)
-    kept_waves = np.exp(-2.0 * (np.pi * PIXEL) ** 2 * (frequency[:, None] ** 2 + frequency[None, :] ** 2))
+    kept_waves = np.exp(-2.0 * (np.pi * pixel) ** 2 * (frequency[:, None] ** 2 + frequency[None, :] ** 2))
     return np.fft.ifft2(np.fft.fft2(pictures) * kept_waves).real
 
 
@@ -163,18 +158,23 @@ def _alike(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.clip(((a - a.mean()) * (b - b.mean())).mean() / both, 0.0, 1.0)) if both > 1e-12 else 1.0
 
 
-def views_alike(views: Rings, pictures: list[np.ndarray], heights: np.ndarray, slope: float) -> np.ndarray:
-    """(V,): how much the picture of a view is like those of its neighbours when what is at its mean height is laid over
-    the same in theirs. `slope`: height over side of the tile."""
-    vectors, texels = views.vectors, heights.shape[1]
-    slant = vectors[:, :2] / vectors[:, 2:]
-    sums, numbers = np.zeros(views.number), np.zeros(views.number)
+def views_alike(patch: Patch, pixels: Sequence[float]) -> np.ndarray:
+    """(K, V), for each of K widths of pixels: how much the decoded pictures of a view are like those of its neighbours
+    under the same lights, when what is at their mean height is laid over the same in theirs."""
+    views, texels, slope = patch.views, patch.texels, patch.height / patch.size
+    some = range(0, patch.lights.number, max(patch.lights.number // 7, 1))
+    light = np.stack([patch.pictures(view)[some] @ LUMA for view in range(views.number)])
+    slant = views.vectors[:, :2] / views.vectors[:, 2:]
+    mean = patch.mean_heights()
+    sums, numbers = np.zeros((len(pixels), views.number)), np.zeros(views.number)
+    shown = [_seen(light, pixel) for pixel in pixels]
     for a, b in views.neighbours():
-        below = 1.0 - 0.5 * (heights[a].mean() + heights[b].mean())
+        below = 1.0 - 0.5 * (mean[a] + mean[b])
         x, y = (int(step) for step in np.rint(below * slope * (slant[b] - slant[a]) * texels))
-        found = _alike(pictures[a], np.roll(pictures[b], (-y, -x), axis=(0, 1)))
+        moved = [np.roll(one[b], (-y, -x), axis=(1, 2)) for one in shown]
+        found = [np.mean([_alike(*pair) for pair in zip(one[a], other)]) for one, other in zip(shown, moved)]
         for view in (a, b):
-            sums[view] += found
+            sums[:, view] += found
             numbers[view] += 1.0
     return sums / np.maximum(numbers, 1.0)
 
@@ -202,6 +202,8 @@ def save(patch: Patch, path: Path) -> None:
         "light_alike": patch.light_alike.astype("<f4"),
         "view_alike": patch.view_alike.astype("<f4"),
     }
+    if patch.view_alike_far is not None:
+        arrays["view_alike_far"] = patch.view_alike_far.astype("<f4")
     if patch.finer_lights is not None:
         about["finer_lights"] = [list(patch.finer_lights.polar), list(patch.finer_lights.counts)]
         arrays["finer"] = patch.finer.astype("<f4")
@@ -281,6 +283,7 @@ def load(path: Path) -> Patch:
             _floats(arrays["view_alike"], (v,)),
             _whole(arrays["heights"], (v, n, n)) / HEIGHT_STEPS,
             finer, None if finer is None else _floats(arrays["finer"], (v, finer.number, 3)),
+            _floats(arrays["view_alike_far"], (v,)) if "view_alike_far" in arrays else None,
         )  # fmt: skip
         sizes = np.array([patch.size, patch.height, patch.white])
         if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):

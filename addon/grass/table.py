@@ -163,5 +163,6 @@ def _pictures(patch: Patch) -> np.ndarray:
     about = np.zeros((len(rows), 1, PICTURE, 4), np.float32)
     about[:, 0, 0, 0], about[:, 0, 0, 1] = patch.view_alike, patch.light_alike
     about[:, 0, 0, 2] = patch.views.vectors[:, 2]
+    about[:, 0, 0, 3] = patch.view_alike if patch.view_alike_far is None else patch.view_alike_far
     about[:, 0, 1, : MOST_RINGS[1] - 1] = powers(patch)
     return np.concatenate([rows, about], axis=1).reshape(-1, 4)

@@ -211,7 +211,9 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   float depth = lead + grass_length(hit.bare ? height : below, rise, bend_down);
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
-  float alike = grass_texel(grass_picture(g, picture, g.lights + 1)).x;
+  vec4 about = grass_texel(grass_picture(g, picture, g.lights + 1));
+  float texels = float(g.side) * sqrt(rise) / max(tile_pixels, 1e-6);  // that a pixel is wide
+  float alike = mix(about.x, about.w, clamp(0.5 * log2(0.5 * texels), 0.0, 1.0));
   float contrast = grass_contrast(grass_squares(outer, inside.z, outside.z), alike) * inversesqrt(tile_squares);
   hit.contrast = contrast * smoothstep(0.5, 2.0, tile_pixels);
   hit.place = float(place);

@@ -9,10 +9,11 @@
 // 18: as 16, of a map that the height is multiplied by. On UV maps both cover the unit square. From 19 on eight rings of lights
 // of which the tile's mean alone is known.
 // A patch: PICTURE texels for each view and light, and one light more, the uniform sky (coefficients of luma, of chroma, mean
-// colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many that begin
-// with the correlation of its pictures with those of neighbouring views, and among neighbouring lights, and the cosine of its
-// polar angle, and then, for each pair of rings of lights, the power of Lommel and Seeliger's law between them; then PLACE texels for
-// each view and place; then, for each view and finer light, the mean over that which pictures give. How they are decoded: addon/grass/compression.py.
+// colour and contrast, ratio of means; w: what cutting off adds to the mean where contrast is doubled), and as many of the view:
+// the correlation of its pictures with those of neighbouring views, among neighbouring lights, the cosine of its polar angle,
+// and the first of these from far away; then, for each pair of rings of lights, the power of Lommel and Seeliger's law between
+// them. Then PLACE texels for each view and place; then, for each view and finer light, the mean there over that which pictures
+// give. How they are decoded: addon/grass/compression.py.
 #include "lib/math.glsl"
 
 #define GRASS_ENTRY 27
@@ -26,6 +27,7 @@
 #define GRASS_FINER_RINGS 19
 #define GRASS_MOST_RINGS 8
 #define GRASS_GAMMA 2.2
+#define GRASS_CUT 2.3  // what cutting off takes from the contrast, over what it adds to the mean
 
 struct Grass {
   int base;      // of the patch, in texels
@@ -204,6 +206,7 @@ vec3 grass_decoded(Grass g, GrassPlace place, int view, int light, float contras
   // Where more contrast makes places darker than black, these are black, and all are darker, so that the mean stays.
   float more = mean.w * contrast;
   float excess = ratio.w * pow(max(more - 1.0, 0.0), 1.5);
+  more *= 1.0 + GRASS_CUT * excess;
   return max(mean.rgb + (shown - mean.rgb) * more, vec3(0.0)) / (1.0 + excess);
 }
 
