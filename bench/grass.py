@@ -65,7 +65,7 @@ def compression(options: argparse.Namespace) -> str:
     from addon.grass import compression as by
     from addon.grass.generate import Order, read_view, studio, view_file, write_view
 
-    order, folder = Order(finer=None), cache_folder() / "grass_views"
+    order, folder = Order(finer=False), cache_folder() / "grass_views"
     missing = [view for view in range(order.views.number) if read_view(order, folder, view) is None]
     if missing:
         with studio(order) as stage:

@@ -87,8 +87,19 @@ class Rings:
 
 VIEWS = Rings((0.0, 15.0, 30.0, 45.0, 60.0, 75.0), (1, 6, 12, 18, 20, 24))
 LIGHTS = Rings((0.0, 35.0, 70.0), (1, 8, 12))
-FINER = VIEWS  # lights of which the tile's mean alone is kept
 GRAZING = 85.0  # of a further ring: most of a meadow is seen from there
+
+
+def finer(rings: Rings) -> Rings:
+    """These directions and others between them and beyond, about 24 a ring: lights of which the mean alone is kept."""
+    polar, counts = [], []
+    ends = (*rings.polar, min(rings.polar[-1] + 10.0, 0.5 * (rings.polar[-1] + 90.0)))
+    for k, (angle, count) in enumerate(zip(rings.polar, rings.counts)):
+        last = k == len(rings.polar) - 1
+        between = ends[k + 1] if last else 0.5 * (angle + ends[k + 1])
+        polar += [angle, between]
+        counts += [count * max(round(24 / count), 1) if count > 1 else 1, 24 if between > 20.0 else 12]
+    return Rings(tuple(polar), tuple(counts))
 
 
 def thinned(rings: Rings, number: int) -> Rings:

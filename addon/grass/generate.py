@@ -27,7 +27,7 @@ import numpy as np
 
 from ..snapshot.exr import ExrError, read_exr
 from .blades import COLORS, SOIL, TRANSLUCENT, Recipe, blades_of
-from .directions import FINER, LIGHTS, VIEWS, Rings
+from .directions import LIGHTS, VIEWS, Rings, finer
 from .patch import Patch, PatchError, compressed_patch, read_arrays, save, write_arrays
 
 BOUNCES = 4
@@ -46,7 +46,7 @@ class Order:
     samples: int = 16
     luma: int = 8
     chroma: int = 2
-    finer: Rings | None = FINER  # lights of which means alone are kept
+    finer: bool = True  # means under lights in between are kept
 
     def __post_init__(self):
         if not 4 <= self.texels <= 256 or not 1 <= self.samples <= 65536:
@@ -56,8 +56,12 @@ class Order:
     def fingerprint(self) -> str:
         """Equal orders give equal pictures; how they are compressed is no part of it."""
         parts = (GENERATION, asdict(self.recipe), self.texels, self.views, self.lights, self.samples)
-        parts += (self.finer,) if self.finer else ()
+        parts += (self.finer_lights,) if self.finer else ()
         return hashlib.blake2b(repr(parts).encode(), digest_size=12).hexdigest()
+
+    @property
+    def finer_lights(self) -> Rings | None:
+        return finer(self.lights) if self.finer else None
 
 
 def generate(order: Order, path: Path) -> Iterator[tuple[int, int]]:
@@ -70,7 +74,7 @@ def generate(order: Order, path: Path) -> Iterator[tuple[int, int]]:
         with studio(order) as stage:
             for view in missing:
                 direction = order.views.vectors[view]
-                means = stage.means(direction, order.finer.vectors if order.finer else np.zeros((0, 3)))
+                means = stage.means(direction, order.finer_lights.vectors if order.finer else np.zeros((0, 3)))
                 write_view(order, folder, view, *stage.render(direction, order.lights.vectors), means)
                 done += 1
                 yield done, order.views.number
@@ -92,11 +96,11 @@ def patch_of(order: Order, folder: Path) -> Patch:
         return content
 
     heights = np.stack([found(view)[1] for view in range(order.views.number)])
-    finer = np.stack([found(view)[2] for view in range(order.views.number)]) if order.finer else None
+    means = np.stack([found(view)[2] for view in range(order.views.number)]) if order.finer else None
     recipe = order.recipe
     return compressed_patch(
         recipe.size, recipe.height, order.views, order.lights, lambda view: found(view)[0], heights, order.luma,
-        order.chroma, order.finer, finer,
+        order.chroma, order.finer_lights, means,
     )  # fmt: skip
 
 
@@ -134,7 +138,7 @@ def read_view(order: Order, folder: Path, view: int) -> tuple[np.ndarray, np.nda
         return None
     n = order.texels
     fits = pictures.shape == (order.lights.number, n, n, 3) and heights.shape == (n, n)
-    fits = fits and means.shape == (order.finer.number if order.finer else 0, 3)
+    fits = fits and means.shape == (order.finer_lights.number if order.finer else 0, 3)
     return (pictures, heights, means) if own and fits and np.isfinite(pictures).all() else None
 
 
@@ -223,7 +227,7 @@ _KINDS = ("scenes", "objects", "meshes", "cameras", "lights", "materials", "coll
 def build(order: Order, scene: bpy.types.Scene) -> None:
     """The tile with its copies, ground, sun and camera, and the settings of the render."""
     recipe = order.recipe
-    used = [rings for rings in (order.views, order.lights, order.finer) if rings]
+    used = [rings for rings in (order.views, order.lights, order.finer_lights) if rings]
     slant = max(math.tan(math.radians(rings.polar[-1])) for rings in used)
     around = min(math.ceil(recipe.height * slant / recipe.size) + 1, 12)
     field_of(recipe, scene, range(-around, around + 1))

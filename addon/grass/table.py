@@ -118,7 +118,8 @@ def finer_ratios(patch: Patch) -> np.ndarray:
     law = ((cosines[numbers] + seen) / (wanted[:, 2, None] + seen)) ** power
     share = shares * law * wanted[:, 2, None] / cosines[numbers]  # (V, M, 4)
     given = np.einsum("vmk,vmkc->vmc", share, patch.picture_mean[:, numbers])
-    return np.clip(patch.finer / np.maximum(given, 1e-8), 0.2, 5.0)
+    found = np.clip(patch.finer / np.maximum(given, 1e-8), 0.2, 5.0)
+    return np.where((shares.max(axis=1) > 1.0 - 1e-6)[:, None], 1.0, found)  # pictures have less noise than small ones
 
 
 def powers(patch: Patch) -> np.ndarray:

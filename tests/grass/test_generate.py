@@ -13,8 +13,7 @@ from addon.grass.directions import Rings
 from addon.grass.table import finer_ratios
 
 FEW_VIEWS, FEW_LIGHTS = Rings((0.0, 45.0), (1, 8)), Rings((0.0, 50.0), (1, 4))
-FINER = Rings((0.0, 25.0, 50.0), (1, 3, 4))
-TINY = generate.Order(Recipe(0.25, 0.1, 60), 16, FEW_VIEWS, FEW_LIGHTS, 4, finer=FINER)
+TINY = generate.Order(Recipe(0.25, 0.1, 60), 16, FEW_VIEWS, FEW_LIGHTS, 4, finer=False)
 
 
 def run(order, path):
@@ -29,7 +28,7 @@ def tiny(tmp_path_factory):
 
 
 def render(view, light, recipe=TINY.recipe, texels=16, samples=4, change=None):
-    order = generate.Order(recipe, texels, FEW_VIEWS, FEW_LIGHTS, samples, finer=None)
+    order = generate.Order(recipe, texels, FEW_VIEWS, FEW_LIGHTS, samples, finer=False)
     with generate.studio(order) as stage:
         if change:
             change(stage.scene)
@@ -100,10 +99,17 @@ def test_the_file_has_what_was_rendered(tiny):
     assert shown.mean(axis=(1, 2)) == pytest.approx(pictures.mean(axis=(1, 2)), rel=0.01)
     assert np.sqrt(((shown - pictures) ** 2).mean()) < 0.25 * pictures.mean()
     assert np.abs(made.heights[view] * made.height - heights).max() < 1e-4
-    # Lights of which means alone are kept: where they are lights of pictures, too, as those; between, as rendered.
-    assert made.finer[view, -4:] == pytest.approx(made.picture_mean[view, 1:5], rel=0.05)
+
+
+def test_between_lights_the_mean_is_kept(tmp_path):
+    """At lights of pictures it is theirs; between, of which pictures know nothing, it is as rendered."""
+    order = generate.Order(Recipe(0.25, 0.1, 60), 16, Rings((60.0,), (2,)), FEW_LIGHTS, 4)
+    run(order, tmp_path / "finer.grass")
+    made = patch.load(tmp_path / "finer.grass")
+    assert made.finer_lights.polar == (0.0, 25.0, 50.0, 60.0) and made.finer_lights.counts == (1, 24, 24, 24)
+    assert made.finer[:, 25:49:6] == pytest.approx(made.picture_mean[:, 1:5], rel=0.05)
     ratios = finer_ratios(made)
-    assert ratios[:, -4:] == pytest.approx(np.ones((9, 4, 3)), rel=0.05)
+    assert ratios[:, 25:49:6] == pytest.approx(np.ones((2, 4, 3)), abs=1e-6)
     assert ratios.min() > 0.5 and ratios.max() < 2.0
 
 
@@ -131,7 +137,7 @@ def test_views_of_other_settings_are_rendered_anew(tmp_path):
     steps = generate.generate(TINY, path)
     next(steps), next(steps)
     steps.close()
-    other = generate.Order(Recipe(0.25, 0.1, 61), 16, FEW_VIEWS, FEW_LIGHTS, 4, finer=FINER)
+    other = generate.Order(Recipe(0.25, 0.1, 61), 16, FEW_VIEWS, FEW_LIGHTS, 4, finer=False)
     assert next(generate.generate(other, path)) == (0, 9)
     assert next(generate.generate(TINY, path)) == (1, 9)
 
