@@ -536,6 +536,6 @@ def test_lights_that_take_turns_shine_as_much_as_if_each_sample_had_all(stage, t
     irradiance(stage, technique, 1, (8, 8))  # so that the next one is drawn anew
     every = irradiance(stage, technique, 5, (64, 64), grid=48)
     assert views < 0.7 * stage.ledger.row(technique).counters["light views"]
-    assert turns.mean() == pytest.approx(every.mean(), rel=0.005)
+    assert turns.mean() == pytest.approx(every.mean(), rel=0.01)  # from two or three points of a lamp instead of five
     coarse, fine = (light.reshape(8, 8, 8, 8).mean(axis=(1, 3)) for light in (turns, every))
     assert np.abs(coarse - fine).mean() < 0.03 * every.mean()
