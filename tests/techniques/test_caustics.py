@@ -528,13 +528,12 @@ def test_lights_that_take_turns_shine_as_much_as_if_each_sample_had_all(stage, t
     for k in range(3):
         stage.light("POINT", (0.6 * (k - 1), 0.4 * k, 4.0), energy=100 * (k + 1), shadow_soft_size=0.0)
     stage.camera_above(4.0)
-    turns = irradiance(stage, technique, 5, (64, 64), grid=48)
+    turns = irradiance(stage, technique, 8, (64, 64), grid=48)
     views = stage.ledger.row(technique).counters["light views"]
     monkeypatch.setattr(photons, "VIEWS", 100)
     irradiance(stage, technique, 1, (8, 8))  # so that the next one is drawn anew
-    every = irradiance(stage, technique, 5, (64, 64), grid=48)
+    every = irradiance(stage, technique, 8, (64, 64), grid=48)
     assert views < 0.7 * stage.ledger.row(technique).counters["light views"]
-    # Whether light leaves a ball by its mirrored lobe is drawn anew for each sample of a light: two or five draws.
-    assert turns.mean() == pytest.approx(every.mean(), rel=0.015)
+    assert turns.mean() == pytest.approx(every.mean(), rel=0.005)
     coarse, fine = (light.reshape(8, 8, 8, 8).mean(axis=(1, 3)) for light in (turns, every))
-    assert np.abs(coarse - fine).mean() < 0.03 * every.mean()  # each lamp has its own weight
+    assert np.abs(coarse - fine).mean() < 0.1 * every.mean()  # of half as many samples, footprints are wider
