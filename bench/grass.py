@@ -83,6 +83,8 @@ def compression(options: argparse.Namespace) -> str:
     level = moved_to_mean_height(data, order, folder)
     found = by.errors(level, by.compressed(level, 140, 6, white))
     rows.append(["and views moved to their mean height, 140 / 6", *(f"{value:.3f}" for value in found.values())])
+    found = by.errors(level, by.compressed(level, 140, 6, white, weighted=True))
+    rows.append(["and errors weighted by the pictures' luma, 140 / 6", *(f"{value:.3f}" for value in found.values())])
     for luma, chroma in ((4, 1), (8, 1), (8, 2)):
         views = [view.reshape(-1, order.texels**2, 3).transpose(1, 0, 2) for view in data]
         found = by.errors(flat, np.concatenate([by.compressed(one, luma, chroma, white) for one in views], axis=1))

@@ -47,15 +47,16 @@ class Components:
         return self.mean[:, None] + self.parts @ self.weights
 
 
-def components(data: np.ndarray, count: int) -> Components:
-    """The first `count` principal components of pictures (P, I), through their Gram matrix (I, I)."""
+def components(data: np.ndarray, count: int, weight: np.ndarray | float = 1.0) -> Components:
+    """The first `count` principal components of pictures (P, I), through their Gram matrix (I, I); `weight` (I,): how
+    much an error of each counts."""
     mean = data.mean(axis=1)
-    off = data - mean[:, None]
+    off = (data - mean[:, None]) * weight
     values, vectors = np.linalg.eigh(off.T @ off)
     order = np.argsort(values)[::-1][: min(count, off.shape[1])]
     sizes, vectors = np.sqrt(np.maximum(values[order], 0.0)), vectors[:, order]
     parts = off @ vectors / np.where(sizes > 0.0, sizes, 1.0)
-    weights = sizes[:, None] * vectors.T
+    weights = sizes[:, None] * vectors.T / weight
     most = np.maximum(np.abs(parts).max(axis=0), 1e-12)
     return Components(mean, parts / most, weights * most[:, None])
 
@@ -82,10 +83,14 @@ def errors(true: np.ndarray, found: np.ndarray) -> dict[str, float]:
     }
 
 
-def compressed(light: np.ndarray, luma: int, chroma: int, white: float | None = None) -> np.ndarray:
-    """Pictures (P, I, 3) after compression to these numbers of components, decoded, with their true means."""
+def compressed(
+    light: np.ndarray, luma: int, chroma: int, white: float | None = None, weighted: bool = False
+) -> np.ndarray:
+    """Pictures (P, I, 3) after compression to these numbers of components, decoded, with their true means. `weighted`:
+    errors count by the mean luma of their picture, about as much as they are worth once decoded."""
     white = white_of(light) if white is None else white
     data = encoded(light, white)
-    parts = [components(data[..., k], luma if k == 0 else chroma).pictures() for k in range(3)]
+    weight = data[..., 0].mean(axis=0) if weighted else 1.0
+    parts = [components(data[..., k], luma if k == 0 else chroma, weight).pictures() for k in range(3)]
     found = decoded(np.stack(parts, axis=-1), white)
     return found * mean_ratio(light, found)

@@ -52,6 +52,15 @@ def test_error_falls_with_components_and_the_mean_stays():
         assert one.mean(axis=0) == pytest.approx(light.mean(axis=0), rel=1e-9)
 
 
+def test_weights_move_error_to_pictures_that_count_less():
+    data = pictures()[..., 0]
+    weight = np.where(np.arange(21) < 10, 4.0, 1.0)
+    plain, weighted = (compression.components(data, 4, one).pictures() for one in (1.0, weight))
+    of = [((one - data) ** 2).sum(axis=0) for one in (plain, weighted)]
+    assert of[1][:10].sum() < of[0][:10].sum() and of[1][10:].sum() > of[0][10:].sum()
+    assert np.abs(compression.components(data, 21, weight).pictures() - data).max() < 1e-6
+
+
 def test_nothing_negative_is_decoded():
     rng = np.random.default_rng(3)
     assert compression.decoded(rng.normal(size=(100, 3)), 1.0).min() >= 0.0
