@@ -111,6 +111,10 @@ def test_between_lights_the_mean_is_kept(tmp_path):
     ratios = finer_ratios(made)
     assert ratios[:, 25:49:6] == pytest.approx(np.ones((2, 4, 3)), abs=1e-6)
     assert ratios.min() > 0.5 and ratios.max() < 2.0
+    arrays = patch.read_arrays(tmp_path / "finer.grass")
+    patch.write_arrays(tmp_path / "wrong.grass", arrays | {"finer": arrays["finer"][:, 1:]})
+    with pytest.raises(patch.PatchError, match=r"wrong.grass is no grass patch, or it is damaged\.$"):
+        patch.load(tmp_path / "wrong.grass")
 
 
 def test_nothing_is_left_in_the_open_file(tiny):

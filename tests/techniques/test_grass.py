@@ -1,6 +1,7 @@
 """Grass from patches: radiometry in closed form, depth, shadow, invariants, and real blades by Cycles."""
 
 import math
+from dataclasses import replace
 
 import bmesh
 import bpy
@@ -14,6 +15,10 @@ from addon.grass.blades import Recipe
 from addon.grass.compression import LUMA
 from addon.grass.directions import Rings
 from addon.grass.generate import field_of
+from addon.materials.compiled import Attribute
+from addon.materials.compiler import compile_material
+from addon.scene import uv_placed
+from addon.snapshot.shading import empty_slot_graph
 from addon.techniques.grass import SHIPPED
 
 MEADOW = Recipe(0.4, 0.1, 1300, 3)  # of the shipped patch
@@ -317,6 +322,18 @@ def test_a_map_along_the_axes_shows_what_the_axes_show(stage):
     plain.data.uv_layers.remove(plain.data.uv_layers[0])
     with_map(plain, [(0.5, 0, 0), (0, 0.5, 0)])
     assert np.abs(seen(stage) - expected).mean() < 0.02 * expected.mean()
+
+
+def test_the_map_is_one_more_attribute_if_there_is_room():
+    compiled = compile_material("Soil", empty_slot_graph())
+    placed = uv_placed.with_map(compiled)
+    assert placed.attributes[uv_placed.map_of(placed)] == uv_placed.ACTIVE
+    assert placed.program_key != compiled.program_key
+    assert uv_placed.with_map(placed) is placed
+    full = replace(compiled, attributes=tuple(Attribute("NAMED", f"{k}") for k in range(8)))
+    refused = uv_placed.with_map(full)
+    assert uv_placed.map_of(refused) == -1
+    assert refused.fallbacks[-1][1].startswith("The material reads 8 attributes, so that none is left")
 
 
 def test_a_turned_map_is_a_turned_object(stage):
