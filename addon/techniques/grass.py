@@ -15,7 +15,7 @@ the blade is; indirect light takes its albedo under a uniform sky. In depth maps
 | cost | |
 |---|---|
 | surface pass, per pixel of grass and sample | 1 view of four, 1 texel: up to 12 fetches of rings, 9 of the patch |
-| light loop, per light and pixel of grass | 20 fetches of pictures, up to 5 of rings |
+| light loop, per light and pixel of grass | 25 fetches of pictures and means, up to 11 of rings |
 | depth maps, per texel of grass | as the surface pass; where grass is shown, lamps have maps and no rays |
 | memory | 32 bytes for each texel and view: 7 MiB for 64 x 64 and 57 views |
 
