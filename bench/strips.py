@@ -103,6 +103,30 @@ def _over_grass(name: str) -> None:
     camera.rotation_euler = (np.radians(72.0), 0.0, 0.0)
 
 
+def _grass_by_map(name: str) -> None:
+    """The shipped meadow on a ball or a ring, where their UV maps place it."""
+    import bpy
+
+    from bench import grass
+
+    grass.clear()
+    grass.field(True, 12)
+    bpy.data.materials["Soil"].candela.grass_patch = "NONE"
+    if name == "ball":
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=1.2, location=(0, 0, 1.25))
+    else:
+        bpy.ops.mesh.primitive_torus_add(
+            major_segments=64, minor_segments=32, major_radius=1.2, minor_radius=0.5, location=(0, 0, 0.6)
+        )
+    shown = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    material = bpy.data.materials["Soil"].copy()
+    material.candela.grass_patch, material.candela.grass_placement = "MEADOW", "UV"
+    material.candela.grass_tiles = 14.0 if name == "ball" else 6.0
+    shown.data.materials.append(material)
+    grass.camera((0.0, -5.5, 2.9), (np.radians(71.0), 0.0, 0.0), angle=0.7)
+
+
 NO_BOUNCES = ("slot_indirect", "OFF")
 CYCLES = Entrant("CYCLES", 128)
 STRIPS = {
@@ -122,6 +146,9 @@ STRIPS = {
         lambda frame: _over_grass(f"{frame} varied"),
         (Entrant("CANDELA", 8, (NO_BOUNCES,), _over_grass), Entrant("CANDELA", 8, (NO_BOUNCES,))),
         own_exposure=False,
+    ),
+    "grass_by_map": Strip(
+        (160, 112), ("ball", "ring"), _grass_by_map, (Entrant("CANDELA", 16, (NO_BOUNCES,)),), own_exposure=False
     ),
     "media": Strip(
         (128, 128),

@@ -209,6 +209,11 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   float density = g.density * grass_map(g, GRASS_MAP, root);
   hit.bare = height < GRASS_LOWEST * g.height || (density < 1.0 && grass_clumps(root * 6.0) >= density);
   float depth = lead + grass_length(hit.bare ? height : below, rise, bend_down);
+  if (bend_down <= 0.0) {
+    // Down to the triangle itself, which is flat: what lay below it would be in its shadow.
+    float reach = instance_shares_mesh(instance_flat.x) ? 1.0 : length(world_normal);
+    depth *= reach * dot(up, point.geometric_normal) * rise / max(dot(toward, point.geometric_normal), 0.02);
+  }
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   vec4 about = grass_texel(grass_picture(g, picture, g.lights + 1));
