@@ -410,25 +410,6 @@ def test_a_lower_height_is_a_lower_field(stage):
     assert np.abs(seen(stage) - expected).mean() < 0.02 * expected.mean()
 
 
-def test_what_grows_on_facets_is_not_in_their_shadow(stage, tmp_path):
-    """The ground of a ball of few faces, lit from the viewer. Measured against smooth normals a tenth of it was dark."""
-    mesh = bpy.data.meshes.new("Ball")
-    made = bmesh.new()
-    bmesh.ops.create_uvsphere(made, u_segments=24, v_segments=12, radius=1.0)
-    for face in made.faces:
-        face.smooth = True
-    made.to_mesh(mesh)
-    made.free()
-    material = stage.diffuse(0.5)
-    material.candela.grass_patch, material.candela.grass_file = "FILE", str(flat_patch(tmp_path / "flat.grass", 0.0))
-    mesh.materials.append(material)
-    stage.link("Ball", mesh, (0, 0, 0))
-    sun(stage, 60, 30)
-    towards(stage, 60, 30, 1.0)
-    light = seen(stage, 4)[..., 1]
-    assert (light < 0.5 * np.median(light)).mean() < 0.01
-
-
 # Invariants ----------------------------------------------------------------------------------------------------------
 
 
