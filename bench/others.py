@@ -7,8 +7,8 @@ a crash or a hang is one row of the table. A scene without a camera gets one tha
 stays dark, and is compared dark.
 
 A row says relMSE of the picture without the reference's noise and without the worst hundredth of the pixels (edges in
-few samples), the mean beside Cycles', and the light paths that differ by more than `--tolerance`; then how many
-sentences Candela itself says about what it leaves out. `--page` writes docs/other_files.md, worst first.
+few samples), the mean beside Cycles', and the light paths whose mean differs by more than SHARE of the picture's light;
+then how many sentences Candela itself says about what it leaves out. `--page` writes docs/other_files.md, worst first.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ COMMAND = "python -m bench others --page"
 LIMIT = 240.0  # seconds for a file
 MARGIN = 1.1  # of the sphere about everything, for a camera where a file has none
 ENDED = "ended without an answer"
+SHARE = 0.02  # of the picture's light
 
 
 @dataclass
@@ -109,12 +110,16 @@ def render(path: Path, options: argparse.Namespace) -> dict:
     if not all(np.isfinite(picture).all() for picture in own.values()):
         return {"state": "not finite", "said": said, "seconds": seconds}
     first, second = (pictures("CYCLES", options.reference_samples, seed) for seed in (1, 2))
-    found, off = differences(own, first, second, options.tolerance)
+    found, _ = differences(own, first, second, options.tolerance)
     values = {name: (float(error), float(mean)) for name, error, mean in map(str.split, found)}
     error, mean = values.get("combined", (0.0, 1.0))
-    worse = [f"{name} {value:.3f} ({ratio:.2f})" for name, (value, ratio) in values.items()
-             if value > options.tolerance and name != "combined"]  # fmt: skip
-    return {"state": "off" if off and error > options.tolerance else "alike", "error": error, "mean": mean,
+    light = max(float((first["combined"][..., :3] + second["combined"][..., :3]).mean()) / 2, 1e-30)
+    worse = [
+        f"{name} {share:+.1%}"
+        for name in values
+        if abs(share := float((own[name] - (first[name] + second[name]) / 2)[..., :3].mean()) / light) > SHARE
+    ]
+    return {"state": "off" if error > options.tolerance else "alike", "error": error, "mean": mean,
             "off": worse, "said": said, "seconds": seconds}  # fmt: skip
 
 
@@ -156,8 +161,9 @@ def row_of(repository: dict, place: Path, path: Path, options: argparse.Namespac
                "--size", "x".join(map(str, options.size))]  # fmt: skip
     try:
         done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=options.limit
-        )
+            command, check=False, cwd=ROOT, capture_output=True, text=True, errors="replace",
+            timeout=options.limit,
+        )  # fmt: skip
     except subprocess.TimeoutExpired:
         named.state = f"not done in {options.limit:g} s"
         return named
@@ -187,7 +193,7 @@ def page(rows: list[Row], options: argparse.Namespace) -> str:
         if count:
             url = f"https://github.com/{one['name']}/tree/{one['commit']}"
             sources.append((f"[{one['name']}]({url})", one["commit"][:10], one["about"], str(count)))
-    table = [("file", "relMSE", "mean", "light paths that differ (their means)", "sentences")]
+    table = [("file", "relMSE", "mean", "light paths that differ, of the picture's light", "sentences")]
     rest = [("file", "why there is no comparison")]
     for row in sorted(rows, key=lambda row: -row.error):
         name = f"{row.repository.split('/')[1]}: {row.path}"
