@@ -81,18 +81,18 @@ def rms(picture: np.ndarray, truth: np.ndarray, noise: np.ndarray) -> float:
     return float(np.sqrt(max(((picture - truth) ** 2).mean() - (noise**2).mean(), 0.0)) / truth.mean())
 
 
-def equal_time(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+def equal_time(rows: list[tuple[str, ...]], figure: str = "relMSE") -> list[tuple[str, ...]]:
     """By scene and EQUAL_SAMPLES: processor seconds of micro-rendering, its error, and its peers' in as long."""
-    found = []
+    found, column = [], HEAD.index(figure)
     for scene in dict.fromkeys(row[0] for row in rows):
         own = [row for row in rows if row[0] == scene]
         for samples in EQUAL_SAMPLES:
             mine = next((row for row in own if row[1:3] == (NAME, str(samples))), None)
             if mine is None:
                 continue
-            seconds, told = float(mine[4]), [mine[5]]
+            seconds, told = float(mine[4]), [mine[column]]
             for peer in PEERS:
-                known = sorted((float(row[4]), max(float(row[5]), 1e-5)) for row in own if row[1] == peer)
+                known = sorted((float(row[4]), max(float(row[column]), 1e-5)) for row in own if row[1] == peer)
                 told.append(at_time(known, seconds) if known else "")
             found.append((scene, str(samples), f"{seconds:.2f}", *told))
     return found
@@ -150,8 +150,8 @@ def keep(path: Path, size: tuple[int, int], key: tuple[str, str, int], figures: 
 
 
 def kept_rows(path: Path, size: tuple[int, int]) -> tuple[list[tuple[str, ...]], list[str]]:
-    """Lines of the table of what is kept of this size, in the order of scenes, techniques and samples; by technique, when
-    its oldest was made."""
+    """Lines of the table of what is kept of this size, in the order of scenes, techniques and samples; by technique,
+    when its oldest was made."""
     kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     rows, made = [], {}
     for key, figures in kept.items():
@@ -205,11 +205,13 @@ def write_picture(path: Path, pictures: list) -> None:
 def tables(rows: list[tuple[str, ...]]) -> str:
     from bench import markdown
 
-    equal = "Error (relMSE) in the processor seconds of one sample and of sixteen of micro-rendering:"
-    floor = "The floor: what the error ends at with many samples."
-    parts = ([HEAD, *rows], [EQUAL_HEAD, *equal_time(rows)], [FLOOR_HEAD, *floors(rows)])
-    first, second, third = (markdown.table(part) for part in parts)
-    return f"{first}\n\n{equal}\n\n{second}\n\n{floor}\n\n{third}"
+    equal = "in the processor seconds of one sample and of sixteen of micro-rendering:"
+    floor = "The floor, what relMSE ends at with many samples:"
+    by_measure = [
+        f"{figure} {equal}\n\n{markdown.table([EQUAL_HEAD, *equal_time(rows, figure)])}" for figure in ("relMSE", "RMS")
+    ]
+    ends = f"{floor}\n\n{markdown.table([FLOOR_HEAD, *floors(rows)])}"
+    return "\n\n".join((markdown.table([HEAD, *rows]), *by_measure, ends))
 
 
 def page(turned: list, options: argparse.Namespace) -> None:
