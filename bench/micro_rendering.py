@@ -115,8 +115,10 @@ def floors(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
 
 
 def at_time(known: list[tuple[float, float]], seconds: float) -> str:
-    """The error after so long, of (seconds, error) in order: along lines in logarithms; the first's of less time than
-    that takes; of more time than the last takes it is at most the last's."""
+    """The error after so long, of (seconds, error) in order: along lines in logarithms; the first's where that takes
+    longer, and how long; of more time than the last takes it is at most the last's."""
+    if seconds < known[0][0]:
+        return f"{known[0][1]:.4f} in {known[0][0]:.2f} s"
     times, errors = np.log(known).T
     error = f"{float(np.exp(np.interp(np.log(seconds), times, errors))):.4f}"
     return error if seconds <= known[-1][0] else f"{error} or less"
@@ -221,7 +223,9 @@ def page(turned: list, options: argparse.Namespace) -> None:
     size = "x".join(map(str, options.size))
     rows, made = kept_rows(options.results, options.size)
     if rows:
-        text = f"{size} pixels, {BOUNCES} bounces, two references of {options.reference} samples. " + " ".join(made)
+        text = f"{size} pixels, {BOUNCES} bounces, two references of {options.reference} samples.\n\n" + "\n".join(
+            f"- {one}" for one in made
+        )
         markdown.put_between(PAGE, f"{COMMAND} --no-dials", f"{text}\n\n{tables(rows)}", stamped=False)
     if turned:
         text = f"One sample, {DIAL_SCENE}.\n\n"

@@ -20,6 +20,7 @@ def test_figures_are_kept_one_by_one_and_tables_are_of_one_size(tmp_path):
     assert micro_rendering.kept_rows(path, (96, 64))[0] == []
     # Halfway between .5 and 2 seconds in logarithms lies 1.
     assert micro_rendering.equal_time(rows)[0][3:] == ("0.04", "", "", "", "", "0.0200")
+    assert micro_rendering.at_time([(3.0, 0.5)], 1.0) == "0.5000 in 3.00 s"
 
 
 def test_the_floor_is_what_does_not_fall_with_samples(tmp_path):
