@@ -29,7 +29,7 @@ from ..gfx.library import Program
 from ..scene import acceleration
 from ..scene.point_tree import COVER
 from ..scene.view import VIEW
-from .point_runs import CLIPS, ROW, PointRuns, Run
+from .point_runs import CLIPS, ROW, TURN, PointRuns, Run
 
 PULLED = 7  # levels of a pass
 NODE_ROW = 128  # groups and sides side by side
@@ -37,7 +37,7 @@ SOFTWARE_LEAVES = 2048  # of a part of a tree, at GROUP_SIDE pixels
 GROUP_SIDE = 8  # pixels of a micro-buffer of a group
 FARTHEST, NEAREST = 2.0, 1e-6  # by the size of the scene: the range of depths that a pixel tells apart
 BUFFER_TEXTURES = (("RGBA32F", "tree_nodes"), ("RGBA32F", "piece_clips"))
-BUFFER_DEFINES = (("POINT_ROW", str(ROW)),)
+BUFFER_DEFINES = (("POINT_ROW", str(ROW)), ("TURN", TURN))
 BUFFER_IMAGE = ("micro", "R32UI", "UINT_2D", "READ_WRITE")
 BUFFER_CONSTANTS = (
     ("IVEC2", "part"), ("INT", "micro_side"), ("INT", "leaf_count"), ("INT", "id_bits"), ("FLOAT", "detail"),

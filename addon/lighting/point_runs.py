@@ -38,6 +38,7 @@ ROW = 128  # entries of a row of images of points
 RUNS = 8
 LEAST = 6  # levels of a tree, at least
 LIGHTS, OTHERS = 4, 16  # points on each lamp in a picture of one sample; of the world and emissive meshes at least
+TURN = "8.0"  # more than a turn: what bits of shaders/micro/clips.frag.glsl count beside an angle
 CLIPS = passes.fullscreen_program(
     "where light of points holds",
     "micro/clips.frag.glsl",
@@ -47,7 +48,7 @@ CLIPS = passes.fullscreen_program(
     ),
     blocks=((VIEW, "film_view"),),
     constants=(("INT", "leaf_count"), ("FLOAT", "offset_size")),
-    defines=(("POINT_ROW", str(ROW)),),
+    defines=(("POINT_ROW", str(ROW)), ("TURN", TURN)),
     outputs=(("VEC4", "out_clips"),),
 )  # fmt: skip
 NOTHING_STANDS = 1e29  # less than NONE of shaders/micro/clips.frag.glsl

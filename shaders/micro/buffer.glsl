@@ -78,12 +78,20 @@ void micro_store(ivec2 texel, float depth, int node, bool behind)
   }
 }
 
-// Whether something stands between a place on a piece and the point where it was lit (micro/clips.frag.glsl).
-bool beyond_clips(int node, bool behind, vec2 at)
+// The node whose light a place on a piece sends: its own, or beyond a line on which something stands that of a piece beside it,
+// 0 for none (micro/clips.frag.glsl).
+int lit_node(int node, bool behind, vec2 at)
 {
   int entry = 2 * (node - leaf_count) + (behind ? 1 : 0);
   vec4 clips = piece_clips_fetch(ivec2(entry % POINT_ROW, entry / POINT_ROW));
-  return dot(at, vec2(cos(clips.x), sin(clips.x))) > clips.y || dot(at, vec2(cos(clips.z), sin(clips.z))) > clips.w;
+  vec2 turned = floor(clips.xz / TURN + 0.5);
+  vec2 angle = clips.xz - TURN * turned;
+  bool first = dot(at, vec2(cos(angle.x), sin(angle.x))) > clips.y;
+  if (!first && dot(at, vec2(cos(angle.y), sin(angle.y))) <= clips.w) {
+    return node;
+  }
+  int bits = int(first ? turned.x : turned.y);
+  return (bits > 0) ? leaf_count + ((node - leaf_count) ^ bits) : 0;
 }
 
 // A point's piece of a triangle or disc, a flat group's rectangle or a bent one's ball, into the pixels `low` to `high` whose
@@ -121,8 +129,9 @@ void micro_draw(MicroFrame f, ivec2 corner, ivec2 low, ivec2 high, vec3 to_node,
     }
     if (depth > nearest && inside && dot(ray, f.plane) > 0.0) {
       bool behind = cosine > 0.0;
-      bool dark = piece && node >= leaf_count && beyond_clips(node, behind, vec2(dot(off, along), dot(off, across)));
-      micro_store(corner + pixel, depth, dark ? 0 : node, behind);
+      bool parted = piece && node >= leaf_count;
+      int lit = parted ? lit_node(node, behind, vec2(dot(off, along), dot(off, across))) : node;
+      micro_store(corner + pixel, depth, lit, behind);
     }
   }
 }

@@ -1,7 +1,9 @@
 // Where light at a point holds on its piece of a triangle: up to two lines beyond which something stands between both, found
 // by rays from the point to the corners, a little above the piece. So a floor's piece under the wall between two rooms is lit
 // on one side of it alone. By point and side: angle of the line's normal in the piece's frame and its distance from the middle
-// of the piece's longest edge, twice; NONE: no line.
+// of the piece's longest edge, twice; NONE: no line. Beyond a line the piece has the light of another one beside it in the tree,
+// whose point sees the corner there: its number is this one's with bits turned, and TURN times these bits are added to the
+// angle; 0: dark.
 #include "lib/math.glsl"
 #include "trace/rays.glsl"
 
@@ -11,6 +13,9 @@
 #define APART 0.9     // cosine between two lines that count as one
 #define BEYOND 0.2    // half lengths behind such a line, and
 #define WIDE 0.4      // to both sides, where it must hide, too: posts and legs end no light
+#define LEVEL 0.99    // cosine between planes that count as one
+#define BESIDE 32     // pieces that are asked
+#define INWARDS 0.1   // of the way from a corner to its piece's middle, where a place beyond the line is asked for
 
 vec4 tree_texel(int index)
 {
@@ -23,6 +28,22 @@ bool hidden(vec3 origin, vec3 place)
   float distance = length(way);
   ivec2 hit;
   return trace_until(origin, way / max(distance, 1e-30), distance, distance, 0u, hit) < distance;
+}
+
+// Bits to turn in the number of a leaf for one that lies in the same plane and sees `place`, from which on `normal` leads.
+int lit_beside(int leaf, ivec2 pixel, vec3 place, vec3 normal, float lift)
+{
+  for (int k = 1; k < min(BESIDE, leaf_count); k++) {
+    int other = (leaf - leaf_count) ^ k;
+    int entry = 2 * other + (pixel.x & 1);
+    ivec2 at = ivec2(entry % POINT_ROW, entry / POINT_ROW);
+    vec3 point = point_place_fetch(at).xyz;
+    bool level = dot(-point_facing_fetch(at).xyz, normal) > LEVEL && abs(dot(point - place, normal)) < lift;
+    if (level && !hidden(point + lift * normal, place + lift * normal)) {
+      return k;
+    }
+  }
+  return 0;
 }
 
 void main()
@@ -40,11 +61,17 @@ void main()
   vec3 along = octahedral_decode(sides.xy);
   vec3 across = cross(axis, along);
   vec3 normal = -point_facing_fetch(pixel).xyz;
-  vec3 origin = point_place_fetch(pixel).xyz + (LIFT * shape.w + 8.0 * offset_size) * normal;
+  float lift = LIFT * shape.w + 8.0 * offset_size;
+  vec3 middle = ball.xyz + (sides.z * along + sides.w * across) / 3.0;
+  vec3 origin = point_place_fetch(pixel).xyz + lift * normal;
+  vec3 beyond[2];
+  beyond[0] = middle;
+  beyond[1] = middle;
   vec2 nearest = vec2(NONE);
   for (int k = 0; k < 3; k++) {
     vec2 place = (k == 0) ? vec2(-shape.w, 0.0) : ((k == 1) ? vec2(shape.w, 0.0) : sides.zw);
-    vec3 to_corner = ball.xyz + place.x * along + place.y * across + (LIFT * shape.w + 8.0 * offset_size) * normal - origin;
+    vec3 corner = ball.xyz + place.x * along + place.y * across;
+    vec3 to_corner = corner + lift * normal - origin;
     float distance = length(to_corner);
     vec3 direction = to_corner / max(distance, 1e-30);
     ivec2 hit;
@@ -70,11 +97,18 @@ void main()
     vec2 first = vec2(cos(out_clips.x), sin(out_clips.x));
     if (out_clips.y == NONE || dot(first, level) > APART) {
       out_clips.xy = (t < nearest.x) ? vec2(angle, off) : out_clips.xy;
+      beyond[0] = (t < nearest.x) ? mix(corner, middle, INWARDS) : beyond[0];
       nearest.x = min(nearest.x, t);
     }
     else {
       out_clips.zw = (t < nearest.y) ? vec2(angle, off) : out_clips.zw;
+      beyond[1] = (t < nearest.y) ? mix(corner, middle, INWARDS) : beyond[1];
       nearest.y = min(nearest.y, t);
+    }
+  }
+  for (int line = 0; line < 2; line++) {
+    if (out_clips[2 * line + 1] != NONE) {
+      out_clips[2 * line] += TURN * float(lit_beside(leaf, pixel, beyond[line], normal, lift));
     }
   }
 }

@@ -8,8 +8,12 @@ vec2 disc_of_square(vec2 square)
   bool wide = abs(square.x) >= abs(square.y);
   float radius = wide ? square.x : square.y;
   float along = (wide ? square.y : square.x) / ((radius == 0.0) ? 1.0 : radius);
+  // Sine and cosine of 45 degrees at most, to 4e-7: this is where most of a micro-buffer's time goes.
   float turn = 0.25 * PI * along;
-  return radius * (wide ? vec2(cos(turn), sin(turn)) : vec2(sin(turn), cos(turn)));
+  float t = turn * turn;
+  float sine = turn * (1.0 - t * (1.0 / 6.0 - t * (1.0 / 120.0 - t * (1.0 / 5040.0))));
+  float cosine = 1.0 - t * (0.5 - t * (1.0 / 24.0 - t * (1.0 / 720.0 - t * (1.0 / 40320.0))));
+  return radius * (wide ? vec2(cosine, sine) : vec2(sine, cosine));
 }
 
 vec2 square_of_disc(vec2 disc)

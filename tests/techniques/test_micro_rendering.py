@@ -183,3 +183,20 @@ def test_the_threshold_and_the_test_of_centres_change_the_cost_and_not_the_light
         assert render(1, **params).mean() == pytest.approx(0.25, rel=within), params
         for name in params:
             stage.scene.candela.property_unset(f"{NAME}_{name}")
+
+
+def test_light_goes_on_beyond_what_stands_on_a_piece(stage, render):
+    """Fins parallel to the sun's light stand on a floor of few points: they hide nothing of it from above, and are as
+    wide as its pieces."""
+    stage.rectangle((-1, -1), (1, 1), material=stage.diffuse(0.8))
+    for x in (-0.55, -0.05, 0.35):
+        fin = [(x, -1, 0), (x, 1, 0), (x, 1, 0.08), (x, -1, 0.08)]
+        stage.mesh(fin, [(0, 1, 2, 3)], material=stage.diffuse(0.0))
+    stage.mesh([(-3, -3, 4), (3, -3, 4), (3, 3, 4), (-3, 3, 4)], [(0, 1, 2, 3)], material=stage.diffuse(0.8))
+    stage.scene.objects[-1].visible_shadow = False
+    stage.light("SUN", energy=10.0, angle=0.0)
+    stage.camera((0, 0, 1), (np.pi, 0, 0), angle=0.8)
+    many = render(1, points=16384, samples=4)
+    assert many.mean() > 0.1
+    few = render(1, points=64, samples=8)  # all runs of points
+    assert few.mean() == pytest.approx(many.mean(), rel=0.08)  # dark beyond the fins: .62
