@@ -14,6 +14,7 @@ struct LampRays {
   vec3 axis;
   float cosine;  // of the cone; -1: everywhere; 0: by the cosine, before an area lamp
   bool by_cosine;
+  float wide;  // share of rays that go anywhere: fog beside a lamp or its cone is lit by the fog in it
 };
 
 LampRays lamp_rays(int number, vec2 u)
@@ -24,6 +25,7 @@ LampRays lamp_rays(int number, vec2 u)
   rays.axis = vec3(0.0, 0.0, 1.0);
   rays.cosine = -1.0;
   rays.by_cosine = false;
+  rays.wide = 0.0;
   rays.shadow = false;
   rays.source = vec3(0.0);
   rays.face = vec3(0.0);
@@ -61,15 +63,15 @@ LampRays lamp_rays(int number, vec2 u)
 float lamp_rays_share(LampRays rays, vec3 way)
 {
   float cosine = dot(way, rays.axis);
-  if (rays.by_cosine) {
-    return max(cosine, 0.0) / PI;
-  }
-  return (cosine >= rays.cosine) ? 1.0 / (2.0 * PI * (1.0 - rays.cosine)) : 0.0;
+  float within = (cosine >= rays.cosine) ? 1.0 / (2.0 * PI * (1.0 - rays.cosine)) : 0.0;
+  return mix(rays.by_cosine ? max(cosine, 0.0) / PI : within, 0.25 / PI, rays.wide);
 }
 
 vec3 lamp_rays_way(LampRays rays, vec2 u)
 {
-  float cosine = rays.by_cosine ? sqrt(1.0 - u.x) : mix(1.0, rays.cosine, u.x);
+  bool anywhere = u.x < rays.wide;
+  float x = anywhere ? u.x / rays.wide : (u.x - rays.wide) / (1.0 - rays.wide);
+  float cosine = anywhere ? 1.0 - 2.0 * x : (rays.by_cosine ? sqrt(1.0 - x) : mix(1.0, rays.cosine, x));
   float across = sqrt(max(1.0 - cosine * cosine, 0.0));
   vec3 tangent;
   vec3 bitangent;
@@ -104,6 +106,8 @@ vec3 lamp_rays_draw(LampRays rays, vec3 position, vec3 u)
 // Places on a ray in proportion to one over their distance to a lamp, as light that has been scattered near it falls off.
 struct Near {
   bool exist;
+  float begin;
+  float end;
   float middle;
   float apart;
   float low;
@@ -130,8 +134,10 @@ Near near_lamp(LampRays rays, int number, vec3 origin, vec3 direction, float beg
   near.middle = dot(point - origin, direction);
   vec3 missed = origin + near.middle * direction - point;
   near.apart = max(sqrt(dot(missed, missed) + size * size), 1e-6 * max(abs(near.middle), 1e-3));
+  near.begin = begin;
+  near.end = end;
   near.low = area_sine((begin - near.middle) / near.apart);
-  near.range = area_sine((min(end, 1e15) - near.middle) / near.apart) - near.low;
+  near.range = area_sine((end - near.middle) / near.apart) - near.low;
   near.exist = near.exist && near.range > 1e-6;
   return near;
 }
@@ -139,12 +145,15 @@ Near near_lamp(LampRays rays, int number, vec3 origin, vec3 direction, float beg
 float near_draw(Near near, float u)
 {
   float x = near.low + u * near.range;
-  return near.middle + near.apart * 0.5 * (exp(x) - exp(-x));
+  return clamp(near.middle + near.apart * 0.5 * (exp(x) - exp(-x)), near.begin, near.end);
 }
 
 // Per metre.
 float near_density(Near near, float t)
 {
+  if (t < near.begin || t > near.end) {
+    return 0.0;
+  }
   float off = t - near.middle;
   return 1.0 / (near.range * sqrt(off * off + near.apart * near.apart));
 }
