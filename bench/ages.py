@@ -27,6 +27,7 @@ PAGES = {  # and the commands that write them
     "docs/gpu.md": "python -m bench gpu",
     "docs/indirect_light.md": "python -m bench indirect --page docs/indirect_light.md",
     "docs/nodes.md": "make nodes",
+    "docs/other_files.md": "python -m bench others --page",
     "docs/performance.md": "make bench",
     "docs/soft_shadows.md": (
         "python -m bench.soft --page, python -m bench.soft_lights --page, python -m bench soft_sources --page"

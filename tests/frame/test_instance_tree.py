@@ -177,7 +177,8 @@ def test_rays_meet_what_they_meet_where_all_is_expanded(gpu_context, kind):
     assert same.sum() > 0.998 * hit.sum()
     shown_by = np.append(owner, np.full(20, -1))[triangle]
     assert (found[same, 0, 2] == shown_by[same]).mean() > 0.998  # the instance
-    assert np.array_equal(found[same, 0, 3], known[same, 0, 3])  # bundles: a ray that ends before, one behind
+    # Bundles: a ray that ends before, one behind. Along an edge a driver may have either (one of 769 by Vulkan).
+    assert (found[same, 0, 3] == known[same, 0, 3]).mean() > 0.998
     assert np.mean(found[same, 0, 3] == 1) > 0.99
     assert np.abs(found[same, 1, :3] - known[same, 1, :3]).max() < 1e-3  # normal
     turn = (found[same, 2, :3] * known[same, 2, :3]).sum(axis=1)

@@ -37,7 +37,7 @@ def paths_of(stage, strength, samples, bounces, seed=1):
 @pytest.mark.slow
 def test_indirect_light_has_half_the_error_and_the_same_mean(stage):
     lit_room(stage)
-    truth = paths_of(stage, 0.0, 512, 2, seed=2)["diffuse_indirect"]
+    truth = paths_of(stage, 0.0, 192, 2, seed=2)["diffuse_indirect"]
     errors = []
     for strength in (0.0, 1.0):
         found = paths_of(stage, strength, 16, 2)["diffuse_indirect"]
@@ -126,7 +126,7 @@ def test_fireflies_of_glossy_indirect_light_are_spread_and_none_of_it_is_lost(st
     ball.visible_camera = False
     stage.light("POINT", (2.5, 0.5, 1.5), energy=50, shadow_soft_size=0.05)
     stage.camera_above(6.0)
-    truth = paths_of(stage, 0.0, 512, 2, seed=2)["glossy_indirect"]
+    truth = paths_of(stage, 0.0, 192, 2, seed=2)["glossy_indirect"]
     plain, filtered = (paths_of(stage, strength, 16, 2)["glossy_indirect"] for strength in (0.0, 1.0))
     assert filtered.mean() == pytest.approx(plain.mean(), rel=0.01)
     assert np.mean((filtered - truth) ** 2) < 0.6 * np.mean((plain - truth) ** 2)
