@@ -60,6 +60,7 @@ MANY = 64  # and that of several bounces, which is smoother and noisier, below t
 WIDE = 64  # pixels: in smaller pictures a mean over eight pixels is one over much of what is seen
 COARSE = 2  # pixels of one known pixel's side then
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
+FEW_WORLD_DIRECTIONS = 8  # below FEW samples, where two are most of what the whole picture gets
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
 MOST_LAMPS = 16  # in a sample
 SENDING = (
@@ -75,37 +76,38 @@ WORLD_TEXTURES = (("RGBA32F", "environment_map"), ("R32F", "environment_density_
 CONSTANTS = (
     ("INT", "light_count"), ("IVEC2", "shown_pixel"), ("FLOAT", "offset_size"), ("FLOAT", "world_rows"),
     ("INT", "glass_blocks"),  # what it bends or mirrors arrives as beams
+    ("INT", "stride"),
 )  # fmt: skip
 
 
 @cache
-def airlight_program(stride: int, kinds: int, world: bool) -> Program:
-    """Finds the light of media at every `stride`-th pixel, for lights of these kinds (bits as in lights.LAMPS).
+def airlight_program(kinds: int, world: bool) -> Program:
+    """Finds the light of media at every so many pixels, for lights of these kinds (bits as in lights.LAMPS).
     `world`: rays by the phase function look for it, too."""
     return passes.fullscreen_program(
-        f"airlight, stride {stride}",
+        "airlight",
         "media/airlight.frag.glsl",
         textures=(*LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "surface_position")),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
         constants=(*CONSTANTS, ("INT", "places")),
-        defines=_defines(stride, kinds, world),
+        defines=_defines(kinds, world),
         outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
     )
 
 
 @cache
-def indirect_program(stride: int, kinds: int, world: bool, shining: bool = True) -> Program:
+def indirect_program(kinds: int, world: bool, shining: bool = True) -> Program:
     """Finds the light that media scatter after other bounces, and that they bring to surfaces. `shining`: and apart
     from it what comes there straight from media that shine."""
     return passes.fullscreen_program(
-        f"airlight after bounces, stride {stride}",
+        "airlight after bounces",
         "media/indirect.frag.glsl",
         textures=(
             *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"), *SURFACE_TEXTURES,
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
-        constants=(*CONSTANTS, ("INT", "bounces")),
-        defines=(*_defines(stride, kinds, world), *((("SHINING", "1"),) if shining else ())),
+        constants=(*CONSTANTS, ("INT", "is_spread"), ("INT", "bounces")),
+        defines=(*_defines(kinds, world), *((("SHINING", "1"),) if shining else ())),
         outputs=tuple(
             ("VEC4", name)
             for name in ("out_indirect", "out_surface", "out_straight", "out_straight_surface")[: 4 if shining else 2]
@@ -116,7 +118,7 @@ def indirect_program(stride: int, kinds: int, world: bool, shining: bool = True)
 @cache
 def at_hits_program(kinds: int, world: bool, transmission: bool) -> Program:
     """The same on rays that mirrors and glass send on."""
-    seen = airlight_program(1, kinds, world)
+    seen = airlight_program(kinds, world)
     paths = ("glossy", "transmission") if transmission else ("glossy",)
     return replace(
         seen,
@@ -128,8 +130,8 @@ def at_hits_program(kinds: int, world: bool, transmission: bool) -> Program:
     )
 
 
-def _defines(stride: int, kinds: int, world: bool) -> tuple[tuple[str, str], ...]:
-    return ("STRIDE", str(stride)), ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
+def _defines(kinds: int, world: bool) -> tuple[tuple[str, str], ...]:
+    return ("LIGHT_KINDS", str(kinds)), *((("WORLD_LIT", "1"),) if world else ())
 
 
 GUIDE_TEXTURE = ("RGBA32F", "airlight_guide")
@@ -159,14 +161,13 @@ SPREAD, SPREAD_ON_SURFACES = (
             ("RGBA32F", "surface_diffuse") if on_surfaces else GUIDE_TEXTURE,
         ),
         blocks=((VIEW, "film_view"),),
-        constants=(("IVEC2", "shown_pixel"),),
-        defines=(("STRIDE", str(COARSE)), ("ON_SURFACES" if on_surfaces else "GUIDED", "1")),
+        constants=(("IVEC2", "shown_pixel"), ("INT", "stride")),
+        defines=(("ON_SURFACES" if on_surfaces else "GUIDED", "1"),),
         outputs=(("VEC4", "out_direct"), ("VEC4", "out_emission")),
     )
     for on_surfaces in (False, True)
 )  # fmt: skip
-PROGRAMS = tuple(made(stride, -1, True) for made in (airlight_program, indirect_program) for stride in (1, COARSE))
-PROGRAMS = (*PROGRAMS, at_hits_program(-1, True, True), guide_program(-1))
+PROGRAMS = (airlight_program(-1, True), indirect_program(-1, True), at_hits_program(-1, True, True), guide_program(-1))
 
 
 @dataclass(frozen=True)
@@ -234,23 +235,30 @@ class Airlight(Technique):
         rays = frame.settings.get(self, "rays") * stride * stride
         places = places_of(rays, lit.rows + world)
         yield from self._add(
-            frame, airlight_program(stride, kinds, world), ("radiance.volume_direct", "radiance.volume_emission"),
-            SPREAD if coarse else None, textures=textures | {"surface_position": frame.images["surface.position"]},
-            blocks=blocks, constants=asked | {"places": places, "shown_pixel": turn if coarse else (0, 0)},
+            frame, airlight_program(kinds, world), ("radiance.volume_direct", "radiance.volume_emission"),
+            SPREAD if coarse else None, stride,
+            textures=textures | {"surface_position": frame.images["surface.position"]},
+            blocks=blocks, constants=asked | {
+                "places": places, "shown_pixel": turn if coarse else (0, 0), "stride": stride,
+            },
         )  # fmt: skip
         frame.count(self, "light samples", lit.rows)
         bounces = min(frame.settings.bounces, frame.settings.get(self, "bounces"))
         if bounces and (media.media.scatters or media.media.emits):
             self._reflectance.update(frame)
             shining = media.media.emits
+            stride_after = COARSE if coarse_after else 1
             names = "radiance.volume_indirect", "radiance.diffuse_indirect"
             names += ("radiance.volume_direct", "radiance.diffuse_direct") if shining else ()
             yield from self._add(
-                frame, indirect_program(COARSE if coarse_after else 1, kinds, world, shining), names,
-                SPREAD_ON_SURFACES if coarse_after else None,
+                frame, indirect_program(kinds, world, shining), names,
+                SPREAD_ON_SURFACES if coarse_after else None, stride_after,
                 textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
                 blocks=blocks,
-                constants=asked | {"bounces": bounces, "shown_pixel": turn if coarse_after else (0, 0)},
+                constants=asked | {
+                    "bounces": bounces, "shown_pixel": turn if coarse_after else (0, 0), "stride": stride_after,
+                    "is_spread": int(coarse_after),
+                },
             )  # fmt: skip
 
     def _lit_by(self, frame: Frame, media: MediaService) -> _Lit:
@@ -274,7 +282,7 @@ class Airlight(Technique):
     def _asked(frame: Frame, lit: _Lit) -> dict[str, object]:
         """CONSTANTS but for the pixel."""
         return {
-            "light_count": lit.rows, "offset_size": frame.offset_size, "world_rows": float(WORLD_DIRECTIONS),
+            "light_count": lit.rows, "offset_size": frame.offset_size, "world_rows": float(world_directions(frame)),
             "glass_blocks": int(frame.owned(LIGHT_SPECULAR_MEDIUM)),
         }  # fmt: skip
 
@@ -286,11 +294,14 @@ class Airlight(Technique):
         passes.fullscreen(
             program, target, blend="ADDITIVE_PREMULT", where=rays.where, textures=lit.textures | rays.textures,
             blocks=lit.blocks,
-            constants=self._asked(frame, lit) | {"shown_pixel": (0, 0), "places": places, "ray_number": rays.number},
+            constants=self._asked(frame, lit)
+            | {"shown_pixel": (0, 0), "stride": 1, "places": places, "ray_number": rays.number},
         )  # fmt: skip
         frame.count(technique, "passes")
 
-    def _add(self, frame: Frame, program: Program, names: tuple[str, ...], spread: Program | None, **bindings):
+    def _add(
+        self, frame: Frame, program: Program, names: tuple[str, ...], spread: Program | None, stride: int, **bindings
+    ):
         """Draw a program's outputs into sums, where it is asked at few pixels spread over all, two by two."""
         frame.count(self, "passes", 1 + (len(names) // 2 if spread is not None else 0))
         if spread is None:
@@ -299,7 +310,7 @@ class Airlight(Technique):
                 passes.fullscreen(program, target, blend="ADDITIVE_PREMULT", rows=band, **bindings)
                 yield
             return
-        size = tuple(-(-side // COARSE) for side in frame.size)
+        size = tuple(-(-side // stride) for side in frame.size)
         found = tuple(images.pool.take(*size, "RGBA32F") for _ in names)
         passes.fullscreen(program, images.Target(found), **bindings)
         yield
@@ -322,7 +333,8 @@ class Airlight(Technique):
                     **read, "coarse_direct": found[k], "coarse_emission": found[k + 1],
                     **{name: bindings["textures"][name] for _, name in ATTENUATION_TEXTURES},
                 },
-                blocks={"film_view": frame.view_block}, constants={"shown_pixel": bindings["constants"]["shown_pixel"]},
+                blocks={"film_view": frame.view_block},
+                constants={name: bindings["constants"][name] for name in ("shown_pixel", "stride")},
             )  # fmt: skip
         for image in found:
             images.pool.give(image)
@@ -363,13 +375,12 @@ class Airlight(Technique):
                 samples = EMISSIVE_POINTS * frame.settings.samples
                 rows.append(self._triangles.row(drawn, EMISSIVE_POINTS, lights.SHADOW_FLAG, 1, samples))
         if self._lit_by_world:
-            for k in range(WORLD_DIRECTIONS):
-                drawn = frame.random_at(frame.sample * WORLD_DIRECTIONS + k, "airlight/world")
+            count = world_directions(frame)
+            for k in range(count):
+                drawn = frame.random_at(frame.sample * count + k, "airlight/world")
                 direction, radiance, density = frame.environment.draw(*drawn)
                 rows.append(
-                    lights.direction_row(
-                        direction, radiance / density, density, lights.SHADOW_FLAG, 0, 1, WORLD_DIRECTIONS
-                    )
+                    lights.direction_row(direction, radiance / density, density, lights.SHADOW_FLAG, 0, 1, count)
                 )
         return rows, [emitters[number] for number in chosen]
 
@@ -377,6 +388,11 @@ class Airlight(Technique):
         self._sources.release()
         self._reflectance.release()
         self._triangles = None
+
+
+def world_directions(frame: Frame) -> int:
+    """Directions of the world that all pixels of a sample share."""
+    return FEW_WORLD_DIRECTIONS if frame.settings.samples < FEW else WORLD_DIRECTIONS
 
 
 def places_of(rays: int, rows: int) -> int:

@@ -2,7 +2,7 @@
 //
 // Places are drawn half around the light's point, in equal steps of the angle under which it sees the ray (Kulla & Fajardo
 // 2012), half in proportion to what the medium sends back (media/bins.glsl), both weighted by the balance heuristic. One
-// row of `sources` after the other takes `places` of them, stratified; STRIDE pixels of the picture share one of this.
+// row of `sources` after the other takes `places` of them, stratified. Of every `stride`-th pixel, whose light is spread where that is above 1.
 // AT_HITS: of rays that mirrors and glass send on, up to what those have met, instead of the camera's.
 #include "media/arriving.glsl"
 #ifdef AT_HITS
@@ -62,19 +62,19 @@ void main()
   out_direct = vec4(0.0);
   out_emission = vec4(0.0);
   ivec2 size = surface_position_size();
-  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * STRIDE + shown_pixel, size - 1);
+  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * stride + shown_pixel, size - 1);
   ViewRay ray = view_ray(surface_position_fetch(pixel), vec2(pixel) + 0.5);
   uvec3 roll = roll_of(pixel, film_view.sample_index, film_view.seed, 43);
 #endif
   uint seed = roll.x;
   Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
-#if STRIDE > 1
-  out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around
-  out_emission.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
-#endif
 #ifdef AT_HITS
   show(pixel, vec3(0.0), bins.emitted);
 #else
+  if (stride > 1) {
+    out_direct.w = min(ray.limit, 1e18);  // for what spreads this over the pixels around
+    out_emission.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
+  }
   out_emission.rgb = bins.emitted;
 #endif
   if (!(bins.total > 0.0) || bins.count == 0) {
@@ -89,11 +89,8 @@ void main()
 #else
     uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed * 64 + i)));
 #endif
-#if STRIDE > 1
-    float own = fract(dither(ivec2(gl_FragCoord.xy)) + 0.618034 * float(film_view.sample_index) + 0.7548777 * float(i));
-#else
-    float own = shuffled(film_view.sample_index, salt.xy);
-#endif
+    float dithered = dither(ivec2(gl_FragCoord.xy)) + 0.618034 * float(film_view.sample_index) + 0.7548777 * float(i);
+    float own = (stride > 1) ? fract(dithered) : shuffled(film_view.sample_index, salt.xy);
     vec2 lamp_turn = vec2(scrambled(film_view.bits_x, salt.y), scrambled(film_view.bits_y, salt.z));
     Around around = around_row(i, lamp_turn, ray.origin, ray.direction, begin, end);
     vec3 own_sum = vec3(0.0);

@@ -206,6 +206,19 @@ float bin_mean_extinction(Bins bins, int k)
   return dot(bins.extinction[k], vec3(1.0 / 3.0));
 }
 
+// Distance at which this optical depth is reached, or the end of the bins.
+float bins_deep(Bins bins, float depth)
+{
+  for (int i = 0; i < bins.count; i++) {
+    float extinction = bin_mean_extinction(bins, i);
+    if (depth < extinction * (bins.to[i] - bins.from[i])) {
+      return bins.from[i] + depth / extinction;
+    }
+    depth -= extinction * (bins.to[i] - bins.from[i]);
+  }
+  return bins.to[bins.count - 1];
+}
+
 // Density per metre with which bins_draw finds a place in bin k.
 float bins_density(Bins bins, int k, float t)
 {

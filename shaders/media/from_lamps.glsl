@@ -104,6 +104,8 @@ vec3 lamp_rays_draw(LampRays rays, vec3 position, vec3 u)
 // Places on a ray in proportion to one over their distance to a lamp, as light that has been scattered near it falls off.
 struct Near {
   bool exist;
+  float begin;
+  float end;
   float middle;
   float apart;
   float low;
@@ -130,8 +132,10 @@ Near near_lamp(LampRays rays, int number, vec3 origin, vec3 direction, float beg
   near.middle = dot(point - origin, direction);
   vec3 missed = origin + near.middle * direction - point;
   near.apart = max(sqrt(dot(missed, missed) + size * size), 1e-6 * max(abs(near.middle), 1e-3));
+  near.begin = begin;
+  near.end = end;
   near.low = area_sine((begin - near.middle) / near.apart);
-  near.range = area_sine((min(end, 1e15) - near.middle) / near.apart) - near.low;
+  near.range = area_sine((end - near.middle) / near.apart) - near.low;
   near.exist = near.exist && near.range > 1e-6;
   return near;
 }
@@ -139,12 +143,15 @@ Near near_lamp(LampRays rays, int number, vec3 origin, vec3 direction, float beg
 float near_draw(Near near, float u)
 {
   float x = near.low + u * near.range;
-  return near.middle + near.apart * 0.5 * (exp(x) - exp(-x));
+  return clamp(near.middle + near.apart * 0.5 * (exp(x) - exp(-x)), near.begin, near.end);
 }
 
 // Per metre.
 float near_density(Near near, float t)
 {
+  if (t < near.begin || t > near.end) {
+    return 0.0;
+  }
   float off = t - near.middle;
   return 1.0 / (near.range * sqrt(off * off + near.apart * near.apart));
 }

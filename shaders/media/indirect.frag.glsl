@@ -52,6 +52,7 @@ Asked ask_surface(int number, vec3 position, vec3 normal, vec2 u)
 #define LOOK 1
 #define LOOK_AT_LIT 2
 #define GO_ON 3
+#define SEEN_DEPTH 5.0  // optical depth up to which places on the view ray are drawn around the lamp
 #define AIMED 0.25  // of steps that go on to places by the rays of the lamp
 
 // A place that a walk has come to: in media, or on a surface of albedo 1.
@@ -86,6 +87,32 @@ vec3 stop_sends(Stop stop, vec3 way, float density, uint seed)
   return media_scattered(stop.inside, stop.position, -way, stop.onwards, seed);
 }
 
+// A walk asks one row, drawn evenly, but that the world counts as few of them, however many it has: its rows come last.
+#ifdef WORLD_LIT
+#define OTHER_ROWS (light_count - int(world_rows + 0.5))
+#define WORLD_COUNTS 3
+#endif
+
+int draw_row(float u)
+{
+#ifdef WORLD_LIT
+  return min(int(u * float(OTHER_ROWS + WORLD_COUNTS)), ROWS_ASKED - 1);
+#else
+  return min(int(u * float(ROWS_ASKED)), ROWS_ASKED - 1);
+#endif
+}
+
+// One over the chance that it asks this one.
+float rows_stood_for(int number)
+{
+#ifdef WORLD_LIT
+  float share = (number >= OTHER_ROWS) ? float(ROWS_ASKED - OTHER_ROWS) / float(WORLD_COUNTS) : 1.0;
+  return share * float(OTHER_ROWS + WORLD_COUNTS);
+#else
+  return float(ROWS_ASKED);
+#endif
+}
+
 // What a walk brings back that sets out from a stop with this weight, of row `number` of lights. `media_only`: a surface that
 // it meets first ends it. `straight`: what comes straight from media that shine, as light of lamps does.
 vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, vec2 first_turn, inout uint seed,
@@ -106,10 +133,9 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     vec2 turn = vec2(media_random(seed), media_random(seed));
 #ifdef WORLD_LIT
     // Of the world another row at each stop: its rows are the last ones.
-    int first = light_count - int(world_rows + 0.5);
     float choice = media_random(seed);
-    if (number >= first) {
-      number = min(first + int(choice * float(ROWS_ASKED - first)), ROWS_ASKED - 1);
+    if (number >= OTHER_ROWS) {
+      number = min(OTHER_ROWS + int(choice * float(ROWS_ASKED - OTHER_ROWS)), ROWS_ASKED - 1);
       ask_turn = vec2(media_random(seed), media_random(seed));
     }
 #endif
@@ -229,7 +255,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
         stop.face = normal;
       }
     }
-    sum += arrives * float(ROWS_ASKED) * asked_arriving(asked, position, seed);
+    sum += arrives * rows_stood_for(number) * asked_arriving(asked, position, seed);
     if (doing == GO_ON) {
       stop.position = position;
       bounce++;
@@ -255,23 +281,23 @@ void main()
   out_indirect = vec4(0.0);
   out_surface = vec4(0.0);
   ivec2 size = surface_position_size();
-  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * STRIDE + shown_pixel, size - 1);
+  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * stride + shown_pixel, size - 1);
   vec4 seen = surface_position_fetch(pixel);
   ViewRay ray = view_ray(seen, vec2(pixel) + 0.5);
   uint seed = roll_of(pixel, film_view.sample_index, film_view.seed, 44).x;
   uvec3 salt = hash3(uvec3(uvec2(pixel), uint(film_view.seed) + 4711u));
   Bins bins = media_bins(ray.origin, ray.direction, ray.limit, seed);
-#if STRIDE > 1
-  out_indirect.w = min(ray.limit, 1e18);
-  out_surface.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
-#endif
+  if (is_spread != 0) {
+    out_indirect.w = min(ray.limit, 1e18);
+    out_surface.w = 1.0 - dot(bins.end, vec3(1.0 / 3.0));
+  }
 #ifdef SHINING
   out_straight = out_indirect;
   out_straight_surface = out_surface;
 #endif
   vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   Surface s = SURFACE_READ(pixel);
-  int number = min(int(shuffled(film_view.sample_index, salt.zx) * float(ROWS_ASKED)), ROWS_ASKED - 1);
+  int number = draw_row(shuffled(film_view.sample_index, salt.zx));
   // One walk after the other, so that the program holds it once.
   for (int which = 0; which < 2; which++) {
     bool from_surface = which == 1;
@@ -286,7 +312,8 @@ void main()
     vec3 weight = vec3(0.0);
     if (!from_surface && bins.total > 0.0 && bins.count > 0) {
       LampRays rays = lamp_rays(number, ask_turn);
-      Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], bins.to[bins.count - 1]);
+      float deep = bins_deep(bins, SEEN_DEPTH);  // in endless fog all but a few places lay beyond, where nothing is seen
+      Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], deep);
       float v = shuffled(film_view.sample_index, salt.yz);
       int k;
       float t;
@@ -308,7 +335,7 @@ void main()
     }
     if (from_surface && ray.hit && max_component(s.diffuse) > 0.0) {
       stop.position = ray_origin(s.position, s.geometric_normal);
-      weight = (STRIDE > 1) ? vec3(1.0) : s.diffuse;
+      weight = (is_spread != 0) ? vec3(1.0) : s.diffuse;
     }
     if (max_component(weight) > 0.0) {
       vec3 straight;

@@ -1,4 +1,4 @@
-// Light of media at every STRIDE-th pixel brought to all pixels: the mean over 4 x 4 of the known ones around, which have
+// Light of media at every `stride`-th pixel brought to all pixels: the mean over 4 x 4 of the known ones around, which have
 // all 16 numbers of the dither among them, of those whose ray ends about as far away and is hidden about as much.
 //
 // What is spread is light over what is known at each pixel: opacity, so that outlines of media and their detail stay sharp,
@@ -22,7 +22,7 @@ void main()
   vec3 passing = media_transmittance(ray.origin, ray.direction, ray.limit, salt);
   float opacity = 1.0 - dot(passing, vec3(1.0 / 3.0));
   float own = min(ray.limit, 1e18);
-  vec2 middle = (vec2(pixel) - vec2(shown_pixel)) / float(STRIDE);
+  vec2 middle = (vec2(pixel) - vec2(shown_pixel)) / float(stride);
   ivec2 corner = ivec2(floor(middle + 0.5));
   vec4 direct = vec4(0.0);
   vec4 emission = vec4(0.0);
@@ -49,7 +49,7 @@ void main()
       known_opacity += weight * second.w;
 #ifdef GUIDED
       // Shares of light, each as good as the next one: a peak among them must not outweigh all, nor a share of nothing.
-      vec3 there = airlight_guide_fetch(min(other * STRIDE + shown_pixel, last)).rgb;
+      vec3 there = airlight_guide_fetch(min(other * stride + shown_pixel, last)).rgb;
       vec3 trust = weight / max(there + here, vec3(1e-20));
       guided += trust * found.rgb;
       guides += trust * there;
