@@ -13,6 +13,31 @@ void input_attribute(vec4 stored, out vec3 color, out vec3 vector, out float ave
   alpha = min(stored.w, 1.0);
 }
 
+// Of the object or its instancer. What belongs to no instance has none.
+void input_instance_attribute(SurfacePoint point, float column, out vec3 color, out vec3 vector, out float average,
+                              out float alpha)
+{
+#ifdef INSTANCE_IMAGE
+  vec4 stored = instance_attribute(point.object_attributes, int(column + 0.5));
+#else
+  vec4 stored = vec4(0.0);
+#endif
+  color = stored.xyz;
+  vector = stored.xyz;
+  average = vector_average(stored.xyz);
+  alpha = stored.w;
+}
+
+// Of the view layer, the scene or the world: the row of material_values where it stands.
+void input_layer_attribute(int first, int rows, out vec3 color, out vec3 vector, out float average, out float alpha)
+{
+  vec4 stored = material_value(first);
+  color = stored.xyz;
+  vector = stored.xyz;
+  average = vector_average(stored.xyz);
+  alpha = stored.w;
+}
+
 void input_color_attribute(vec4 stored, out vec3 color, out float alpha)
 {
   color = stored.xyz;

@@ -90,6 +90,22 @@ ENTRIES = (
         when={"attribute_type": "GEOMETRY"},
     ),
     Entry(
+        "ShaderNodeAttribute",
+        "input_instance_attribute",
+        (POINT, Setting("attribute_column")),
+        (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
+        SURFACE,
+        when={"of_instance": True},
+    ),
+    Entry(
+        "ShaderNodeAttribute",
+        "input_layer_attribute",
+        (Rows("layer_value", lambda value: [tuple(value or (0.0,) * 4)]),),
+        (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
+        SURFACE,
+        when={"attribute_type": "VIEW_LAYER"},
+    ),
+    Entry(
         "ShaderNodeHairInfo",
         "input_strand",
         (POINT, Attribute("NAMED", name=STRAND), Attribute("NAMED", name=WAY)),

@@ -65,7 +65,7 @@ ENTRIES = (
         "absent_attribute",
         outputs=(("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
         include=SOURCE,
-        note="Attributes of objects, instancers and view layers are not read; all outputs are 0.",
+        note="Attributes of objects and instancers are read by materials' surfaces alone; all outputs are 0.",
     ),
     Entry(
         "ShaderNodeVolumeInfo",
