@@ -247,7 +247,12 @@ def _instances(
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
         one = object.__new__(Instance)
         vars(one).update(
-            alike, matrix=transforms[k], random=place.random, generated=place.generated, uv=place.uv, key=place.key,
+            alike,
+            matrix=transforms[k],
+            random=place.random,
+            generated=place.generated,
+            uv=place.uv,
+            key=place.key,
             attributes=own,
         )
         made.append(one)

@@ -215,6 +215,22 @@ void input_point(SurfacePoint point, vec4 place, vec4 mark, out vec3 position, o
   random = mark.y;
 }
 
+// 1 within half of `size` of an edge of the triangle. `weights`: of its corners, in any order; elsewhere they are 0.
+void input_wireframe(SurfacePoint point, vec4 weights, vec4 weights_dx, vec4 weights_dy, float size, bool in_pixels,
+                     out float share)
+{
+  float step = length(point.position_dx);
+  vec3 gradient = sqrt(weights_dx.xyz * weights_dx.xyz + weights_dy.xyz * weights_dy.xyz) / max(step, 1e-30);
+  vec3 from_edges = abs(weights.xyz) / max(gradient, vec3(1e-30));
+  float nearest = min(from_edges.x, min(from_edges.y, from_edges.z));
+  bool triangle = weights.x + weights.y + weights.z > 0.5;
+  // A pixel is as wide as both steps along the surface look on average: Cycles' choice.
+  vec3 across = point.position_dx - dot(point.position_dx, point.incoming) * point.incoming;
+  vec3 along = point.position_dy - dot(point.position_dy, point.incoming) * point.incoming;
+  float unit = in_pixels ? 0.5 * (length(across) + length(along)) : 1.0;
+  share = (triangle && nearest < 0.5 * size * unit) ? 1.0 : 0.0;
+}
+
 void input_color(vec3 chosen, out vec3 color)
 {
   color = chosen;

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from .entry import POINT, Attribute, Entry, Rows, Setting, Socket
+from .entry import POINT, Attribute, Choice, Entry, Rows, Setting, Socket
 
 SURFACE = "material/input.glsl"
 STRAND, WAY, PLACE, MARK = ".strand", ".strand_way", ".point", ".point_mark"  # and snapshot/strands.py
 POINTINESS, ISLAND = ".pointiness", ".island"  # attributes that snapshot/shape.py makes
+CORNER = ".corner"  # which corner of its triangle, made by snapshot/meshes.py
 FLAT = ".flat"  # 1 at corners of faces that are not smooth, read where a material displaces
 
 GENERATED = Attribute("GENERATED", output="Generated")
@@ -104,6 +105,18 @@ ENTRIES = (
         (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
         SURFACE,
         when={"attribute_type": "VIEW_LAYER"},
+    ),
+    Entry(
+        "ShaderNodeWireframe",
+        "input_wireframe",
+        (
+            POINT,
+            Attribute("NAMED", name=CORNER, slopes=True),
+            Socket("Size", "FLOAT", 0.01),
+            Choice("use_pixel_size", {False: "false", True: "true"}, "false"),
+        ),
+        (("Fac", "FLOAT"),),
+        SURFACE,
     ),
     Entry(
         "ShaderNodeHairInfo",

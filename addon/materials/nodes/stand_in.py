@@ -33,13 +33,6 @@ ENTRIES = (
         note="Occlusion is not measured; the node says that nothing is near.",
     ),
     Entry(
-        "ShaderNodeWireframe",
-        "no_wire",
-        outputs=_floats("Fac"),
-        include=SOURCE,
-        note="Wires are not drawn; the node gives 0 everywhere.",
-    ),
-    Entry(
         "ShaderNodeRaycast",
         "no_hit",
         (Socket("Length", "FLOAT", 1.0),),
