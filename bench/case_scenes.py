@@ -1,4 +1,4 @@
-"""Scenes of `python -m bench cases`: what people put into materials, lamps and meshes, several of a kind in one picture.
+"""Scenes of `python -m bench cases`: what people put into materials, lamps and meshes, several of a kind in a picture.
 
 Each builder fills a `Stage` (tests/techniques/conftest.py). Cards stand in a grid that an orthographic camera sees from
 above, a third of each metre between them showing the floor that they light; lamps and displaced meshes stand alone.
@@ -311,7 +311,7 @@ def box(stage, corner, size: float):
 
 
 def displacement(stage) -> None:
-    """A ball by Displacement Only, a floor by Displacement and Bump with the mesh's own density, and a subdivided plate,
+    """A ball by Displacement Only, a floor by Displacement and Bump at its mesh's density, and a subdivided plate,
     under a lamp and the world."""
     import bpy
 

@@ -173,11 +173,6 @@ def panels():
                 bpy.ops.view2d.scroll_down(page=True)
             yield 0.5
             picture("panel_frame.png")
-            for page in ("panel_film", "panel_film_below"):
-                with bpy.context.temp_override(window=window(), area=right, region=main_region(right)):
-                    bpy.ops.view2d.scroll_down(page=True)
-                yield 0.5
-                picture(f"{page}.png")
     material = mesh.active_material
     yield from no_icon_is_drawn()
     material.asset_generate_preview()
