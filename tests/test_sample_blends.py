@@ -137,6 +137,7 @@ def test_triangles_stay_few_enough_for_a_software_gpu(sample):
 
 def test_cycles_renders_it(sample, tmp_path):
     scene = bpy.context.scene
+    scene.render.engine = "CYCLES"  # the files open with Candela
     scene.render.resolution_x = scene.render.resolution_y = 16
     scene.cycles.samples = 64  # so that most pixels of a room behind a door see light
     scene.cycles.use_denoising = False

@@ -88,7 +88,7 @@ class CausticMaps:
 
     def __init__(self):
         self.maps: list[KeptMap] = []
-        self.lights: set[str] = set()  # keys of those that the maps are of
+        self.lights: set[str] = set()  # keys of those that the maps of this or another sample are of
         self._sample: tuple[weakref.ref[Frame], int] | None = None
         self._pending: tuple[LitView, LightView, images.Image] | None = None
         self._receivers = LightBuffers()
@@ -96,9 +96,10 @@ class CausticMaps:
         self._blocks: list[Block] = []
         self._shift = np.zeros(2)
 
-    def begin(self, frame: Frame) -> None:
-        """Drop the maps of the sample before."""
+    def begin(self, frame: Frame, resting: set[str]) -> None:
+        """Drop the maps of the sample before. Lights that are `resting` have theirs in other samples."""
         self.end()
+        self.lights = set(resting)
         self._sample = weakref.ref(frame), frame.sample
         self._shift = np.array(frame.random_at(frame.sample, "caustics/map"))
 
@@ -120,9 +121,8 @@ class CausticMaps:
         return len(self.maps) < MOST or light.emitter.light.key in self.lights
 
     def add(
-        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, count: int,
-        photons: Photons,
-    ) -> Callable[[Bundle], None]:  # fmt: skip
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, photons: Photons
+    ) -> Callable[[Bundle], None]:
         """Draw what the light's view shows; the function that is returned splats a bundle into its map, and `keep` ends
         it."""
         low, high = frame.geometry.bounds_min, frame.geometry.bounds_max
@@ -135,7 +135,7 @@ class CausticMaps:
         self._map.clear()
 
         def splat(bundle: Bundle) -> None:
-            records = photons.footprints(frame, technique, bundle, block, count, LEAST_TEXELS)
+            records = photons.footprints(frame, technique, bundle, block, LEAST_TEXELS)
             splats.draw(INTO_MAP, self._map, records, textures=caught, blocks={"map_view": block})
             frame.count(technique, "passes")
 

@@ -92,6 +92,7 @@ FOOTPRINTS = passes.fullscreen_program(
 )
 WIDENING = 1.25  # of footprints beside the way to the neighbours: the least that leaves no gaps (docs/caustics.md)
 FALL_KNOWN, FALL_GROWING = -1.0 / 5.0, -1.0 / 5.0  # exponents of the footprints' fall with samples
+VIEWS = 4  # of lights and casters in a sample, in the mean, where lights may take turns
 LONGEST = 12.0  # way to a neighbour, in ways of photons that nothing bends: beyond it, the bundle is torn
 
 
@@ -103,7 +104,9 @@ class LitView:
     sample: np.ndarray  # the point of the light that it looks from
     view: LightView
     lobes: tuple[int, ...]  # that photons may take there
-    index: int  # of the sample
+    index: int  # how many samples had photons of this light before
+    count: int  # how many samples of the picture have, or have had up to now
+    weight: float  # of the sample's photons: they stand for the samples that have none
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ class Bundle:
 
     found: tuple[images.Image, ...]
     side: int
+    count: int  # of samples that share the light
 
 
 class Photons:
@@ -133,31 +137,51 @@ class Photons:
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
 
-    def views(self, frame: Frame, casters: caustic_casters.Casters, side: int, index: int) -> Iterator[LitView]:
-        """Views of all lights that are answered for, `side` photons along each side, in the sample number `index`."""
+    def views(self, frame: Frame, casters: caustic_casters.Casters, side: int) -> Iterator[LitView]:
+        """Views of the lights whose turn it is in this sample, `side` photons along each side."""
         lobes = ()
         if casters.refracting:
             lobes += (REFRACTED,)
         if frame.snapshot.film.caustics_reflective:
             lobes += (REFLECTED,)
-        for emitter in frame.emitters:
-            if emitter.light.key not in casters.lights:
-                continue
-            alone = frame.settings.whole and frame.settings.samples == 1
+        alone = frame.settings.whole and frame.settings.samples == 1
+        for emitter, index, count, weight in self._turns(frame, casters):
             sample = emitter.middle() if alone else emitter.sample(*frame.random_volume_at(index, "light"))
             shift = frame.random_at(index, "caustics/grid")
             for low, high in caustic_casters.boxes_of(frame, casters):
                 for view in views_of(emitter, sample, low, high, side, shift, frame.geometry.size):
-                    yield LitView(emitter, sample, view, lobes, index)
+                    yield LitView(emitter, sample, view, lobes, index, count, weight)
+
+    def _rounds(self, frame: Frame, casters: caustic_casters.Casters) -> tuple[list[lights.Emitter], int]:
+        """The lights that are answered for, and how many samples have photons of all of them. Where many lights see
+        many casters and only the mean of a known number of samples is shown, lights take turns: the photons of a view
+        are smooth, and VIEWS of them in a sample cost about as much as its other light."""
+        settings = frame.settings
+        answered = [one for one in frame.emitters if one.light.key in casters.lights]
+        if not settings.whole or settings.may_end_early:
+            return answered, 1
+        return answered, max(1, min(settings.samples, -(-len(answered) * len(casters.low) // VIEWS)))
+
+    def _turns(self, frame: Frame, casters: caustic_casters.Casters):
+        """The lights of this sample, with the last three fields of their views."""
+        settings = frame.settings
+        answered, rounds = self._rounds(frame, casters)
+        for turn, emitter in enumerate(answered):
+            if frame.sample % rounds == turn % rounds:
+                count = len(range(turn % rounds, settings.samples, rounds)) if settings.whole else frame.sample + 1
+                yield emitter, frame.sample // rounds, count, settings.samples / count if settings.whole else 1.0
+
+    def resting(self, frame: Frame, casters: caustic_casters.Casters) -> set[str]:
+        """Keys of the lights whose turn it is not in this sample."""
+        answered, rounds = self._rounds(frame, casters)
+        return {one.light.key for k, one in enumerate(answered) if frame.sample % rounds != k % rounds}
 
     def traced(
-        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int,
-        count: int,
-    ) -> Iterator[Bundle]:  # fmt: skip
-        """Photons of a view by rays, over up to `interfaces` after the first; `count` samples share the light, or have
-        up to now. Each bundle is valid until the next."""
+        self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, interfaces: int
+    ) -> Iterator[Bundle]:
+        """Photons of a view by rays, over up to `interfaces` after the first. Each bundle is valid until the next."""
         target = self._target("_found", light.view.side, len(FOUND))
-        for block, bound in self._drawn(frame, technique, casters, light, count, interfaces):
+        for block, bound in self._drawn(frame, technique, casters, light, interfaces):
             passes.fullscreen(
                 PHOTONS,
                 target,
@@ -168,17 +192,17 @@ class Photons:
                 blocks={"film_view": block, **bound["blocks"]},
                 constants={"offset_size": 1e-6 * frame.geometry.size, "photon_roll": light.index},
             )  # fmt: skip
-            yield self._bundle(frame, technique, target)
+            yield self._bundle(frame, technique, target, light)
 
     def looked_up(
         self, frame: Frame, technique: Technique, casters: caustic_casters.Casters, light: LitView, map_block: Block,
-        receivers: dict[str, images.Image], count: int,
+        receivers: dict[str, images.Image],
     ) -> Iterator[Bundle]:  # fmt: skip
         """The same by look-ups in what the light's views show: the casters' nearest and farthest surfaces, and
         `receivers`, images of MAP in the view `map_block`."""
         target = self._target("_found", light.view.side, len(FOUND))
         behind = self._behind.farthest(frame, technique, light.view, casters.refracting)
-        for block, bound in self._drawn(frame, technique, casters, light, count, 1):
+        for block, bound in self._drawn(frame, technique, casters, light, 1):
             passes.fullscreen(
                 LOOKUPS,
                 target,
@@ -187,18 +211,18 @@ class Photons:
                 },
                 blocks={"film_view": block, "map_view": map_block, **bound["blocks"]},
             )  # fmt: skip
-            yield self._bundle(frame, technique, target)
+            yield self._bundle(frame, technique, target, light)
 
-    def _drawn(self, frame, technique, casters, light: LitView, count: int, interfaces: int):
+    def _drawn(self, frame, technique, casters, light: LitView, interfaces: int):
         """Draws the casters' nearest surfaces by each lobe, and yields what programs that find photons bind."""
-        emitter, view = light.emitter, light.view
+        emitter, view, count = light.emitter, light.view, light.count
         share = float(count) ** -0.5
         wide = np.tan(min(emitter.radius, 1.5)) if emitter.kind == lights.SUN else emitter.reach
         u, later = frame.random_at(light.index, "caustics/lobe"), frame.random_at(light.index, "caustics/interface")
         strata = float(count) if frame.settings.whole and count > 1 else 0.0
         if count == 1:
             u, later, strata = (0.5, 0.5), (0.5, 0.5), -1.0
-        sources = self._sources.set([emitter.row(light.sample, 0, 0)])
+        sources = self._sources.set([emitter.row(light.sample, 0, 0, light.weight)])
         choice = frame.random_volume_at(light.index, "caustics/interface")[2]
         drawn = self.buffers.draw(frame, technique, view, casters.materials, light.lobes, choice)
         for lobe, block, surfaces in drawn:
@@ -215,13 +239,13 @@ class Photons:
             textures = {**surfaces, "energy_table": frame.materials.energy_table}
             yield block, {"textures": textures, "blocks": {"sources": sources, "photon_light": self._emission}}
 
-    def _bundle(self, frame: Frame, technique: Technique, target: images.Target) -> Bundle:
+    def _bundle(self, frame: Frame, technique: Technique, target: images.Target, light: LitView) -> Bundle:
         frame.count(technique, "passes")
         frame.count(technique, "photons", target.size[0] ** 2)
-        return Bundle(target.colors, target.size[0])
+        return Bundle(target.colors, target.size[0], light.count)
 
     def footprints(
-        self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, count: int, least_pixels: float
+        self, frame: Frame, technique: Technique, bundle: Bundle, onto: Block, least_pixels: float
     ) -> tuple[images.Image, ...]:
         """Records of kernels/splats.py for a bundle, at least `least_pixels` pixels of the view `onto` wide."""
         fall = FALL_KNOWN if frame.settings.whole else FALL_GROWING
@@ -232,7 +256,7 @@ class Photons:
             textures=dict(zip(FOUND, bundle.found)),
             blocks={"film_view": onto},
             constants={
-                "widening": WIDENING * float(max(count, 1)) ** fall, "least_pixels": least_pixels,
+                "widening": WIDENING * float(max(bundle.count, 1)) ** fall, "least_pixels": least_pixels,
                 "longest": LONGEST,
             },
         )  # fmt: skip

@@ -118,11 +118,10 @@ class CausticsMapping(Technique):
         settings = frame.settings
         side, map_side = settings.get(self, "grid"), settings.get(self, "map_size")
         by_rays = settings.get(self, "by") == RAYS
-        count = settings.samples if settings.whole else frame.sample + 1
         shift = np.array(frame.random_at(frame.sample, "caustics/map"))
         maps = frame.kept(CausticMaps)
-        maps.begin(frame)
-        for light in self._photons.views(frame, self._casters, side, frame.sample):
+        maps.begin(frame, self._photons.resting(frame, self._casters))
+        for light in self._photons.views(frame, self._casters, side):
             view = widened(light.view, settings.get(self, "extent"), frame.receivers.corners, map_side, shift)
             block, seen = self._receivers.receivers(frame, self, view, self._casters.materials)
             receivers = {name.replace("surface", "receiver"): image for name, image in seen.items()}
@@ -130,17 +129,17 @@ class CausticsMapping(Technique):
             target = self._map_of(map_side)
             target.clear()
             bundles = (
-                self._photons.traced(frame, self, self._casters, light, 1, count)
+                self._photons.traced(frame, self, self._casters, light, 1)
                 if by_rays
-                else self._photons.looked_up(frame, self, self._casters, light, block, caught, count)
+                else self._photons.looked_up(frame, self, self._casters, light, block, caught)
             )
             at_hits = maps.wants(frame, light)
             if at_hits:
-                into_kept = maps.add(frame, self, self._casters, light, count, self._photons)
+                into_kept = maps.add(frame, self, self._casters, light, self._photons)
             for bundle in bundles:
                 if at_hits:
                     into_kept(bundle)
-                records = self._photons.footprints(frame, self, bundle, block, count, LEAST_TEXELS)
+                records = self._photons.footprints(frame, self, bundle, block, LEAST_TEXELS)
                 splats.draw(INTO_MAP, target, records, textures=caught, blocks={"map_view": block})
                 frame.count(self, "passes")
             bound = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}

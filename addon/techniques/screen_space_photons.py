@@ -102,16 +102,15 @@ class ScreenSpacePhotons(Technique):
             return
         settings = frame.settings
         side, interfaces = settings.get(self, "grid"), settings.get(self, "interfaces")
-        count = settings.samples if settings.whole else frame.sample + 1
         seen = {name: image for name, image in surface_bindings(frame).items() if ("RGBA32F", name) in SEEN}
         maps = frame.kept(CausticMaps)
-        maps.begin(frame)
-        for light in self._photons.views(frame, self._casters, side, frame.sample):
+        maps.begin(frame, self._photons.resting(frame, self._casters))
+        for light in self._photons.views(frame, self._casters, side):
             at_hits = maps.wants(frame, light)
             if at_hits:
-                into_kept = maps.add(frame, self, self._casters, light, count, self._photons)
-            for bundle in self._photons.traced(frame, self, self._casters, light, interfaces, count):
-                records = self._photons.footprints(frame, self, bundle, frame.view_block, count, LEAST_PIXELS)
+                into_kept = maps.add(frame, self, self._casters, light, self._photons)
+            for bundle in self._photons.traced(frame, self, self._casters, light, interfaces):
+                records = self._photons.footprints(frame, self, bundle, frame.view_block, LEAST_PIXELS)
                 splats.draw(
                     SPLAT,
                     frame.target("radiance.diffuse_indirect"),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from addon.frame.ledger import RAN, SKIPPED
+from addon.lighting import photons
 from tests.techniques.conftest import places
 
 PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
@@ -426,7 +427,7 @@ def touching(stage):
 
 
 def sheets(stage):
-    for k in range(64):
+    for k in range(40):
         stage.rectangle((-0.5, -0.5), (0.5, 0.5), 0.3 + 0.01 * k, material=glass(stage, 1.2))
 
 
@@ -517,3 +518,22 @@ def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_n
     inside = mirrored[np.hypot(x, y) < 0.3].mean()
     around = mirrored[(np.hypot(x, y) > 0.75) & (np.hypot(x, y) < 0.8)].mean()
     assert inside == pytest.approx(around, rel=0.12)  # by the cosine and the distance of the spot
+
+
+def test_lights_that_take_turns_shine_as_much_as_if_each_sample_had_all(stage, technique, monkeypatch):
+    """Three lamps over two balls are six views: 4 a sample at most, so that two rounds have all."""
+    stage.floor()
+    for side in (-0.8, 0.8):
+        ball(stage, glass(stage), radius=0.4, place=(side, 0, 0.8), segments=32)
+    for k in range(3):
+        stage.light("POINT", (0.6 * (k - 1), 0.4 * k, 4.0), energy=100 * (k + 1), shadow_soft_size=0.0)
+    stage.camera_above(4.0)
+    turns = irradiance(stage, technique, 8, (64, 64), grid=48)
+    views = stage.ledger.row(technique).counters["light views"]
+    monkeypatch.setattr(photons, "VIEWS", 100)
+    irradiance(stage, technique, 1, (8, 8))  # so that the next one is drawn anew
+    every = irradiance(stage, technique, 8, (64, 64), grid=48)
+    assert views < 0.7 * stage.ledger.row(technique).counters["light views"]
+    assert turns.mean() == pytest.approx(every.mean(), rel=0.005)
+    coarse, fine = (light.reshape(8, 8, 8, 8).mean(axis=(1, 3)) for light in (turns, every))
+    assert np.abs(coarse - fine).mean() < 0.1 * every.mean()  # of half as many samples, footprints are wider
