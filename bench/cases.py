@@ -1,7 +1,7 @@
 """Scenes as people make them, beside Cycles: `python -m bench cases`, which takes a few minutes.
 
 Scenes (case_scenes.py): images, attributes, working space, lamps' trees, displacement and Blender 5's nodes, each a
-picture with all its light at 64 samples beside Cycles at 1024. relMSE and the ratio of means; the reference's own noise
+picture with all its light at 64 samples beside Cycles at 512. relMSE and the ratio of means; the reference's own noise
 is half the difference of two seeds. Mixes: noise of one and of two closures on a plane at 8 samples, the standard
 deviation of pixels over their mean from Cycles' at 512, own and Cycles'. Instances: 100,489 cubes by geometry nodes,
 seconds of wall and of processor of reading the scene (sync) and of its way to the GPU (upload): first, nothing changed,
@@ -22,7 +22,7 @@ from bench.markdown import put_between, table
 
 COMMAND = "python -m bench cases"
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "cases.md"
-SIZE, SAMPLES, REFERENCE_SAMPLES = (96, 96), 64, 1024
+SIZE, SAMPLES, REFERENCE_SAMPLES = (64, 64), 64, 512
 MOST = 0.01  # relMSE
 SIDE = 317  # instances along a side
 
