@@ -138,6 +138,8 @@ def images(stage) -> None:
                                            ("PNG", "CHANNEL_PACKED")), 5):  # fmt: skip
         image = noisy(f"alpha {number}.{'png' if kind == 'PNG' else 'exr'}", kind, alpha=True)
         image.alpha_mode = mode
+        if kind == "OPEN_EXR":
+            image.colorspace_settings.name = "Linear Rec.709"
         material, node = coloured(stage, "ShaderNodeTexImage", "Color", image=image)
         see_through(stage, material, node.outputs["Alpha"])
         card(stage, number, material)

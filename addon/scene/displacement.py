@@ -298,6 +298,8 @@ class Displacement:
                     compiled, own_surface=relief_surface(compiled), casts_stochastically=True
                 )
         self._settings = {k: snapshot.materials[k].own for k in ranges}
+        if ranges:
+            materials.share()  # what is moved or relief is drawn by other programs than before
 
     @staticmethod
     def _bumps(snapshot: Snapshot, materials: MaterialSet, k: int) -> bool:
