@@ -194,6 +194,8 @@ def _inputs() -> list[Case]:
         *(case for axis in "XYZ" for case in shown("Tangent", ("Tangent",), {"axis": axis}, name=f"Tangent {axis}")),
         *shown("Tangent", ("Tangent",), {"direction_type": "UV_MAP"}, name="Tangent UV"),
         *shown("HairInfo", ("Is Strand",), name="Hair Info"),
+        Case("Wireframe", "Wireframe", "Fac", {}, {"Size": 0.1}, procedural=True),
+        Case("Wireframe in pixels", "Wireframe", "Fac", {"use_pixel_size": True}, {"Size": 2.0}, procedural=True),
         Case("Value", "Value", "Value"),
         Case("RGB", "RGB", "Color"),
     ]  # fmt: skip

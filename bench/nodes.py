@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -128,6 +129,22 @@ def page(found: list[Difference], pixels: int) -> str:
     return "".join(lines)
 
 
+def renewed(text: str) -> str:
+    """The page with the table of nodes as it is now; the comparison stays, and so does its stamp."""
+    rows = node_rows()
+    counts = {state: sum(row[1] == state for row in rows) for state in ("supported", "limited", "stand-in", "missing")}
+    numbers = iter(counts.values())
+    head, _, rest = text.partition("## What is drawn\n")
+    sentence = head.index(" node types are drawn in full")
+    start = head.rindex("\n", 0, sentence) + 1
+    end = head.index("at all.", start)
+    counted = re.sub(r"\d+", lambda _: str(next(numbers)), head[start:end])
+    made = "".join(f"| {name} | {state} | {said} |\n" for name, state, said in rows)
+    columns = "| node | state | what differs |\n|---|---|---|\n"
+    compared = rest.partition("## Compared")[2]
+    return f"{head[:start]}{counted}{head[end:]}## What is drawn\n\n{columns}{made}\n## Compared{compared}"
+
+
 def contact_sheet(found: list[Difference], path: Path) -> None:
     """All pairs in rows, the first at the top left, a dark line between neighbours."""
     height, width = found[0].ours.shape[:2]
@@ -149,8 +166,14 @@ def main() -> None:
     parser.add_argument("--pixels", type=int, default=32, help="width of a tile")
     parser.add_argument("--only", default="", help="cases whose name contains this; prints them and writes no page")
     parser.add_argument("--output", type=Path, default=ROOT / "docs")
+    parser.add_argument("--table", action="store_true", help="the table of nodes alone; the comparison stays as it is")
     arguments = parser.parse_args()
     addon.register()
+    if arguments.table:
+        known = arguments.output / "nodes.md"
+        write_whole(known, renewed(known.read_text(encoding="utf-8")))
+        sys.stdout.flush()
+        os._exit(0)
     cases = [case for case in available() if arguments.only.lower() in case.name.lower()]
     found = compare(cases, arguments.pixels)
     if arguments.only:

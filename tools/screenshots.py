@@ -24,6 +24,7 @@ PICTURES = (
     ("viewport_moving", "drive", "viewport_moving", LEFT),
     ("panel_render", "drive", "panel_render", "properties"),
     ("panel_frame", "drive", "panel_frame", "properties"),
+    ("panel_film", "features", "film_panel", "properties"),
     ("panel_tune", "tune", "tune_found", "properties"),
     ("panel_tune_apply", "tune", "tune_apply", DIALOG),
     ("panel_view_layer", "drive", "panel_view_layer", "properties"),

@@ -60,7 +60,6 @@ def surroundings_of(graph: Graph) -> frozenset[str]:
             outputs = table.get(node.type)
             if outputs is not None and (not outputs or any((node.key, output) in read for output in outputs)):
                 found.add(name)
-        elsewhere = node.properties.get("attribute_type", "GEOMETRY") != "GEOMETRY"
-        if node.properties.get("from_instancer") or node.properties.get("of_another_object") or elsewhere:
+        if any(node.properties.get(name) for name in ("from_instancer", "of_another_object", "of_instance")):
             found.add(INSTANCE)
     return frozenset(found)

@@ -289,7 +289,11 @@ class Expressions:
             if argument.output and (node.key, argument.output) not in self._read_outputs:
                 return "vec4(0.0)"
             name = argument.name or str(node.properties.get(argument.property, ""))
-            return self.attribute(node, argument.kind, name)
+            read = self.attribute(node, argument.kind, name)
+            if not argument.slopes:
+                return read
+            along = (read.replace(".attributes[", f".attributes_{axis}[") for axis in ("dx", "dy"))
+            return ", ".join((read, *along))
         if isinstance(argument, words.Used):
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
         if isinstance(argument, words.Rows):

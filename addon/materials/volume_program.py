@@ -44,7 +44,7 @@ class CompiledVolume:
 
 def compile_volume(name: str, graph: Graph, images: dict | None = None) -> CompiledVolume:
     """Compile what is linked to the volume output of `graph`."""
-    graph = _without_volume_info(graph)
+    graph = _without_volume_info(_without_instances(graph))
     code = Expressions(name, graph, images)
     code.includes.setdefault(SOURCE)
     if code.exists(graph.volume):
@@ -136,6 +136,13 @@ LEAVES = {
     "ShaderNodeVolumeCoefficients": _coefficients,
     "ShaderNodeEmission": _emission,
 }
+
+
+def _without_instances(graph: Graph) -> Graph:
+    """With Attribute nodes of objects and instancers as stand-ins: the grid's points know no instance."""
+    reading = {key: node for key, node in graph.nodes.items() if node.properties.get("of_instance")}
+    plain = {key: replace(node, properties={**node.properties, "of_instance": False}) for key, node in reading.items()}
+    return replace(graph, nodes={**graph.nodes, **plain}) if plain else graph
 
 
 def _without_volume_info(graph: Graph) -> Graph:

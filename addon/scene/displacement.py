@@ -41,7 +41,7 @@ from ..materials.compiled import Attribute, CompiledMaterial, OwnSurface
 from ..materials.expressions import MAX_ATTRIBUTES
 from ..materials.nodes.inputs import FLAT
 from ..snapshot.scene import Instance, Mesh, Note, Snapshot
-from .geometry import TEXELS_PER_INSTANCE, corner_attribute, instance_facts
+from .geometry import TEXELS_PER_INSTANCE, attribute_rows, corner_attribute, instance_facts
 from .materials import EVERY_DEFINES, MATERIAL_SCENE, MaterialSet, caster_like
 from .shells import corner_list
 
@@ -210,9 +210,11 @@ class Displacement:
         rows = np.zeros((1, TEXELS_PER_INSTANCE, 4), np.float32)
         rows[0, :3], rows[0, 3:7] = instance.matrix[:3], instance_facts([instance])[0]
         rows[0, 3, 3] = -1.0 if np.linalg.det(instance.matrix[:3, :3]) < 0.0 else 1.0
+        attributes, rows[:, 7, 1] = attribute_rows([instance], 1)
+        listed = np.concatenate([rows.reshape(-1, 4), attributes])
         if self._scene is None:
             self._scene = Block(MATERIAL_SCENE, **dict.fromkeys(MATERIAL_SCENE.fields, np.zeros(4)))
-        bindings = materials.bindings(k, images.upload_list(rows.reshape(-1, 4)), own=False)
+        bindings = materials.bindings(k, images.upload_list(listed), own=False)
         bindings["blocks"]["material_scene"] = self._scene
         shader = passes.get(displacement_program(materials.compiled[k]))
         with images.borrowed(images.LIST_WIDTH, height, "RGBA32F") as target:
@@ -296,6 +298,8 @@ class Displacement:
                     compiled, own_surface=relief_surface(compiled), casts_stochastically=True
                 )
         self._settings = {k: snapshot.materials[k].own for k in ranges}
+        if ranges:
+            materials.share()  # what is moved or relief is drawn by other programs than before
 
     @staticmethod
     def _bumps(snapshot: Snapshot, materials: MaterialSet, k: int) -> bool:

@@ -96,6 +96,7 @@ class SceneGeometry:
         self._any = False  # whether there is any instance
         self._told: tuple = (None, ())  # the instances of the last update, and what of meshes and materials was asked
         self.instance_rows = np.zeros((0, TEXELS_PER_INSTANCE, 4), np.float32)
+        self.attribute_rows = np.zeros((0, 4), np.float32)  # behind them, what nodes read of objects and instancers
         self._order: list[int] = []  # of the snapshot's instances with triangles
         self._kinds: tuple = ()
         self._matrices = np.zeros((0, 4, 4))
@@ -157,7 +158,7 @@ class SceneGeometry:
     def rows_showing(self, material: int) -> bytes:
         """What the instance image holds of the instances that show a material."""
         shown = [k for k, instance in enumerate(self.placed[0]) if material in instance.materials]
-        return self.instance_rows[shown].tobytes()
+        return self.instance_rows[shown].tobytes() + self.attribute_rows.tobytes()
 
     def resting_casters(self, make: bool = True) -> list[casters.Clusters] | None:
         """Opaque casters in world space; None where there are too many. They are made when first asked for; without
@@ -260,6 +261,7 @@ class SceneGeometry:
             rows[new, 3:7] = instance_facts([instances[k] for k in new])
             rows[new, 7, 0] = [instances[k].links.receiver for k in new]
         self._written = instances
+        attributes, rows[: len(instances), 7, 1] = attribute_rows(instances, len(rows))
         if len(instances):
             users = Counter(instance.mesh for instance in instances)
             rows[:, 6, 2] = [users[instance.mesh] > 1 for instance in instances]
@@ -269,12 +271,14 @@ class SceneGeometry:
             self._mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
             rows[:, 3, 3] = np.where(self._mirrored, -1.0, 1.0)
         before, self.instance_rows = self.instance_rows, rows
-        if rows.shape != before.shape:
-            self.instances = images.upload_list(rows.reshape(-1, 4))
+        attributes_before, self.attribute_rows = self.attribute_rows, attributes
+        listed = np.concatenate([rows.reshape(-1, 4), attributes])
+        if rows.shape != before.shape or not np.array_equal(attributes, attributes_before):
+            self.instances = images.upload_list(listed)
             return True
         changed = np.flatnonzero((rows != before).any(axis=(1, 2)))
         if len(changed) > MOST_MOVED:
-            self.instances = images.upload_list(rows.reshape(-1, 4))
+            self.instances = images.upload_list(listed)
         else:
             self._move(changed)
         return len(changed) > 0
@@ -393,6 +397,20 @@ def instance_facts(instances: list[Instance]) -> np.ndarray:
     rows[:, 2, 3], rows[:, 3, 0] = np.array([i.uv for i in instances], np.float64).T
     rows[:, 3, 1] = [i.terminator for i in instances]
     return rows
+
+
+def attribute_rows(instances: list[Instance], after: int) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 4) attributes of instances, alike ones once, and (N,) where those of each begin, behind the rows of `after`
+    instances; 0 for instances without."""
+    first: dict[tuple, int] = {(): 0}
+    texels: list[tuple] = []
+    for own in {instance.attributes: None for instance in instances}:
+        if own:
+            first[own] = after * TEXELS_PER_INSTANCE + len(texels)
+            texels += own
+    if not texels:
+        return np.zeros((0, 4), np.float32), np.zeros(len(instances))
+    return np.array(texels, np.float32), np.array([first[instance.attributes] for instance in instances])
 
 
 def _stacked(arrays: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:

@@ -115,9 +115,9 @@ class MaterialSet:
                 block.update(value=values)
 
         if len(before) != len(self.compiled) or any(one is not other for one, other in zip(before, self.compiled)):
-            self._share()
+            self.share()
 
-    def _share(self) -> None:
+    def share(self) -> None:
         """Find which materials can be drawn by one program with one block."""
         self.sharing += 1
         self.leaders, self.first_rows = list(range(len(self.compiled))), [0] * len(self.compiled)

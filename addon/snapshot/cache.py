@@ -108,6 +108,8 @@ class SnapshotCache:
     volumes: dict[str, tuple[tuple, Volume]] = field(default_factory=dict)  # with the state they were read in
     facts: dict[tuple[int, int, int], object] = field(default_factory=dict)  # ObjectFacts by uid, parent's, data's
     placed: Placed | None = None
+    # Attributes of objects and instancers that materials ever asked for, by kind and name: where instances keep them.
+    columns: dict[tuple[str, str], int] = field(default_factory=dict)
     changed: set[int] = field(default_factory=set)  # session_uids of original data-blocks
     informed: bool = False  # all updates since the last sync are in `changed`
     arranged: bool = False  # one of them was about the scene as a whole

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import reduce
+from itertools import repeat
 from operator import or_
 
 import bpy
@@ -23,6 +24,7 @@ from .lights import emission_of_graph, read_light, uses_nodes
 from .linking import LinkTable, read_links
 from .meshes import Wanted, build_mesh, read_mesh
 from .motion import with_motion
+from .object_attributes import of_places
 from .scene import (
     CRYPTOMATTES,
     NO_LINKS,
@@ -89,7 +91,8 @@ def take(
         border = border or _scene_border(scene.render, width, height)
 
     images = ImageTable(cache, scene.frame_current)
-    shading = ShadingTable(cache, images, aovs_of(depsgraph.view_layer_eval))
+    layer = depsgraph.view_layer_eval
+    shading = ShadingTable(cache, images, aovs_of(layer), (scene, layer))
     places, light_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
     links = _links(places, light_places)
@@ -197,17 +200,27 @@ def _meshes(
         mesh = by_pointer[source.pointer]
         own_links = links.of(source.facts.uid, source.facts.parent_uid)
         resolved[id(source)] = mesh.key, _fitted(materials[id(source)], mesh.slots), own_links
-    instances = _instances(places, transforms, resolved, list(meshes), cache)
+    attributes = repeat(())
+    reading = {k for k in range(len(shading.materials)) if shading.reads_instances(k)} if cache.columns else set()
+    if reading:
+        attributes = of_places(places, cache.columns, lambda source: not reading.isdisjoint(materials[id(source)]))
+    instances = _instances(places, transforms, resolved, attributes, list(meshes), cache)
     stats = {"meshes_read": read, "meshes_reused": len(meshes) - read, "instances": len(instances)}
     return meshes, instances, notes, stats
 
 
-def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, order: list[str], cache: SnapshotCache):
+def _instances(
+    places: list[Place], transforms: np.ndarray, resolved: dict, attributes: Iterable[tuple], order: list[str],
+    cache: SnapshotCache,
+):  # fmt: skip
     """The instances, by mesh in `order`; those of the last sync where nothing has changed. `resolved`: key of the mesh
-    materials and links, by identity of the source."""
+    materials and links, by identity of the source. `attributes` of each place."""
     keys = [place.key for place in places]
     facts = [place.source.facts for place in places]
-    looks = [(place.random, place.generated, place.uv, *resolved[id(place.source)]) for place in places]
+    looks = [
+        (place.random, place.generated, place.uv, own, *resolved[id(place.source)])
+        for place, own in zip(places, attributes)
+    ]
     before = cache.placed
     known = before is not None and before.keys == keys
     same = (transforms == before.matrices).all(axis=(1, 2)).tolist() if known else ()
@@ -219,7 +232,7 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
         if known and same[k] and before.facts[k] is facts[k] and before.looks[k] == looks[k]:
             made.append(before.made[k])
             continue
-        *_, mesh, chosen, links = looks[k]
+        *_, own, mesh, chosen, links = looks[k]
         of_object = facts[k]
         alike = like.get(id(place.source))
         if alike is None:
@@ -234,7 +247,13 @@ def _instances(places: list[Place], transforms: np.ndarray, resolved: dict, orde
         # A copy of the source's first one: a frozen dataclass's constructor takes half of a large sync's time.
         one = object.__new__(Instance)
         vars(one).update(
-            alike, matrix=transforms[k], random=place.random, generated=place.generated, uv=place.uv, key=place.key
+            alike,
+            matrix=transforms[k],
+            random=place.random,
+            generated=place.generated,
+            uv=place.uv,
+            key=place.key,
+            attributes=own,
         )
         made.append(one)
     groups: dict[tuple, list[Instance]] = {}

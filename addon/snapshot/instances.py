@@ -36,6 +36,12 @@ class Place:
     matrix: np.ndarray  # (4, 4) float32
     generated: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where on its instancer an instance stands
     uv: tuple[float, float] = (0.0, 0.0)
+    ids: list[int] = ()  # Blender's persistent id of an instance, the innermost first; unused ones too
+
+    @property
+    def numbers(self) -> list[int]:
+        """Those of the ids that are used."""
+        return [number for number in self.ids if number != _UNUSED_ID]
 
 
 @dataclass(slots=True, eq=False)
@@ -171,7 +177,7 @@ def walk(
                 else:
                     ids = "-".join([str(number) for number in numbers if number != _UNUSED_ID])
                 key = f"{facts.uid}/{facts.parent_uid}/{ids}{source.own}"
-                place = Place(source, key, random, placed, orco, uv)
+                place = Place(source, key, random, placed, orco, uv, numbers)
             else:
                 place = Place(source, f"{facts.uid}{source.own}", facts.random, placed)
             (lights if source.is_light else meshes).append(place)

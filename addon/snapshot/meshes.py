@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..materials.nodes.inputs import FLAT, ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
+from ..materials.nodes.inputs import CORNER, FLAT, ISLAND, MARK, PLACE, POINTINESS, STRAND, WAY
 from .cache import next_version
 from .hair import HairSystem, read_hair
 from .scene import Mesh, Note
-from .shape import island_numbers, pointiness
+from .shape import corner_numbers, island_numbers, pointiness
 from .strands import HAIR_RADIUS, POINT_RADIUS, between, point_facts, spheres, strand_facts, strand_places, tubes
 from .tangents import corner_tangents
 
@@ -211,6 +211,10 @@ def build_mesh(key: str, raw: RawMesh, mesh, wanted: Wanted, subject: str) -> tu
     if raw.flat:
         raw, normals, triangles = _folded(raw, positions, normals, triangles)
     low, high = _bounds(positions, raw.corner_vertices, triangles)
+    if CORNER in wanted.attributes and mesh.id_type == "MESH":
+        colors = np.ones((len(raw.corner_vertices), 4), np.float32)
+        colors[:, :3] = np.eye(3, dtype=np.float32)[corner_numbers(triangles, len(raw.corner_vertices))]
+        raw = replace(raw, colors={**raw.colors, CORNER: colors})
     tangents = {}
     for name in sorted({name or raw.active_uv for name in wanted.tangents}):
         if name in raw.uv_maps:

@@ -120,6 +120,7 @@ class Instance:
     group: str = ""  # light group of the object
     links: Links = NO_LINKS
     shadow_catcher: bool = False
+    attributes: tuple[tuple[float, ...], ...] = ()  # that Attribute nodes read of it and of its instancer, by column
 
 
 @dataclass(frozen=True, eq=False)

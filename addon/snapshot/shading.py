@@ -16,10 +16,12 @@ from ..materials.translucency import names_of, with_maps
 from .cache import GraphEntry, SnapshotCache
 from .images import ImageTable
 from .meshes import Wanted
+from .object_attributes import INSTANCER, OBJECT, VIEW_LAYER, of_view_layer
 from .own_settings import own_images, own_settings
 from .scene import Aov, Material, Note
 
 GREY = (0.8, 0.8, 0.8)
+OF_OTHERS = {"object_matrix", "layer_value"}  # properties of nodes that change without their tree
 
 
 def diffuse_graph(color) -> Graph:
@@ -54,12 +56,13 @@ def empty_slot_graph() -> Graph:
 class ShadingTable:
     """Collects materials in order of first use; index 0 is the neutral default."""
 
-    def __init__(self, cache: SnapshotCache, images: ImageTable, aovs: tuple[Aov, ...] = ()):
+    def __init__(self, cache: SnapshotCache, images: ImageTable, aovs: tuple[Aov, ...] = (), layer=None):
+        """`layer`: the evaluated scene and view layer, of which nodes may read properties."""
         self.materials: list[Material] = [Material("default", "Default", empty_slot_graph())]
         self.wanted: list[Wanted] = [Wanted()]
         self.notes: list[Note] = []
         self.graphs: set[str] = set()
-        self._cache, self._images, self._aovs = cache, images, aovs
+        self._cache, self._images, self._aovs, self._layer = cache, images, aovs, layer
         uv = tuple((aov.name, aov.kind, Input("VECTOR")) for aov in aovs if aov.of_surface)
         self.materials[0] = replace(self.materials[0], graph=replace(self.materials[0].graph, aovs=uv))
         self._index: dict[int, int] = {}
@@ -112,11 +115,35 @@ class ShadingTable:
         if isinstance(block, bpy.types.Material):
             named = ((name, bpy.data.images.get(image)) for name, image in names_of(own_settings(block)).items())
             graph = with_maps(graph, {name: image_key(image, None) for name, image in named if image is not None})
+        graph = self._with_sources(graph, isinstance(block, bpy.types.Material))
         if old is not None and old.graph == graph:
             graph = old.graph  # the same object, so that whoever compiled it need not compare again
         name = block.name if isinstance(block, bpy.types.Material) else ""
         notes = tuple(Note(subject, text, material=name, node=node) for node, text in remarks)
         return GraphEntry(graph, notes, tuple(dict.fromkeys(shown)), self._aovs)
+
+    def _with_sources(self, graph: Graph, of_material: bool) -> Graph:
+        """With what Attribute nodes read of the view layer, and for materials where instances keep what they read of
+        objects and instancers."""
+        changed = {}
+        for key, node in graph.nodes.items():
+            kind, name = node.properties.get("attribute_type"), str(node.properties.get("attribute_name", ""))
+            if node.type != "ShaderNodeAttribute":
+                continue
+            if kind == VIEW_LAYER and self._layer is not None:
+                changed[key] = {"layer_value": of_view_layer(*self._layer, name)}
+            elif kind in (OBJECT, INSTANCER) and of_material:
+                column = self._cache.columns.setdefault((kind, name), len(self._cache.columns))
+                changed[key] = {"of_instance": True, "attribute_column": float(column)}
+        if not changed:
+            return graph
+        made = {key: replace(graph.nodes[key], properties={**graph.nodes[key].properties, **new})
+                for key, new in changed.items()}  # fmt: skip
+        return replace(graph, nodes={**graph.nodes, **made})
+
+    def reads_instances(self, material: int) -> bool:
+        """Whether a material reads attributes of objects or instancers."""
+        return any(node.properties.get("of_instance") for node in self.materials[material].graph.nodes.values())
 
     def _reusable(self, entry: GraphEntry, block) -> bool:
         """Nothing was said about it since the last sync, and its images can be handed on again."""
@@ -125,8 +152,8 @@ class ShadingTable:
             return False
         if not cache.informed or (block.original or block).session_uid in cache.changed:
             return False
-        if any("object_matrix" in node.properties for node in entry.graph.nodes.values()):
-            return False  # another object's place is part of it
+        if any(not OF_OTHERS.isdisjoint(node.properties) for node in entry.graph.nodes.values()):
+            return False  # another object's place is part of it, or what the view layer says
         if any(node.type == "ShaderNodeTexIES" for node in entry.graph.nodes.values()):
             return False  # its file, or text, changes without a trace
         if entry.images and self._images_by_uid is None:

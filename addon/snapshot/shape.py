@@ -1,4 +1,5 @@
-"""What a mesh knows about its shape beyond places and normals: pointiness, and a number for each of its islands.
+"""What a mesh knows about its shape beyond places and normals: pointiness, a number for each of its islands, and which
+corner of their triangles corners are.
 
 Both follow Cycles' definitions. Pointiness is the angle between a vertex's normal and the mean direction of its edges
 over pi: 0.5 on flat ground, more on peaks, less in pits; then averaged over the neighbours. Vertices at one place count
@@ -54,6 +55,35 @@ def islands(count: int, edges: np.ndarray) -> np.ndarray:
 def island_numbers(count: int, edges: np.ndarray) -> np.ndarray:
     """(V,) float32 in 0..1, the same within an island: a hash of its lowest vertex."""
     return (_hash(islands(count, edges).astype(np.uint32)) / np.float64(0xFFFFFFFF)).astype(np.float32)
+
+
+def corner_numbers(triangles: np.ndarray, corners: int) -> np.ndarray:
+    """(C,) 0, 1 or 2, so that the three corners of every triangle differ, (T, 3).
+
+    Triangles of one face share corners, those of other faces none. A face without holes is cut into triangles that hang
+    together like a tree, so three numbers are enough: a triangle that shares two corners with one before has but one
+    number left for its third.
+    """
+    numbers = np.full(corners, -1)
+    left = triangles
+    while len(left):
+        given = numbers[left] >= 0
+        count = given.sum(axis=1)
+        third = left[count == 2]
+        if len(third):
+            free = ~given[count == 2]
+            numbers[third[free]] = (3 - np.where(free, 0, numbers[third]).sum(axis=1)) % 3
+        else:  # the first of each group that begins: none of those shares a corner with another
+            fresh = left[count == 0]
+            if not len(fresh):
+                numbers[left[~given]] = 0
+                break
+            first = np.full(corners, len(fresh))
+            np.minimum.at(first, fresh.reshape(-1), np.repeat(np.arange(len(fresh)), 3))
+            begins = fresh[(first[fresh] == np.arange(len(fresh))[:, None]).all(axis=1)]
+            numbers[begins] = np.arange(3)
+        left = left[(numbers[left] < 0).any(axis=1)]
+    return np.maximum(numbers, 0)
 
 
 def _hash(x: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ SurfacePoint hit_point(ivec2 pixel, Instance instance, int id)
   point.object_random = instance.random;
   point.object_index = instance.pass_index;
   instance_extras(id, point.object_color, point.instancer_generated, point.instancer_uv);
+  point.object_attributes = instance_attributes(id);
   vec3 beside = cross(vec3(1.0), point.geometric_normal);
   beside = (dot(beside, beside) > 1e-12) ? beside : cross(vec3(-1.0, 1.0, 1.0), point.geometric_normal);
   point.position_dx = normalize(beside);

@@ -92,6 +92,7 @@ void main()
   point.object_color = lamp.color;
   point.object_random = lamp.half_u.w;
   point.object_index = lamp.half_v.w;
+  point.object_attributes = 0;
   point.instancer_generated = vec3(path, 0.0, 0.0);  // a lamp has no instancer: the way that its light goes
   point.position_dx = vec3(0.0);
   point.position_dy = vec3(0.0);

@@ -1,6 +1,9 @@
 // Instances from the instance image, eight texels each: three rows of the matrix; random number, pass index, flags,
 // orientation; the object's colour; place on the instancer (generated, first of UV), second of UV, the object's offset
-// against the shadow terminator, and whether others share its mesh; its group of receivers of light.
+// against the shadow terminator, and whether others share its mesh; its group of receivers of light, and where behind
+// all instances the attributes stand that nodes read of it and of its instancer.
+
+#define INSTANCE_IMAGE
 
 #define FLAG_CAMERA 1
 #define FLAG_SHADOW 2
@@ -87,6 +90,18 @@ bool instance_shares_mesh(int id)
 float instance_receiver_group(int id)
 {
   return instances_fetch(instance_place(id) + ivec2(7, 0)).x;
+}
+
+// Number of the texel of an instance's first attribute; 0 where it has none.
+int instance_attributes(int id)
+{
+  return int(instances_fetch(instance_place(id) + ivec2(7, 0)).y + 0.5);
+}
+
+vec4 instance_attribute(int first, int column)
+{
+  int texel = first + column;
+  return (first > 0) ? instances_fetch(ivec2(texel & 2047, texel >> 11)) : vec4(0.0);
 }
 
 bool instance_seen(Instance instance)

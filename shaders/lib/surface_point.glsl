@@ -23,6 +23,7 @@ struct SurfacePoint {
   float object_index;
   vec3 instancer_generated;  // where on its instancer an instance stands
   vec2 instancer_uv;
+  int object_attributes;  // where the instance's attributes stand (lib/instance.glsl)
   vec4 attributes[8];
   // Along the surface, one pixel's width of the camera apart, in two directions at right angles: for bump mapping.
   vec3 position_dx;

@@ -13,6 +13,31 @@ void input_attribute(vec4 stored, out vec3 color, out vec3 vector, out float ave
   alpha = min(stored.w, 1.0);
 }
 
+// Of the object or its instancer. What belongs to no instance has none.
+void input_instance_attribute(SurfacePoint point, float column, out vec3 color, out vec3 vector, out float average,
+                              out float alpha)
+{
+#ifdef INSTANCE_IMAGE
+  vec4 stored = instance_attribute(point.object_attributes, int(column + 0.5));
+#else
+  vec4 stored = vec4(0.0);
+#endif
+  color = stored.xyz;
+  vector = stored.xyz;
+  average = vector_average(stored.xyz);
+  alpha = stored.w;
+}
+
+// Of the view layer, the scene or the world: the row of material_values where it stands.
+void input_layer_attribute(int first, int rows, out vec3 color, out vec3 vector, out float average, out float alpha)
+{
+  vec4 stored = material_value(first);
+  color = stored.xyz;
+  vector = stored.xyz;
+  average = vector_average(stored.xyz);
+  alpha = stored.w;
+}
+
 void input_color_attribute(vec4 stored, out vec3 color, out float alpha)
 {
   color = stored.xyz;
@@ -188,6 +213,22 @@ void input_point(SurfacePoint point, vec4 place, vec4 mark, out vec3 position, o
   position = (world_from_object(point, place.xyz) + object_place(point) + material_scene.origin.xyz) * mark.x;
   radius = place.w * mark.x;
   random = mark.y;
+}
+
+// 1 within half of `size` of an edge of the triangle. `weights`: of its corners, in any order; elsewhere they are 0.
+void input_wireframe(SurfacePoint point, vec4 weights, vec4 weights_dx, vec4 weights_dy, float size, bool in_pixels,
+                     out float share)
+{
+  float step = length(point.position_dx);
+  vec3 gradient = sqrt(weights_dx.xyz * weights_dx.xyz + weights_dy.xyz * weights_dy.xyz) / max(step, 1e-30);
+  vec3 from_edges = abs(weights.xyz) / max(gradient, vec3(1e-30));
+  float nearest = min(from_edges.x, min(from_edges.y, from_edges.z));
+  bool triangle = weights.x + weights.y + weights.z > 0.5;
+  // A pixel is as wide as both steps along the surface look on average: Cycles' choice.
+  vec3 across = point.position_dx - dot(point.position_dx, point.incoming) * point.incoming;
+  vec3 along = point.position_dy - dot(point.position_dy, point.incoming) * point.incoming;
+  float unit = in_pixels ? 0.5 * (length(across) + length(along)) : 1.0;
+  share = (triangle && nearest < 0.5 * size * unit) ? 1.0 : 0.0;
 }
 
 void input_color(vec3 chosen, out vec3 color)

@@ -14,11 +14,6 @@ void open_occlusion(vec3 color, out vec3 shown, out float open)
   open = 1.0;
 }
 
-void no_wire(out float share)
-{
-  share = 0.0;
-}
-
 void no_volume(out vec3 color, out float density, out float flame, out float temperature)
 {
   color = vec3(0.0);

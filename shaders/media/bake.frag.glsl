@@ -33,6 +33,7 @@ void main()
   point.object_index = medium_place.facts.y;
   point.instancer_generated = vec3(0.0);
   point.instancer_uv = vec2(0.0);
+  point.object_attributes = 0;
   point.position_dx = vec3(0.0);
   point.position_dy = vec3(0.0);
   for (int i = 0; i < 8; i++) {

@@ -65,6 +65,7 @@ SurfacePoint surface_point(vec3 incoming, Instance instance)
   point.object_random = instance.random;
   point.object_index = instance.pass_index;
   instance_extras(instance_flat.x, point.object_color, point.instancer_generated, point.instancer_uv);
+  point.object_attributes = instance_attributes(instance_flat.x);
   float width = pixel_width(world_position);
   // Heights are compared in one direction only, so bumps depend on it a little: Cycles' choice.
   vec3 beside = cross(vec3(1.0), flat_normal);

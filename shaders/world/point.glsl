@@ -20,6 +20,7 @@ SurfacePoint world_point(vec3 direction, int ray)
   point.object_index = 0.0;
   point.instancer_generated = vec3(0.0);
   point.instancer_uv = vec2(0.0);
+  point.object_attributes = 0;
   point.position_dx = vec3(0.0);
   point.position_dy = vec3(0.0);
   for (int i = 0; i < 8; i++) {

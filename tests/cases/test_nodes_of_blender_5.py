@@ -128,7 +128,7 @@ def test_menu_switch_within_a_group(tree, beside, chosen):
 
 
 def test_trees_without_them_are_read_as_they_are(stage, tree):
-    tree.nodes.new("ShaderNodeWireframe").name = "My Wires"
-    tree.links.new(tree.nodes["My Wires"].outputs[0], colour(tree))
+    tree.nodes.new("ShaderNodeBevel").name = "My Bevel"
+    tree.links.new(tree.nodes["My Bevel"].outputs[0], colour(tree))
     stage.render()
-    assert any(note.node == "My Wires" for note in stage.ledger.notes)
+    assert any(note.node == "My Bevel" for note in stage.ledger.notes)

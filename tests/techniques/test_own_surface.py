@@ -30,7 +30,7 @@ def lifted(monkeypatch):
             if one.name == "Lifted":
                 self.compiled[k] = replace(one, own_surface=LIFTED, casts_stochastically=True)
                 self.own_images[k] = {}
-        self._share()  # what has a program of its own is not drawn with others
+        self.share()  # what has a program of its own is not drawn with others
 
     monkeypatch.setattr(MaterialSet, "update", update)
 

@@ -32,7 +32,7 @@ def steps():
     open_panels()
     left, right = yield from two_areas()
     result["properties"] = [right.x, window().height - right.y - right.height, right.width, right.height]
-    for step in (warning, painting, reflections, glare, grass, relief, caustics):
+    for step in (film, warning, painting, reflections, glare, grass, relief, caustics):
         name, started = step.__name__, time.monotonic()
         if ONLY and name not in ONLY:
             continue
@@ -44,6 +44,17 @@ def steps():
             print(traceback.format_exc(), flush=True)
         result["s"][name] = time.monotonic() - started
         print(f"features: {name} {result['s'][name]:.0f} s", flush=True)
+
+
+def film(left, right):
+    """The Film panel with its limits for single samples, found by searching for them."""
+    stage()
+    right.spaces.active.context = "RENDER"
+    right.spaces.active.search_filter = "Clamp"
+    yield 1.0
+    picture("film_panel.png")
+    right.spaces.active.search_filter = ""
+    yield 0.3
 
 
 def open_panels():

@@ -62,6 +62,7 @@ class Attribute:
     property: str = ""
     output: str = ""
     name: str = ""  # always this one
+    slopes: bool = False  # handed on with its changes along point.position_dx and _dy
 
 
 @dataclass(frozen=True)

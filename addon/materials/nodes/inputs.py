@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from .entry import POINT, Attribute, Entry, Rows, Setting, Socket
+from .entry import POINT, Attribute, Choice, Entry, Rows, Setting, Socket
 
 SURFACE = "material/input.glsl"
 STRAND, WAY, PLACE, MARK = ".strand", ".strand_way", ".point", ".point_mark"  # and snapshot/strands.py
 POINTINESS, ISLAND = ".pointiness", ".island"  # attributes that snapshot/shape.py makes
+CORNER = ".corner"  # which corner of its triangle, made by snapshot/meshes.py
 FLAT = ".flat"  # 1 at corners of faces that are not smooth, read where a material displaces
 
 GENERATED = Attribute("GENERATED", output="Generated")
@@ -88,6 +89,34 @@ ENTRIES = (
         (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
         SURFACE,
         when={"attribute_type": "GEOMETRY"},
+    ),
+    Entry(
+        "ShaderNodeAttribute",
+        "input_instance_attribute",
+        (POINT, Setting("attribute_column")),
+        (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
+        SURFACE,
+        when={"of_instance": True},
+    ),
+    Entry(
+        "ShaderNodeAttribute",
+        "input_layer_attribute",
+        (Rows("layer_value", lambda value: [tuple(value or (0.0,) * 4)]),),
+        (("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
+        SURFACE,
+        when={"attribute_type": "VIEW_LAYER"},
+    ),
+    Entry(
+        "ShaderNodeWireframe",
+        "input_wireframe",
+        (
+            POINT,
+            Attribute("NAMED", name=CORNER, slopes=True),
+            Socket("Size", "FLOAT", 0.01),
+            Choice("use_pixel_size", {False: "false", True: "true"}, "false"),
+        ),
+        (("Fac", "FLOAT"),),
+        SURFACE,
     ),
     Entry(
         "ShaderNodeHairInfo",

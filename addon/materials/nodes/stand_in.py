@@ -33,13 +33,6 @@ ENTRIES = (
         note="Occlusion is not measured; the node says that nothing is near.",
     ),
     Entry(
-        "ShaderNodeWireframe",
-        "no_wire",
-        outputs=_floats("Fac"),
-        include=SOURCE,
-        note="Wires are not drawn; the node gives 0 everywhere.",
-    ),
-    Entry(
         "ShaderNodeRaycast",
         "no_hit",
         (Socket("Length", "FLOAT", 1.0),),
@@ -65,7 +58,7 @@ ENTRIES = (
         "absent_attribute",
         outputs=(("Color", "COLOR"), ("Vector", "VECTOR"), ("Fac", "FLOAT"), ("Alpha", "FLOAT")),
         include=SOURCE,
-        note="Attributes of objects, instancers and view layers are not read; all outputs are 0.",
+        note="Attributes of objects and instancers are read by materials' surfaces alone; all outputs are 0.",
     ),
     Entry(
         "ShaderNodeVolumeInfo",
