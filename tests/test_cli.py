@@ -255,6 +255,7 @@ def test_grass_writes_a_patch_and_says_where(tmp_path):
     assert sorted(one.name for one in tmp_path.iterdir()) == ["tiny.grass"]
 
 
+@pytest.mark.slow
 def test_grass_that_cannot_be_made_is_refused_in_a_sentence(tmp_path):
     assert_refused(candela("grass", "tiny.png", folder=tmp_path), 2, "must end in .grass")
     assert_refused(candela("grass", "tiny.grass", "--luma", "9", folder=tmp_path), 2, "at most 8 components")

@@ -143,6 +143,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_rendering_a_file_writes_the_picture_and_nothing_else(folder, tmp_path):
     before = contents(folder)
     done = run(

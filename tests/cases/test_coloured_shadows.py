@@ -72,6 +72,7 @@ def test_panes_behind_each_other_multiply(stage, beside):
     same(beside(32, bounces=0))
 
 
+@pytest.mark.slow
 def test_glass_that_bends_no_light(stage, beside):
     stage.scene.cycles.caustics_refractive = stage.scene.cycles.caustics_reflective = False
     try:

@@ -28,6 +28,7 @@ def thirds(pixels):
     return np.stack([middle[:, k * width // 3 : (k + 1) * width // 3].mean((0, 1)) for k in range(3)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [1.0, 0.3])
 def test_bulbs_of_one_material_shine_in_their_objects_colours(stage, beside, roughness):
     stage.floor(2.0, material=stage.principled(Base_Color=(0.8, 0.8, 0.8, 1), Roughness=roughness))
@@ -91,6 +92,7 @@ def test_emission_by_place_follows_a_moving_lamp(stage, beside):
         agree(thirds(own["combined"]), thirds(cycles["combined"]))
 
 
+@pytest.mark.slow
 def test_the_bounce_of_an_animated_object_colour_is_followed(stage, beside):
     stage.floor(1.0, material=stage.diffuse(0.8))
     paint = stage.principled()

@@ -7,6 +7,7 @@ import pytest
 from .conftest import agree
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parametrization", "inputs"), [
     ("COLOR", {}), ("COLOR", {"Color": (0.8, 0.4, 0.1, 1)}), ("MELANIN", {"Melanin": 0.5, "Melanin Redness": 0.3}),
     ("ABSORPTION", {"Absorption Coefficient": (0.2, 0.5, 1.3)}),

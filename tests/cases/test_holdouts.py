@@ -31,6 +31,7 @@ def on_floor(passes):
     return passes["combined"][26:38, 24:30, :3].mean((0, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seen", [False, True])
 @pytest.mark.parametrize("kind", ["object", "glowing", "collection"])
 def test_light_of_a_holdout_reaches_others(stage, corner, beside, kind, seen):

@@ -120,6 +120,7 @@ def test_falloff(lamp, beside, kind, output, smooth):
     same(*beside(16, (32, 32), 0, 64))
 
 
+@pytest.mark.slow
 def test_falloff_of_a_gobo_in_reflected_light(stage, lamp, beside):
     tree, emission = lamp("POINT", shadow_soft_size=0.1)
     chain(tree, emission, "Strength", ("ShaderNodeLightFalloff", "Linear", "", {"Strength": 0.5}))

@@ -7,6 +7,7 @@ import pytest
 from .conftest import agree
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("floor", "wall"), [(0.5, 0.5), (0.5, 0.0)])
 def test_a_highlight_that_one_mirror_sees_in_another_lights_nothing_else(stage, beside, floor, wall):
     """A sun over two mirrors, and a wall beside them that only the dim sides of their lobes light: it had up to seven

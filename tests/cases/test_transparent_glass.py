@@ -39,6 +39,7 @@ def test_a_pane_is_as_transparent_as_in_cycles(stage, hole, beside, through, sam
     assert (middle(own)[3] < 0.5) == through
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inputs", [
     {"Base_Color": (0.9, 0.5, 0.2, 1)}, {"Roughness": 0.2}, {"Roughness": 0.08}, {"Transmission_Weight": 0.5},
 ])  # fmt: skip
@@ -49,6 +50,7 @@ def test_kinds_of_glass_are_as_in_cycles(stage, hole, beside, inputs):
     agree(middle(own), middle(cycles))
 
 
+@pytest.mark.slow
 def test_what_stands_behind_glass_is_there(stage, hole, beside):
     hole()
     stage.rectangle((-1, -1), (0, 1), -1.0, material=stage.material("ShaderNodeEmission", Color=(1, 0.5, 0.2, 1)))
@@ -57,6 +59,7 @@ def test_what_stands_behind_glass_is_there(stage, hole, beside):
         agree(own["combined"][12:20, cell].mean((0, 1)), cycles["combined"][12:20, cell].mean((0, 1)))
 
 
+@pytest.mark.slow
 def test_a_ball_of_glass_has_a_hole(stage, hole, beside):
     bpy.ops.mesh.primitive_uv_sphere_add(radius=1.2, segments=64, ring_count=32)
     bpy.context.object.data.shade_smooth()

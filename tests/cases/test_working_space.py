@@ -77,6 +77,7 @@ def test_texture(stage, beside, space, floats, named):
     same(beside(1, (4, 4), 0, 1))
 
 
+@pytest.mark.slow
 def test_sky(stage, beside, space):
     stage.camera((0, 0, 1), (np.pi / 2 + 0.3, 0, 0), 1.2)
     tree = stage.world().node_tree

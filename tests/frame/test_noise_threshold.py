@@ -98,6 +98,7 @@ def test_a_threshold_that_is_not_reached_draws_all_samples(room):
     assert ledger.latest().samples == 12
 
 
+@pytest.mark.slow
 def test_a_picture_that_ends_early_is_whole_and_denoised(room):
     room.scene.candela.noise_threshold = 0.2
     found = room.render(256, (32, 24), bounces=1)

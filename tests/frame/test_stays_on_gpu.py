@@ -48,6 +48,7 @@ def moved(scene):
     bpy.ops.render.render()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_picture_with_a_moved_camera_is_read_back_and_little_else(counted, name, monkeypatch):
     # On a GPU that keeps up: it is waited for between samples so that not more than this lies before it.
@@ -77,6 +78,7 @@ def test_two_thousand_instances_are_few_draws(monkeypatch):
     assert 0 < len(drawn) <= 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_turning_viewport_makes_no_framebuffer_after_the_second_frame_of_a_size(name):
     opened(name, 1)

@@ -89,6 +89,7 @@ def sound(images: dict[str, np.ndarray]) -> None:
     assert images["combined"][..., 3].max() <= 1.0 + 1e-6
 
 
+@pytest.mark.slow
 @long_run
 @batches
 def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, batch):
@@ -106,6 +107,7 @@ def test_every_picture_is_finite_and_comes_out_twice_the_same(kept_stage, batch)
     hold(claim, batch, check)
 
 
+@pytest.mark.slow
 @long_run
 @batches
 def test_eight_times_the_light_is_eight_times_the_picture(kept_stage, batch):
@@ -241,6 +243,7 @@ def planes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(normals), np.concatenate(points)
 
 
+@pytest.mark.slow
 @long_run
 @batches
 def test_a_lamp_is_two_lamps_of_half_its_power(kept_stage, batch):

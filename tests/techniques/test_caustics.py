@@ -70,6 +70,7 @@ def ball_lens(stage, technique, distance, span=1.2, **settings):
     return irradiance(stage, technique, samples=16, **settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", BALL_LENS)
 def test_ball_lens_has_the_light_of_the_table_in_each_ring(stage, distance):
     energy = ball_lens(stage, PHOTONS, distance, span=0.6)
@@ -77,6 +78,7 @@ def test_ball_lens_has_the_light_of_the_table_in_each_ring(stage, distance):
         assert within(energy, 0.5 * radius, 0.6, 0.5) == pytest.approx(share, abs=0.01, rel=0.015)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", (2.0, 2.5))
 def test_ball_lens_by_look_ups_lacks_little_of_its_light(stage, distance):
     """What neighbouring texels of the far side tell of its normals is coarser than rays: 5 % of the light."""
@@ -85,6 +87,7 @@ def test_ball_lens_by_look_ups_lacks_little_of_its_light(stage, distance):
         assert within(energy, 0.5 * radius, 1.2, 0.5) == pytest.approx(share, abs=0.02, rel=0.05)
 
 
+@pytest.mark.slow
 def test_ball_lens_by_a_map_and_rays_has_the_light_of_the_table(stage):
     energy = ball_lens(stage, MAPPING, 2.0, by="RAYS")
     for radius, share in BALL_LENS[2.0].items():
@@ -124,6 +127,7 @@ def nephroid(distance, radius=0.5, height=0.25, elevation=np.pi / 6):
     return sheet
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", (PHOTONS, MAPPING))
 def test_mirror_ring_has_the_nephroid(stage, technique):
     """Ring of radius .5 and height .25 under a sun of 30 degrees that travels along +x, beside the closed
@@ -184,6 +188,7 @@ def passed(cosine, ior):
     return 1 - 0.5 * (s * s + p * p), sine / ior / bent
 
 
+@pytest.mark.slow
 def test_slab_shifts_light_sideways_and_takes_what_its_faces_reflect(stage):
     """Sun at 30 degrees through a hole of .4 m over .4 m of glass: the spot lies h (tan T - tan T') nearer, as bright
     as two faces leave and what goes to and fro between them gives back."""
@@ -241,6 +246,7 @@ def test_glass_with_an_absorbing_inside_dims_by_beer_and_lambert(stage, techniqu
     np.testing.assert_allclose(means[1] / means[0], np.exp(-2.0 * 0.3 * np.array([0.5, 1.0, 0.0])), rtol=0.01)
 
 
+@pytest.mark.slow
 def test_crests_of_water_focus_where_the_paraxial_law_says(stage):
     """z = A sin(kx): light below a crest comes together at the depth f = ior / ((ior - 1) A k^2), and above it has T /
     (1 - depth / f) of the sun's light."""
@@ -351,6 +357,7 @@ def test_glass_casts_a_full_shadow_where_its_light_arrives_as_photons(stage):
     assert "the caustics slot is off" in stage.ledger.row(PHOTONS).reason
 
 
+@pytest.mark.slow
 def test_maps_of_glass_that_stops_light_are_no_finer_and_not_drawn_by_colour(stage):
     """Coloured glass takes three maps, twice as fine from 64 samples on, only where light passes it straight."""
     stage.floor()
@@ -369,6 +376,7 @@ def test_maps_of_glass_that_stops_light_are_no_finer_and_not_drawn_by_colour(sta
     assert fine[1] == 3 * coarse[1]
 
 
+@pytest.mark.slow
 def test_larger_lamps_make_softer_caustics(stage):
     """A mirror shows the floor a disc of .2 m from 2 m away: edges are .2 m wide, in the mean of samples and in one."""
     stage.floor()
@@ -393,6 +401,7 @@ def reason(stage, name=PHOTONS):
     return row.reason
 
 
+@pytest.mark.slow
 def test_scenes_without_casters_lamps_or_room_for_them_say_so(stage):
     stage.floor()
     lamp = stage.light("SUN", angle=0.0)
@@ -461,6 +470,7 @@ def tiny(stage):
     ball(stage, glass(stage), radius=1e-4, place=(0, 0, 1e-3), segments=16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "build", (touching, sheets, around_the_lamp, around_the_camera, rough, thin, broken, extreme_index, tiny)
 )
@@ -502,6 +512,7 @@ def seen_directly_and_in_a_mirror(stage, technique, ior, samples=4):
     return pictures
 
 
+@pytest.mark.slow
 def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
     seen, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.5)
     mirrored = mirrored[::-1]
@@ -512,6 +523,7 @@ def test_a_caustic_is_as_bright_in_a_mirror_as_beside_it(stage, technique_name):
     assert spread[1] == pytest.approx(spread[0], rel=0.1)
 
 
+@pytest.mark.slow
 def test_glass_that_bends_nothing_leaves_no_trace_in_a_mirror(stage, technique_name):
     _, mirrored = seen_directly_and_in_a_mirror(stage, technique_name, 1.0)
     x, y = places((48, 48), 1.6)

@@ -111,6 +111,7 @@ def single_closures(stage):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [pytest.param(20, marks=SLOW), 70])
 def test_closures_in_a_white_furnace_have_cycles_albedo(stage, degrees):
     wanted = single_closures(stage)

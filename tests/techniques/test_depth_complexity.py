@@ -124,6 +124,7 @@ def lamp(stage, kind, **options):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ("RECTANGLE", "ELLIPSE", "SUN", "WIDE SUN", "SPHERE", "POINT"))
 def test_every_bit_is_what_brute_force_says(by_edges, kind):
     """Exact integers: no tolerance but for the rounding of float32 where a way meets an edge."""

@@ -67,6 +67,7 @@ def test_what_is_even_stays_even(stage, samples):
     np.testing.assert_allclose(seen, np.broadcast_to([3.0, 1.5, 0.75], seen.shape), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_dark_side_of_edges_has_half_the_error_at_most(stage, monkeypatch):
     """Most of the relative error of points that each count in full, since few lie in the filter's tails."""
     edge(stage, 1.5)
@@ -83,6 +84,7 @@ def test_the_dark_side_of_edges_has_half_the_error_at_most(stage, monkeypatch):
     assert shared < 0.5 * own
 
 
+@pytest.mark.slow
 def test_noise_that_pixels_have_by_themselves_is_halved(stage, monkeypatch):
     """Points on a lamp that each pixel draws, in a penumbra as wide as the picture."""
     stage.floor(material=stage.diffuse(0.8))

@@ -42,6 +42,7 @@ def test_samples_share_the_films_points(points, samples, count):
     assert count_of(points, samples) == count
 
 
+@pytest.mark.slow
 def test_edges_are_as_smooth_as_with_as_many_samples_as_points(stage, light_of):
     stripes(stage, 0.11, stage.diffuse(0.1), stage.diffuse(0.9))
     stage.light("SUN", energy=3.0)
@@ -70,6 +71,7 @@ def test_nothing_is_drawn_twice_where_all_points_are_one(stage, light_of):
     assert stage.ledger.row("film").counters["points"] == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 8])
 def test_a_shadows_edge_on_one_colour_is_as_sharp_as_without(stage, light_of, samples):
     """No point of the film sees another surface, so light moves by the half pixel to the next one's point at most."""
@@ -83,6 +85,7 @@ def test_a_shadows_edge_on_one_colour_is_as_sharp_as_without(stage, light_of, sa
     assert error(shared, truth) < 1.2 * error(own, truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colors", [((0, 0, 0, 1), (1, 1, 1, 1)), ((1, 0, 0, 1), (0, 1, 1, 1))], ids=["black", "red"])
 def test_no_light_is_lost_beside_a_surface_that_shows_none(stage, light_of, colors):
     """What is black, or has no green, tells nothing of the light that arrives there."""
@@ -102,6 +105,7 @@ MATERIALS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MATERIALS)
 def test_every_lobe_keeps_its_light_at_edges(stage, light_of, kind):
     node, inputs, path = MATERIALS[kind]
@@ -118,6 +122,7 @@ def test_every_lobe_keeps_its_light_at_edges(stage, light_of, kind):
     assert shared.mean() == pytest.approx(truth.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_mix_of_lobes_keeps_its_light(stage, light_of):
     """Of several lobes a point draws one at random, another than the sample that was lit."""
     material = stage.principled(Base_Color=(0.8, 0.4, 0.2, 1), Roughness=0.5, Coat_Weight=0.8, Sheen_Weight=0.5)

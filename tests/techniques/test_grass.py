@@ -500,6 +500,7 @@ def real_field(stage, tiles):
     field_of(MEADOW, stage.scene, range(-tiles, tiles))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view, light", [((40, 72), (35, 45)), ((60, 30), (35, 225)), ((75, 257.142857), (0, 0))])
 def test_from_sampled_directions_it_is_the_field_of_blades(stage, view, light):
     """Mean of the tile within 3 %, contrast within 5 %."""

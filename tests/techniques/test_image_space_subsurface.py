@@ -191,6 +191,7 @@ def test_a_sphere_of_burleys_is_as_in_cycles_under_every_light(stage, light):
     assert ours.mean(axis=(0, 1)) == pytest.approx(cycles.mean(axis=(0, 1)), rel=0.04)
 
 
+@pytest.mark.slow
 def test_indirect_light_enters_too(stage):
     slab(stage, scattering(stage, scale=0.3), half=3.0)
     wall = stage.rectangle((-3, -3), (3, 3), 0.0, material=stage.diffuse(0.8))

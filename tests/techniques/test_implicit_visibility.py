@@ -107,6 +107,7 @@ def test_parallel_squares_exchange_light_by_their_form_factor(stage, render):
     assert mean * np.pi == pytest.approx(8 * 0.19982, rel=0.02)
 
 
+@pytest.mark.slow
 def test_perpendicular_squares_exchange_light_by_their_form_factor(stage, render):
     """Beside the mean, .20004, the wall's irradiance by height, and the picture's."""
     stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
@@ -197,6 +198,7 @@ def test_a_picture_is_the_same_each_time(stage, render):
     np.testing.assert_array_equal(first, render(3, samples=3))
 
 
+@pytest.mark.slow
 def test_error_falls_with_orientations(stage, render):
     """Few bins, so that what is wrong is theirs: eight solutions beside one, both beside many bins."""
     corner(stage)
@@ -392,6 +394,7 @@ def test_coincident_and_many_surfaces_stay_finite(stage, render):
     assert light.max() > 0.0
 
 
+@pytest.mark.slow
 def test_a_kilometre_of_ground_leaves_the_room_its_surfels(stage, render):
     corner(stage)
     for placed in stage.scene.objects:
@@ -428,6 +431,7 @@ def cornell(stage):
     stage.camera((0, -4.4, 1), (np.pi / 2, 0, 0), angle=0.6)
 
 
+@pytest.mark.slow
 def test_irradiance_of_a_cornell_box_is_that_of_cycles(stage, render):
     """With as many bins as cube maps of 12: within 8 % of the mean at one sample, and less at four, by one bounce and
     by four over the same links.

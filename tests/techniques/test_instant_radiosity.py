@@ -47,6 +47,7 @@ def sphere(stage, material, rings=24):
     return stage.mesh(vertices, faces, material=material)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 2, 3, 8])
 def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces):
     """Albedo 1/2 under irradiance pi: 1/2 straight, and half as much again with every bounce, the same everywhere."""
@@ -58,6 +59,7 @@ def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, r
     assert light.mean(axis=2).std() < 0.06 * light.mean()
 
 
+@pytest.mark.slow
 def test_a_sphere_that_shines_itself_reflects_its_own_light(stage, render):
     """Radiance 1 and albedo 1/2: 1 / (1 - 1/2) in all, half of the first reflection is direct light."""
     shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
@@ -149,6 +151,7 @@ def test_light_does_not_depend_on_the_scale_of_the_scene(stage, render, scale):
     assert scaled.mean() == pytest.approx(unit.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_a_mirror_shows_of_lit_surfaces_is_glossy_indirect_light(stage, render):
     """A mirror on the floor shows the ceiling, whose direct light is known from the picture of the ceiling itself."""
     stage.rectangle(
@@ -208,6 +211,7 @@ def test_a_transparent_card_may_block_what_comes_from_lamps_only(stage, render, 
     assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "light", "settings"),
     [

@@ -64,6 +64,7 @@ def test_shares_are_those_of_cycles_and_sum_to_combined(grouped):
         assert error < 0.02
 
 
+@pytest.mark.slow
 def test_lights_of_no_group_are_in_combined_alone(grouped):
     stage = grouped
     group(stage, "Key")
@@ -90,6 +91,7 @@ def test_direct_and_indirect_light_of_a_group_sum_to_its_share(grouped):
     np.testing.assert_allclose(alone["Combined_Key Direct"].mean(), own["Combined_Key Direct"].mean(), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_passes_of_light_are_those_of_all_groups(grouped):
     """Colours, depth and light by path beside groups: as without them."""
     stage = grouped

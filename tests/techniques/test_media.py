@@ -300,6 +300,7 @@ def test_henyey_and_greenstein_mirrors_with_the_sign_of_g(stage):
     assert 2 * np.pi * (forward * mu).sum() / 4096 == pytest.approx(0.7, abs=2e-3)  # g is the mean cosine
 
 
+@pytest.mark.slow
 def test_a_cloud_of_albedo_one_in_even_light_is_hardly_to_be_seen(stage):
     """A white furnace: what is missing is light of more bounces than are asked."""
     stage.camera_above()
@@ -366,6 +367,7 @@ def test_a_lens_of_index_one_changes_no_fog_below_it(stage):
     assert lens.mean() == pytest.approx(clear.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_neither_rays_nor_pixels_change_a_beam(stage):
     lens_scene(stage, 1.5)
     found = {}
@@ -435,6 +437,7 @@ def test_a_ball_lens_gathers_light_where_optics_say(stage):
 # What breaks things -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [0.0, 1e6, -3.0, 1e38])
 def test_any_density_gives_a_finite_picture(stage, density):
     stage.camera_above()
@@ -539,6 +542,7 @@ def test_a_change_of_fog_alone_begins_the_picture_anew(stage):
     assert stage.render(size=(8, 8))["combined"][0, 0, 0] == pytest.approx(thin * np.exp(-1.2), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_fog_in_a_scene_without_any_mesh(stage):
     stage.camera((0, -6, 0), (np.pi / 2, 0, 0))
     stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.0)

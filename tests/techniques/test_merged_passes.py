@@ -60,6 +60,7 @@ def close(one: np.ndarray, other: np.ndarray, name: str) -> None:
     assert np.abs(one - other)[near].max(initial=0.0) < 2e-5 * scale, name
 
 
+@pytest.mark.slow
 def test_ranks_are_merged_by_id_and_values_by_samples(sliced):
     stage = sliced
     names, layer = scene(stage), stage.layer

@@ -63,6 +63,7 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(four_rows[1:], wall_irradiance(height).reshape(16, 4).mean(axis=1)[1:], rtol=0.08)
 
 
+@pytest.mark.slow
 def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
     """Radiance 1 and albedo 1/2: each wall sends out 2 in all, so what it gets from others' reflection is 1/2."""
     shining = stage.principled(Base_Color=(0.5, 0.5, 0.5, 1), IOR=1.0, Emission_Strength=1.0)
@@ -167,6 +168,7 @@ def test_one_triangle_and_nothing_are_drawn(stage, render):
     assert ledger.latest().row(NAME).reason == "the scene has no surface"
 
 
+@pytest.mark.slow
 def test_the_threshold_and_the_test_of_centres_change_the_cost_and_not_the_light(stage, render):
     sphere(stage, stage.diffuse(0.5))
     stage.light("POINT", (0, 0, 0), energy=4 * np.pi**2, shadow_soft_size=0.0)

@@ -80,6 +80,7 @@ def growing_shape(stage):
     stage.camera((0, -6, 5), (0.87, 0, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [moving_box, moving_camera, growing_shape])
 def test_beside_cycles(blurred, scene):
     scene(blurred)

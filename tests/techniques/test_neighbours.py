@@ -123,6 +123,7 @@ def test_a_picture_of_one_sample_is_filtered_and_the_ledger_says_so(stage, techn
     assert one.mean() == pytest.approx(many.mean(), rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_picture_of_one_sample_shows_indirect_light_on_stripes_as_smooth_as_many_samples_do(stage):
     """Slanting stripes, a pixel and a half wide, before a wall in the sun: one point per pixel would tear them."""
     stage.scene.render.filter_size = 1.5

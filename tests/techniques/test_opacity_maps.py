@@ -65,6 +65,7 @@ def test_what_shows_a_material_is_weighted_by_its_size(stage, sheet):
     assert sides(stage) == pytest.approx([0.8] * 2, abs=0.01)
 
 
+@pytest.mark.slow
 def test_it_is_measured_once(stage, sheet):
     placed = stage.card(sheet, 0.0, 1.0)
     stage.light("SUN")

@@ -121,6 +121,7 @@ def exact(stage, size, samples=256):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thing", ("monkey", "torus", "cube"))
 def test_one_group_is_the_area_that_it_hides(by_wedges, thing):
     """A cube, a ring with its hole, and an open head with eyes that are islands of their own."""
@@ -173,6 +174,7 @@ def test_the_camera_in_a_wedge_or_a_shadow_changes_nothing(by_wedges):
     assert np.abs(share(stage, size) - exact(stage, size)).max() < 0.03
 
 
+@pytest.mark.slow
 def test_several_objects_err_half_as_much_as_their_product(by_wedges):
     """Random boxes between a lamp and the floor, against rays."""
     stage = by_wedges

@@ -315,6 +315,7 @@ def constrain(mirror, point, target, viewer, radius=10.0, border=0.0):
     mirror.update_tag()
 
 
+@pytest.mark.slow
 def test_without_enabled_edits_pictures_are_the_same_to_the_bit(stage):
     mirror = mirror_scene(stage)
     plain = stage.render(2, bounces=4)
@@ -324,6 +325,7 @@ def test_without_enabled_edits_pictures_are_the_same_to_the_bit(stage):
     assert all(np.array_equal(plain[name], off[name]) for name in plain)
 
 
+@pytest.mark.slow
 def test_a_plane_mirror_shows_what_one_leaning_by_half_the_angle_does(stage):
     """The axis of the edit lies in the mirror: every ray is as off a mirror that is turned by half as much."""
     mirror = mirror_scene(stage)
@@ -343,6 +345,7 @@ def test_a_plane_mirror_shows_what_one_leaning_by_half_the_angle_does(stage):
     assert np.array_equal(found["diffuse_direct"], plain["diffuse_direct"])
 
 
+@pytest.mark.slow
 def test_pixels_outside_of_regions_do_not_change(stage):
     mirror = mirror_scene(stage)
     stage.scene.candela.denoise_strength = 0.0
@@ -413,6 +416,7 @@ def sphere(stage, material, rings=64):
     return made
 
 
+@pytest.mark.slow
 def test_a_sphere_under_a_world_shows_what_cycles_does_under_the_turned_world(stage):
     """Scene C of the specification. One constraint over all of a convex mirror turns all that it reflects alike, which
     is the same as a world that is turned back: an exact reference without an own shader."""
@@ -436,6 +440,7 @@ def test_a_sphere_under_a_world_shows_what_cycles_does_under_the_turned_world(st
     assert wrong < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.0, 0.2])
 def test_a_ring_with_a_fading_region_stays_continuous(stage, roughness):
     """Scene D of the specification: no step between neighbouring pixels twice as large as without the edit. The world's
@@ -494,6 +499,7 @@ def test_fades_grow_with_their_share():
         assert (np.diff(found) < 1e-2).all() and found[0] == pytest.approx(angle, abs=0.05)
 
 
+@pytest.mark.slow
 def test_an_island_without_a_constraint_stays_as_it_is(stage):
     """Distances along the surface do not reach it, however near it stands."""
     metal = stage.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1))
@@ -510,6 +516,7 @@ def test_an_island_without_a_constraint_stays_as_it_is(stage):
     assert changed[:, :15].all() and not changed[:, 17:].any()
 
 
+@pytest.mark.slow
 def test_a_camera_inside_a_region_sees_the_same_edit(stage):
     mirror = mirror_scene(stage)
     constrain(mirror, (0.1, 0, 0), (-3, 6, 3), (0, -6, 3), radius=5.0)  # less than to the camera

@@ -132,6 +132,7 @@ def test_a_ramp_is_a_tilted_plane(stage, search):
     np.testing.assert_allclose(shown["combined"][..., 0], 0.5 / np.pi * normal[2], rtol=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("safe", [False, True])
 def test_first_hits_on_a_cone_are_those_of_a_fine_search(stage, safe):
     """Seen at 30 degrees above the plane, so that its tip stands before what lies behind it."""
@@ -422,6 +423,7 @@ def test_relief_shadows_others_as_it_should(stage):
     assert np.abs(relief - mesh)[receiver].mean() < 0.02 * mesh[receiver].max()
 
 
+@pytest.mark.slow
 def test_a_mirror_shows_the_relief(stage):
     """A cone of .8 metres seen in a mirror above it, aslant, as one of triangles is seen there."""
 

@@ -5,6 +5,7 @@ import pytest
 from bench import relief as figures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["stones", "box", "cylinder"])
 def test_relief_is_what_cycles_displaces(registered, name, monkeypatch):
     """Away from edges, at outlines, and where a box stands in it; and so are the moved vertices of a fine mesh."""

@@ -130,6 +130,7 @@ def test_the_same_picture_twice(stage, light_of):
     np.testing.assert_array_equal(first, light_of("direct_light", 4, True))
 
 
+@pytest.mark.slow
 def test_layers_under_lamp_and_world_keep_their_mean(stage, light_of):
     """Cards with alpha over a floor, under lamp and world: what maps and random choices decide is decided again."""
     stage.floor(material=stage.diffuse(0.5))

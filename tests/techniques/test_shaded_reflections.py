@@ -110,6 +110,7 @@ def test_a_draft_shows_means(stage):
     assert "drafts" in ShadedReflections().skip(snapshot, Settings().as_draft())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.0, 0.05, 0.15, 0.5])
 def test_light_behind_a_pane_is_found_once(stage, roughness):
     """Samples of the world pass a pane on straight lines, and rays of lobes go through it: in a furnace of white gloss

@@ -82,6 +82,7 @@ def test_aovs_at_edges_have_the_pixel_filter(written):
     assert difference.max() < 2 * ONE_STEP and np.sqrt((difference**2).mean()) < ONE_STEP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threshold", [0.5, 0.2, 0.0])
 def test_layers_show_as_in_cycles(written, threshold):
     """Of opacity 0.4 and 0.7, before a floor: which of them hide the rest depends on the alpha threshold."""

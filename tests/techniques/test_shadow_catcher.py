@@ -41,6 +41,7 @@ def differences(own, truth):
     return rgb, np.abs(own["combined"][..., 3] - truth["combined"][..., 3]).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transparent", [True, False])
 def test_the_pass_beside_cycles(caught, transparent):
     caught.scene.render.film_transparent = transparent
@@ -51,6 +52,7 @@ def test_the_pass_beside_cycles(caught, transparent):
     assert error <= 0.01 and rgb <= 0.01 and alpha <= 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transparent", [True, False])
 def test_combined_beside_cycles(caught, transparent):
     caught.scene.render.film_transparent = transparent

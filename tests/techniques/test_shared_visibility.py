@@ -35,6 +35,7 @@ def both(stage, size=SIZE, samples=1, kind="vssm"):
     return found, expected, lights
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "size"), [("vssm", SIZE), ("cssm", SIZE), ("vssm", WHOLE)])
 def test_penumbra_is_alike_and_all_else_the_same(large, kind, size):
     large.scene.candela.slot_shadow = kind
@@ -81,6 +82,7 @@ def test_outlines_and_what_stands_on_the_floor_look_for_themselves(large):
     assert np.percentile(abs(found - expected), 99) < 0.05 * expected.max()
 
 
+@pytest.mark.slow
 def test_where_shaders_cannot_count_the_same_pixels_look_for_themselves(large, monkeypatch):
     """Without lists each pixel is asked whether it does."""
     for k in range(3):
@@ -94,6 +96,7 @@ def test_where_shaders_cannot_count_the_same_pixels_look_for_themselves(large, m
     assert np.array_equal(listed, marked)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "samples"), [(SMALL, 1), (SIZE, 16)])
 def test_small_pictures_and_those_of_many_samples_ask_every_pixel(large, size, samples):
     large.light("AREA", (0, 0, HEIGHT), size=1.0)

@@ -219,6 +219,7 @@ def choose(stage, technique):
         setattr(stage.scene.candela, f"slot_{slot}", technique.name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", [t for t in REGISTRY if t.name not in ALWAYS], ids=lambda t: t.name)
 def test_a_scene_without_the_need_plans_allocates_compiles_and_draws_nothing_of_it(room, bound, monkeypatch, technique):
     assert technique.name in WITHOUT, f"Give {technique.name} a scene that does not need it."
@@ -245,6 +246,7 @@ def test_a_scene_without_the_need_plans_allocates_compiles_and_draws_nothing_of_
     assert library.compile_count == compiled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", REGISTRY, ids=lambda t: t.name)
 def test_an_unchanged_frame_redoes_nothing_of_it(room, bound, technique):
     WITH.get(technique.name, no_needs)(room)

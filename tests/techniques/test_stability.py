@@ -373,6 +373,7 @@ def test_settings_toggled_objects_deleted_and_sizes_changed_in_a_row_give_what_e
     np.testing.assert_array_equal(room.stage.render(2, SIZE)["combined"], pictures[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["MAPS", "RAYS"])
 def test_a_sky_of_ten_kilometres_leaves_small_things_as_they_are(stage, by):
     """Contact shadows, indirect light below a small card, and what stands close to the camera."""

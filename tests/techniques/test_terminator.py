@@ -139,6 +139,7 @@ def test_nothing_shines_into_a_closed_body_whose_normals_are_smooth(stage, light
     assert irradiance(stage, 16, SIZE).mean() < 1e-3 * bright
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("even", [True, False])
 def test_light_of_the_world_ends_as_by_cycles(stage, even):
     """Cycles lifts rays that it draws from the world's own light, of which a single colour has none."""

@@ -1,10 +1,12 @@
 """GPUs fetch texels from textures, software rasterisers load them from images: the picture is the same."""
 
 import numpy as np
+import pytest
 
 from addon.gfx import library
 
 
+@pytest.mark.slow
 def test_the_picture_does_not_depend_on_how_texels_are_read(stage, monkeypatch):
     stage.floor(material=stage.principled(Roughness=0.3))
     stage.rectangle((-0.5, -0.3), (0.5, 0.3), 0.5, material=stage.diffuse(0.5))

@@ -166,6 +166,7 @@ def test_a_mirrored_card_shows_its_picture_mirrored(by_edges):  # noqa: F811
     assert np.abs(found - mirrored[::-1]).max() < 0.05
 
 
+@pytest.mark.slow
 def test_cards_beside_opaque_casters_hide_what_either_hides(by_edges):  # noqa: F811
     stage = by_edges
     stage.floor()

@@ -87,6 +87,7 @@ def test_what_stands_behind_an_interface_is_seen_where_snell_says(stage):
     assert lit[on_glass > edge + step].all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.0, pytest.param(0.3, marks=SLOW)])
 def test_a_white_solid_vanishes_in_a_white_world(stage, roughness):
     """The mean over the ball; Cycles has 0.96 for roughness 0.3, where the shared factor for multiple scattering does
@@ -159,6 +160,7 @@ def test_surfaces_behind_glass_keep_their_texture(stage):
     assert found[:11].max() < 0.3 * passed < 0.6 * passed < found[-11:].min()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", ["instant_radiosity", pytest.param("clustered_visibility", marks=SLOW)])
 def test_surfaces_behind_glass_get_the_light_of_other_surfaces_as_in_cycles(stage, technique):
     """A room that only its pane shows. Its ceiling, the upper part of the picture, has no light but that of the floor
