@@ -1,9 +1,7 @@
 """Files of other people: what is said of a file, and of one that ends its process."""
 
 import argparse
-import json
 import subprocess
-import sys
 from pathlib import Path
 
 from bench import others
@@ -51,10 +49,3 @@ def test_the_page_counts_and_names_every_file():
 def test_every_repository_is_named_by_a_whole_commit():
     for one in others.repositories():
         assert len(one["commit"]) == 40 and int(one["commit"], 16) and one["about"]
-
-
-def test_one_file_by_itself_prints_json():
-    command = [sys.executable, "-m", "bench", "others", "--one", str(SAMPLE), "--samples", "1",
-               "--reference-samples", "1", "--size", "8x8"]  # fmt: skip
-    done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
-    assert set(json.loads(done.stdout.strip().splitlines()[-1])) == {"state", "error", "mean", "off", "said", "seconds"}
