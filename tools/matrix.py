@@ -40,6 +40,7 @@ def main(versions):
 def run(python):
     """Numbers of tests by what became of them, and when and at which commit that was."""
     done = subprocess.run([python, "-m", "pytest", *TESTS], cwd=ROOT, check=False, capture_output=True, text=True)
+    print(*[line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))], sep="\n", flush=True)
     last = done.stdout.strip().splitlines()[-1] if done.stdout.strip() else ""
     counts = {word: int(number) for number, word in re.findall(r"(\d+) (passed|failed|skipped|xfailed|errors?)", last)}
     commit = subprocess.run(
