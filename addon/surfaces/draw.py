@@ -18,7 +18,6 @@ from ..scene.materials import FIRST_VALUE, SURFACE_IMAGES, AovLayout
 from ..scene.view import VIEW
 
 STOCHASTIC, OPAQUE, LEFT_OUT = 0, 1, 2
-KNOWN_DEPTH = 3  # from so many times two samples on, what is drawn by chance is spread over all of them
 TINTED = ("surface.diffuse", "surface.tint", "surface.emission")
 
 SURFACES = tuple(f"surface.{name}" for name in SURFACE_IMAGES)
@@ -50,19 +49,8 @@ def draw_surfaces(frame: Frame, technique: Technique, target: images.Target, mod
     # What reaches the eye where nothing is hit:
     images.Target((target.colors[-1],)).clear((1.0, 1.0, 1.0, 0.0))
     with passes.drawing(target):
-        constants = drawing_constants(by_chance(frame) if mode == STOCHASTIC else mode, glass)
-        _submit(frame, technique, frame.materials.surface_program, None, constants)
+        _submit(frame, technique, frame.materials.surface_program, None, drawing_constants(mode, glass))
     frame.count(technique, "passes")
-
-
-def by_chance(frame: Frame) -> int:
-    """How layers, and lobes where a surface has several, are drawn by chance: STOCHASTIC, or how many times two the
-    samples of the picture are. Then layers are drawn alike in all pixels of a plane, and lobes by samples in a row.
-    Single samples would show or leave out the whole of a layer: not where they are seen one by one, or are few."""
-    settings = frame.settings
-    depth = settings.samples_to_draw.bit_length() - 1
-    whole = settings.whole and not settings.may_end_early
-    return depth if whole and depth >= KNOWN_DEPTH else STOCHASTIC
 
 
 def drawing_constants(mode: int, glass: bool) -> dict[str, int]:
@@ -83,7 +71,7 @@ def draw_numbers(frame: Frame, technique: Technique, target: images.Target) -> N
 
 def _draw_indices(frame: Frame, technique: Technique, target: images.Target, indices: list[int]) -> None:
     target.clear((0.0, 0.0, 0.0, 0.0), 1.0)
-    constants = drawing_constants(by_chance(frame), refracts(frame))
+    constants = drawing_constants(STOCHASTIC, refracts(frame))
     with passes.drawing(target):
         _submit(frame, technique, frame.materials.surface_program, None, constants, indices=indices)
 

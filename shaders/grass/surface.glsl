@@ -51,7 +51,7 @@ float grass_length(float below, float rise, float bend)
   return 2.0 * below / (rise + sqrt(rise * rise + 2.0 * bend * below));
 }
 
-// Repeats show where the same tile lies beside itself. A triangular lattice has a shift of the tile at each of its vertices,
+// Repeats show where the same tile lies beside itself. A triangular lattice has a aside of the tile at each of its vertices,
 // and a place takes one of the three around it, with a probability that falls fast with the distance (the lattice of Heitz &
 // Neyret, "High-Performance By-Example Noise using a Histogram-Preserving Blending Operator", 2018). `squares`: the sum of
 // squared probabilities.
@@ -162,17 +162,17 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   if (seen.z < steepest) {
     seen = vec3(safe_normalize(vec3(seen.xy, 0.0)).xy * sqrt(1.0 - steepest * steepest), steepest);
   }
-  vec2 shift = (1.0 - ring.w) * g.slope * (taken.xy / taken.z - seen.xy / seen.z);
+  vec2 aside = (1.0 - ring.w) * g.slope * (taken.xy / taken.z - seen.xy / seen.z);
   float tile_squares = 1.0;
   if (grass_texel(g.entry + GRASS_VARIED).x > 0.5) {
     // By where the blades' mean height is seen, which stays as the view moves.
-    shift += grass_variation(uv - (1.0 - ring.w) * g.slope * seen.xy / seen.z, grass_roll(55), tile_squares);
+    aside += grass_variation(uv - (1.0 - ring.w) * g.slope * seen.xy / seen.z, grass_roll(55), tile_squares);
   }
   // Between texels that are larger than pixels one is drawn as bilinear interpolation weighs them; smaller ones the pixel's
   // own filter mixes.
   float tile_pixels = size * sqrt(rise) / max(pixel_width(world_position), 1e-20);
   float spread = smoothstep(0.75, 1.5, tile_pixels / float(g.side));
-  vec2 texel = (uv + shift) * float(g.side) + spread * (vec2(grass_roll(53), grass_roll(54)) - 0.5);
+  vec2 texel = (uv + aside) * float(g.side) + spread * (vec2(grass_roll(53), grass_roll(54)) - 0.5);
   ivec2 wrapped = ivec2(floor(fract(texel / float(g.side)) * float(g.side)));
   wrapped = clamp(wrapped, ivec2(0), ivec2(g.side - 1));
   int picture = int(number + 0.5);

@@ -63,24 +63,6 @@ float shuffled(int index, uvec2 salt)
   return to_unit(owen_scramble(reverse_bits(owen_scramble(uint(index), salt.y)), salt.x));
 }
 
-// A scrambled number whose first three bits are those of many pixels, which `of_all` scrambles, and the others the
-// pixel's own. Where these draw by the same chance, they draw alike in seven of eight samples, all but that in whose
-// eighth the chance lies; and since the filter weighs a sample's points alike in all pixels, those leave no noise.
-float alike(uint bits, uint of_all, uint salt)
-{
-  uint first = owen_scramble(bits, of_all);
-  return to_unit((first & 0xE0000000u) | (owen_scramble(first, salt) & 0x1FFFFFFFu));
-}
-
-// A number of this sample of 2^`depth`, which grows along the samples, but for a shift of the pixel's own: who draws one of
-// two by a chance of a half draws it in half of the samples that stand in a row. Those are well spread in all other
-// numbers, as every part of a sequence is that begins at a multiple of its length, which scattered ones are not.
-float in_a_row(int index, int depth, uint shift, uint within)
-{
-  uint last = (1u << uint(depth)) - 1u;
-  return min((float((uint(index) ^ shift) & last) + to_unit(within)) / float(last + 1u), 0.9999999);
-}
-
 // Bits of a pixel, a sample and a seed, to draw from by hashing again; those of another `purpose` (below 1,024) are
 // independent.
 uvec3 roll_of(ivec2 pixel, int sample_number, int seed, int purpose)

@@ -12,17 +12,6 @@
 #define FIRST_EVEN 16
 #define EVEN_SHARE 0.125
 
-// Of an instance's side in a plane, so that layers behind each other have different ones. Slices are as thick as a
-// hundredth of the camera's near distance; where float32 is less exact than that, pixels of one surface differ.
-uvec3 plane_bits(SurfacePoint point)
-{
-  float slice = floor(dot(point.geometric_normal, point.position) / (0.01 * film_view.film.z) + 0.5);
-  vec3 normal = floor(64.0 * point.geometric_normal + 0.5) + 64.0;
-  uint side = uint(instance_flat.x) * 2u + (point.backfacing ? 1u : 0u);
-  uint turned = uint(normal.x) + 256u * (uint(normal.y) + 256u * uint(normal.z));
-  return hash3(hash3(uvec3(side, turned, floatBitsToUint(slice))) + uvec3(uint(film_view.seed), 0u, 0u));
-}
-
 void main()
 {
   vec3 eye = film_view.eye.xyz;
@@ -53,11 +42,7 @@ void main()
 #ifdef ONE_LOBE
   Closures c = closures_begin(point.normal, lobe_choice, 0.0);
 #else
-  float lobe = scrambled(film_view.bits_w, bits.z);
-  if (transparent_mode >= 3) {
-    lobe = in_a_row(film_view.sample_index, transparent_mode, bits.z, bits.x);
-  }
-  Closures c = closures_begin(point.normal, lobe, even_share);
+  Closures c = closures_begin(point.normal, scrambled(film_view.bits_w, bits.z), even_share);
 #endif
   evaluate_material(point, c);
   closures_end(c);
@@ -66,19 +51,12 @@ void main()
 #endif
 
   float through = layer_chance(c);
-  // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie); from 3
-  // on: stochastic, but alike in the pixels of a plane, in a picture of so many times two samples.
-  bool by_chance = transparent_mode == 0 || transparent_mode >= 3;
-  float chance = shuffled(film_view.sample_index, layer.xy);
-  for (int k = transparent_mode; k >= 3; k = 0) {
-    uvec3 plane = plane_bits(point);
-    chance = alike(reverse_bits(owen_scramble(uint(film_view.sample_index), plane.y)), plane.x, layer.x);
-  }
-  bool passes = by_chance ? chance < through : through > 0.0;
+  // transparent_mode 0: stochastic; 1: draw as opaque; 2: leave out (the two ends between which all layers lie).
+  bool passes = (transparent_mode == 0) ? shuffled(film_view.sample_index, layer.xy) < through : through > 0.0;
   if (transparent_mode != 1 && passes) {
     discard;
   }
-  float covered = by_chance ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
+  float covered = (transparent_mode == 0) ? 1.0 / max(1.0 - through, 1e-4) : 1.0;
   float holdout = clamp(c.holdout * covered, 0.0, 1.0);
   // It cuts its hole in what the camera sees; other views ask for what the object reflects, which lights others.
   if ((instance.flags & FLAG_HOLDOUT) != 0 && film_view.visibility == FLAG_CAMERA) {
