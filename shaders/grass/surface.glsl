@@ -51,7 +51,7 @@ float grass_length(float below, float rise, float bend)
   return 2.0 * below / (rise + sqrt(rise * rise + 2.0 * bend * below));
 }
 
-// Repeats show where the same tile lies beside itself. A triangular lattice has a aside of the tile at each of its vertices,
+// Repeats show where the same tile lies beside itself. A triangular lattice has a shift of the tile at each of its vertices,
 // and a place takes one of the three around it, with a probability that falls fast with the distance (the lattice of Heitz &
 // Neyret, "High-Performance By-Example Noise using a Histogram-Preserving Blending Operator", 2018). `squares`: the sum of
 // squared probabilities.
