@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from addon.compare.metrics import relative_squared_error
+from addon.materials import working_space
 
 from .conftest import agree
 
@@ -19,6 +20,7 @@ def space(request, stage):
     choose(request.param)
     yield request.param
     choose("Linear Rec.709")
+    working_space.follow(working_space.REC709)  # as the next picture would
 
 
 def shown(stage, kind, output, **inputs):

@@ -335,7 +335,7 @@ def test_a_sweep_of_principled_is_lit_as_in_cycles(stage, light, sweep):
         studio(stage)
     size = (CELL * COLUMNS, CELL * rows)
     samples = 256 if sweep is LIT_GLASS else 128
-    stage.scene.candela.light_probes_maps = 2.0  # there is no shadow to be soft: a map or two in each sample are enough
+    stage.scene.candela.light_probes_maps = 4.0  # there is no shadow to be soft: a few maps in each sample are enough
     ours, cycles = stage.render(samples, size), stage.render(1024, size, engine="CYCLES")
     found, expected = (
         light_paths(images)["direct_light"] - images["environment"][..., :3] for images in (ours, cycles)
