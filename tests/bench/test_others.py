@@ -8,7 +8,7 @@ from bench import others
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "sample_blends" / "hdri_product.blend"
-OPTIONS = argparse.Namespace(samples=2, reference_samples=8, size=(16, 12), tolerance=0.5, limit=120.0)
+OPTIONS = argparse.Namespace(samples=2, reference_samples=8, size=(16, 12), tolerance=0.5, limit=600.0)
 REPOSITORY = {"name": "someone/something"}
 
 
@@ -31,7 +31,7 @@ def test_a_process_that_ends_or_hangs_is_a_row(monkeypatch, tmp_path):
         raise subprocess.TimeoutExpired("", 5)
 
     monkeypatch.setattr(others.subprocess, "run", slow)
-    assert others.row_of(REPOSITORY, tmp_path, broken, OPTIONS).state == "not done in 120 s"
+    assert others.row_of(REPOSITORY, tmp_path, broken, OPTIONS).state == "not done in 600 s"
 
 
 def test_the_page_counts_and_names_every_file():
