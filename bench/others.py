@@ -228,6 +228,9 @@ def command(options: argparse.Namespace) -> int:
     if options.one:
         print(json.dumps(render(options.one, options)))
         return 0
+    if options.every < 1:
+        print("--every takes a number of at least 1.", file=sys.stderr)
+        return 2
     rows = []
     for repository in repositories():
         try:
@@ -240,6 +243,9 @@ def command(options: argparse.Namespace) -> int:
             rows.append(row_of(repository, place, path, options))
             print(line_of(rows[-1]), flush=True)
             _keep(options.folder, rows)
+    if not rows:
+        print(f"No file of the repositories has '{options.only}' in its path.", file=sys.stderr)
+        return 2
     if options.page:
         markdown.put_between(PAGE, COMMAND, page(rows, options))
         print(PAGE)
