@@ -156,7 +156,9 @@ def test_mirror_ring_has_the_nephroid(stage, technique):
 
 
 def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
-    """A sheet of index 1.33 under a sun at 30 degrees from its normal: E cos T on the floor below, evenly."""
+    """A sheet of index 1.33 under a sun at 30 degrees from its normal: E cos T / n^2 on the floor below, evenly. The
+    radiance that leaves water is L / n^2 of what its floor sends, which stands in the light on the floor, as in Cycles.
+    """
     stage.floor()
     stage.rectangle((-4, -4), (4, 4), 0.5, material=glass(stage, 1.33)).visible_camera = False
     stage.light("SUN", turn=(0, np.pi / 6, 0), angle=0.0)
@@ -165,7 +167,7 @@ def test_flat_water_passes_the_share_that_fresnel_leaves(stage):
     cosine, bent = np.cos(np.pi / 6), np.sqrt(1 - (0.5 / 1.33) ** 2)
     s = (cosine - 1.33 * bent) / (cosine + 1.33 * bent)
     p = (1.33 * cosine - bent) / (1.33 * cosine + bent)
-    expected = cosine * (1 - 0.5 * (s * s + p * p))
+    expected = cosine * (1 - 0.5 * (s * s + p * p)) / 1.33**2
     assert energy.mean() == pytest.approx(expected, rel=0.005)
     assert energy == pytest.approx(expected, rel=0.03)
 
@@ -263,7 +265,7 @@ def test_crests_of_water_focus_where_the_paraxial_law_says(stage):
     floor = stage.floor(4.0)
     stage.light("SUN", angle=0.0)
     stage.camera_above(0.2, height=3.0)
-    through = passed(1.0, ior)[0]
+    through = passed(1.0, ior)[0] / ior**2  # as radiance above the water
     starts = np.linspace(-0.15, 0.15, 30001)
     lean = np.arctan(amplitude * wave * np.sin(wave * starts))  # of the surface
     bend = lean - np.arcsin(np.sin(lean) / ior)
@@ -277,7 +279,7 @@ def test_crests_of_water_focus_where_the_paraxial_law_says(stage):
         assert exact == pytest.approx(1 / (1 - part), rel=0.1)  # what aberration leaves of the law
         assert found == pytest.approx(through * exact, rel=0.02)
     floor.location.z = -focus
-    assert irradiance(stage, PHOTONS, samples=4, size=(32, 8), grid=512)[2:6, 14:18].mean() > 8.0
+    assert irradiance(stage, PHOTONS, samples=4, size=(32, 8), grid=512)[2:6, 14:18].mean() > 8.0 / ior**2
 
 
 def test_a_turned_scene_has_the_same_caustic_and_grey_light_stays_grey(stage, technique_name):
@@ -549,3 +551,25 @@ def test_lights_that_take_turns_shine_as_much_as_if_each_sample_had_all(stage, t
     assert turns.mean() == pytest.approx(every.mean(), rel=0.005)
     coarse, fine = (light.reshape(8, 8, 8, 8).mean(axis=(1, 3)) for light in (turns, every))
     assert np.abs(coarse - fine).mean() < 0.1 * every.mean()  # of half as many samples, footprints are wider
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solid", [False, True], ids=["pool", "glass"])
+def test_what_lies_in_water_or_glass_is_as_bright_as_in_cycles(written, solid):
+    """Seen from above, through a sheet of water and in a block of glass that rays do not leave before."""
+    stage = written
+    stage.floor(4.0, material=stage.diffuse(0.01))  # dark: light is not thrown to and fro below the surface
+    made = glass(stage, 1.5 if solid else 1.33)
+    if solid:
+        slab(stage, made, -0.5, 0.5, half=4.0).visible_camera = True
+    else:
+        stage.rectangle((-4, -4), (4, 4), 0.5, material=made)
+    stage.light("SUN", angle=0.8)  # wide, so that Cycles' paths find it
+    stage.scene.cycles.caustics_refractive = True
+    stage.camera_above(1.0)
+    own, cycles = (
+        stage.written(engine, samples, size=(16, 16), bounces=4)["Transmission Indirect"][..., :3].mean()
+        for engine, samples in (("CANDELA", 8), ("CYCLES", 1024))
+    )
+    print(f"{own:.6f} beside {cycles:.6f}")
+    assert own == pytest.approx(cycles, rel=0.04)
