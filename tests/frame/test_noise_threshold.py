@@ -92,6 +92,7 @@ def room(registered):
     return stage
 
 
+@pytest.mark.slow
 def test_a_threshold_that_is_not_reached_draws_all_samples(room):
     room.scene.candela.noise_threshold = 1e-6
     room.render(12, (32, 24), bounces=1)
