@@ -215,15 +215,15 @@ def test_a_transparent_card_may_block_what_comes_from_lamps_only(stage, render, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "light", "settings"),
+    ("technique", "kind", "light", "settings"),
     [
-        ("ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),
-        ("ShaderNodeBsdfSheen", "diffuse_indirect", {"distribution": "MICROFIBER"}),
-        ("ShaderNodeBsdfSheen", "glossy_indirect", {"distribution": "ASHIKHMIN"}),
-        ("ShaderNodeBsdfToon", "diffuse_indirect", {"component": "DIFFUSE"}),
+        ("instant_radiosity", "ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),
+        ("instant_radiosity", "ShaderNodeBsdfSheen", "diffuse_indirect", {"distribution": "MICROFIBER"}),
+        ("instant_radiosity", "ShaderNodeBsdfSheen", "glossy_indirect", {"distribution": "ASHIKHMIN"}),
+        ("instant_radiosity", "ShaderNodeBsdfToon", "diffuse_indirect", {"component": "DIFFUSE"}),
+        ("multires_radiosity", "ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),  # lobes are shared between the two
     ],
 )
-@pytest.mark.parametrize("technique", ["instant_radiosity", "multires_radiosity"])
 def test_lobes_without_microfacets_get_the_light_of_other_surfaces_as_in_cycles(
     stage, render, kind, light, settings, technique
 ):
