@@ -215,7 +215,7 @@ def test_a_mirror_shows_the_fog_before_it(stage):
     lit_cube(stage)
     mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
     stage.rectangle((-2, -2), (2, 2), z=-1.01, material=mirror)
-    stage.scene.candela.slot_caustics = "OFF"
+    stage.scene.candela.slot_caustics, stage.scene.candela.airlight_bounces = "OFF", 0
     seen = stage.render(64, size=(8, 8), bounces=1)
     assert of_corners(seen["glossy_indirect"]) == pytest.approx(airlight_of_cube(down=False), rel=0.03)
     assert seen["volume_direct"][5, 5, 0] == pytest.approx(airlight_of_cube(), rel=0.03)
@@ -225,7 +225,7 @@ def test_a_mirror_shows_the_fog_before_it(stage):
 def test_glass_shows_the_fog_behind_it(stage):
     lit_cube(stage)
     box(stage, stage.material("ShaderNodeBsdfGlass", IOR=1.0001, Roughness=0.0), (-2, -2, 1.2), (2, 2, 1.4))
-    stage.scene.candela.slot_caustics = "OFF"
+    stage.scene.candela.slot_caustics, stage.scene.candela.airlight_bounces = "OFF", 0
     seen = stage.render(64, size=(8, 8), bounces=1)
     assert of_corners(seen["transmission_indirect"]) == pytest.approx(airlight_of_cube(), rel=0.03)
 
@@ -303,12 +303,12 @@ def test_henyey_and_greenstein_mirrors_with_the_sign_of_g(stage):
 @pytest.mark.slow
 def test_a_cloud_of_albedo_one_in_even_light_is_hardly_to_be_seen(stage):
     """A white furnace: what is missing is light of more bounces than are asked."""
-    stage.camera_above()
+    stage.camera_above(span=1.0)
     stage.world((1, 1, 1))
     box(stage, volume(stage, Color=(1, 1, 1, 1), Density=1.0))
     missing = []
     for bounces in (0, 1, 8):
-        missing.append(1.0 - stage.render(32, size=(16, 16), bounces=bounces)["combined"][6:10, 6:10, :3].mean())
+        missing.append(1.0 - stage.render(32, size=(4, 4), bounces=bounces)["combined"][..., :3].mean())
     assert missing[0] > missing[1] > 0.02
     assert missing[2] == pytest.approx(0.0, abs=0.01)
 
@@ -360,24 +360,25 @@ def lens_scene(stage, ior):
 @pytest.mark.slow
 def test_a_lens_of_index_one_changes_no_fog_below_it(stage):
     made = lens_scene(stage, 1.0001)
-    lens = media_light(stage.render(16, size=(32, 32), bounces=1))[:13]
+    lens = media_light(stage.render(16, size=(24, 24), bounces=1))[:10]
     assert stage.ledger.row("volume_caustics").state == "ran"
     made.hide_render = True
-    clear = media_light(stage.render(16, size=(32, 32), bounces=1))[:13]
+    clear = media_light(stage.render(16, size=(24, 24), bounces=1))[:10]
     assert lens.mean() == pytest.approx(clear.mean(), rel=0.02)
 
 
 @pytest.mark.slow
 def test_neither_rays_nor_pixels_change_a_beam(stage):
     lens_scene(stage, 1.5)
+    stage.scene.candela.slot_volume = "OFF"
     found = {}
-    for rays, size in ((32, 32), (64, 32), (128, 32), (128, 64)):
+    for rays, size in ((32, 24), (64, 24), (128, 24), (64, 48)):
         stage.scene.candela.volume_caustics_rays = rays
-        found[rays, size] = stage.render(4, size=(size, size), bounces=1)["volume_indirect"].mean()
-    assert list(found.values()) == pytest.approx([found[128, 32]] * 4, rel=0.02)
+        found[rays, size] = stage.render(2, size=(size, size), bounces=1)["volume_indirect"].mean()
+    assert list(found.values()) == pytest.approx([found[128, 24]] * 4, rel=0.02)
 
 
-def beams_of_a_ball(density, ior=1.5, pixels=96, span=6.0, rays=400_000, bounces=4):
+def beams_of_a_ball(density, ior=1.5, pixels=48, span=6.0, rays=100_000, bounces=2):
     """(pixels, pixels) radiance that a ball of radius 1 in a cube of fog throws into it under a sun of irradiance 1,
     seen from the side: rays by Snell and Fresnel, with those mirrored inside up to `bounces` times. Row 0 is low."""
     rng, half = np.random.default_rng(0), span / 2
@@ -416,13 +417,13 @@ def test_a_ball_lens_gathers_light_where_optics_say(stage):
     camera.type, camera.ortho_scale = "ORTHO", 6.0
     stage.light("SUN", (0, 0, 5), energy=1.0, angle=0.0)
     box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.01), (-3, -3, -3), (3, 3, 3))
-    stage.scene.candela.airlight_bounces = 0
+    stage.scene.candela.slot_volume = "OFF"
     ball(stage, 1.0, 1.5)
-    stage.scene.candela.volume_caustics_rays = 128
-    beams = stage.render(4, size=(64, 64), bounces=1)["volume_indirect"][..., 0]
-    z = 6.0 * ((np.arange(64) + 0.5) / 64 - 0.5)
+    stage.scene.candela.volume_caustics_rays = 96
+    beams = stage.render(4, size=(48, 48), bounces=1)["volume_indirect"][..., 0]
+    z = 6.0 * ((np.arange(48) + 0.5) / 48 - 0.5)
     below = (z < -1.05) & (z > -2.95)
-    expected = beams_of_a_ball(0.01, pixels=64)
+    expected = beams_of_a_ball(0.01)
     np.testing.assert_allclose(beams[below].sum(axis=1), expected[below].sum(axis=1), rtol=0.02)
     outside = z[:, None] ** 2 + z[None] ** 2 > 1.1**2  # the camera sees no beam behind the ball, nor in it
     assert beams[outside].sum() == pytest.approx(expected[outside].sum(), rel=0.01)
@@ -478,8 +479,8 @@ def test_a_grid_of_any_numbers_gives_a_finite_picture(stage, tmp_path):
     stage.camera_above()
     glowing_floor(stage)
     stage.light("POINT", (0, 0, 2))
-    seen = stage.render(2, size=(16, 16))
-    assert seen["combined"][8, 8, 0] > 0.05
+    seen = stage.render(2, size=(8, 8))
+    assert seen["combined"][4, 4, 0] > 0.05
     assert seen["volume_direct"].max() > 0
 
 
@@ -499,6 +500,7 @@ def test_voxels_absorb_what_stands_in_them(stage, tmp_path):
     stage.link("even", cloud)
     stage.camera_above()
     glowing_floor(stage)
+    stage.scene.candela.slot_volume = "OFF"
     seen = stage.render(4, size=(16, 16))["combined"]
     assert seen[8, 8, 0] == pytest.approx(2 * np.exp(-0.8), rel=0.01)
     # Interpolated linearly, the grid fades out over the voxel beyond its rim, which is pixel 3; the next is free of it.
@@ -517,8 +519,8 @@ def test_beams_of_odd_casters_are_finite(stage, case):
     stage.light("POINT", (0, 0, 0.1 if case == "lamp inside" else 2.0), energy=300, shadow_soft_size=0.0)
     made = volume(stage, Color=(0.9, 0.9, 0.9, 1), Density=0.15)
     box(stage, made, (0.0 if case == "box beside" else -3, -6, -4), (3, 3, 3))
-    stage.scene.candela.airlight_bounces = 0
-    stage.scene.candela.volume_caustics_rays = 64
+    stage.scene.candela.slot_volume = "OFF"
+    stage.scene.candela.volume_caustics_rays = 32
     ball(stage, 5e-4 if case == "speck" else 0.5, 2.4 if case == "gem" else 1.5)
     seen = stage.render(2, size=(16, 16), bounces=1)["volume_indirect"][..., :3]
     assert np.isfinite(seen).all() and (seen >= 0).all()
@@ -566,3 +568,14 @@ def test_a_lamp_in_endless_fog_is_seen_as_far_as_it_is(stage):
     fog(stage, node="ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=0.2)
     seen = stage.render(8, size=(9, 9))["emission"][4, 4, 0]
     assert seen == pytest.approx(clear * np.exp(-0.2 * 6.0), rel=0.01)
+
+
+def test_walks_in_endless_fog_begin_where_they_are_seen(stage):
+    """Drawn evenly by the logarithm of the distance to a lamp, nine of ten lay behind thousands of metres of fog."""
+    stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.8)
+    stage.light("POINT", (0, 0, 0), energy=100, shadow_soft_size=0.1)
+    fog(stage, Density=0.2)
+    seen = stage.render(4, size=(16, 16), bounces=1)["volume_indirect"][..., 0]
+    sides = [turned for one in (seen, seen.T) for turned in (one, one[::-1])]
+    alike = np.array([turned for one in sides for turned in (one, one[:, ::-1])])
+    assert np.mean(alike.var(axis=0) / alike.mean(axis=0) ** 2) < 0.2
