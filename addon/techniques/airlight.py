@@ -11,7 +11,7 @@ media. V are rays of the hierarchy, T is that of media.py. What media emit is in
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
 spread their light, divided by what lamps would send without shadows, to pixels whose rays end equally far away.
 Others take a quarter as many at every pixel, and converge. Light of several bounces, one walk a pixel and sample, is
-smooth, and spread over opacity below MANY samples: two walks at a quarter of the pixels over eight in pictures of WIDE
+smooth, and spread over opacity below MANY samples: four walks at a quarter of the pixels over eight in pictures of WIDE
 pixels a side, one over four in those of SMALL. At each stop walks look for places along a lamp's rays, and at the
 surface that one of these ends at, beside those that they meet by chance; steps go on to places all around lamps, too.
 
