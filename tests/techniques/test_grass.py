@@ -289,8 +289,8 @@ def test_in_a_hollow_nothing_is_seen_below_the_ground(stage):
 
 
 def test_in_a_hollow_of_flat_faces_nothing_is_seen_below_them(stage, tmp_path):
-    """A gutter of three metres' radius whose faces are 10 degrees apart, and soil that is seen through blades 0.1 m high: the
-    next face stands up to 23 mm above the circle, which is where the soil would be by the bend alone."""
+    """A gutter of three metres' radius whose faces are 10 degrees apart, and soil that is seen through blades 0.1 m
+    high: by the bend alone it would lie up to 22 mm below the next face."""
 
     def depth(patch):
         stage.clear()
