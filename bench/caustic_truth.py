@@ -73,12 +73,14 @@ def trace(scene_file: str, result_file: str, photons: int) -> None:
 
 def follow(mi, scene, kind_of, ior_of, origin, direction, rng):
     """Where photons end, (3, N), whether on a diffuse surface after specular ones, and what of each is left:
-    mirrors keep all, and glass mirrors or bends in proportion to Fresnel's reflectance."""
+    mirrors keep all, and glass mirrors or bends in proportion to Fresnel's reflectance. In water it is 1 / n^2 of the
+    power: radiance that leaves it is smaller by that, which the engines leave to the light below (Cycles as well)."""
     import drjit as dr
 
     count = len(origin)
     origin, direction = np.ascontiguousarray(origin.T), np.ascontiguousarray(direction.T)
     alive, met, landed = np.ones(count, bool), np.zeros(count, bool), np.zeros(count, bool)
+    left = np.ones(count)
     place = np.zeros((3, count))
     for _ in range(DEPTH):
         some = np.flatnonzero(alive)
@@ -113,11 +115,12 @@ def follow(mi, scene, kind_of, ior_of, origin, direction, rng):
         onward /= np.linalg.norm(onward, axis=0)
         lost = ((onward * ng).sum(0) > 0) == bends
         index = some[on]
+        left[index] *= np.where(bends, eta**2, 1.0)
         origin[:, index] = p + 1e-4 * np.where(bends, -ng, ng)
         direction[:, index] = onward
         met[index] = True
         alive[index[lost]] = False
-    return place, landed, np.ones(count)
+    return place, landed, left
 
 
 def emit(lamp: np.ndarray, middle, radius: float, rng, count: int):

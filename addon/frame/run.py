@@ -11,13 +11,14 @@ import numpy as np
 from ..gfx import context, images, passes
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler, Stopwatch
+from ..materials.compiler import may_reflect
 from ..materials.working_space import current
 from ..scene.acceleration import HierarchyCache
 from ..scene.displacement import Displacement
 from ..scene.emission_maps import EmissionMaps
 from ..scene.geometry import SceneGeometry
 from ..scene.materials import MaterialSet, compiling
-from ..scene.media import volumes_key
+from ..scene.media import has_media, volumes_key
 from ..scene.opacity_maps import OpacityMaps
 from ..scene.surface_means import SurfaceMeans
 from ..scene.view import VIEW, View
@@ -360,7 +361,10 @@ class Renderer:
             if self.materials.compiled[material].casts_stochastically
         ]
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
-        varied = [k for k in shown if self.materials.compiled[k].uneven_emission]
+        # Pictures of what shines alone, as unlit drawings, measure no emission; where somebody asks after all, they are
+        # compiled then.
+        lit = has_media(snapshot) or any(may_reflect(snapshot.materials[k].graph) for k in snapshot.used_materials)
+        varied = [k for k in shown if lit and self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.emission_map_program(k) for k in varied]
         wanted += [

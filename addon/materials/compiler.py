@@ -288,6 +288,15 @@ def may_emit(graph: Graph) -> bool:
     return False
 
 
+def may_reflect(graph: Graph) -> bool:
+    """Whether some node of the graph can scatter light that falls on it: cheap, by the nodes' types alone."""
+    return any(
+        ("Bsdf" in node.type and node.type != "ShaderNodeBsdfTransparent") or node.type in REFLECTING
+        for node in graph.nodes.values()
+    )
+
+
+REFLECTING = ("ShaderNodeSubsurfaceScattering", "ShaderNodeEeveeSpecular")  # beside those named Bsdf
 REFRACTING = ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 

@@ -51,6 +51,7 @@ WHITE = Input("COLOR", (1.0, 1.0, 1.0, 1.0))
 
 
 FINE_LAYERS = bpy.app.version >= (5, 3, 0)  # finer tables (energy.py), and rough diffuse (shaders/lib/brdf.glsl)
+DEPTH_FROM_CAMERA = bpy.app.version >= (5, 3, 0)  # Denoising Depth, before from where the camera begins to see
 NUMBERS = {"FLOAT", "VECTOR", "COLOR"}
 INLINES = bpy.app.version >= (5, 0, 0)  # Blender dissolves groups itself before Cycles sees the tree
 

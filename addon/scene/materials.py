@@ -17,7 +17,7 @@ from ..materials.attributes import CAMERA, INSTANCE
 from ..materials.compiled import CompiledMaterial
 from ..materials.compiler import compile_material
 from ..materials.energy import energy_texture
-from ..materials.reader import FINE_LAYERS
+from ..materials.reader import DEPTH_FROM_CAMERA, FINE_LAYERS
 from ..materials.working_space import current
 from ..snapshot.scene import Note, Snapshot
 from . import uv_placed
@@ -466,7 +466,7 @@ def _aov_program(compiled: CompiledMaterial, layout: AovLayout) -> Program:
                     ("RGBA32F", "surface_position"),
                     *((("RGBA32F", "motion_table"),) if moving else ()),
                 ),
-                "snippets": (*shared["snippets"], ("generated/aovs", _aov_texts(compiled.aovs, layout))),
+                "snippets": (*shared["snippets"], ("generated/aovs", AOV_NEAR + _aov_texts(compiled.aovs, layout))),
             },
         )
         known = _aov_programs[id(compiled), layout] = (compiled, program)
@@ -493,6 +493,10 @@ def _aov_texts(given: tuple[tuple[str, str], ...], layout: AovLayout) -> str:
                 }.get(aov[1], f"out_{k} = vec4({value}(point), 1.0);")
             )
     return f"#define AOV_NONE {none}\n#define AOV_WRITE {' '.join(written)}\n"
+
+
+# Where Denoising Depth begins, as Cycles of this Blender has it (shaders/surface/aov.frag.glsl).
+AOV_NEAR = f"#define AOV_NEAR {'0.0' if DEPTH_FROM_CAMERA else 'film_view.film.z'}\n"
 
 
 @_once

@@ -42,7 +42,7 @@ from ..lighting.visibility import (
     by_rays,
     map_resolution,
 )
-from ..materials.compiler import may_emit
+from ..materials.compiler import may_emit, may_reflect
 from ..snapshot.scene import Snapshot
 from ..sources import lights
 from ..surfaces.draw import LIT_SURFACES
@@ -69,9 +69,11 @@ class EmissiveLight(Technique):
         self._traced = False  # rays take the place of maps
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
-        used = snapshot.used_materials
-        if not any(may_emit(snapshot.materials[slot].graph) for slot in used):
+        graphs = [snapshot.materials[slot].graph for slot in snapshot.used_materials]
+        if not any(map(may_emit, graphs)):
             return "no material emits light"
+        if not any(map(may_reflect, graphs)):
+            return "no material reflects light"
         return None
 
     def begin(self, frame: Frame) -> None:

@@ -56,7 +56,7 @@ from ..lighting.virtual_lights import (
     VirtualLightSet,
     near_radius,
 )
-from ..materials.compiler import may_emit
+from ..materials.compiler import may_emit, may_reflect
 from ..materials.graph import Graph
 from ..scene import acceleration
 from ..snapshot.scene import Snapshot
@@ -128,7 +128,7 @@ def no_indirect_light(snapshot: Snapshot, settings: Settings) -> str | None:
         return "the scene's bounces are set to 0"
     if not snapshot.instances:
         return "the scene has no surface"
-    if not any(_may_reflect(graph) for graph in _used(snapshot)):
+    if not any(may_reflect(graph) for graph in _used(snapshot)):
         return "no material reflects light"
     return no_diffuse_light(snapshot)
 
@@ -144,10 +144,6 @@ def no_diffuse_light(snapshot: Snapshot) -> str | None:
 
 def _used(snapshot: Snapshot) -> list[Graph]:
     return [snapshot.materials[m].graph for m in snapshot.used_materials]
-
-
-def _may_reflect(graph) -> bool:
-    return any("Bsdf" in node.type and node.type != "ShaderNodeBsdfTransparent" for node in graph.nodes.values())
 
 
 def gather_bindings(frame: Frame, finder: VirtualLights, lights: VirtualLightSet) -> dict:

@@ -112,7 +112,7 @@ void main()
   if (bends != (dot(onward, s.geometric_normal) < 0.0)) {
     return;
   }
-  flux *= weight;
+  flux *= bends ? weight / (s.glossy_ior * s.glossy_ior) : weight;  // see caustics/photon.frag.glsl
   vec3 from = s.position;
   float travelled = 0.0;
   float extent = length(photon_light.box_high.xyz - photon_light.box_low.xyz);
@@ -162,7 +162,7 @@ void main()
     if (max_component(weight) <= 0.0) {
       return;
     }
-    flux *= weight;
+    flux *= weight / (leaving.glossy_ior * leaving.glossy_ior);
   }
 
   // Steps grow along the ray, from a part of the way to the receivers straight ahead.

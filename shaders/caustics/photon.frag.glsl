@@ -82,7 +82,9 @@ void main()
   if (passes != (dot(onward, geometric_normal) < 0.0)) {
     return;
   }
-  flux *= weight;
+  // Radiance does not change with the medium here, as in Cycles: what a floor under water sends out is seen undimmed by
+  // 1/n^2, and so the light on it is divided by it.
+  flux *= bends ? weight / (s.glossy_ior * s.glossy_ior) : weight;
   float path = bends ? 1.0 : 2.0;
   vec3 position = s.position;
   float travelled = 0.0;
@@ -135,6 +137,7 @@ void main()
                                           scale * glass.rgb, scale * ((shape.w > 0.5) ? glass.rgb : vec3(1.0)));
       onward = interface_sample_strata(surface, drawn, numbers.y, photon_light.spread.w, weight);
       passes = dot(onward, smooth_normal) < 0.0;
+      weight /= passes ? ior * ior : 1.0;
       lobe_spread = max(lobe_spread, interface_is_smooth(surface) ? 0.0 : lobe_width(surface.alpha, passes, ior));
     }
     else {

@@ -1,7 +1,8 @@
 // What AOV Output nodes of a material give at the surface that a pixel sees. As in Cycles a layer gives all of it, and
 // what lies behind follows where the layer is less opaque than the threshold and this sample passes it: LAYERS adds such
 // layers to what the first surface from the threshold on has drawn.
-// generated/aovs: AOV_NONE and AOV_WRITE set the outputs, from functions of generated/material.
+// generated/aovs: AOV_NONE and AOV_WRITE set the outputs, from functions of generated/material; Denoising Depth begins
+// at AOV_NEAR.
 #include "lib/math.glsl"
 #include "lib/closure.glsl"
 #include "lib/instance.glsl"
@@ -10,15 +11,15 @@
 #ifdef MOTION
 #include "surface/motion.glsl"
 #endif
-// How far a camera's ray goes to a place from the near end of what is seen, where it begins.
+#include "generated/aovs"
+
+// How far a camera's ray goes to a place from where it begins.
 float aov_distance(vec3 position)
 {
   vec3 away = position - film_view.eye.xyz;
   float depth = -dot(away, film_view.backward.xyz);
-  return (film_view.eye.w > 0.5) ? depth - film_view.film.z : length(away) * (1.0 - film_view.film.z / depth);
+  return (film_view.eye.w > 0.5) ? depth - AOV_NEAR : length(away) * (1.0 - AOV_NEAR / depth);
 }
-
-#include "generated/aovs"
 
 void main()
 {

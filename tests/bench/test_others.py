@@ -4,6 +4,8 @@ import argparse
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from bench import others
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -12,6 +14,7 @@ OPTIONS = argparse.Namespace(samples=2, reference_samples=8, size=(16, 12), tole
 REPOSITORY = {"name": "someone/something"}
 
 
+@pytest.mark.slow
 def test_a_file_is_compared_in_a_process_of_its_own():
     row = others.row_of(REPOSITORY, ROOT, SAMPLE, OPTIONS)
     assert row.state == "alike", row

@@ -40,6 +40,7 @@ def means(passes, name):
     return passes[name][..., :3].reshape(4, 8, 4, 8, 3).mean((1, 3))
 
 
+@pytest.mark.slow
 def test_light_on_surfaces(stage, clamped):
     """A lamp close above a floor, which lights a wall: one limit leaves the other light as it was. Bounced light comes
     from many points at once and varies less than Cycles' does, so that less of it is taken away."""

@@ -1,10 +1,13 @@
 """Displaced materials of one topology, some drawn by moved vertices and some by relief, in one scene."""
 
+import pytest
+
 from bench.case_scenes import displacing
 
 from .conftest import agree
 
 
+@pytest.mark.slow
 def test_relief_and_moved_vertices_of_one_topology(stage, beside):
     stage.rectangle((-1.8, -1.8), (1.8, 0), material=displacing(stage, "DISPLACEMENT", 1.0, 0.1))
     for k in range(2):

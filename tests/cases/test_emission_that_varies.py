@@ -54,6 +54,7 @@ def test_lamps_may_differ_by_anything_that_the_object_says(stage, beside, output
     agree(thirds(own["combined"]), thirds(cycles["combined"]))
 
 
+@pytest.mark.slow
 def test_a_screen_lights_by_what_it_shows_where_it_shows_it(stage, beside):
     image = bpy.data.images.new("Screen", 4, 4, float_buffer=True)
     pixels = np.zeros((4, 4, 4), np.float32)
@@ -110,6 +111,7 @@ def test_the_bounce_of_an_animated_object_colour_is_followed(stage, beside):
         agree(own["combined"][cell].mean((0, 1)), cycles["combined"][cell].mean((0, 1)))
 
 
+@pytest.mark.slow
 def test_the_opacity_of_animated_objects_is_followed_by_light_of_the_world(stage, beside):
     """Two lids of one mesh and material, whose alphas go opposite ways."""
     fading = stage.material("ShaderNodeBsdfTransparent")

@@ -56,6 +56,7 @@ def test_light_of_a_holdout_reaches_others(stage, corner, beside, kind, seen):
         bpy.data.collections.remove(bpy.data.collections["Group"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [True, False])
 def test_what_was_a_holdout_in_one_frame_lights_the_next_and_the_other_way_round(stage, corner, beside, first):
     found = []
@@ -66,6 +67,7 @@ def test_what_was_a_holdout_in_one_frame_lights_the_next_and_the_other_way_round
         agree(own, cycles)
 
 
+@pytest.mark.slow
 def test_a_holdout_of_one_layer_lights_that_layer_and_the_next(stage, corner):
     scene = stage.scene
     group = bpy.data.collections.new("Group")

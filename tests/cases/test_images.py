@@ -83,6 +83,7 @@ def test_udim_tiles_are_shown_where_they_belong(stage, beside, tmp_path):
     assert quarters(own)[0, 0, 0] > 0.9 and quarters(own)[0, 1, 1] > 0.9 and quarters(own)[1, 0, 2] > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [13, 30])
 def test_a_material_may_read_many_images(stage, beside, count):
     """The sum of many images of other colours, sizes, extensions and interpolations."""

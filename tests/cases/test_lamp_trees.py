@@ -180,6 +180,7 @@ def test_profiles_that_lie_on_their_side(lamp, beside, kind, angles, across):
     agree(own, cycles)
 
 
+@pytest.mark.slow
 def test_a_lamp_that_is_seen_in_a_mirror_shows_its_tree(stage, beside):
     stage.camera_above()
     stage.rectangle((-2, -2), (2, 2), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.05))
@@ -222,6 +223,7 @@ def test_plain_lamps_have_no_maps(stage, lamp):
     assert stage.renderer.frame.lamp_maps.image is None  # run once, and the same all around
 
 
+@pytest.mark.slow
 def test_a_lamps_influence_is_left_to_eevee(stage, beside):
     """Cycles has none of these factors, and neither has Candela."""
     stage.floor(material=stage.principled(Base_Color=(0.5, 0.5, 0.5, 1)))

@@ -26,6 +26,7 @@ def test_a_highlight_that_one_mirror_sees_in_another_lights_nothing_else(stage, 
     agree(*(passes["diffuse_indirect"][6:18, 18:22].mean((0, 1)) for passes in (own, cycles)))
 
 
+@pytest.mark.slow
 def test_highlights_of_lamps_behind_glass_are_as_bright_as_they_are(stage, beside):
     """Rays find the lamp through the pane, and so do points on it: they shared it as if the lamp stood at the pane's
     distance, and the highlight was a fifth too bright."""

@@ -89,6 +89,7 @@ def test_what_geometry_nodes_store_with_instances(stage, beside, kind):
     same(stage, beside)
 
 
+@pytest.mark.slow
 def test_properties_of_view_layer_scene_and_world(stage, beside):
     scene = stage.scene
     world = stage.world((0.1, 0.3, 0.2), 1.0)

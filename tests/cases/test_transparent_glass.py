@@ -29,6 +29,7 @@ def middle(passes):
     return passes["combined"][10:22, 10:22].mean((0, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [16, 64])
 @pytest.mark.parametrize("through", [True, False])
 def test_a_pane_is_as_transparent_as_in_cycles(stage, hole, beside, through, samples):

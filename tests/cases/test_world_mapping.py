@@ -7,6 +7,7 @@ import pytest
 from .conftest import agree
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [
     {"Rotation": (0.3, 0.8, 2.0), "Scale": (1, -1, 1)}, {"Rotation": (0.3, 0.8, 2.0), "Scale": (1, 1, 3)},
     {"Location": (0.2, 0.0, 0.4)},

@@ -150,6 +150,7 @@ def test_open_lids_free_the_widest_pupil_and_shut_ones_nothing():
     assert lids.closure(0.5, 1.0) == 1.0
 
 
+@pytest.mark.slow
 def test_an_eye_blinks_as_often_as_is_asked():
     seconds = np.arange(0, 600, 0.01)
     state = np.array([lids.blinking(s, 15.0, 0) for s in seconds])
@@ -250,6 +251,7 @@ def test_defocus_blurs_the_core_and_keeps_the_light():
     assert blurred.max() < 0.2 * sharp.max()
 
 
+@pytest.mark.slow
 def test_the_kernel_does_not_depend_on_how_fine_the_pattern_is():
     """The same angle holds the same share of the light, whatever the pattern's and the picture's resolution."""
     aperture = aperture_at(Eye(pupil=4.0, lashes=0.0), 0.0, 1.0)

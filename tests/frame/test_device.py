@@ -69,6 +69,7 @@ def test_the_plan_foresees_the_same_choice(room):
         assert f": {method}, because" in sentence
 
 
+@pytest.mark.slow
 def test_film_points_differ_between_two_devices_and_ledger_and_plan_say_why(room):
     """On one card triangles cost nothing, on the other all that there is."""
     import bpy

@@ -65,6 +65,7 @@ def test_a_picture_with_a_moved_camera_is_read_back_and_little_else(counted, nam
     assert counted["reads"] + counted["waits"] <= 3
 
 
+@pytest.mark.slow
 def test_two_thousand_instances_are_few_draws(monkeypatch):
     """Of meshes: at each of eight points of the film, and into depth maps."""
     scene = opened("instances", 1)
@@ -92,6 +93,7 @@ def test_a_turning_viewport_makes_no_framebuffer_after_the_second_frame_of_a_siz
     assert len(last) > 3 and last[-1] == last[1], made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ("cornell_box", "soft_shadow_garden"))
 def test_a_final_picture_makes_each_framebuffer_once(name, monkeypatch):
     """Blender makes a context for each of them, so they cannot stay longer."""
@@ -109,6 +111,7 @@ def test_a_final_picture_makes_each_framebuffer_once(name, monkeypatch):
     assert images.framebuffer_count - before == len(asked)
 
 
+@pytest.mark.slow
 def test_the_first_picture_compiles_materials_that_rays_met_alone(monkeypatch):
     """Later ones compile what else rays may meet, and then never ask."""
     scene = opened("window_interior", 1)

@@ -73,6 +73,7 @@ def differences(evaluate, materials, images):
         yield float(np.abs(measured - expected).max())
 
 
+@pytest.mark.slow
 def test_extension_interpolation_and_alpha_match_cycles(evaluate, empty_scene):
     image, pixels = new_image("Straight")
     cases = list(itertools.product(EXTENSIONS, ("Linear", "Closest"), (False, True)))

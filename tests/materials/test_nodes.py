@@ -239,6 +239,7 @@ CYCLES_NODES = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_converters_match_cycles(evaluate, empty_scene):
     """The first visible output of each node as an emission, by both. Scaled down, so that a display value fits."""
     materials = []
@@ -310,6 +311,7 @@ def two_kinds_of_lookup():
     return graph(sky, seen, diffuse(Color=("Image", "Color")), surface=("Diffuse", "BSDF"))
 
 
+@pytest.mark.slow
 @hypothesis.settings(max_examples=30, deadline=None, suppress_health_check=list(hypothesis.HealthCheck))
 @hypothesis.given(trees())
 @hypothesis.example(two_kinds_of_lookup())

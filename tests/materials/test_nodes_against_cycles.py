@@ -31,6 +31,7 @@ def apart(cases: list[Case], pixels: int) -> dict[str, tuple[float, float]]:
     return {d.case.name: (d.largest, d.percentile_99) for d in compare(cases, pixels) if not d.good}
 
 
+@pytest.mark.slow
 def test_common_nodes_give_cycles_pixels(registered):
     cases = [case for case in available() if case.name in QUICK]
     assert len(cases) == len(QUICK)

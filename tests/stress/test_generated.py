@@ -149,6 +149,7 @@ def brighter(scene: Scene, factor: float) -> Scene:
     return replace(scene, lamps=lamps, world=world, surfaces=surfaces)
 
 
+@pytest.mark.slow
 @long_run
 @batches
 def test_order_and_names_of_objects_change_nothing(kept_stage, batch):

@@ -171,6 +171,7 @@ ROUGH = ("ShaderNodeBsdfDiffuse", {"Color": (0.95, 0.6, 0.2, 1.0), "Roughness": 
 BLACK = ("ShaderNodeBsdfDiffuse", {"Color": (0.0, 0.0, 0.0, 1.0)})
 
 
+@pytest.mark.slow
 def test_the_weight_of_a_rough_diffuse_closure_is_no_colour(stage):
     """Light that is scattered several times takes on the closure's colour, not that of the whole mix."""
     materials = [
@@ -202,6 +203,7 @@ def test_diffuse_closures_that_differ_keep_their_normals_and_roughness(stage, tu
     np.testing.assert_allclose(ours, cycles, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_a_closure_of_little_weight_is_not_left_to_chance(stage):
     """One lobe is kept a sample: a faint one often enough for its own pass."""
     faint = ("ShaderNodeBsdfGlossy", {"Roughness": 0.6})
@@ -280,6 +282,7 @@ def relative_error(found, expected):
     return error.relmse, error.bias
 
 
+@pytest.mark.slow
 def test_anisotropy_without_a_tangent_node_runs_around_the_objects_own_axis(stage):
     metal = {"Base_Color": COLOR, "Metallic": 1.0, "Roughness": 0.4}
     principled = stage.principled(**metal, Anisotropic=0.8, Anisotropic_Rotation=0.1)
@@ -387,6 +390,7 @@ def test_holdout_cuts_a_hole_as_in_cycles(stage):
     assert a[1::3, 3] == pytest.approx([0.0, 0.5, 1.0], abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_coat_has_a_normal_of_its_own(stage):
     """The coat mirrors a sun where the surface below, tilted the other way, does not."""
     material = stage.principled(Base_Color=(0.02, 0.02, 0.02, 1.0), Roughness=0.3, Coat_Weight=1.0, Coat_Roughness=0.2)

@@ -58,6 +58,7 @@ def test_a_sphere_that_shines_itself_keeps_all_its_energy(stage, render):
     assert render(12, samples=4).mean() == pytest.approx(0.5, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shadows", ["TEXELS", "CONVOLUTION"])
 def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render, shadows):
     """Nothing hides the unit squares from each other: clusters may not darken what their members bring."""
@@ -74,6 +75,7 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(light, unshadowed, rtol=1e-3, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_shadows_take_light_away_and_never_add_any(stage, render):
     corner(stage)
     stage.rectangle((-0.3, -0.3), (0.3, 0.3), z=0.6, material=stage.diffuse(0.2))

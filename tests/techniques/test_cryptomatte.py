@@ -82,6 +82,7 @@ def test_layers_cover_by_their_opacity(written):
     assert_like_cycles(written, crowd(written, opacity=0.4), 512, 8 * ONE_STEP, 1.5 * ONE_STEP)
 
 
+@pytest.mark.slow
 def test_metadata_is_the_standards(written):
     stage = written
     objects = crowd(stage)
@@ -127,6 +128,7 @@ def test_names_beyond_the_levels_are_left_out(written):
         assert (ours <= all_of_it + 1e-5).all()
 
 
+@pytest.mark.slow
 def test_nothing_runs_where_none_is_asked_for_and_the_picture_is_the_same(written):
     stage = written
     crowd(stage)

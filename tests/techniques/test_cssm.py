@@ -26,6 +26,7 @@ def test_the_series_is_exact_from_its_offset_on(order, scale, offset):
     assert (0.5 + scale * (lit - 0.5) > 0.9995).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(PENUMBRA_RMS))
 @pytest.mark.parametrize("prefilter", ["PYRAMID", "TABLE"])
 def test_one_map_shows_the_penumbra_of_an_edge(strip, name, prefilter):

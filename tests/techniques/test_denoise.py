@@ -46,6 +46,7 @@ def test_indirect_light_has_half_the_error_and_the_same_mean(stage):
     assert errors[1] < 0.5 * errors[0]
 
 
+@pytest.mark.slow
 def test_columns_a_few_pixels_wide_lose_their_noise_too(stage):
     """Normals turn by some 20 degrees from pixel to pixel, light hardly."""
     lit_room(stage)

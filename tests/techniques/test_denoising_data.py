@@ -24,10 +24,10 @@ def steps(stage):
 
 
 def surfaces(cycles) -> np.ndarray:
-    """Where Cycles sees a surface in all samples: a background is 1e36 away since Blender 5, and before it 0, as in
-    Candela."""
+    """Where Cycles sees a surface in all samples: a background is as far as the camera sees since Blender 5.3, 1e36
+    away since 5.0, and before it 0, as in Candela."""
     depth = cycles["Denoising Depth"][..., 0]
-    return (depth > 0.0) & (depth < 1e9)
+    return (depth > 0.0) & (depth < 100.0)
 
 
 def test_albedo_normal_and_depth_are_those_of_cycles(asked):

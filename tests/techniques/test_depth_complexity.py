@@ -315,6 +315,7 @@ def in_two_colours(light):
     tree.links.new(ramp.outputs["Result"], emission.inputs["Color"])
 
 
+@pytest.mark.slow
 def test_shadows_of_a_textured_lamp_have_its_colours(by_edges):
     """A lamp whose left and right halves differ in colour, behind the edge of a plate: one sample as many rays."""
     stage = by_edges

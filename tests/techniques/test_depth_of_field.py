@@ -33,6 +33,7 @@ def moments(picture):
     return total, mean, spread
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("z", [2.0, 7.0], ids=["behind the focus", "before it"])
 @pytest.mark.parametrize(("blades", "ratio"), [(0, 1.0), (0, 2.0), (4, 1.0)])
 def test_a_blurred_lamp_spreads_as_the_aperture_does(stage, z, blades, ratio):

@@ -53,6 +53,7 @@ def test_edges_are_as_smooth_as_with_as_many_samples_as_points(stage, light_of):
     assert shared < 1.5 * many < 0.5 * few
 
 
+@pytest.mark.slow
 def test_a_sample_is_lit_once_however_many_points_it_shows(stage, light_of):
     stage.floor()
     stage.light("SUN", energy=3.0)
@@ -134,6 +135,7 @@ def test_a_mix_of_lobes_keeps_its_light(stage, light_of):
         assert shared.mean() == pytest.approx(truth.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inputs", [{"Coat_Weight": 0.25}, {"Coat_Weight": 1.0}, {"IOR": 1.2}], ids=str)
 @pytest.mark.parametrize("metal", [0.5, 1.0])
 def test_lobes_that_reflect_unlike_keep_their_light(stage, light_of, metal, inputs):

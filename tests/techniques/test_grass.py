@@ -210,6 +210,7 @@ def test_density_is_the_share_that_is_covered(stage, tmp_path):
     assert 0.35 < (depth < 4.95).mean() < 0.65
 
 
+@pytest.mark.slow
 def test_a_ball_stands_in_the_grass(stage):
     """Blades cover the lower part of what stands in them, and nothing higher. The view is 80 degrees from above."""
     ball(stage, 0.11, (0, 0, 0.11))
@@ -256,6 +257,7 @@ def test_it_casts_shadows_beside_it(stage, tmp_path):
     np.testing.assert_allclose(shown[x < -0.05], grass, rtol=0.05)  # it shows its own shadows alone
 
 
+@pytest.mark.slow
 def test_in_a_hollow_nothing_is_seen_below_the_ground(stage):
     """A bowl of three metres' radius seen at a slant, where rays meet rising ground ahead. With lengths as on flat
     ground 5 % of the pixels lie more than a centimetre below it, and 9 % are dark."""

@@ -48,6 +48,7 @@ def shown(images):
     return images["combined"][..., :3]
 
 
+@pytest.mark.slow
 def test_an_evenly_lit_plane_has_its_albedo(stage):
     slab(stage, scattering(stage, scale=0.3))
     stage.light("SUN", energy=np.pi)
@@ -82,6 +83,7 @@ def test_light_enters_beside_the_picture_too(stage, turn):
     assert found[:, 0] == pytest.approx(expected, abs=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
 def test_each_method_means_what_it_means_in_cycles(stage, method):
     slab(stage, scattering(stage, method, scale=0.1 if method == "RANDOM_WALK" else 1.0))
@@ -114,6 +116,7 @@ def test_without_scattering_materials_it_is_skipped_with_a_reason(stage):
     assert "surface.scatter_share" not in stage.renderer.frame.images
 
 
+@pytest.mark.slow
 def test_tessellation_changes_nothing_that_is_seen(stage):
     pictures = []
     for cuts in (1, 12):
@@ -265,6 +268,7 @@ def _painted_plane(stage, **maps):
     return stage.render(16)
 
 
+@pytest.mark.slow
 def test_neutral_maps_equal_no_maps_to_the_bit(stage):
     plain = shown(_painted_plane(stage))
     stage.clear()

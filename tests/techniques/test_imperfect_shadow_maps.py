@@ -80,6 +80,7 @@ def test_a_closed_box_that_shines_loses_and_gains_nothing(stage, render):
     assert render(12, samples=16).mean() == pytest.approx(0.5, rel=0.03)
 
 
+@pytest.mark.slow
 def test_large_things_hide_virtual_lights_as_rays_say(stage, render):
     """The same virtual lights, all of them traced; unless anything hides them, the picture is 6 % brighter."""
     corner(stage)

@@ -123,6 +123,7 @@ def test_perpendicular_squares_exchange_light_by_their_form_factor(stage, render
     np.testing.assert_allclose(found, wall_irradiance((rows + 0.5) / 32), rtol=0.06)
 
 
+@pytest.mark.slow
 def test_what_stands_behind_a_blocker_gets_nothing(stage, render):
     lit_floor(stage)
     stage.rectangle((-0.3, -0.3), (0.3, 0.3), z=2.0, material=stage.diffuse(1.0))
@@ -139,6 +140,7 @@ def test_what_stands_behind_a_blocker_gets_nothing(stage, render):
 # Invariants -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_groups_of_surfels_bring_what_single_ones_do(stage, render, monkeypatch):
     """The hierarchy beside brute force: links to leaves alone."""
     corner(stage)
@@ -191,6 +193,7 @@ def test_light_does_not_depend_on_units(stage, render, scale):
     np.testing.assert_allclose(render(2, surfels=512, size=(16, 16)), light, rtol=0.05, atol=1e-3 * light.max())
 
 
+@pytest.mark.slow
 def test_a_picture_is_the_same_each_time(stage, render):
     corner(stage)
     first = render(3, samples=3)

@@ -88,6 +88,7 @@ def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage
     np.testing.assert_allclose(irradiance[:, 9:11].mean(axis=1), wall_irradiance(height), rtol=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [-1, 1], ids=["towards the sun", "away from it"])
 @pytest.mark.parametrize("floor_in_view", [True, False])
 def test_a_glossy_floor_lights_the_wall_that_its_lobe_meets(stage, render, side, floor_in_view):
@@ -178,6 +179,7 @@ def light_of_a_card_out_of_sight(stage, half, alpha):
     return float(stage.render(16, bounces=1)["diffuse_indirect"].mean())
 
 
+@pytest.mark.slow
 def test_light_of_a_small_thing_out_of_sight_does_not_depend_on_how_wide_the_scene_is(stage):
     narrow = light_of_a_card_out_of_sight(stage, 3.0, 1.0)
     assert narrow > 0.01
@@ -213,15 +215,15 @@ def test_a_transparent_card_may_block_what_comes_from_lamps_only(stage, render, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "light", "settings"),
+    ("technique", "kind", "light", "settings"),
     [
-        ("ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),
-        ("ShaderNodeBsdfSheen", "diffuse_indirect", {"distribution": "MICROFIBER"}),
-        ("ShaderNodeBsdfSheen", "glossy_indirect", {"distribution": "ASHIKHMIN"}),
-        ("ShaderNodeBsdfToon", "diffuse_indirect", {"component": "DIFFUSE"}),
+        ("instant_radiosity", "ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),
+        ("instant_radiosity", "ShaderNodeBsdfSheen", "diffuse_indirect", {"distribution": "MICROFIBER"}),
+        ("instant_radiosity", "ShaderNodeBsdfSheen", "glossy_indirect", {"distribution": "ASHIKHMIN"}),
+        ("instant_radiosity", "ShaderNodeBsdfToon", "diffuse_indirect", {"component": "DIFFUSE"}),
+        ("multires_radiosity", "ShaderNodeBsdfTranslucent", "diffuse_indirect", {}),  # lobes are shared between the two
     ],
 )
-@pytest.mark.parametrize("technique", ["instant_radiosity", "multires_radiosity"])
 def test_lobes_without_microfacets_get_the_light_of_other_surfaces_as_in_cycles(
     stage, render, kind, light, settings, technique
 ):
@@ -315,6 +317,7 @@ def test_pictures_of_few_samples_trace_more_of_the_virtual_lights():
     assert rays(1, draft=True) == 2 and rays(16, asked=5) == 5
 
 
+@pytest.mark.slow
 def test_where_an_orthographic_camera_stands_changes_nothing(stage):
     """Blender's orthographic viewport looks from half a kilometre away."""
     stage.floor(half=1.0, material=stage.diffuse(0.8))

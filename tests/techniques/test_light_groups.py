@@ -78,6 +78,7 @@ def test_lights_of_no_group_are_in_combined_alone(grouped):
     np.testing.assert_array_equal(with_groups["Combined"][..., 3], without["Combined"][..., 3])
 
 
+@pytest.mark.slow
 def test_direct_and_indirect_light_of_a_group_sum_to_its_share(grouped):
     stage = grouped
     group(stage, "Key", "Fill")
@@ -110,6 +111,7 @@ def test_passes_of_light_are_those_of_all_groups(grouped):
             np.testing.assert_allclose(own[name].mean(), plain[name].mean(), rtol=0.03)
 
 
+@pytest.mark.slow
 def test_a_picture_without_groups_is_drawn_once(grouped, monkeypatch):
     from addon.frame.run import Renderer
 

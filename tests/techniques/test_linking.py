@@ -71,6 +71,7 @@ def beside_cycles(stage, bounces=0):
     return own, truth, relative_squared_error(own, truth).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", LINKS)
 def test_lamps_beside_cycles(room, link):
     plain = room.render(64, SIZE)["combined"][..., :3]
@@ -87,6 +88,7 @@ def shining(stage):
     return stage.rectangle((-0.3, -0.3), (0.3, 0.3), material=glow, location=(-2, -2, 3), turn=(0.7, -0.5, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", (all_but_one, both))
 def test_shining_meshes_beside_cycles(room, link):
     link(room, shining(room))
@@ -95,6 +97,7 @@ def test_shining_meshes_beside_cycles(room, link):
     assert error <= 0.01
 
 
+@pytest.mark.slow
 def test_glossy_receivers_beside_cycles(room):
     room.boxes[1].data.materials[0] = room.principled(Metallic=1.0, Roughness=0.3)
     all_but_one(room, room.lamp)
@@ -115,6 +118,7 @@ def test_every_shadow_technique_follows_links(room, shadow):
     assert np.abs(own - auto).mean() < 0.25 * np.abs(own - blocked).mean()
 
 
+@pytest.mark.slow
 def test_the_ledger_says_by_what_blockers_are_found(room):
     blocked_by_one(room, room.lamp)
     room.render(1, SIZE)

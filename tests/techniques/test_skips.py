@@ -257,3 +257,28 @@ def test_an_unchanged_frame_redoes_nothing_of_it(room, bound, technique):
     room.render(SAMPLES, bounces=room.bounces)
     assert room.ledger.row(technique.name).state == REUSED
     assert set(bound) <= {RESOLVE}
+
+
+def test_what_only_shines_measures_no_emission(stage, bound):
+    """Nothing takes the light: unlit drawings, whose colours vary."""
+    drawing = stage.material("ShaderNodeEmission")
+    tree = drawing.node_tree
+    noise, shader = tree.nodes.new("ShaderNodeTexNoise"), next(n for n in tree.nodes if n.type == "EMISSION")
+    tree.links.new(noise.outputs["Color"], shader.inputs["Color"])
+    stage.floor(material=drawing)
+    stage.camera_above(4.0)
+    picture = stage.render(1)["combined"]
+    assert stage.ledger.row("emissive_light").reason == "no material reflects light"
+    assert picture[..., :3].std() > 0.01
+    assert not [name for name in bound if name.startswith("emission")]
+
+
+def test_what_scatters_below_its_surface_alone_takes_light_of_others(stage):
+    wax = stage.material("ShaderNodeSubsurfaceScattering", Scale=0.1)
+    stage.floor(material=wax)
+    stage.rectangle((-0.5, -0.5), (0.5, 0.5), 0.5, material=stage.material("ShaderNodeEmission", Strength=2.0))
+    stage.camera_above(4.0)
+    stage.scene.candela.slot_indirect = "instant_radiosity"
+    stage.render(1, bounces=1)
+    assert stage.ledger.row("emissive_light").state == RAN
+    assert stage.ledger.row("instant_radiosity").state == RAN

@@ -311,6 +311,7 @@ CHOICES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("choice", CHOICES)
 def test_every_pixel_is_finite_and_not_negative_by_choice(room, choice):
     slot, technique, case = CHOICES[choice]

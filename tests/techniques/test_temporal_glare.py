@@ -171,6 +171,7 @@ def test_odd_pictures_are_drawn(night, change):
     assert np.isfinite(images["glare"]).all()
 
 
+@pytest.mark.slow
 def test_a_viewport_shows_the_lens_and_shows_its_samples_anew_at_another_time(night):
     from tests.viewport.region import SIZE as REGION_SIZE
     from tests.viewport.region import Region

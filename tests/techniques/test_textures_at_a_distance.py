@@ -81,6 +81,7 @@ def by_points(monkeypatch):
     return rendered
 
 
+@pytest.mark.slow
 def test_one_sample_of_a_floor_to_the_horizon_is_as_smooth_as_the_mean(stage, by_points):
     floor(stage)
     reference = picture(stage, 1024, "CYCLES")
@@ -145,6 +146,7 @@ def leaves(stage, alpha):
     return material, texture
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 64])
 def test_leaves_keep_their_density(stage, by_points, samples):
     leaves(stage, "Alpha")
@@ -157,6 +159,7 @@ def test_leaves_keep_their_density(stage, by_points, samples):
     assert error(found, reference) < 1.05 * error(by_points(stage, samples), reference)
 
 
+@pytest.mark.slow
 def test_alpha_behind_a_threshold_stays_as_it_is(stage, by_points):
     """The mean of alpha would lose all leaves that cover less than half."""
     material, texture = leaves(stage, "Alpha")
@@ -169,6 +172,7 @@ def test_alpha_behind_a_threshold_stays_as_it_is(stage, by_points):
     np.testing.assert_array_equal(picture(stage, 1), by_points(stage, 1))
 
 
+@pytest.mark.slow
 def test_a_mirror_shows_a_smooth_floor(stage, by_points):
     """Rays know the footprint of their pixel where they arrive."""
     floor(stage)
@@ -181,6 +185,7 @@ def test_a_mirror_shows_a_smooth_floor(stage, by_points):
     assert error(found[mirrored], reference[mirrored]) < 0.5 * error(points[mirrored], reference[mirrored])
 
 
+@pytest.mark.slow
 def test_normals_are_averaged_in_the_first_sample_of_many_alone(stage, by_points):
     """The mean of shaded normals is not what the mean normal shades: many samples show the former."""
     floor(stage, shader="ShaderNodeBsdfPrincipled", socket="Roughness")

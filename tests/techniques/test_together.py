@@ -55,6 +55,7 @@ def lit_room(stage):
     stage.camera((0, -3, 2.5), (0.9, 0, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 4])
 @pytest.mark.parametrize("transparent", [False, True])
 def test_the_sum_is_the_same_picture(stage, samples, transparent):
@@ -66,6 +67,7 @@ def test_the_sum_is_the_same_picture(stage, samples, transparent):
     assert TOGETHER in held and not held & {"film.diffuse_direct", "radiance.emission", *COLORS}
 
 
+@pytest.mark.slow
 def test_denoise_keeps_the_paths_that_it_filters(stage):
     lit_room(stage)
     stage.scene.candela.use_denoise = True
@@ -74,6 +76,7 @@ def test_denoise_keeps_the_paths_that_it_filters(stage):
     assert "radiance.emission" not in held and "color.transmission" not in held
 
 
+@pytest.mark.slow
 def test_what_passes_show_is_apart(stage):
     lit_room(stage)
     names = ("radiance.glossy_direct", "color.glossy", "radiance.environment")
@@ -133,6 +136,7 @@ def test_a_path_that_is_not_held_is_an_error(stage):
         drawn(stage, frozenset(), names=("film.combined", "radiance.diffuse_direct"))
 
 
+@pytest.mark.slow
 def test_a_final_render_asks_for_its_passes(stage):
     """Through Blender: Combined alone is one sum; with a pass its path is apart."""
     from addon import engine

@@ -117,6 +117,7 @@ def test_rough_interfaces_bend_a_sun_as_in_cycles(stage, roughness, inside):
         stage.scene.collection.objects.unlink(sun)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["area", pytest.param("emissive", marks=SLOW)])
 def test_light_behind_rough_glass_is_as_bright_as_in_cycles(stage, kind):
     stage.rectangle((-9, -9), (9, 9), material=glass(stage, 0.4, color=(0.9, 0.7, 0.5, 1.0)))
@@ -181,6 +182,7 @@ def test_surfaces_behind_glass_get_the_light_of_other_surfaces_as_in_cycles(stag
     assert ((ours - cycles) ** 2).sum() < 0.01 * (cycles**2).sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.0, 0.3])
 def test_what_a_solid_of_glass_absorbs_is_missing_as_in_cycles(stage, roughness):
     """A block of coloured glass before a white world: exp(-d (1 - c) t) of it on a straight path."""

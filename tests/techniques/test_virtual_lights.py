@@ -67,6 +67,7 @@ def candidates():
     return points, numbers.random((1536, 3)) ** 4
 
 
+@pytest.mark.slow
 def test_what_is_kept_stands_for_all_candidates(candidates):
     points, radiance = candidates
     mean = np.zeros(len(points))

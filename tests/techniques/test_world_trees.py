@@ -78,6 +78,7 @@ def ball_before_the_sky(stage):
     stage.camera((0.0, -4.0, 0.8), (1.4, 0.0, 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", [gradient, two_worlds, two_images])
 def test_a_tree_lights_and_shows_what_it_does_in_cycles(stage, world):
     ball_before_the_sky(stage)
