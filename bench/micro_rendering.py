@@ -35,7 +35,7 @@ HEAD = ("scene", "technique", "samples", *FIGURES)
 EQUAL_HEAD = ("scene", "samples", "seconds", NAME, *PEERS)
 FLOOR_HEAD = ("scene", NAME, *PEERS)
 EQUAL_SAMPLES = (1, 16)
-DIAL_HEAD = ("dial", "value", *HEAD[3:], "counters")
+DIAL_HEAD = ("dial", "value", *HEAD[3:], "counters", "gathers a processor second")
 DIALS = (
     ("side", (8, 12, 16, 24)),
     ("points", (2048, 4096, 8192, 16384)),
@@ -177,8 +177,10 @@ def dials(options: argparse.Namespace) -> Iterator[tuple[str, ...]]:
             setattr(scene.candela, f"{NAME}_{dial}", value)
             figures, _ = measured(scene, NAME, 1, options.size, truth)
             counted = ledger.latest().row(NAME).counters
-            told = ("regions", "light rays", "passes")
-            yield dial, str(value), *figures, ", ".join(f"{counted[one]} {one}" for one in told if one in counted)
+            told = ("regions", "gathers of points", "light rays", "passes")
+            gathers = (counted.get("regions", 0) + counted.get("gathers of points", 0)) / float(figures[1])
+            counters = ", ".join(f"{counted[one]} {one}" for one in told if one in counted)
+            yield dial, str(value), *figures, counters, f"{gathers:.0f}"
         scene.candela.property_unset(f"{NAME}_{dial}")
 
 

@@ -33,6 +33,13 @@ SIZE = (96, 64)
 SAMPLES = 16
 OWN_SAMPLES = {"SUN": 32, "AREA": 8, "WORLD": 16}
 REFERENCE_SAMPLES = {"SUN": 64, "AREA": 256, "WORLD": 256}
+PARTS = ("errors", "times", "detail", "iterations")
+TITLES = {
+    "errors": "Beside Cycles' displaced mesh",
+    "times": "Seconds from sync to picture, under the sun, 16 samples",
+    "detail": "Seconds by detail, under the sun, 16 samples",
+    "iterations": "Iterations to a height within .01, bisection / false position",
+}
 JUMP = 0.05  # m: twice a pixel's width
 
 
@@ -50,7 +57,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--lamps", nargs="*", default=list(LAMPS), choices=LAMPS)
     parser.add_argument("--details", nargs="*", type=int, default=DETAILS, help="of the table by detail")
-    parser.add_argument("--page", action="store_true", help="write the tables into docs/relief.md")
+    parser.add_argument("--parts", nargs="*", choices=PARTS, default=PARTS)
+    parser.add_argument("--page", action="store_true", help="write the tables of these parts into docs/relief.md")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write what each entrant showed as PNG")
 
 
@@ -58,32 +66,34 @@ def command(options: argparse.Namespace) -> int:
     from addon import register
 
     register()
-    head = ["scene", "light", "drawn by", "relMSE", "away from edges", "outline, px", "intersection, px"]
-    table = [head]
+    made = dict(zip(PARTS, (error_table, time_table, growth_table, iteration_table), strict=True))
+    for part in options.parts:
+        text = f"**{TITLES[part]}**\n\n{markdown.table(made[part](options))}"
+        print(f"{text}\n", flush=True)
+        if options.page:
+            markdown.put_between(PAGE, f"{COMMAND} --parts {part}", text)
+    return 0
+
+
+def error_table(options: argparse.Namespace) -> list[list[str]]:
+    rows = [["scene", "light", "drawn by", "relMSE", "away from edges", "outline, px", "intersection, px"]]
     for name in options.scenes:
         for lamp in options.lamps:
             for label, figures in errors(name, lamp, options.pictures):
                 row = [SCENES[name].label, lamp.lower(), label, *(cell(value) for value in vars(figures).values())]
-                table.append(row)
+                rows.append(row)
                 print("  ".join(row), flush=True)
-    times = [["scene", *(label for label, *_ in TIMED), "mesh / relief"]]
+    return rows
+
+
+def time_table(options: argparse.Namespace) -> list[list[str]]:
+    rows = [["scene", *(label for label, *_ in TIMED), "mesh / relief", "by processor seconds"]]
     for name in options.scenes:
-        seconds = [timed(name, *how) for _, *how in TIMED]
-        ratio = f"{seconds[2] / seconds[0]:.1f}"
-        times.append([SCENES[name].label, *(f"{one:.2f}" for one in seconds), ratio])
-        print("  ".join(times[-1]), flush=True)
-    growth = growth_table(options.details) if options.details else [["no detail asked for"]]
-    parts = [
-        "**Beside Cycles' displaced mesh**\n\n" + markdown.table(table),
-        "**Seconds from sync to picture, under the sun, 16 samples**\n\n" + markdown.table(times),
-        "**Seconds by detail, under the sun, 16 samples**\n\n" + markdown.table(growth),
-        "**Iterations to a height within .01, bisection / false position**\n\n" + markdown.table(iteration_table()),
-    ]
-    text = "\n\n".join(parts)
-    print(text)
-    if options.page:
-        markdown.put_between(PAGE, COMMAND, text)
-    return 0
+        spent = [timed(name, *how) for _, *how in TIMED]
+        ratios = (f"{spent[2][k] / spent[0][k]:.1f}" for k in range(2))
+        rows.append([SCENES[name].label, *(f"{seconds:.2f}" for seconds, _ in spent), *ratios])
+        print("  ".join(rows[-1]), flush=True)
+    return rows
 
 
 def cell(value: float) -> str:
@@ -199,11 +209,14 @@ TIMED = (
 )
 
 
-def timed(name: str, engine: str, subdivided: bool, mode: str, safe: bool = False) -> float:
-    """Seconds of the shortest of some renders of a scene that has just been built, after a first one."""
+def timed(name: str, engine: str, subdivided: bool, mode: str, safe: bool = False) -> tuple[float, float]:
+    """Seconds of the wall and of processors, the least of some renders of a scene that has just been built, after a
+    first one."""
     detail = SCENES[name].detail if subdivided else 0
     again = 1 if engine == "BLENDER_EEVEE" else 3
-    return min([once(name, engine, detail, mode, relief_scenes.IMAGE, safe)[0] for _ in range(1 + again)][1:])
+    spent = [once(name, engine, detail, mode, relief_scenes.IMAGE, safe) for _ in range(1 + again)]
+    seconds, work = (min(column) for column in zip(*spent[1:], strict=True))
+    return seconds, work
 
 
 def once(name: str, engine: str, detail: int, mode: str, size: int, safe: bool = False) -> tuple[float, float]:
@@ -223,8 +236,9 @@ GROWN = ("stones", "cylinder")
 LARGE = 512  # from which on a mesh is rendered once: it takes a minute
 
 
-def growth_table(details: list[int]) -> list[list[str]]:
+def growth_table(options: argparse.Namespace) -> list[list[str]]:
     """Relief and mesh by detail."""
+    details = options.details
     rows = [["scene", "faces", "relief", "mesh", "mesh / relief", "by processor seconds"]]
     for name in GROWN:
         for how in (0, "RELIEF"), (details[0], "MESH"):  # programs
@@ -328,7 +342,7 @@ def iterations(name: str, angle: int, steps: int) -> tuple[float, float]:
     return float(means[0]), float(means[1])
 
 
-def iteration_table() -> list[list[str]]:
+def iteration_table(options: argparse.Namespace) -> list[list[str]]:
     rows = [["field", *(f"{angle}°, {steps} steps" for angle, steps in RAYS)]]
     for name in ITERATION_FIELDS:
         found = [iterations(name, *ray) for ray in RAYS]

@@ -11,8 +11,9 @@ media. V are rays of the hierarchy, T is that of media.py. What media emit is in
 Pictures of few samples take many places at a quarter of the pixels, whose numbers are dithered over 4 x 4 of them, and
 spread their light, divided by what lamps would send without shadows, to pixels whose rays end equally far away.
 Others take a quarter as many at every pixel, and converge. Light of several bounces, one walk a pixel and sample, is
-smooth, and spread over opacity below MANY samples (in pictures of at least WIDE pixels a side). At each stop walks look
-for places along a lamp's rays, and at the surface that one of these ends at, beside those that they meet by chance.
+smooth, and spread over opacity below MANY samples: four walks at a quarter of the pixels over eight in pictures of WIDE
+pixels a side, one over four in those of SMALL. At each stop walks look for places along a lamp's rays, and at the
+surface that one of these ends at, beside those that they meet by chance; steps go on to places all around lamps, too.
 
 | cost | per sample |
 |---|---|
@@ -57,8 +58,9 @@ from ..surfaces.reflectance import Reflectance
 
 FEW = 8  # samples: below, light of media is found at a quarter of the pixels
 MANY = 64  # and that of several bounces, which is smoother and noisier, below these
-WIDE = 64  # pixels: in smaller pictures a mean over eight pixels is one over much of what is seen
+WIDE, SMALL = 64, 32  # pixels: in smaller pictures a mean over eight, or four, is one over much of what is seen
 COARSE = 2  # pixels of one known pixel's side then
+COARSE_WALKS = 4  # of each of them, from FEW samples on
 WORLD_DIRECTIONS, EMISSIVE_POINTS = 2, 4  # in a sample
 FEW_WORLD_DIRECTIONS = 8  # below FEW samples, where two are most of what the whole picture gets
 MOST_BOUNCES = 12  # of walks: what is left after them is little in all but the whitest of clouds
@@ -106,7 +108,7 @@ def indirect_program(kinds: int, world: bool, shining: bool = True) -> Program:
             *LIT_TEXTURES, *(WORLD_TEXTURES if world else ()), ("RGBA32F", "reflectance"), *SURFACE_TEXTURES,
         ),
         blocks=((VIEW, "film_view"), (lights.SOURCES, "sources"), *(((WORLD, "world_light"),) if world else ())),
-        constants=(*CONSTANTS, ("INT", "is_spread"), ("INT", "bounces")),
+        constants=(*CONSTANTS, ("INT", "is_spread"), ("INT", "walks"), ("INT", "bounces")),
         defines=(*_defines(kinds, world), *((("SHINING", "1"),) if shining else ())),
         outputs=tuple(
             ("VEC4", name)
@@ -226,7 +228,8 @@ class Airlight(Technique):
             return
         lit, world = self._lit_by(frame, media), self._lit_by_world
         coarse = frame.settings.samples < FEW
-        coarse_after = coarse or (frame.settings.samples < MANY and min(frame.size) >= WIDE)
+        spread_after = coarse or (frame.settings.samples < MANY and min(frame.size) >= SMALL)
+        coarse_after = coarse or (spread_after and min(frame.size) >= WIDE)
         stride = COARSE if coarse else 1
         asked = self._asked(frame, lit)
         turn = (frame.sample % COARSE, frame.sample // COARSE % COARSE)
@@ -252,12 +255,12 @@ class Airlight(Technique):
             names += ("radiance.volume_direct", "radiance.diffuse_direct") if shining else ()
             yield from self._add(
                 frame, indirect_program(kinds, world, shining), names,
-                SPREAD_ON_SURFACES if coarse_after else None, stride_after,
+                SPREAD_ON_SURFACES if spread_after else None, stride_after,
                 textures=textures | surface_bindings(frame) | {"reflectance": self._reflectance.image},
                 blocks=blocks,
                 constants=asked | {
                     "bounces": bounces, "shown_pixel": turn if coarse_after else (0, 0), "stride": stride_after,
-                    "is_spread": int(coarse_after),
+                    "is_spread": int(spread_after), "walks": COARSE_WALKS if coarse_after and not coarse else 1,
                 },
             )  # fmt: skip
 

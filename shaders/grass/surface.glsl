@@ -51,6 +51,21 @@ float grass_length(float below, float rise, float bend)
   return 2.0 * below / (rise + sqrt(rise * rise + 2.0 * bend * below));
 }
 
+// The same in a hollow of flat triangles. Normals that are interpolated between unit ones by t have the square 1 - t (1 - t) a^2,
+// where a is the angle between the normals, and lean from the triangle's own by a (t - 1/2): so both tell a, and how far ahead
+// the next triangle rises by that angle.
+float grass_folded(float sunk, float facing, SurfacePoint point, float curvature, vec3 ahead)
+{
+  float shorter = instance_shares_mesh(instance_flat.x) ? 0.0 : max(1.0 - dot(world_normal, world_normal), 0.0);
+  float lean = dot(point.normal, ahead) - dot(point.geometric_normal, ahead);
+  float half_fold = sqrt(shorter + lean * lean);
+  float level = sqrt(max(1.0 - facing * facing, 1e-6));
+  float edge = max(half_fold - lean, 0.0) / (curvature * level);
+  float fold = min(2.0 * half_fold, 1.5);
+  float risen = facing * cos(fold) + level * sin(fold);
+  return (sunk <= edge * facing) ? sunk / facing : edge + (sunk - edge * facing) / max(risen, facing);
+}
+
 // Repeats show where the same tile lies beside itself. A triangular lattice has a shift of the tile at each of its vertices,
 // and a place takes one of the three around it, with a probability that falls fast with the distance (the lattice of Heitz &
 // Neyret, "High-Performance By-Example Noise using a Histogram-Preserving Blending Operator", 2018). `squares`: the sum of
@@ -209,11 +224,12 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   float density = g.density * grass_map(g, GRASS_MAP, root);
   hit.bare = height < GRASS_LOWEST * g.height || (density < 1.0 && grass_clumps(root * 6.0) >= density);
   float depth = lead + grass_length(hit.bare ? height : below, rise, bend_down);
-  if (bend_down <= 0.0) {
-    // Down to the triangle itself, which is flat: what lay below it would be in its shadow.
-    float reach = instance_shares_mesh(instance_flat.x) ? 1.0 : length(world_normal);
-    depth *= reach * dot(up, point.geometric_normal) * rise / max(dot(toward, point.geometric_normal), 0.02);
-  }
+  // Down to the triangle itself, which is flat: what lay below it would be in its shadow. In a hollow the next triangle rises from
+  // the edge ahead.
+  float reach = instance_shares_mesh(instance_flat.x) ? 1.0 : length(world_normal);
+  float facing = max(dot(toward, point.geometric_normal), 0.02);
+  float sunk = (lead * rise + (hit.bare ? height : below)) * reach * dot(up, point.geometric_normal);
+  depth = (bend_down > 0.0) ? min(depth, grass_folded(sunk, facing, point, -curvature, ahead)) : sunk / facing;
   point.position -= toward * depth;
   // Where a tile is smaller than a few pixels its mean is all that can be seen.
   vec4 about = grass_texel(grass_picture(g, picture, g.lights + 1));

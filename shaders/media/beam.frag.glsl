@@ -20,7 +20,10 @@ void main()
   float cosine = dot(direction, ray.direction);
   float sine_squared = max(1.0 - cosine * cosine, 1e-8);
   float along_beam = (dot(between, ray.direction) * cosine - dot(between, direction)) / sine_squared;
-  along_beam = clamp(along_beam, 0.0, reach);
+  // The kernel is across both lines: beyond its ends a beam gives nothing, where it would shine through what it starts on.
+  if (along_beam < 0.0 || along_beam > reach) {
+    discard;
+  }
   vec3 position = beam_start.xyz + along_beam * direction;
   float along_view = dot(position - ray.origin, ray.direction);
   if (along_view <= 0.0 || along_view >= ray.limit) {

@@ -119,7 +119,6 @@ void bins_add(inout Bins bins, uint inside, vec3 origin, vec3 direction, float f
   }
   vec3 extinction;
 #ifdef MEDIA_GRIDS
-  float inner_steps = any_grid(inside) ? 4.0 : 1.0;
   float middle = from + (to - from) * media_random(seed);
   extinction = media_depth(inside, origin, direction, from, to, seed) / (to - from);
 #else
@@ -152,16 +151,18 @@ void bins_add(inout Bins bins, uint inside, vec3 origin, vec3 direction, float f
 void bins_interval(inout Bins bins, uint inside, vec3 origin, vec3 direction, float from, float to, inout uint seed)
 {
 #ifdef MEDIA_GRIDS
+  float parts = 1.0;
   if (inside != 0u && to > from && any_grid(inside)) {
-    float parts = clamp(ceil((to - from) / (2.0 * smallest_cell(inside))), 1.0, float(GRID_BINS));
-    float part = (to - from) / parts;
-    for (int i = 0; i < int(parts); i++) {
-      bins_add(bins, inside, origin, direction, from + float(i) * part, from + float(i + 1) * part, seed);
-    }
-    return;
+    parts = clamp(ceil((to - from) / (2.0 * smallest_cell(inside))), 1.0, float(GRID_BINS));
   }
-#endif
+  float part = (to - from) / parts;
+  for (int i = 0; i < int(parts); i++) {
+    float begin = from + float(i) * part;
+    bins_add(bins, inside, origin, direction, begin, (i + 1 < int(parts)) ? begin + part : to, seed);
+  }
+#else
   bins_add(bins, inside, origin, direction, from, to, seed);
+#endif
 }
 
 Bins media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
@@ -174,14 +175,12 @@ Bins media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
   Crossings c = media_crossings(origin, direction);
   uint inside = media_at_start(c);
   float from = 0.0;
-  for (int i = 0; i < c.count && from < limit; i++) {
-    float to = min(c.t[i], limit);
+  for (int i = 0; i <= c.count && from < limit; i++) {  // the last one after all crossings
+    int next = min(i, MOST_CROSSINGS - 1);
+    float to = (i < c.count) ? min(c.t[next], limit) : limit;
     bins_interval(bins, inside, origin, direction, from, to, seed);
-    inside = media_after(inside, c.medium[i]);
+    inside = media_after(inside, c.medium[next]);
     from = to;
-  }
-  if (from < limit) {
-    bins_interval(bins, inside, origin, direction, from, limit, seed);
   }
   return bins;
 }

@@ -72,28 +72,42 @@ void crossings_insert(inout Crossings c, float t, int medium)
   c.medium[place] = medium;
 }
 
+// Four triangles at once, then those that are met one after the other: compilers make four copies of a loop over four.
 void media_leaf(int leaf, vec3 origin, vec3 direction, inout Crossings c)
 {
   int base = int(media_table_fetch(ivec2(2047, 0)).x) + leaf * MEDIA_LEAF;
-  vec4 materials = media_leaf_texel(base + 13);
+  vec4 e1x = media_leaf_texel(base + 3);
+  vec4 e1y = media_leaf_texel(base + 4);
+  vec4 e1z = media_leaf_texel(base + 5);
+  vec4 e2x = media_leaf_texel(base + 6);
+  vec4 e2y = media_leaf_texel(base + 7);
+  vec4 e2z = media_leaf_texel(base + 8);
+  vec4 px = direction.y * e2z - direction.z * e2y;
+  vec4 py = direction.z * e2x - direction.x * e2z;
+  vec4 pz = direction.x * e2y - direction.y * e2x;
+  vec4 determinant = e1x * px + e1y * py + e1z * pz;
+  vec4 sx = origin.x - media_leaf_texel(base);
+  vec4 sy = origin.y - media_leaf_texel(base + 1);
+  vec4 sz = origin.z - media_leaf_texel(base + 2);
+  vec4 u = (sx * px + sy * py + sz * pz) / determinant;
+  vec4 qx = sy * e1z - sz * e1y;
+  vec4 qy = sz * e1x - sx * e1z;
+  vec4 qz = sx * e1y - sy * e1x;
+  vec4 v = (direction.x * qx + direction.y * qy + direction.z * qz) / determinant;
+  vec4 t = (e2x * qx + e2y * qy + e2z * qz) / determinant;
+  bvec4 inside = lessThanEqual(max(max(-u, -v), u + v - vec4(1.0)), vec4(1e-6));
+  bvec4 before = greaterThan(t, vec4(0.0));
+  bvec4 edge_on = equal(determinant, vec4(0.0));
+  vec4 medium = media_leaf_texel(base + 13);
+  uint met = 0u;
   for (int k = 0; k < 4; k++) {
-    vec3 corner = vec3(media_leaf_texel(base)[k], media_leaf_texel(base + 1)[k], media_leaf_texel(base + 2)[k]);
-    vec3 e1 = vec3(media_leaf_texel(base + 3)[k], media_leaf_texel(base + 4)[k], media_leaf_texel(base + 5)[k]);
-    vec3 e2 = vec3(media_leaf_texel(base + 6)[k], media_leaf_texel(base + 7)[k], media_leaf_texel(base + 8)[k]);
-    vec3 p = cross(direction, e2);
-    float determinant = dot(e1, p);
-    if (determinant == 0.0) {
-      continue;
-    }
-    vec3 s = origin - corner;
-    float u = dot(s, p) / determinant;
-    vec3 q = cross(s, e1);
-    float v = dot(direction, q) / determinant;
-    float t = dot(e2, q) / determinant;
-    if (u >= -1e-6 && v >= -1e-6 && u + v <= 1.000001 && t > 0.0) {
-      int medium = int(materials[k] + 0.5) + 1;
-      crossings_insert(c, t, (determinant > 0.0) ? medium : -medium);  // seen from outside corners run anticlockwise
-    }
+    met |= (inside[k] && before[k] && !edge_on[k]) ? (1u << uint(k)) : 0u;
+  }
+  while (met != 0u) {
+    int k = findLSB(met);
+    met &= met - 1u;
+    int number = int(medium[k] + 0.5) + 1;
+    crossings_insert(c, t[k], (determinant[k] > 0.0) ? number : -number);  // seen from outside corners run anticlockwise
   }
 }
 #endif

@@ -14,6 +14,7 @@ struct LampRays {
   vec3 axis;
   float cosine;  // of the cone; -1: everywhere; 0: by the cosine, before an area lamp
   bool by_cosine;
+  float wide;  // share of rays that go anywhere: fog beside a lamp or its cone is lit by the fog in it
 };
 
 LampRays lamp_rays(int number, vec2 u)
@@ -24,6 +25,7 @@ LampRays lamp_rays(int number, vec2 u)
   rays.axis = vec3(0.0, 0.0, 1.0);
   rays.cosine = -1.0;
   rays.by_cosine = false;
+  rays.wide = 0.0;
   rays.shadow = false;
   rays.source = vec3(0.0);
   rays.face = vec3(0.0);
@@ -61,15 +63,15 @@ LampRays lamp_rays(int number, vec2 u)
 float lamp_rays_share(LampRays rays, vec3 way)
 {
   float cosine = dot(way, rays.axis);
-  if (rays.by_cosine) {
-    return max(cosine, 0.0) / PI;
-  }
-  return (cosine >= rays.cosine) ? 1.0 / (2.0 * PI * (1.0 - rays.cosine)) : 0.0;
+  float within = (cosine >= rays.cosine) ? 1.0 / (2.0 * PI * (1.0 - rays.cosine)) : 0.0;
+  return mix(rays.by_cosine ? max(cosine, 0.0) / PI : within, 0.25 / PI, rays.wide);
 }
 
 vec3 lamp_rays_way(LampRays rays, vec2 u)
 {
-  float cosine = rays.by_cosine ? sqrt(1.0 - u.x) : mix(1.0, rays.cosine, u.x);
+  bool anywhere = u.x < rays.wide;
+  float x = anywhere ? u.x / rays.wide : (u.x - rays.wide) / (1.0 - rays.wide);
+  float cosine = anywhere ? 1.0 - 2.0 * x : (rays.by_cosine ? sqrt(1.0 - x) : mix(1.0, rays.cosine, x));
   float across = sqrt(max(1.0 - cosine * cosine, 0.0));
   vec3 tangent;
   vec3 bitangent;

@@ -1,4 +1,4 @@
-// Light that media scatter after other bounces, and that they bring to surfaces: one walk of up to `bounces` steps for each.
+// Light that media scatter after other bounces, and that they bring to surfaces: `walks` of up to `bounces` steps for each.
 //
 // The first walk starts at a place on the view ray, the second at the surface, whose irradiance it finds (of what media
 // scatter; light of other surfaces is not its matter). Each asks one row of lights, drawn evenly. At each stop it looks once
@@ -143,13 +143,15 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
     float wanted = -1.0;
     vec3 way;
     bool more = doing == GO_ON && bounce + 1 < bounces;
+    LampRays aiming = rays;
+    aiming.wide = (doing == GO_ON) ? 0.5 : 0.0;
     float aimed = !rays.exist ? 0.0 : ((doing == LOOK) ? 0.5 : (more ? AIMED : 0.0));  // share along rays of the lamp
     if (doing == FIND_LIT) {
       way = lamp_rays_way(rays, turn);
       from = ray_origin(rays.source, (dot(way, rays.face) < 0.0) ? -rays.face : rays.face);
     }
     else if (doing == LOOK_AT_LIT || media_random(seed) < aimed) {
-      vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(rays, from, vec3(turn, media_random(seed)));
+      vec3 offset = (doing == LOOK_AT_LIT) ? lit - from : lamp_rays_draw(aiming, from, vec3(turn, media_random(seed)));
       wanted = length(offset);
       way = offset / max(wanted, 1e-30);
     }
@@ -211,7 +213,7 @@ vec3 walk(Stop stop, vec3 weight, int number, vec2 ask_turn, bool media_only, ve
       }
       float density = bins_density(bins, k, t);
       density = lobe * chance * (around.exists ? 0.5 * (density + around_density(around, t)) : density);
-      density = (aimed > 0.0) ? mix(density, lamp_rays_density(rays, from, way, t), aimed) : density;
+      density = (aimed > 0.0) ? mix(density, lamp_rays_density(aiming, from, way, t), aimed) : density;
       position += t * way;
       arrives = passed * bin_passing(bins, k, t) / max(density, 1e-30);
       if (doing == LOOK && number >= 0) {
@@ -295,12 +297,14 @@ void main()
   out_straight = out_indirect;
   out_straight_surface = out_surface;
 #endif
-  vec2 u = vec2(scrambled(film_view.bits_x, salt.x), scrambled(film_view.bits_y, salt.y));
   Surface s = SURFACE_READ(pixel);
-  int number = draw_row(shuffled(film_view.sample_index, salt.zx));
   // One walk after the other, so that the program holds it once.
-  for (int which = 0; which < 2; which++) {
-    bool from_surface = which == 1;
+  for (int which = 0; which < 2 * walks; which++) {
+    bool from_surface = (which & 1) == 1;
+    int turn = film_view.sample_index * walks + (which >> 1);
+    uvec2 moved = salt.xy + uint(which >> 1) * 0x9E3779B1u;
+    vec2 u = vec2(scrambled(film_view.bits_x, moved.x), scrambled(film_view.bits_y, moved.y));
+    int number = draw_row(shuffled(turn, salt.zx));
     vec2 ask_turn = vec2(media_random(seed), media_random(seed));
     Stop stop;
     stop.position = ray.origin;
@@ -314,7 +318,7 @@ void main()
       LampRays rays = lamp_rays(number, ask_turn);
       float deep = bins_deep(bins, SEEN_DEPTH);  // in endless fog all but a few places lay beyond, where nothing is seen
       Near near = near_lamp(rays, number, ray.origin, ray.direction, bins.from[0], deep);
-      float v = shuffled(film_view.sample_index, salt.yz);
+      float v = shuffled(turn, salt.yz);
       int k;
       float t;
       if (near.exist && v < 0.5) {
@@ -339,20 +343,20 @@ void main()
     }
     if (max_component(weight) > 0.0) {
       vec3 straight;
-      vec3 found = finite_sum(walk(stop, weight, number, ask_turn, from_surface, u, seed, straight));
+      vec3 found = finite_sum(walk(stop, weight, number, ask_turn, from_surface, u, seed, straight)) / float(walks);
       if (from_surface) {
-        out_surface.rgb = found;
+        out_surface.rgb += found;
       }
       else {
-        out_indirect.rgb = found;
+        out_indirect.rgb += found;
       }
 #ifdef SHINING
-      straight = finite_sum(straight);
+      straight = finite_sum(straight) / float(walks);
       if (from_surface) {
-        out_straight_surface.rgb = straight;
+        out_straight_surface.rgb += straight;
       }
       else {
-        out_straight.rgb = straight;
+        out_straight.rgb += straight;
       }
 #endif
     }

@@ -290,6 +290,37 @@ def test_in_a_hollow_nothing_is_seen_below_the_ground(stage):
     assert (light[within] < 0.1 * light[within].mean()).mean() < 0.02
 
 
+def test_in_a_hollow_of_flat_faces_nothing_is_seen_below_them(stage, tmp_path):
+    """A gutter of three metres' radius whose faces are 10 degrees apart, and soil that is seen through blades 0.1 m
+    high: by the bend alone it would lie up to 22 mm below the next face."""
+
+    def depth(patch):
+        stage.clear()
+        angles = np.radians(np.arange(-40, 41, 10))
+        places = [(x, 3.0 * math.sin(a), 3.0 - 3.0 * math.cos(a)) for a in angles for x in (-2.0, 2.0)]
+        mesh = bpy.data.meshes.new("Gutter")
+        mesh.from_pydata(places, [], [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(len(angles) - 1)])
+        mesh.shade_smooth()
+        material = stage.diffuse(0.5)
+        material.candela.grass_patch = patch
+        material.candela.grass_file = str(flat_patch(tmp_path / "ground.grass", 0.0))
+        mesh.materials.append(material)
+        stage.link("Gutter", mesh)
+        sun(stage, 0, 0)
+        towards(stage, 60, -90, 1.6)
+        shown = stage.render(4, (48, 48))
+        return shown["depth"][..., 0], shown["combined"][..., :3].mean(axis=2)
+
+    ground_depth, _ = depth("NONE")
+    found, light = depth("FILE")
+    within = np.maximum(found, ground_depth) < 1e9
+    below = (found - ground_depth)[within]
+    assert within.mean() > 0.6
+    assert below.max() < 1e-4  # 22 mm by the bend alone
+    assert below.min() > -0.03 and abs(np.median(below)) < 2e-3
+    assert (light[within] < 0.5 * np.median(light[within])).mean() < 0.01
+
+
 # UV maps ------------------------------------------------------------------------------------------------------------
 
 

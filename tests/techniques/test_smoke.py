@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.snapshot import instances, smoke
-from tests.techniques.test_media import box, glowing_floor, volume
+from tests.techniques.foggy_stage import box, glowing_floor, volume
 
 SIZE = 4, 2, 6
 

@@ -1,0 +1,132 @@
+"""Volume caustics against closed forms: identity lens, rays and pixels, a ball lens by Snell and Fresnel; stress."""
+
+import bpy
+import numpy as np
+import pytest
+
+from bench.shaft_truth import meet
+from tests.techniques.foggy_stage import box, fog, volume
+
+
+def ball(stage, radius, ior, location=(0, 0, 0)):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=radius, location=location)
+    made = bpy.context.object
+    for face in made.data.polygons:
+        face.use_smooth = True
+    made.data.materials.append(stage.material("ShaderNodeBsdfGlass", IOR=ior, Roughness=0.0))
+    return made
+
+
+def media_light(seen):
+    return (seen["volume_direct"] + seen["volume_indirect"])[..., 0]
+
+
+def beams_alone(stage):
+    """Nothing else is drawn, nor compiled."""
+    for slot in ("volume", "indirect", "caustics", "reflection"):  # glass still hides beams behind it
+        setattr(stage.scene.candela, f"slot_{slot}", "OFF")
+
+
+def lens_scene(stage, ior):
+    stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
+    stage.light("POINT", (0, 0, 2.0), energy=300, shadow_soft_size=0.0)
+    fog(stage, Color=(0.9, 0.9, 0.9, 1), Density=0.15)
+    stage.scene.candela.airlight_bounces = 0
+    return ball(stage, 0.5, ior)
+
+
+@pytest.mark.slow
+def test_a_lens_of_index_one_changes_no_fog_below_it(stage):
+    made = lens_scene(stage, 1.0001)
+    lens = media_light(stage.render(16, size=(24, 24), bounces=1))[:10]
+    assert stage.ledger.row("volume_caustics").state == "ran"
+    made.hide_render = True
+    clear = media_light(stage.render(16, size=(24, 24), bounces=1))[:10]
+    assert lens.mean() == pytest.approx(clear.mean(), rel=0.02)
+
+
+@pytest.mark.slow
+def test_neither_rays_nor_pixels_change_a_beam(stage):
+    lens_scene(stage, 1.5)
+    beams_alone(stage)
+    found = {}
+    for rays, size in ((32, 32), (64, 32), (128, 32), (128, 64)):
+        stage.scene.candela.volume_caustics_rays = rays
+        found[rays, size] = stage.render(4, size=(size, size), bounces=1)["volume_indirect"].mean()
+    assert list(found.values()) == pytest.approx([found[128, 32]] * 4, rel=0.02)
+
+
+def beams_of_a_ball(density, ior=1.5, pixels=64, span=6.0, rays=60_000, bounces=3):
+    """(pixels, pixels) radiance that a ball of radius 1 in a cube of fog throws into it under a sun of irradiance 1,
+    seen from the side: rays by Snell and Fresnel, with those mirrored inside up to `bounces` times. Row 0 is low."""
+    half, number = span / 2, np.arange(rays)
+    r, turn = np.sqrt((number + 0.5) / rays), np.pi * (3 - np.sqrt(5)) * number  # a spiral: even, and without noise
+    place = np.stack([r * np.cos(turn), r * np.sin(turn), np.sqrt(1 - r * r)], axis=1)
+    direction = np.broadcast_to([0.0, 0.0, -1.0], place.shape)
+
+    flux = np.pi / rays * np.exp(-density * (half - place[:, 2]))
+    bent, mirrored, share = meet(direction, place, 1 / ior)
+    leaving = [(place, mirrored, flux * share)]
+    direction, flux = bent, flux * (1 - share)
+    within = np.exp(2 * density * (bent * place).sum(axis=1))  # fog fills the ball; chords are all as long
+    for _ in range(bounces + 1):
+        flux = flux * within
+        place = place - 2 * (direction * place).sum(axis=1)[:, None] * direction
+        bent, mirrored, share = meet(direction, -place, ior)
+        leaving.append((place, bent, flux * (1 - share)))
+        direction, flux = mirrored, flux * share
+    image = np.zeros((pixels, pixels))
+    for place, direction, flux in leaving:
+        down = np.where(np.abs(direction[:, 2]) > 1e-6, direction[:, 2], 1e-6)
+        for row, z in enumerate((np.arange(pixels) + 0.5) * span / pixels - half):
+            t = (z - place[:, 2]) / down
+            x, y = place[:, 0] + t * direction[:, 0], place[:, 1] + t * direction[:, 1]
+            there = (t > 0) & (np.abs(x) < half) & (np.abs(y) < half)
+            seen = flux[there] * np.exp(-density * (t[there] + half + y[there])) / np.abs(down[there])
+            image[row] += np.histogram(x[there], bins=pixels, range=(-half, half), weights=seen)[0]
+    return image * density / (4 * np.pi) * pixels / span
+
+
+@pytest.mark.slow
+def test_a_ball_lens_gathers_light_where_optics_say(stage):
+    """Rays off the axis cross it before the paraxial focus, half a radius behind the ball: the waist is nearer."""
+    stage.camera((0, -20, 0), (np.pi / 2, 0, 0))
+    camera = stage.scene.camera.data
+    camera.type, camera.ortho_scale = "ORTHO", 6.0
+    stage.light("SUN", (0, 0, 5), energy=1.0, angle=0.0)
+    box(stage, volume(stage, Color=(1, 1, 1, 1), Density=0.01), (-3, -3, -3), (3, 3, 3))
+    beams_alone(stage)
+    ball(stage, 1.0, 1.5)
+    stage.scene.candela.volume_caustics_rays = 128
+    beams = stage.render(8, size=(64, 64), bounces=1)["volume_indirect"][..., 0]
+    z = 6.0 * ((np.arange(64) + 0.5) / 64 - 0.5)
+    below = (z < -1.05) & (z > -2.95)
+    expected = beams_of_a_ball(0.01)
+    np.testing.assert_allclose(beams[below].sum(axis=1), expected[below].sum(axis=1), rtol=0.02)
+    outside = z[:, None] ** 2 + z[None] ** 2 > 1.1**2  # the camera sees no beam behind the ball, nor in it
+    assert beams[outside].sum() == pytest.approx(expected[outside].sum(), rel=0.01)
+
+    def waist(image):
+        wide = [(row > 0.3 * row.max()).sum() for row in image[below]]
+        return z[below][np.flatnonzero(np.array(wide) == min(wide))].mean()
+
+    assert waist(beams) == pytest.approx(waist(expected), abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["lamp inside", "gem", "speck", "box beside", "along the shaft"])
+def test_beams_of_odd_casters_are_finite(stage, case):
+    """A lamp in the glass, light that is mirrored inside over and over, glass of a millimetre, fog around half of the
+    way, and a camera within the beam that looks along it."""
+    stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
+    if case == "along the shaft":
+        stage.camera((0, 0, -3), (np.pi, 0, 0))
+    stage.light("POINT", (0, 0, 0.1 if case == "lamp inside" else 2.0), energy=300, shadow_soft_size=0.0)
+    made = volume(stage, Color=(0.9, 0.9, 0.9, 1), Density=0.15)
+    box(stage, made, (0.0 if case == "box beside" else -3, -6, -4), (3, 3, 3))
+    beams_alone(stage)
+    stage.scene.candela.volume_caustics_rays = 32
+    ball(stage, 5e-4 if case == "speck" else 0.5, 2.4 if case == "gem" else 1.5)
+    seen = stage.render(2, size=(16, 16), bounces=1)["volume_indirect"][..., :3]
+    assert np.isfinite(seen).all() and (seen >= 0).all()
+    assert case == "speck" or seen.max() > 0
