@@ -64,7 +64,7 @@ def page(rows: list[tuple[str, ...]], samples: int, size: tuple[int, int], refer
         f"# Direct light at {samples} samples", "",
         f"Written by `python -m bench direct --page PATH`; do not edit. Pictures of {size[0]} x {size[1]} pixels",
         f"without bounces against two renders of {reference_samples} samples by Cycles, whose noise is taken off the",
-        "errors (relMSE). Without the worst 0.1 %: without the 49 pixels with the largest error. Of it noise: what two",
+        "errors (relMSE). Without the worst 0.1 %: without the pixels with the largest error. Of it noise: what two",
         "pictures by Candela differ by, without their worst 0.1 %; what is left of the column before it is bias.",
         "Single pixels of a path that is black elsewhere: finding 110 of [performance.md](performance.md).",
         "Light that goes through glass is no direct light, so that Cycles without bounces has black shadows below it;",
