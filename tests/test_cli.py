@@ -179,6 +179,7 @@ def test_plan_names_material_and_node(blends, tmp_path):
     assert "'Marble'" in done.stdout and "Principled Hair BSDF" in done.stdout
 
 
+@pytest.mark.slow
 def test_render_writes_the_picture_and_prints_the_ledger(tmp_path):
     output = tmp_path / "made" / "picture.png"
     done = candela("render", CORNELL, *TINY, "--set", "seed=3", "--output", output, folder=tmp_path)
@@ -248,6 +249,7 @@ def test_tune_proposes_settings_and_writes_them_only_when_asked(tmp_path):
 TINY_GRASS = ("--texels", "8", "--views", "7", "--lights", "5", "--samples", "1", "--blades", "20")
 
 
+@pytest.mark.slow
 def test_grass_writes_a_patch_and_says_where(tmp_path):
     done = candela("grass", "tiny.grass", *TINY_GRASS, folder=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -21,6 +21,7 @@ def test_a_file_is_compared_in_a_process_of_its_own():
     assert 0.8 < row.mean < 1.25 and row.seconds > 0  # of 2 samples beside 8
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_or_hangs_is_a_row(monkeypatch, tmp_path):
     broken = tmp_path / "broken.blend"
     broken.write_bytes(b"BLENDER")

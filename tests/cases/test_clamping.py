@@ -23,6 +23,7 @@ def clamped(stage):
     return render
 
 
+@pytest.mark.slow
 def test_what_is_seen_keeps_its_colour(stage, clamped):
     """Emission and the world, above the limit and below it."""
     stage.camera_above()

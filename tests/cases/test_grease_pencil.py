@@ -9,6 +9,7 @@ from addon.frame import ledger
 from .conftest import agree
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bpy.app.version < (5, 0), reason="Grease Pencil has another Python interface before Blender 5.0")
 def test_a_stroke_is_drawn_without_a_warning(stage):
     pencil = bpy.data.grease_pencils.new("Pencil")

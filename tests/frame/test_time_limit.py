@@ -41,6 +41,7 @@ def test_a_picture_of_many_samples_ends_in_time_and_is_denoised(room):
         assert limited[name].mean() == pytest.approx(whole[name].mean(), rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_not_reached_changes_nothing(room):
     plain = room.render(6, (32, 24), bounces=1)
     room.scene.candela.time_limit = 1000.0

@@ -21,6 +21,7 @@ def program(number):
     )
 
 
+@pytest.mark.slow
 def test_programs_that_no_recent_picture_used_make_room(few_programs):
     for number in range(20):
         context.begin_picture()

@@ -29,6 +29,7 @@ def snapshot(materials):
     return Snapshot({}, (), tuple(materials), {}, (), World(np.zeros(3)), camera, film)
 
 
+@pytest.mark.slow
 def test_200_materials_of_10_topologies_make_10_programs(gpu_context):
     from addon.gfx import library
     from addon.scene.materials import MaterialSet

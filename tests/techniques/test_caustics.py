@@ -303,6 +303,7 @@ def test_a_turned_scene_has_the_same_caustic_and_grey_light_stays_grey(stage, te
     np.testing.assert_allclose(images[..., 1:3], images[..., :1].repeat(2, axis=-1), rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_nothing_bent_puts_light_straight_behind_its_caster(stage, technique_name):
     """Index 1: caustic and shadow together are the light without the ball."""
     stage.floor()

@@ -213,6 +213,7 @@ def test_a_closure_of_little_weight_is_not_left_to_chance(stage):
     assert pixels.std() < 0.5 * pixels.mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [pytest.param(20, marks=SLOW), 70])
 def test_thin_walls_have_cycles_albedo(stage, degrees):
     inputs = [

@@ -87,6 +87,7 @@ def test_shadows_take_light_away_and_never_add_any(stage, render):
     assert (clustered <= unshadowed * (1 + 1e-4) + 1e-6).mean() > 0.99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refine", [True, False])
 def test_pictures_repeat_to_the_last_bit(stage, render, refine):
     corner(stage)

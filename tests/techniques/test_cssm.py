@@ -40,6 +40,7 @@ def test_one_map_shows_the_penumbra_of_an_edge(strip, name, prefilter):
     assert found[expected == 0].max() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["square", "sphere"])
 def test_blockers_at_two_heights_that_close_the_light_together_leak_nothing(strip, name):
     kind, settings, source = LIGHTS[name]

@@ -73,6 +73,7 @@ def test_what_both_halves_agree_on_is_left_as_it_is(stage):
     np.testing.assert_allclose(denoised[floor], plain[floor], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_picture_is_the_sum_of_its_passes(stage):
     lit_room(stage, 0.3)
     stage.scene.candela.denoise_strength = 1.0
@@ -96,6 +97,7 @@ def test_light_paths_that_nothing_writes_are_not_filtered(stage):
     assert row().counters == {"passes": 5}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gloss", "passes"), [(False, 12), (True, 19)])
 def test_glossy_indirect_light_is_filtered_where_something_is_glossy(stage, gloss, passes):
     stage.floor(material=stage.principled(Roughness=0.3) if gloss else stage.diffuse(0.7))
@@ -133,6 +135,7 @@ def test_fireflies_of_glossy_indirect_light_are_spread_and_none_of_it_is_lost(st
     assert np.mean((filtered - truth) ** 2) < 0.6 * np.mean((plain - truth) ** 2)
 
 
+@pytest.mark.slow
 def test_the_edge_of_a_penumbra_stays_where_it_is(stage):
     """Pixels exchange what may be noise. Light that differs by more is shade: the mean over seeds keeps its slope."""
     lit_room(stage, 0.4)
@@ -185,6 +188,7 @@ def test_of_an_unknown_number_of_samples_about_half_are_kept(count):
     assert count / 3 <= half <= 2 * count / 3 + 1e-9 or count == 2
 
 
+@pytest.mark.slow
 def test_dark_surroundings_of_a_bright_rim_stay_dark(stage):
     """A lamp of .4 m, 4 cm above the floor: light falls by a thousand within some pixels, and so does its noise."""
     stage.floor()

@@ -59,6 +59,7 @@ def test_depth_begins_where_the_camera_begins_to_see(asked, kind):
     assert np.median(difference) < 2e-3 and (difference < 0.03).mean() > 0.9
 
 
+@pytest.mark.slow
 def test_nothing_runs_where_it_is_not_asked_for(asked):
     stage = steps(asked)
     stage.light("POINT", (0, 0, 3))

@@ -141,6 +141,7 @@ def test_a_sun_that_the_camera_may_see_is_a_disc_of_its_radiance(stage):
     assert (found[away > 0.32] == 0).all()
 
 
+@pytest.mark.slow
 def test_a_light_is_hidden_by_what_stands_before_it(stage):
     seen(stage.light("POINT", (0, 0, 0), shadow_soft_size=0.5, use_soft_falloff=False))
     stage.rectangle((-2, -2), (0, 2), 1.0)

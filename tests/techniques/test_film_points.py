@@ -160,6 +160,7 @@ def test_layers_are_drawn_stochastically_at_every_point(stage, light_of):
     assert coverage[1] < 0.6 * coverage[0]
 
 
+@pytest.mark.slow
 def test_wires_that_no_pixels_own_point_meets_have_light(stage, light_of):
     for k in range(-8, 9):
         x = k / 8

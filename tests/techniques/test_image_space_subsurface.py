@@ -56,6 +56,7 @@ def test_an_evenly_lit_plane_has_its_albedo(stage):
     assert shown(stage.render(4)).mean(axis=(0, 1)) == pytest.approx(COLOR, rel=0.015)
 
 
+@pytest.mark.slow
 def test_a_half_lit_plane_has_the_profile_of_an_edge(stage):
     slab(stage, scattering(stage))
     stage.blocker((-50, -50), (0, 50), 1.0)
@@ -237,6 +238,7 @@ def test_extreme_settings_stay_finite(stage, method, change):
     assert picture.min() >= 0.0
 
 
+@pytest.mark.slow
 def test_many_materials_and_no_light(stage):
     for k in range(16):
         sphere(stage, scattering(stage, color=(0.1 + 0.05 * k, 0.5, 0.3)), 0.2, location=(k % 4 - 1.5, k // 4 - 1.5, 0))
@@ -277,6 +279,7 @@ def test_neutral_maps_equal_no_maps_to_the_bit(stage):
     assert np.array_equal(shown(_painted_plane(stage, **painted)), plain)
 
 
+@pytest.mark.slow
 def test_the_edge_of_a_painted_tint_is_as_soft_as_the_range(stage):
     tint = _map("tint", lambda x: (0.25, 1.0, 1.0) if x > 0.5 else (1.0, 1.0, 1.0))
     picture = shown(_painted_plane(stage, tint_map=tint)).mean(axis=0)
@@ -286,6 +289,7 @@ def test_the_edge_of_a_painted_tint_is_as_soft_as_the_range(stage):
     assert picture[:, 1] / COLOR[1] == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_translucent_it_is_diffuse_and_gives_nothing(stage):
     mask = _map("mask", lambda x: (0.0, 0.0, 0.0))
     assert shown(_painted_plane(stage, translucency_map=mask)) == pytest.approx(

@@ -152,6 +152,7 @@ def test_groups_of_surfels_bring_what_single_ones_do(stage, render, monkeypatch)
     assert not np.array_equal(grouped, single)
 
 
+@pytest.mark.slow
 def test_more_bounces_never_darken_and_black_surfaces_send_nothing(stage, render):
     corner(stage)
     pictures = [render(bounces, size=(16, 16)) for bounces in (1, 2, 4)]

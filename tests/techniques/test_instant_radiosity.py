@@ -186,6 +186,7 @@ def test_light_of_a_small_thing_out_of_sight_does_not_depend_on_how_wide_the_sce
     assert light_of_a_card_out_of_sight(stage, 40.0, 1.0) == pytest.approx(narrow, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_half_transparent_card_reflects_half_of_the_light(stage):
     whole = light_of_a_card_out_of_sight(stage, 3.0, 1.0)
     assert light_of_a_card_out_of_sight(stage, 3.0, 0.5) == pytest.approx(whole / 2, rel=0.05)
@@ -202,6 +203,7 @@ def test_a_card_that_some_rays_pass_dims_the_bounce_as_in_cycles(stage, render, 
     assert render(3)["diffuse_indirect"].mean() == pytest.approx(expected.mean(), rel=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("passes", [False, True])
 def test_a_transparent_card_may_block_what_comes_from_lamps_only(stage, render, passes):
     """Material setting "Transparent Shadows": off, the floor below is dark, but light of the wall still passes."""

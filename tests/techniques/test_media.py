@@ -78,6 +78,7 @@ def test_size_changes_nothing_where_densities_follow(stage, scale):
 # Light of media -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_medium_shines_as_the_integral_of_what_it_emits(stage):
     stage.camera_above()
     made = volume(stage, "ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0.5, 0.5, 0.5),
@@ -117,6 +118,7 @@ def airlight(origin, direction, far, light, intensity, scattering, extinction, s
     return trapezoid(values, angle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("samples", "mean_error", "pixel_error"), [(64, 0.01, 0.05), (1, 0.05, 0.10)])
 def test_airlight_of_a_point_light_is_its_integral(stage, samples, mean_error, pixel_error):
     """With one sample, too: the peak at the lamp, which the camera sees, is not spread over its neighbours."""
@@ -164,6 +166,7 @@ def of_corners(seen):
     return seen[[2, 2, 5, 5], [2, 5, 2, 5], 0].mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
 def test_airlight_is_the_same_at_any_size(stage, scale):
     lit_cube(stage, scale)
@@ -197,6 +200,7 @@ def test_glass_shows_the_fog_behind_it(stage):
     assert of_corners(seen["transmission_indirect"]) == pytest.approx(airlight_of_cube(), rel=0.03)
 
 
+@pytest.mark.slow
 def test_fog_fades_what_a_mirror_shows(stage):
     stage.camera_above()
     mirror = stage.material("ShaderNodeBsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
@@ -317,6 +321,7 @@ def test_any_density_gives_a_finite_picture(stage, density):
         assert seen[4, 4, 0] < 1.0
 
 
+@pytest.mark.slow
 def test_open_meshes_and_flat_ones_give_a_finite_picture(stage):
     stage.camera_above()
     glowing_floor(stage)
@@ -417,6 +422,7 @@ def test_a_lamp_in_endless_fog_is_seen_as_far_as_it_is(stage):
     assert seen == pytest.approx(clear * np.exp(-0.2 * 6.0), rel=0.01)
 
 
+@pytest.mark.slow
 def test_walks_in_endless_fog_begin_where_they_are_seen(stage):
     """Drawn evenly by the logarithm of the distance to a lamp, nine of ten lay behind thousands of metres of fog."""
     stage.camera((0, -6, 0), (np.pi / 2, 0, 0), angle=0.8)

@@ -85,6 +85,7 @@ def test_ranks_are_merged_by_id_and_values_by_samples(sliced):
             assert merged["header"][field] == text
 
 
+@pytest.mark.slow
 def test_each_light_group_is_merged_for_itself(sliced):
     stage = sliced
     scene(stage)

@@ -40,6 +40,7 @@ def shelf(stage, **options):
     return stage.rectangle((-0.3, -0.3), (0.3, 0.3), 0.6, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 3])
 def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, render, bounces):
     sphere(stage, stage.diffuse(0.5))
@@ -49,6 +50,7 @@ def test_a_sphere_lit_from_its_centre_follows_the_series_of_reflections(stage, r
     assert light.mean(axis=2).std() < 0.03 * light.mean()
 
 
+@pytest.mark.slow
 def test_a_floor_in_the_sun_lights_the_wall_beside_it_by_their_form_factor(stage, render):
     stage.rectangle((0, 0), (1, 1), material=stage.diffuse(0.8))
     stage.mesh([(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)], [(0, 1, 2, 3)], material=stage.diffuse(1.0))
@@ -187,6 +189,7 @@ def test_the_threshold_and_the_test_of_centres_change_the_cost_and_not_the_light
             stage.scene.candela.property_unset(f"{NAME}_{name}")
 
 
+@pytest.mark.slow
 def test_light_goes_on_beyond_what_stands_on_a_piece(stage, render):
     """Fins parallel to the sun's light stand on a floor of few points: they hide nothing of it from above, and are as
     wide as its pieces."""

@@ -112,6 +112,7 @@ def test_a_viewport_shows_its_first_samples_filtered_and_keeps_their_sums(frame_
         assert shown is frame.images["radiance.light"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", ["instant_radiosity", "ssdo"])
 def test_a_picture_of_one_sample_is_filtered_and_the_ledger_says_so(stage, technique):
     corner(stage)
@@ -149,6 +150,7 @@ def test_a_picture_of_one_sample_shows_indirect_light_on_stripes_as_smooth_as_ma
     assert (one["diffuse_color"] / many["diffuse_color"]).std() < 0.5 * torn.std()  # what the passes multiply by
 
 
+@pytest.mark.slow
 def test_light_of_what_is_thinner_than_a_pixel_is_in_the_passes_of_one_sample(stage):
     """Wires that most pixels' own points miss: the product of colour and light has what the picture has."""
     stage.scene.render.filter_size = 1.5

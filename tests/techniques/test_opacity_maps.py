@@ -137,6 +137,7 @@ def test_rays_meet_the_side_that_is_there(stage, one_sided, mirrored, upside_dow
     assert direct == pytest.approx(cycles, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_room_whose_walls_are_seen_through_from_outside_keeps_its_light(stage, one_sided):
     """A box with its faces turned inwards and a lamp in it, seen through its own wall: as if it were opaque."""
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]

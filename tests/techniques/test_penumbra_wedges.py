@@ -163,6 +163,7 @@ def test_round_lights_count_as_squares_of_their_area(by_wedges, kind):
     assert np.abs(found - expected).max() < 0.09
 
 
+@pytest.mark.slow
 def test_the_camera_in_a_wedge_or_a_shadow_changes_nothing(by_wedges):
     """One group: the same receivers, seen from above and from within the shadow."""
     stage = by_wedges
@@ -195,6 +196,7 @@ def test_several_objects_err_half_as_much_as_their_product(by_wedges):
     assert errors["BOXES"] <= 0.5 * errors["PRODUCT"] < errors["SUM"]
 
 
+@pytest.mark.slow
 def test_shares_stay_between_plain_sum_and_all(by_wedges):
     stage = by_wedges
     fill(stage)

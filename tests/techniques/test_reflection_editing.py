@@ -357,6 +357,7 @@ def test_pixels_outside_of_regions_do_not_change(stage):
     assert np.array_equal(found["diffuse_direct"], plain["diffuse_direct"])
 
 
+@pytest.mark.slow
 def test_an_edited_mirror_shows_what_cycles_does_off_one_that_leans(stage):
     """Scene A of the specification, with Cycles: normals turned by half the edit's angle are exact for every ray."""
     mirror = mirror_scene(stage)
@@ -526,6 +527,7 @@ def test_a_camera_inside_a_region_sees_the_same_edit(stage):
     assert np.array_equal(stage.render(1, (32, 32), bounces=2)["combined"], outside)
 
 
+@pytest.mark.slow
 def test_a_bound_constraint_follows_its_triangle(stage):
     """The mesh is bent; a constraint on a triangle's middle is where that has gone to."""
     mirror = mirror_scene(stage)

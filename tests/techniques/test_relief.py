@@ -163,6 +163,7 @@ def test_first_hits_on_a_cone_are_those_of_a_fine_search(stage, safe):
 # Invariants ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_without_height_it_is_the_plain_surface(stage):
     def shown(mode, scale):
         stage.clear()
@@ -185,6 +186,7 @@ def test_below_half_a_pixel_it_is_bump(stage):
     np.testing.assert_allclose(shown("RELIEF"), shown("BUMP"), atol=2e-3)
 
 
+@pytest.mark.slow
 def test_mirrored_maps_give_the_same_relief(stage):
     def shown(left, right, build):
         stage.clear()
@@ -203,6 +205,7 @@ def test_mirrored_maps_give_the_same_relief(stage):
     np.testing.assert_allclose(shown(0, 1, along_u), shown(1, 0, backwards), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_tile_border_leaves_no_seam(stage):
     """A card of one colour whose UV runs over three tiles of waves, lit from above: as bright as slopes make it."""
 

@@ -45,6 +45,7 @@ def half_in_shadow(stage):
     stage.scene.objects[-1].visible_camera = False
 
 
+@pytest.mark.slow
 def test_wires_at_a_shadows_edge_have_their_own_light(stage, light_of):
     half_in_shadow(stage)
     truth = light_of("diffuse_direct", 256, True, points=1, bounces=0)

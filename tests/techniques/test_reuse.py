@@ -165,6 +165,7 @@ def test_sliders_of_a_material_compile_nothing(room):
     assert library.compile_count == compiled
 
 
+@pytest.mark.slow
 def test_changing_lights_world_and_size_compiles_nothing(room, monkeypatch):
     """On GPUs; for software that masks branches, programs hold no more kinds of light than the scene has."""
     monkeypatch.setattr(context, "masks_branches", lambda: False)
@@ -244,6 +245,7 @@ def test_what_an_object_does_to_refracted_rays_begins_a_new_picture(room):
     assert states(room)["surfaces"] == RAN
 
 
+@pytest.mark.slow
 def test_absorption_begins_a_new_picture(room):
     glass = room.material("ShaderNodeBsdfGlass")
     tree = glass.node_tree

@@ -35,6 +35,7 @@ def ceiling(stage, material, half=4.0, z=15.0):
     return made
 
 
+@pytest.mark.slow
 def test_a_mirror_shows_a_texture_that_no_view_does(stage):
     """u runs with x, v against y, since the ceiling is turned around X."""
     stage.rectangle((-9, -9), (9, 9), material=mirror(stage))

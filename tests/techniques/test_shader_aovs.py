@@ -68,6 +68,7 @@ def test_colour_value_and_uv_are_those_of_cycles(written):
     assert stage.ledger.row("shader_aovs").state == RAN
 
 
+@pytest.mark.slow
 def test_aovs_at_edges_have_the_pixel_filter(written):
     stage = written
     stage.scene.render.filter_size = 1.5

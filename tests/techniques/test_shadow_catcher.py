@@ -63,6 +63,7 @@ def test_combined_beside_cycles(caught, transparent):
     assert rgb <= 0.01 and alpha <= 0.01
 
 
+@pytest.mark.slow
 def test_catchers_alone_are_as_if_they_were_not_there(caught):
     caught.remove(caught.box)
     found = with_pass(caught, "CANDELA", 8)

@@ -330,6 +330,7 @@ def test_casters_at_rest_give_the_maps_that_instances_give(stage, monkeypatch, k
     np.testing.assert_allclose(written_out, as_instances, atol=1e-4 * float(written_out.max()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("soft_falloff", [True, False], ids=["disc", "sphere"])
 def test_round_light_larger_than_its_distance_does_not_shine_through_a_roof(stage, soft_falloff):
     """The floor is as near as the ball is large: points in it are no places to draw a map from."""

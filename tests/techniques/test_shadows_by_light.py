@@ -56,6 +56,7 @@ def test_a_light_gets_the_maps_that_its_penumbra_asks_for(plate, light):
     assert counters(plate) == {expected: 1}
 
 
+@pytest.mark.slow
 def test_of_many_lights_the_strongest_have_variance_maps(plate):
     plate.scene.candela.shadows_by_light_important = 2
     for k in range(5):
@@ -77,6 +78,7 @@ def test_auto_takes_it_for_one_sample_of_soft_lights_alone(plate):
     assert plate.ledger.row(NAME).state == "skipped"
 
 
+@pytest.mark.slow
 def test_lights_of_all_kinds_add_up_to_what_each_brings_alone(plate):
     plate.scene.candela.shadows_by_light_important = 1
     plate.scene.candela.slot_shadow = NAME

@@ -50,6 +50,7 @@ def test_penumbra_is_alike_and_all_else_the_same(large, kind, size):
     assert found[dark].max() < 0.02 * most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [None, 600], ids=["", "small images"])
 def test_five_lights_are_the_sum_of_each(large, most, monkeypatch):
     """Four share an image, the fifth has another; two where an image may not be as high."""
@@ -104,6 +105,7 @@ def test_small_pictures_and_those_of_many_samples_ask_every_pixel(large, size, s
     assert shared(large) == 0
 
 
+@pytest.mark.slow
 def test_layers_lit_from_both_sides_ask_every_pixel(large):
     large.light("AREA", (0, 0, HEIGHT), size=1.0)
     large.rectangle((1.0, 1.0), (1.5, 1.5), 0.5, material=large.material("ShaderNodeBsdfTranslucent"))
@@ -111,6 +113,7 @@ def test_layers_lit_from_both_sides_ask_every_pixel(large):
     assert shared(large) == 0
 
 
+@pytest.mark.slow
 def test_the_mean_of_a_slanted_and_curved_scene_is_kept(large):
     """In perspective, with a ball: planes of cells are those of facets."""
     large.scene.camera.data.type = "PERSP"

@@ -280,6 +280,7 @@ def test_what_only_shines_measures_no_emission(stage, bound):
     assert not [name for name in bound if name.startswith("emission")]
 
 
+@pytest.mark.slow
 def test_what_scatters_below_its_surface_alone_takes_light_of_others(stage):
     wax = stage.material("ShaderNodeSubsurfaceScattering", Scale=0.1)
     stage.floor(material=wax)

@@ -23,6 +23,7 @@ def counters(stage):
     return stage.ledger.row(stage.kind).counters
 
 
+@pytest.mark.slow
 def test_a_light_that_only_changes_its_power_keeps_its_map(lit):
     blocker = lit.blocker(*EDGE)
     before = irradiance(lit, 1, SIZE)
@@ -46,6 +47,7 @@ def test_of_light_that_is_not_refined_one_map_serves_all_samples(lit):
     assert (counters(lit)["maps"], counters(lit)["maps kept"]) == (1, 2)
 
 
+@pytest.mark.slow
 def test_lights_that_shine_away_or_are_too_far_to_matter_have_no_map(lit):
     lit.blocker(*EDGE)
     irradiance(lit, 1, SIZE)

@@ -61,6 +61,7 @@ def test_rays_bring_what_the_screen_does_not_show(stage, render, bounces):
     assert render(1, samples=8, size=(24, 24), rays=False).mean() < 0.1
 
 
+@pytest.mark.slow
 def test_what_a_mirror_shows_of_lit_surfaces_is_glossy_indirect_light(stage):
     """A mirror on the floor shows a ceiling out of the picture, whose light is known from a picture of the ceiling."""
     mirror = stage.material("ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.0)

@@ -88,6 +88,7 @@ def test_what_passes_show_is_apart(stage):
     assert "summed before the filter, but for Glossy Direct" in str(frame.ledger.row("film").choices)
 
 
+@pytest.mark.slow
 def test_a_picture_of_all_that_needs_no_light_sums_nothing(stage):
     """A pass draws into six images."""
     lit_room(stage)
@@ -105,6 +106,7 @@ def absorbing_box(stage):
     stage.mesh(corners, sides, material=fog)
 
 
+@pytest.mark.slow
 def test_media_dim_the_sum(stage):
     stage.scene.candela.use_denoise = False
     stage.scene.candela.bounces = 0

@@ -70,6 +70,7 @@ def test_a_smooth_interface_passes_what_fresnel_leaves(stage, degrees, inside):
     assert found == pytest.approx(expected * np.array([1.0, 0.5, 0.25]), abs=2e-3)
 
 
+@pytest.mark.slow
 def test_what_stands_behind_an_interface_is_seen_where_snell_says(stage):
     """An emissive half plane a metre below the interface: its edge moves to y = depth * tan of the bent angle."""
     stage.rectangle((-99, -99), (99, 99), material=glass(stage, ior=1.5))

@@ -124,6 +124,7 @@ def test_a_background_moves_as_the_camera_turns(moving):
     np.testing.assert_allclose(middle[:, 2], now - after, atol=0.02)
 
 
+@pytest.mark.slow
 def test_what_does_not_move_has_no_vector_and_the_frame_stays(moving):
     stage = moving
     stage.camera((0, -4, 3), (0.9, 0, 0))

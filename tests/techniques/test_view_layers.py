@@ -52,6 +52,7 @@ def test_surfaces_and_curves_can_be_left_out(stage, layer, left_out):
     assert (STRANDS in own) == ("use_strand" not in left_out)
 
 
+@pytest.mark.slow
 def test_a_number_of_samples_of_its_own_counts_in_final_renders(stage, layer):
     stage.scene.candela.samples = 2
     stage.scene.render.engine = "CANDELA"
@@ -61,6 +62,7 @@ def test_a_number_of_samples_of_its_own_counts_in_final_renders(stage, layer):
         assert stage.ledger.samples == expected
 
 
+@pytest.mark.slow
 def test_comparisons_have_the_number_of_samples_they_ask_for(stage, layer):
     layer.samples = 7
     render_passes(stage.scene, "CANDELA", 3, 1, size=SIZE)

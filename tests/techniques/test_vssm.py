@@ -165,6 +165,7 @@ def test_a_ceiling_behind_an_area_light_hides_none_of_it(floor):
     assert visibility(floor, source, 1, (32, 32)) == pytest.approx(1.0, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_a_closed_roof_lets_no_light_pass_whatever_its_distance(floor):
     for name in ("square", "sphere", "sun"):
         kind, settings, _ = LIGHTS[name]

@@ -16,6 +16,7 @@ def floor(lit_floor):
     return lit_floor
 
 
+@pytest.mark.slow
 def test_tuning_finds_a_curve_changes_nothing_and_applies_when_it_is_told(floor):
     assert bpy.ops.candela.tune() == {"FINISHED"}
     found = tuning.latest(floor)

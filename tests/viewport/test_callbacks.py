@@ -72,6 +72,7 @@ def window(scene):
     viewport.free_all()
 
 
+@pytest.mark.slow
 def test_region_is_redrawn_until_it_is_complete(window):
     made = Engine()
     window.update(made)

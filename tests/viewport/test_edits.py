@@ -80,6 +80,7 @@ def test_draft_after_an_edit_is_that_of_a_new_viewport(scene, region, edit):
     assert np.isclose(picture, fresh, rtol=1e-3, atol=1e-4).all(axis=-1).mean() > 0.98
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own_trees", [False, True])
 def test_view_at_rest_keeps_a_large_tree_after_a_move(scene, region, monkeypatch, own_trees):
     """Small ones are built anew; so this one counts as large, and in turn all meshes have trees of their own."""
@@ -125,6 +126,7 @@ def test_viewports_do_not_share_samples(scene, region):
     other.viewport.release()
 
 
+@pytest.mark.slow
 def test_resizing_leaves_no_images_behind(region):
     region.rest()
     region.draw(size=(64, 64))
