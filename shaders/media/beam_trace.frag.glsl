@@ -102,7 +102,9 @@ void main()
       return;  // straight light is not this technique's
     }
     float reach = missed ? 4.0 * scene_size : t;
-    if (bent && !inside_glass && kept < 2) {
+    // Within a solid of glass none is seen; below a sheet of water, whose light never leaves it again, all of it.
+    bool within = inside_glass && !missed && int(beam_table_fetch(ivec2(1, triangle_material(hit))).x + 0.5) == 1;
+    if (bent && !within && kept < 2) {
       vec4 start = vec4(position, 1.0);
       vec4 end = vec4(position + reach * direction, 1.0);
       vec4 carried = vec4(flux, width + spread * travelled);
@@ -149,7 +151,7 @@ void main()
         float eta = 1.0 / ior;
         float root = sqrt(max(1.0 - eta * eta * (1.0 - cosine * cosine), 0.0));
         direction = safe_normalize(eta * direction + (eta * cosine - root) * smooth_normal);
-        flux *= glass.rgb;
+        flux *= glass.rgb / (ior * ior);  // see caustics/photon.frag.glsl
         inside_glass = !leaves;
       }
       position = ray_origin(position, mirrored ? facing : -facing);

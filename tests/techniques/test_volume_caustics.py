@@ -130,3 +130,21 @@ def test_beams_of_odd_casters_are_finite(stage, case):
     seen = stage.render(2, size=(16, 16), bounces=1)["volume_indirect"][..., :3]
     assert np.isfinite(seen).all() and (seen >= 0).all()
     assert case == "speck" or seen.max() > 0
+
+
+@pytest.mark.slow
+def test_fog_below_a_sheet_of_water_is_lit_as_in_cycles(written):
+    """Rays of a wide sun, which Cycles' paths find, below a surface that they never leave again; one scattering."""
+    stage = written
+    stage.floor(2.0, material=stage.diffuse(0.0))
+    stage.rectangle((-2, -2), (2, 2), 1.0, material=stage.material("ShaderNodeBsdfGlass", IOR=1.33, Roughness=0.0))
+    box(stage, volume(stage, Density=0.3), (-1.5, -1.5, 0.02), (1.5, 1.5, 0.9))
+    stage.light("SUN", energy=3.0, angle=0.6)
+    stage.scene.cycles.caustics_refractive = True
+    stage.camera((0, -3, 0.5), (np.pi / 2, 0, 0), angle=0.25)
+    own, cycles = (
+        stage.written(engine, samples, size=(16, 16), bounces=1)["Volume Indirect"][2:14, 2:14, :3].mean()
+        for engine, samples in (("CANDELA", 8), ("CYCLES", 4096))
+    )
+    print(f"{own:.5f} beside {cycles:.5f}")
+    assert own == pytest.approx(cycles, rel=0.05)
