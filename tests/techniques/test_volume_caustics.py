@@ -148,3 +148,20 @@ def test_fog_below_a_sheet_of_water_is_lit_as_in_cycles(written):
     )
     print(f"{own:.5f} beside {cycles:.5f}")
     assert own == pytest.approx(cycles, rel=0.05)
+
+
+@pytest.mark.slow
+def test_beams_do_not_shine_through_the_mirror_that_they_start_on(stage):
+    """Seen from behind the mirror, whose front a lamp lights: their kernel is as wide as a tenth of the picture."""
+    stage.rectangle((-1, -1), (1, 1), material=stage.material("ShaderNodeBsdfGlossy", Roughness=0.0))
+    stage.light("POINT", (0, 0, 1.0), energy=300, shadow_soft_size=0.0)
+    box(stage, volume(stage, Density=0.2), (-2, -2, -2), (2, 2, 2))
+    beams_alone(stage)
+    stage.scene.candela.volume_caustics_rays = 32
+    seen = []
+    for height, turn in ((5.0, 0.0), (-5.0, np.pi)):
+        stage.camera((0, 0, height), (0, turn, 0), angle=0.3)
+        seen.append(stage.render(2, size=(24, 24), bounces=1)["volume_indirect"][..., 0].mean())
+    assert seen[0] > 0
+    print(f"{seen[1] / seen[0]:.5f} of the light before it")
+    assert seen[1] < 5e-3 * seen[0]
