@@ -165,3 +165,23 @@ def test_beams_do_not_shine_through_the_mirror_that_they_start_on(stage):
     assert seen[0] > 0
     print(f"{seen[1] / seen[0]:.5f} of the light before it")
     assert seen[1] < 5e-3 * seen[0]
+
+
+@pytest.mark.slow
+def test_beams_through_an_absorbing_slab_dim_by_beer_and_lambert(stage):
+    """.5 m of glass that takes 1 per metre of red, 2 of green and no blue, over fog under a sun."""
+    glass = stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)
+    tree = glass.node_tree
+    absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    absorbing.inputs["Color"].default_value = (0.5, 0.0, 1.0, 1.0)
+    absorbing.inputs["Density"].default_value = 2.0
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    tree.links.new(absorbing.outputs[0], output.inputs["Volume"])
+    box(stage, glass, (-1.5, -1.5, 0.5), (1.5, 1.5, 1.0))
+    box(stage, volume(stage, Density=0.1), (-0.5, -0.5, -1.0), (0.5, 0.5, 0.4))
+    stage.light("SUN", energy=3.0, angle=0.0)
+    beams_alone(stage)
+    stage.scene.candela.volume_caustics_rays = 64
+    stage.camera((0, -4, -0.3), (np.pi / 2, 0, 0), angle=0.2)
+    seen = stage.render(2, size=(16, 16), bounces=1)["volume_indirect"][..., :3].mean((0, 1))
+    np.testing.assert_allclose(seen / seen[2], np.exp(-0.5 * np.array([1.0, 2.0, 0.0])), rtol=0.01)
