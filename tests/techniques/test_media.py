@@ -432,3 +432,14 @@ def test_walks_in_endless_fog_begin_where_they_are_seen(stage):
     sides = [turned for one in (seen, seen.T) for turned in (one, one[::-1])]
     alike = np.array([turned for one in sides for turned in (one, one[:, ::-1])])
     assert np.mean(alike.var(axis=0) / alike.mean(axis=0) ** 2) < 0.2
+
+
+@pytest.mark.slow
+def test_a_medium_before_another_dims_its_airlight_by_beer_and_lambert(stage):
+    """1 m that absorbs .7 of red, .2 of green and no blue, before fog that a sun lights from the side."""
+    box(stage, volume(stage, Density=0.4), (-0.5, -0.5, -1.0), (0.5, 0.5, 0.0))
+    box(stage, absorber(stage, (0.7, 0.2, 0.0)), (-0.5, -0.5, 1.0), (0.5, 0.5, 2.0))
+    stage.light("SUN", turn=(0, np.pi / 2, 0), energy=3.0, angle=0.0)
+    stage.camera_above(0.5)
+    seen = stage.render(16, size=(16, 16), bounces=0)["volume_direct"][..., :3].mean((0, 1))
+    np.testing.assert_allclose(seen / seen[2], np.exp(-np.array([0.7, 0.2, 0.0])), rtol=0.01)
