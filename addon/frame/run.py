@@ -363,7 +363,7 @@ class Renderer:
         wanted += [self.materials.opacity_program(k) for k in shown if self.materials.compiled[k].uneven]
         # Pictures of what shines alone, as unlit drawings, measure no emission; where somebody asks after all, they are
         # compiled then.
-        lit = has_media(snapshot) or any(may_reflect(snapshot.materials[k].graph) for k in snapshot.used_materials)
+        lit = any(may_reflect(snapshot.materials[k].graph) for k in snapshot.used_materials) or has_media(snapshot)
         varied = [k for k in shown if lit and self.materials.compiled[k].uneven_emission]
         wanted += [self.materials.emission_program(k) for k in varied]
         wanted += [self.materials.emission_map_program(k) for k in varied]

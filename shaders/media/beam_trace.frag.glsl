@@ -102,9 +102,11 @@ void main()
       return;  // straight light is not this technique's
     }
     float reach = missed ? 4.0 * scene_size : t;
+    int material = missed ? 0 : triangle_material(hit);
+    vec4 kind = beam_table_fetch(ivec2(1, material));
+    bool is_glass = !missed && kind.x > 0.5 && kind.x < 1.5;
     // Within a solid of glass none is seen; below a sheet of water, whose light never leaves it again, all of it.
-    bool within = inside_glass && !missed && int(beam_table_fetch(ivec2(1, triangle_material(hit))).x + 0.5) == 1;
-    if (bent && !within && kept < 2) {
+    if (bent && !(inside_glass && is_glass) && kept < 2) {
       vec4 start = vec4(position, 1.0);
       vec4 end = vec4(position + reach * direction, 1.0);
       vec4 carried = vec4(flux, width + spread * travelled);
@@ -126,9 +128,7 @@ void main()
     flux *= media_transmittance(position, direction, t, seed + uint(i));  // in glass, too: fog fills what stands in it
     travelled += t;
     position += t * direction;
-    int material = triangle_material(hit);
     vec4 glass = beam_table_fetch(ivec2(0, material));
-    vec4 kind = beam_table_fetch(ivec2(1, material));
     vec3 normal = triangle_normal(hit);
     bool leaves = dot(normal, direction) > 0.0;
     vec3 smooth_normal = triangle_shading_normal(hit, position);
@@ -136,7 +136,7 @@ void main()
     vec3 facing = leaves ? -normal : normal;
     smooth_normal = leaves ? -smooth_normal : smooth_normal;
     smooth_normal = (dot(smooth_normal, direction) < 0.0) ? smooth_normal : facing;
-    if (kind.x > 0.5 && kind.x < 1.5) {  // glass
+    if (is_glass) {
       if (leaves) {
         flux *= exp(-min(kind.yzw * t, vec3(80.0)));
       }

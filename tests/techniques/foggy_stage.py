@@ -6,15 +6,21 @@ import numpy as np
 BOX = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
 
+def fill(tree, node, **inputs):
+    """Put a medium into the tree of a material or a world, beside what it has on its surface."""
+    shader = tree.nodes.new(node)
+    output = next(one for one in tree.nodes if one.type in ("OUTPUT_MATERIAL", "OUTPUT_WORLD"))
+    tree.links.new(shader.outputs[0], output.inputs["Volume"])
+    for key, value in inputs.items():
+        shader.inputs[key.replace("_", " ")].default_value = value
+
+
 def volume(stage, node="ShaderNodeVolumeScatter", name="volume", **inputs):
     made = bpy.data.materials.new(name)
     stage.use_nodes(made)
-    nodes = made.node_tree.nodes
-    nodes.clear()
-    shader, output = nodes.new(node), nodes.new("ShaderNodeOutputMaterial")
-    made.node_tree.links.new(shader.outputs[0], output.inputs["Volume"])
-    for key, value in inputs.items():
-        shader.inputs[key.replace("_", " ")].default_value = value
+    made.node_tree.nodes.clear()
+    made.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    fill(made.node_tree, node, **inputs)
     return made
 
 
@@ -30,12 +36,7 @@ def box(stage, material, low=(-0.5, -0.5, -0.5), high=(0.5, 0.5, 0.5), **placeme
 
 def fog(stage, color=(0, 0, 0), node="ShaderNodeVolumeScatter", **inputs):
     """A world of this radiance, full of a medium."""
-    tree = stage.world(color).node_tree
-    shader = tree.nodes.new(node)
-    output = next(one for one in tree.nodes if one.type == "OUTPUT_WORLD")
-    tree.links.new(shader.outputs[0], output.inputs["Volume"])
-    for key, value in inputs.items():
-        shader.inputs[key.replace("_", " ")].default_value = value
+    fill(stage.world(color).node_tree, node, **inputs)
 
 
 def glowing_floor(stage, z=-2.0, strength=2.0):

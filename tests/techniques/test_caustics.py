@@ -7,6 +7,7 @@ import pytest
 from addon.frame.ledger import RAN, SKIPPED
 from addon.lighting import photons
 from tests.techniques.conftest import places
+from tests.techniques.foggy_stage import fill
 
 PHOTONS, MAPPING = "screen_space_photons", "caustics_mapping"
 SIZE = (128, 128)
@@ -233,12 +234,7 @@ def test_glass_with_an_absorbing_inside_dims_by_beer_and_lambert(stage, techniqu
     stage.floor()
     material = glass(stage)
     ball(stage, material, radius=0.1, place=(3, 0, 1))  # flat glass alone is left to shadows
-    tree = material.node_tree
-    absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
-    absorbing.inputs["Color"].default_value = (0.5, 0.0, 1.0, 1.0)
-    absorbing.inputs["Density"].default_value = 2.0
-    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
-    tree.links.new(absorbing.outputs[0], output.inputs["Volume"])
+    fill(material.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.5, 0.0, 1.0, 1.0), Density=2.0)
     stage.light("SUN", angle=0.0)
     stage.camera_above(1.0)
     stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", technique_name

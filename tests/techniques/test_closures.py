@@ -214,7 +214,7 @@ def test_a_closure_of_little_weight_is_not_left_to_chance(stage):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degrees", [pytest.param(20, marks=SLOW), 70])
+@pytest.mark.parametrize("degrees", [20, 70])
 def test_thin_walls_have_cycles_albedo(stage, degrees):
     inputs = [
         {"Transmission_Weight": 1.0, "Roughness": 0.0}, {"Transmission_Weight": 1.0, "Roughness": 0.4},
@@ -323,7 +323,6 @@ COLUMNS, CELL = 5, 16  # spheres in a row, pixels of each
 
 
 @pytest.mark.slow
-@SLOW
 @pytest.mark.parametrize(
     ("light", "sweep"), [("area", LIT_SWEEP), ("world", LIT_SWEEP), ("area", LIT_GLASS)], ids=["area", "world", "glass"]
 )

@@ -36,7 +36,6 @@ def below_a_sky(stage, **settings):
     return sky
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [n if n in COMMON else pytest.param(n, marks=SLOW) for n in CASES])
 def test_a_sky_shows_and_lights_as_in_cycles(stage, name):
     """Within 2 %. A narrow sun moves the edge of the plate's shadow by parts of a pixel: squares count more there.

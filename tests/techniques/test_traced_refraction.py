@@ -119,7 +119,7 @@ def test_rough_interfaces_bend_a_sun_as_in_cycles(stage, roughness, inside):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["area", pytest.param("emissive", marks=SLOW)])
+@pytest.mark.parametrize("kind", ["area", "emissive"])
 def test_light_behind_rough_glass_is_as_bright_as_in_cycles(stage, kind):
     stage.rectangle((-9, -9), (9, 9), material=glass(stage, 0.4, color=(0.9, 0.7, 0.5, 1.0)))
     tilted_camera(stage, 25)

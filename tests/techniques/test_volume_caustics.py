@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bench.shaft_truth import meet
-from tests.techniques.foggy_stage import box, fog, volume
+from tests.techniques.foggy_stage import box, fill, fog, volume
 
 
 def ball(stage, radius, ior, location=(0, 0, 0)):
@@ -171,12 +171,7 @@ def test_beams_do_not_shine_through_the_mirror_that_they_start_on(stage):
 def test_beams_through_an_absorbing_slab_dim_by_beer_and_lambert(stage):
     """.5 m of glass that takes 1 per metre of red, 2 of green and no blue, over fog under a sun."""
     glass = stage.material("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)
-    tree = glass.node_tree
-    absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
-    absorbing.inputs["Color"].default_value = (0.5, 0.0, 1.0, 1.0)
-    absorbing.inputs["Density"].default_value = 2.0
-    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
-    tree.links.new(absorbing.outputs[0], output.inputs["Volume"])
+    fill(glass.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.5, 0.0, 1.0, 1.0), Density=2.0)
     box(stage, glass, (-1.5, -1.5, 0.5), (1.5, 1.5, 1.0))
     box(stage, volume(stage, Density=0.1), (-0.5, -0.5, -1.0), (0.5, 0.5, 0.4))
     stage.light("SUN", energy=3.0, angle=0.0)
