@@ -184,6 +184,9 @@ def _handles(shown) -> list[Place]:
     return found
 
 
+KIND_COLOURS = ((1.0, 0.7, 0.2), (0.3, 0.75, 1.0), (0.5, 1.0, 0.4))  # of handles, by the list whose entry they move
+
+
 class CANDELA_GGT_handles(bpy.types.GizmoGroup):
     """Handles of the active object's points and directions: drag a point, turn a direction"""
 
@@ -210,6 +213,7 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
             return
         self.shown = wanted
         self.gizmos.clear()
+        kinds = list(dict.fromkeys(place.entries for place in places))
         for place in places:
             if place.param.handle == POINT:
                 gizmo = self.gizmos.new("GIZMO_GT_move_3d")
@@ -218,9 +222,11 @@ class CANDELA_GGT_handles(bpy.types.GizmoGroup):
             else:
                 gizmo = self.gizmos.new("GIZMO_GT_dial_3d")
                 gizmo.target_set_handler("offset", get=lambda: 0.0, set=_turner(place, gizmo, _vector(place)))
-            gizmo.color, gizmo.alpha = (1.0, 0.7, 0.2), 0.8
+            kind = kinds.index(place.entries)
+            gizmo.color, gizmo.alpha = KIND_COLOURS[kind % len(KIND_COLOURS)], 0.8
             gizmo.color_highlight, gizmo.alpha_highlight = (1.0, 0.9, 0.6), 1.0
             gizmo.scale_basis = 0.3
+            gizmo.select_bias = float(len(kinds) - kind)  # of handles that overlap, that of the first list is taken
 
     def draw_prepare(self, context):
         """Dials stand where their object is."""
