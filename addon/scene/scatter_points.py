@@ -38,7 +38,7 @@ SPACING = 0.7  # of the longest scale of the profile: how far apart points are w
 
 @dataclass(frozen=True)
 class ScatteringObject:
-    """An instance that scatters: its number in the snapshot, rows of cells, and the distance between cells, m."""
+    """An instance that scatters: its row in the image of instances, rows of cells, and the distance between cells, m."""
 
     instance: int
     first_row: int
@@ -59,28 +59,26 @@ class ScatterPoints:
         self._entries: list[images.Image] = []  # by run: painted tint and translucency
         self.cells: list[images.Image] = []  # by run: place, w = area of the cell, m2
         self.bounds: images.Image | None = None  # by row: centre and radius
-        self.table: images.Image | None = None  # by instance: 1 + number of the object, or 0; then the objects
+        self.table: images.Image | None = None  # by row of the instances: 1 + number of the object, or 0; then the objects
 
     def update(self, frame, most: int) -> bool:
         """Make points anew if surfaces moved or scatter otherwise; True if so. At most `most` cells in all."""
         snapshot, materials = frame.snapshot, frame.materials.compiled
+        placed = frame.geometry.placed[0]  # shaders look objects up by rows of the geometry's image
         reach = tuple(m.scatter for m in materials)
-        shown = [
-            k for k, instance in enumerate(snapshot.instances)
-            if any(reach[m] > 0.0 for m in instance.materials) and snapshot.meshes[instance.mesh].triangle_count
-        ]  # fmt: skip
+        shown = [k for k, instance in enumerate(placed) if any(reach[m] > 0.0 for m in instance.materials)]
         maps = [maps_of(material.graph) for material in snapshot.materials]
         painted = [(k, *one, snapshot.images[one[1]].version) for k, found in enumerate(maps) for one in found.items()]
         moved = [
             (k, one.mesh, snapshot.meshes[one.mesh].version, one.matrix.tobytes(), one.materials)
-            for k, one in ((k, snapshot.instances[k]) for k in shown)
+            for k, one in ((k, placed[k]) for k in shown)
         ]
         origin = tuple(frame.geometry.origin)
-        key = (most, tuple(painted), origin, reach, len(snapshot.instances), tuple(moved))
+        key = (most, tuple(painted), origin, reach, len(placed), tuple(moved))
         if key == self._key:
             return False
         self._key = key
-        self._make(snapshot, shown, reach, maps, frame.geometry.origin, most)
+        self._make(snapshot, placed, shown, reach, maps, frame.geometry.origin, most)
         return True
 
     def entries(self, run: int) -> images.Image:
@@ -92,12 +90,10 @@ class ScatterPoints:
         return self._positions[run % RUNS], self._normals[run % RUNS]
 
     def _make(
-        self, snapshot: Snapshot, shown: list[int], reach: tuple, maps: list, origin: np.ndarray, most: int
-    ) -> None:
-        surfaces = [
-            _Surface.of(snapshot.instances[k], snapshot.meshes[snapshot.instances[k].mesh], reach, origin)
-            for k in shown
-        ]
+        self, snapshot: Snapshot, placed: list[Instance], shown: list[int], reach: tuple, maps: list,
+        origin: np.ndarray, most: int,
+    ) -> None:  # fmt: skip
+        surfaces = [_Surface.of(placed[k], snapshot.meshes[placed[k].mesh], reach, origin) for k in shown]
         wished = np.array([one.area / max(SPACING * one.reach, 1e-30) ** 2 for one in surfaces])
         wished = np.maximum(np.nan_to_num(wished, posinf=1e12), FEWEST)
         if wished.sum() > most:
@@ -111,7 +107,7 @@ class ScatterPoints:
         if counts.sum() > most:  # a row each is too much: what comes first has one
             counts[np.cumsum(counts) > most] = 0
         self.objects, blocks, row = [], [], 0
-        table = np.zeros((max(len(snapshot.instances), 1), 4), np.float32)
+        table = np.zeros((max(len(placed), 1), 4), np.float32)
         for k, surface, count in zip(shown, surfaces, counts):
             if not count or not surface.area > 0.0:
                 continue

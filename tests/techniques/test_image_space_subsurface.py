@@ -7,6 +7,7 @@ import pytest
 from addon.kernels import diffusion
 from addon.techniques import instant_radiosity
 from tests.techniques.conftest import places
+from tests.techniques.foggy_stage import box
 
 COLOR = (0.8, 0.5, 0.2)
 PATH = 0.25 / np.pi  # of a radius: Burley's d
@@ -155,6 +156,20 @@ def test_objects_do_not_exchange_light(stage):
     stage.camera_above(3.0)
     picture = shown(stage.render(4))
     assert picture[:, :15].max() < 0.01 and picture[:, 18:30].min() > 0.1
+
+
+@pytest.mark.parametrize("empty", [False, True])
+def test_copies_of_one_mesh_have_their_own_light_in_any_order(stage, empty):
+    """Rows of the geometry's image are ordered by place, and meshes without faces have none."""
+    if empty:
+        stage.mesh([])
+    sheet = box(stage, scattering(stage), (-1, -1, 0), (1, 1, 0.1), location=(3, 0, 0))
+    stage.link("copy", sheet.data)
+    stage.light("SUN", turn=(np.pi, 0, 0), energy=np.pi)
+    stage.camera((1.5, 0, 10), (0, 0, 0), 0.4)
+    picture = shown(stage.render(4, size=(32, 8)))
+    left, right = picture[:, 4:8].mean(axis=(0, 1)), picture[:, -8:-4].mean(axis=(0, 1))
+    assert left.min() > 0.05 and right == pytest.approx(left, rel=0.05)
 
 
 def test_a_thin_sheet_glows_where_it_is_lit_from_behind(stage):
