@@ -148,12 +148,15 @@ void bins_add(inout Bins bins, uint inside, vec3 origin, vec3 direction, float f
   bins.count = k + 1;
 }
 
-void bins_interval(inout Bins bins, uint inside, vec3 origin, vec3 direction, float from, float to, inout uint seed)
+// `left`: intervals in media from here on, each of which gets its share of the bins that there are.
+void bins_interval(inout Bins bins, uint inside, vec3 origin, vec3 direction, float from, float to, int left,
+                   inout uint seed)
 {
 #ifdef MEDIA_GRIDS
   float parts = 1.0;
   if (inside != 0u && to > from && any_grid(inside)) {
-    parts = clamp(ceil((to - from) / (2.0 * smallest_cell(inside))), 1.0, float(GRID_BINS));
+    int most = clamp((MOST_BINS - bins.count) / max(left, 1), 1, GRID_BINS);
+    parts = clamp(ceil((to - from) / (2.0 * smallest_cell(inside))), 1.0, float(most));
   }
   float part = (to - from) / parts;
   for (int i = 0; i < int(parts); i++) {
@@ -173,13 +176,25 @@ Bins media_bins(vec3 origin, vec3 direction, float limit, inout uint seed)
   bins.end = vec3(1.0);
   bins.emitted = vec3(0.0);
   Crossings c = media_crossings(origin, direction);
-  uint inside = media_at_start(c);
+  uint start = media_at_start(c);
+  int left = 0;
+#ifdef MEDIA_GRIDS
+  uint around = start;
+  float before = 0.0;
+  for (int i = 0; i < media_intervals(c) && before < limit; i++) {
+    float to = media_until(c, i, limit);
+    left += (around != 0u && to > before) ? 1 : 0;
+    around = media_behind(c, i, around);
+    before = to;
+  }
+#endif
+  uint inside = start;
   float from = 0.0;
-  for (int i = 0; i <= c.count && from < limit; i++) {  // the last one after all crossings
-    int next = min(i, MOST_CROSSINGS - 1);
-    float to = (i < c.count) ? min(c.t[next], limit) : limit;
-    bins_interval(bins, inside, origin, direction, from, to, seed);
-    inside = media_after(inside, c.medium[next]);
+  for (int i = 0; i < media_intervals(c) && from < limit; i++) {
+    float to = media_until(c, i, limit);
+    bins_interval(bins, inside, origin, direction, from, to, left, seed);
+    left -= (inside != 0u && to > from) ? 1 : 0;
+    inside = media_behind(c, i, inside);
     from = to;
   }
   return bins;

@@ -11,7 +11,16 @@ struct Crossings {
   int count;
   float t[MOST_CROSSINGS];
   int medium[MOST_CROSSINGS];  // m + 1 where the ray enters medium m, -(m + 1) where it leaves it
+  // Of crossings that there is no room for, the farthest ones: media that they cross an odd number of times, as bits, and
+  // where the last of them is. Up to there the ray stays in what the others lead to.
+  uint dropped;
+  float beyond;
+  int last_dropped;  // a ray through the edge of two triangles crosses once
+  float last_dropped_at;
 };
+
+// Two crossings that are one: into or out of the same medium at the same place.
+#define SAME_PLACE 1e-5
 
 #ifdef MEDIA_BOUNDED
 #define MEDIA_NODE 4   // texels of a node and of a leaf, as in addon/scene/acceleration.py
@@ -52,12 +61,26 @@ uint media_boxes_met(int base, vec3 origin, vec3 inverse)
   return (met.x ? 1u : 0u) | (met.y ? 2u : 0u) | (met.z ? 4u : 0u) | (met.w ? 8u : 0u);
 }
 
-// The farthest ones are dropped where there are too many.
 void crossings_insert(inout Crossings c, float t, int medium)
 {
   int place = min(c.count, MOST_CROSSINGS - 1);
-  if (c.count == MOST_CROSSINGS && t >= c.t[MOST_CROSSINGS - 1]) {
-    return;
+  for (int i = 0; i < c.count; i++) {
+    if (c.medium[i] == medium && abs(c.t[i] - t) <= SAME_PLACE * t) {
+      return;
+    }
+  }
+  if (c.count == MOST_CROSSINGS) {
+    float last = c.t[MOST_CROSSINGS - 1];
+    int gone = (t >= last) ? medium : c.medium[MOST_CROSSINGS - 1];
+    float place_of_it = max(t, last);
+    bool known = gone == c.last_dropped && abs(c.last_dropped_at - place_of_it) <= SAME_PLACE * place_of_it;
+    c.dropped ^= known ? 0u : 1u << uint(abs(gone) - 1);
+    c.last_dropped = gone;
+    c.last_dropped_at = place_of_it;
+    c.beyond = max(c.beyond, place_of_it);
+    if (t >= last) {
+      return;
+    }
   }
   c.count = min(c.count + 1, MOST_CROSSINGS);
   for (int i = place; i > 0; i--) {
@@ -116,6 +139,10 @@ Crossings media_crossings(vec3 origin, vec3 direction)
 {
   Crossings c;
   c.count = 0;
+  c.dropped = 0u;
+  c.beyond = 0.0;
+  c.last_dropped = 0;
+  c.last_dropped_at = 0.0;
   for (int i = 0; i < MOST_CROSSINGS; i++) {
     c.t[i] = 1e30;
     c.medium[i] = 0;
@@ -154,7 +181,8 @@ Crossings media_crossings(vec3 origin, vec3 direction)
   return c;
 }
 
-// Media around the ray's start, as bits; the world's medium is bit 0.
+// Media around the ray's start, as bits; the world's medium is bit 0. The first crossing of a boundary decides; where it was
+// dropped, that of a closed one by their number.
 uint media_at_start(Crossings c)
 {
 #ifdef MEDIA_WORLD
@@ -170,11 +198,29 @@ uint media_at_start(Crossings c)
     }
     seen |= bit;
   }
-  return inside;
+  return inside | (c.dropped & ~seen);
 }
 
-uint media_after(uint inside, int crossing)
+// A ray is a row of intervals between crossings.
+int media_intervals(Crossings c)
 {
+  return c.count + 1 + ((c.beyond > 0.0) ? 1 : 0);
+}
+
+// Where interval i ends, at most at `limit`.
+float media_until(Crossings c, int i, float limit)
+{
+  float end = (i < c.count) ? c.t[min(i, MOST_CROSSINGS - 1)] : (i == c.count && c.beyond > 0.0) ? c.beyond : limit;
+  return min(end, limit);
+}
+
+// Media behind interval i, which lies in `inside`.
+uint media_behind(Crossings c, int i, uint inside)
+{
+  if (i >= c.count) {
+    return inside ^ c.dropped;
+  }
+  int crossing = c.medium[min(i, MOST_CROSSINGS - 1)];
   uint bit = 1u << uint(abs(crossing) - 1);
   return (crossing > 0) ? (inside | bit) : (inside & ~bit);
 }

@@ -117,11 +117,10 @@ vec3 media_transmittance(vec3 origin, vec3 direction, float limit, uint salt)
   Crossings c = media_crossings(origin, direction);
   uint inside = media_at_start(c);
   float from = 0.0;
-  for (int i = 0; i <= c.count && from < limit; i++) {  // the last one after all crossings
-    int next = min(i, MOST_CROSSINGS - 1);
-    float to = (i < c.count) ? min(c.t[next], limit) : limit;
+  for (int i = 0; i < media_intervals(c) && from < limit; i++) {
+    float to = media_until(c, i, limit);
     depth += media_depth(inside, origin, direction, from, to, seed);
-    inside = media_after(inside, c.medium[next]);
+    inside = media_behind(c, i, inside);
     from = to;
   }
 #elif defined(MEDIA_WORLD)

@@ -75,6 +75,26 @@ def test_size_changes_nothing_where_densities_follow(stage, scale):
     assert stage.render(size=(16, 16))["combined"][8, 8, 0] == pytest.approx(2 * np.exp(-0.7), rel=2e-3)
 
 
+def test_a_ray_through_more_media_than_it_keeps_crossings_sees_the_sky(stage):
+    stage.world((1, 1, 1))
+    made = absorber(stage, (0.01, 0.01, 0.01))
+    for x in range(8):
+        box(stage, made, location=(2.0 * x, 0, 0))
+    stage.camera((0, 0, 0), (np.pi / 2, 0, -np.pi / 2), angle=0.05)
+    # Between those that it does not know one by one it stays where it is: a metre more than it should.
+    assert stage.render(size=(8, 8))["combined"][..., 0] == pytest.approx(np.exp(-0.01 * 7.5), abs=0.01)
+
+
+def test_the_fog_around_the_camera_stays_however_much_stands_in_it(stage):
+    stage.world((1, 1, 1))
+    box(stage, absorber(stage, (0.05, 0.05, 0.05)), (-1, -1, -1), (20, 1, 1))
+    made = absorber(stage, (0.001, 0.001, 0.001))
+    for x in range(7):
+        box(stage, made, location=(2.0 * x + 1, 0, 0))
+    stage.camera((0, 0, 0), (np.pi / 2, 0, -np.pi / 2), angle=0.05)
+    assert stage.render(size=(8, 8))["combined"][..., 0] == pytest.approx(np.exp(-0.05 * 20 - 0.007), rel=3e-3)
+
+
 # Light of media -----------------------------------------------------------------------------------------------------
 
 
@@ -86,6 +106,24 @@ def test_a_medium_shines_as_the_integral_of_what_it_emits(stage):
     box(stage, made, (-1, -1, -1), (1, 1, 1))
     seen = stage.render(size=(16, 16))["emission"][8, 8, :3]
     assert seen == pytest.approx(np.array([3, 2, 1]) / 0.5 * (1 - np.exp(-1.0)), rel=1e-3)
+
+
+def test_what_shines_behind_media_that_vary_is_seen(stage):
+    """Those before it leave room among a ray's bins."""
+    stage.camera_above()
+    thin = volume(stage, "ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1))
+    nodes = thin.node_tree.nodes
+    noise, scaled = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeMath")
+    scaled.operation, scaled.inputs[1].default_value = "MULTIPLY", 1e-4
+    thin.node_tree.links.new(noise.outputs[0], scaled.inputs[0])
+    thin.node_tree.links.new(scaled.outputs[0], nodes["Volume Absorption"].inputs["Density"])
+    shining = volume(stage, "ShaderNodeVolumeCoefficients", Absorption_Coefficients=(0, 0, 0),
+                     Scatter_Coefficients=(0, 0, 0), Emission_Coefficients=(3.0, 2.0, 1.0))  # fmt: skip
+    box(stage, shining, (-1, -1, -1), (1, 1, 1))
+    for z in (2.0, 4.0):
+        box(stage, thin, (-1, -1, z), (1, 1, z + 1))
+    seen = stage.render(size=(16, 16))["emission"][8, 8, :3]
+    assert seen == pytest.approx([6.0, 4.0, 2.0], rel=5e-3)
 
 
 @pytest.mark.slow

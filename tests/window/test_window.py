@@ -213,10 +213,12 @@ def test_viewports_come_and_go_with_their_regions(walked):
     assert result["viewports_while_solid"] == 0
     assert result["images_while_solid"] == 0
     # A software GPU has memory for the parts of images that were drawn into: what is given back is what was taken.
-    taken, freed = result["taken_again"], result["freed_again"]
-    assert taken["images_mib"] == freed["images_mib"] > 100
-    assert taken["resident_mib"] > 0.25 * taken["images_mib"]
-    assert freed["resident_mib"] > 0.8 * taken["resident_mib"]
+    for taken, freed in zip(result["taken_again"], result["freed_again"]):
+        assert taken["images_mib"] == freed["images_mib"] > 100
+    taken, freed = (max(one["resident_mib"] for one in result[f"{what}_again"]) for what in ("taken", "freed"))
+    assert taken > 0.25 * result["taken_again"][0]["images_mib"]
+    assert freed > 0.8 * taken
+    assert result["kept"]["resident_mib"] < 1.2 * taken  # the last time may be one of those, four leaks are more
     assert result["viewports_after_split"] == 2
     assert result["viewports_after_load"] == 1
     assert result["viewports_at_home"] == 0
