@@ -48,6 +48,7 @@ from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
 from .interfaces import interface_table
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
+from .media import MediaService
 
 FOUND = ("photon_points", "photon_normals", "photon_fluxes")
 EMISSION = Struct(
@@ -157,7 +158,12 @@ class Photons:
         many casters and only the mean of a known number of samples is shown, lights take turns: the photons of a view
         are smooth, and VIEWS of them in a sample cost about as much as its other light."""
         settings = frame.settings
-        answered = [one for one in frame.emitters if one.light.key in casters.lights]
+        media = frame.service(MediaService)
+        endless = media is not None and media.media.endless  # nothing comes from infinity
+        answered = [
+            one for one in frame.emitters
+            if one.light.key in casters.lights and not (endless and one.kind == lights.SUN)
+        ]  # fmt: skip
         if not settings.whole or settings.may_end_early:
             return answered, 1
         return answered, max(1, min(settings.samples, -(-len(answered) * len(casters.low) // VIEWS)))

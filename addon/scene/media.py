@@ -81,8 +81,12 @@ class Filled:
         return self.varies or bool(np.any(self.medium.emission > 0)) or self.medium.glow > 0
 
     @property
+    def takes(self) -> bool:
+        return self.scatters or bool(np.any(self.medium.absorption > 0))
+
+    @property
     def empty(self) -> bool:
-        return not (self.varies or self.scatters or self.emits or np.any(self.medium.absorption > 0))
+        return not (self.takes or self.emits)
 
 
 def has_media(snapshot: Snapshot) -> bool:
@@ -265,6 +269,11 @@ class Media:
     @property
     def emits(self) -> bool:
         return any(one.emits for one in self.found)
+
+    @property
+    def endless(self) -> bool:
+        """Whether one has no end and takes light everywhere: nothing comes from infinity then."""
+        return any(one.corners is None and not one.varies and one.takes for one in self.found)
 
     def attenuation(self) -> dict[str, images.Image]:
         """What ATTENUATION_TEXTURES bind."""

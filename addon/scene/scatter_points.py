@@ -38,7 +38,7 @@ SPACING = 0.7  # of the longest scale of the profile: how far apart points are w
 
 @dataclass(frozen=True)
 class ScatteringObject:
-    """An instance that scatters: its row in the image of instances, rows of cells, and the distance between cells, m."""
+    """An instance that scatters: its row in the image of instances, rows of cells, distance between cells, m."""
 
     instance: int
     first_row: int
@@ -59,7 +59,7 @@ class ScatterPoints:
         self._entries: list[images.Image] = []  # by run: painted tint and translucency
         self.cells: list[images.Image] = []  # by run: place, w = area of the cell, m2
         self.bounds: images.Image | None = None  # by row: centre and radius
-        self.table: images.Image | None = None  # by row of the instances: 1 + number of the object, or 0; then the objects
+        self.table: images.Image | None = None  # by row of instances: 1 + number of the object, or 0; then the objects
 
     def update(self, frame, most: int) -> bool:
         """Make points anew if surfaces moved or scatter otherwise; True if so. At most `most` cells in all."""

@@ -354,7 +354,7 @@ class Airlight(Technique):
         # Through fog without an end nothing comes from infinity.
         media = frame.service(MediaService)
         found = media.media.found if media is not None else []
-        self._endless = any(one.corners is None and not one.varies for one in found)
+        self._endless = media is not None and media.media.endless
         self._lit_by_world = self._world and not self._endless and any(one.scatters for one in found)
         if media is not None:
             frame.provide(MediaEmission("radiance.volume_emission"))

@@ -143,6 +143,7 @@ class ImplicitVisibility(Technique):
         self._light = SurfelLight()
         self._solutions: dict[int, Solution] = {}
         self._glossy = VirtualLights()
+        self._shadows: tuple = ()
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         return no_indirect_light(snapshot, settings) or acceleration.too_many_copies(snapshot)
@@ -161,6 +162,8 @@ class ImplicitVisibility(Technique):
         if not surfels.receiver_count:
             return
         self._light.begin(frame)
+        # What else that light depends on, which holds shadows.
+        self._shadows = tuple((one.links, one.visibility) for one in frame.snapshot.instances)
         if frame.materials.glossy:
             self._glossy.begin(frame)
 
@@ -220,6 +223,7 @@ class ImplicitVisibility(Technique):
         bounces = min(frame.settings.bounces, MOST_BOUNCES)
         wanted = (
             solution.linked_for, lights_key(frame.snapshot), frame.environment, frame.materials.fingerprint(), bounces,
+            self._shadows,
         )  # fmt: skip
         if _same(solution.lit_for, wanted):
             frame.count(self, "light kept", surfels.receiver_count)

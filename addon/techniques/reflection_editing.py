@@ -158,7 +158,7 @@ class ReflectionEditing(Technique):
             origin = tuple(frame.geometry.origin)
             where = (instance.mesh, mesh.version, instance.matrix.tobytes(), row, origin)
             surfaces[where] = self._surfaces.get(where) or _surface(frame, instance, mesh)
-            key = (*where, instance.own)
+            key = (*where, instance.own, instance.materials, _indices(frame, instance))
             kept[key] = self._kept.get(key) or _made(frame, instance, mesh, row, surfaces[where])
         self._kept, self._edited, self._surfaces = kept, list(kept.values()), surfaces
         frame.shared(SurfaceStages).apply.append(self._at_film_point)
@@ -205,6 +205,12 @@ def _edits(instance: Instance) -> tuple[list[dict], list[dict]]:
     constraints = [one for one in own_value(instance.own, ReflectionEditing, "constraints") if one["enabled"]]
     regions = [one for one in own_value(instance.own, ReflectionEditing, "regions") if one["enabled"]]
     return constraints[:MOST_CONSTRAINTS], regions[:MOST_REGIONS]
+
+
+def _indices(frame: Frame, instance: Instance) -> tuple[float, ...]:
+    """Refractive indices of the glass in an instance's slots, by which constraints know what is seen without them."""
+    compiled = [frame.materials.compiled[slot] for slot in instance.materials]
+    return tuple(one.glass.ior if one.glass else 1.0 for one in compiled)
 
 
 def _surface(frame: Frame, instance: Instance, mesh: Mesh) -> geodesic.Surface:

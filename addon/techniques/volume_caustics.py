@@ -51,7 +51,7 @@ from .airlight import may_send, volume_graphs
 
 SMOOTH = 0.2  # roughness
 BEAM_PIXELS, MOST_PIXELS = 1.5, 8.0  # half widths of beams on the screen
-MOST_LAMPS = 8
+MOST_LAMPS = 8  # in a sample
 GLASS, MIRROR = 1.0, 2.0
 STRETCHES = 2
 TRACE = passes.fullscreen_program(
@@ -124,20 +124,25 @@ class VolumeCaustics(Technique):
         self._table = images.upload(table)
         bending = set(np.flatnonzero(table[:, 1, 0] > 0))
         self._casters = casters_of(frame.snapshot, bending, frame.geometry.origin)
-        found = [one for one in frame.emitters if one.light.visibility.volume and one.light.cast_shadow]
-        self._emitters = sorted(found, key=lambda one: -one.power)[:MOST_LAMPS] if self._casters else []
+        media = frame.service(MediaService)
+        endless = media is not None and media.media.endless
+        self._emitters = [
+            one for one in frame.emitters if self._casters and one.light.visibility.volume and one.light.cast_shadow
+            and not (endless and one.kind == lights.SUN)
+        ]  # fmt: skip
 
     def sample(self, frame: Frame) -> Iterator[None]:
         media = frame.service(MediaService)
         if media is None or not self._emitters or not media.media.scatters:
             return
         side = min(frame.settings.get(self, "rays"), MOST_RAYS * max(frame.size))
-        drawn = [one.sample(*frame.random_volume("beams/light")) for one in self._emitters]
-        sources = self._sources.set([e.row(point, 0, 1) for e, point in zip(self._emitters, drawn)])
+        turn, weight = self._turn(frame)
+        drawn = [one.sample(*frame.random_volume("beams/light")) for one in turn]
+        sources = self._sources.set([e.row(point, 0, 1, weight) for e, point in zip(turn, drawn)])
         centre, radius = self._casters
         traced = [images.pool.take(side, side, "RGBA32F") for _ in range(3 * STRETCHES)]
         surfaces = {"surface_position": frame.images["surface.position"]}
-        for number in range(len(self._emitters)):
+        for number in range(len(turn)):
             passes.fullscreen(
                 TRACE,
                 images.Target(tuple(traced)),
@@ -170,6 +175,14 @@ class VolumeCaustics(Technique):
             yield
         for image in traced:
             images.pool.give(image)
+
+    def _turn(self, frame: Frame) -> tuple[list[lights.Emitter], float]:
+        """The lamps of this sample, evenly out of all, and how many each stands for."""
+        count = len(self._emitters)
+        if count <= MOST_LAMPS:
+            return self._emitters, 1.0
+        chosen = ((np.arange(MOST_LAMPS) + frame.uniform("beams/choose")) * count / MOST_LAMPS).astype(int)
+        return [self._emitters[k] for k in chosen], count / MOST_LAMPS
 
     def release(self) -> None:
         self._sources.release()

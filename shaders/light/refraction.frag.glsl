@@ -94,11 +94,11 @@ vec3 light_found(vec3 origin, vec3 direction, float lobe_density, float limit, b
     vec3 radiance = light_hit(light, origin, direction, hit_distance, density);
     if (hit_distance <= limit && (light.flags & LIGHT_TRANSMISSION) != 0) {
       sum += radiance * ((lobe_density > 0.0) ? power_share(lobe_density, light.rate * density) : 1.0);
-      nearest = (max_component(radiance) > 0.0) ? min(nearest, hit_distance) : nearest;
+      nearest = (max_component(abs(radiance)) > 0.0) ? min(nearest, hit_distance) : nearest;
     }
   }
 #ifdef MEDIA
-  if (max_component(sum) > 0.0) {
+  if (max_component(abs(sum)) > 0.0) {
     sum *= media_transmittance(origin, direction, min(nearest, FARTHEST_MEDIUM), salt);
   }
 #endif

@@ -14,7 +14,7 @@ void main()
     float hit_distance;
     float density;
     vec3 radiance = light_hit(light_read(i), start, direction, hit_distance, density);
-    limit = (max_component(radiance) > 0.0) ? min(limit, hit_distance) : limit;
+    limit = (max_component(abs(radiance)) > 0.0) ? min(limit, hit_distance) : limit;
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 161 + ray_number).x;
   out_passed.rgb = media_transmittance(start, direction, limit, salt);

@@ -12,7 +12,7 @@ void main()
   beam_end = beam_ends_fetch(texel);
   beam_flux = beam_fluxes_fetch(texel);
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-  if (beam_start.w > 0.0 && max(max(beam_flux.x, beam_flux.y), beam_flux.z) > 0.0) {
+  if (beam_start.w > 0.0 && any(notEqual(beam_flux.rgb, vec3(0.0)))) {
     vec4 a = beam_clip(beam_start.xyz);
     vec4 b = beam_clip(beam_end.xyz);
     float near = (film_view.eye.w > 0.5) ? -1e30 : max(film_view.film.z, 1e-20);  // clipped before it is divided

@@ -51,6 +51,7 @@ void main()
     float area = PI * casters.w * casters.w / rays;
     flux = light.radiance * ((light.radius > 0.0) ? light.area : 1.0) * area;
     width = 0.5 * sqrt(area);
+    flux *= media_transmittance(position, light.point, FARTHEST_MEDIUM, 0u);  // upstream
     spread = 0.0;
   }
   else {
@@ -92,7 +93,7 @@ void main()
   int kept = 0;
   float travelled = 0.0;
   for (int i = 0; i < INTERFACES; i++) {
-    if (!(max_component(flux) > 0.0)) {
+    if (!(max_component(abs(flux)) > 0.0)) {  // lamps may have negative power
       return;
     }
     ivec2 hit;

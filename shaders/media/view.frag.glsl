@@ -12,7 +12,7 @@ void main()
     float hit_distance;
     float density;
     vec3 radiance = light_hit(light_read(i), ray.origin, ray.direction, hit_distance, density);
-    ray.limit = (max_component(radiance) > 0.0) ? min(ray.limit, hit_distance) : ray.limit;
+    ray.limit = (max_component(abs(radiance)) > 0.0) ? min(ray.limit, hit_distance) : ray.limit;
   }
   uint salt = roll_of(pixel, film_view.sample_index, film_view.seed, 41).x;
   out_through = vec4(media_transmittance(ray.origin, ray.direction, ray.limit, salt), ray.hit ? 1.0 : 0.0);

@@ -343,6 +343,17 @@ def test_what_moves_is_linked_anew_and_is_what_a_new_session_finds(stage, render
     np.testing.assert_array_equal(after, render(2))
 
 
+def test_a_blocker_that_casts_no_shadow_any_more_lets_the_light_be_made_anew(stage, render):
+    corner(stage)
+    blocker = stage.rectangle((-0.5, -0.5), (0.5, 0.5), z=0.8, material=stage.diffuse(0.0))
+    shadowed = render(2)
+    blocker.visible_shadow = False
+    after = render(2)
+    assert np.abs(after - shadowed).max() > 0.01 * after.mean()
+    engine.free_sessions()
+    np.testing.assert_array_equal(after, render(2))
+
+
 def test_a_lamp_that_allows_no_bounces_is_not_reflected(stage, render):
     corner(stage)
     assert render(1).mean() > 0.0

@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 
+from addon import engine
 from addon.gfx import images, passes
 from addon.surfaces import geodesic, reflection_edits
 from addon.surfaces.reflection_edits import EUCLIDEAN, SOLVE, Constraint, Region, edit_table, mirrored
@@ -547,3 +548,18 @@ def test_a_bound_constraint_follows_its_triangle(stage):
     one.point = (0, 0, 0)
     mirror.update_tag()
     assert np.abs(stage.render(1, (32, 32), bounces=2)["combined"] - bound).max() > 0.05
+
+
+def test_an_edit_of_glass_follows_its_index(stage):
+    """In one session, as if it had been that of glass from the start."""
+    glass = stage.material("ShaderNodeBsdfGlass", IOR=1.1, Roughness=0.0)
+    pane = mirror_scene(stage)
+    pane.data.materials[0] = glass
+    constrain(pane, (0, 0, 0), (1, 2, -1), (0, -6, 3))
+    pane.candela.reflection_editing_constraints[0].of = "REFRACTION"
+    first = stage.render(1, bounces=2)["combined"]
+    glass.node_tree.nodes["Glass BSDF"].inputs["IOR"].default_value = 1.8
+    second = stage.render(1, bounces=2)["combined"]
+    engine.free_sessions()
+    assert np.array_equal(second, stage.render(1, bounces=2)["combined"])
+    assert not np.array_equal(first, second)

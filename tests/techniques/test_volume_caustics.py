@@ -180,3 +180,49 @@ def test_beams_through_an_absorbing_slab_dim_by_beer_and_lambert(stage):
     stage.camera((0, -4, -0.3), (np.pi / 2, 0, 0), angle=0.2)
     seen = stage.render(2, size=(16, 16), bounces=1)["volume_indirect"][..., :3].mean((0, 1))
     np.testing.assert_allclose(seen / seen[2], np.exp(-0.5 * np.array([1.0, 2.0, 0.0])), rtol=0.01)
+
+
+def indirect_light_of_beams(stage, pixels=24, samples=2):
+    beams_alone(stage)
+    stage.scene.candela.volume_caustics_rays = 32
+    return stage.render(samples, size=(pixels, pixels), bounces=1)["volume_indirect"][..., :3]
+
+
+def test_a_sun_sends_no_beams_into_fog_without_an_end(stage):
+    stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
+    stage.light("SUN", energy=3.0)
+    fog(stage, Density=0.01)
+    ball(stage, 0.5, 1.5)
+    assert not indirect_light_of_beams(stage).any()
+
+
+def test_fog_far_upstream_dims_the_beams_of_a_sun(stage):
+    """A slab of optical depth 1, farther away than the scene is large."""
+    stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
+    stage.light("SUN", energy=3.0, angle=0.0)
+    ball(stage, 0.5, 1.5)
+    box(stage, volume(stage, Density=0.1), (-1, -1, -1), (1, 1, 1))
+    clear = indirect_light_of_beams(stage).mean()
+    slab = volume(stage, "ShaderNodeVolumeAbsorption", Color=(0, 0, 0, 1), Density=1.0)
+    box(stage, slab, (-2, -2, 50), (2, 2, 51))
+    assert indirect_light_of_beams(stage).mean() == pytest.approx(clear * np.exp(-1.0), rel=0.02)
+
+
+def test_lamps_of_opposite_power_send_beams_that_cancel(stage):
+    lens_scene(stage, 1.5)
+    one = next(lamp for lamp in stage.scene.objects if lamp.type == "LIGHT")
+    single = indirect_light_of_beams(stage)
+    stage.light("POINT", one.location, energy=-one.data.energy, shadow_soft_size=0.0)
+    assert np.abs(indirect_light_of_beams(stage)).max() < 1e-4 * single.max()
+
+
+@pytest.mark.slow
+def test_many_lamps_take_turns(stage):
+    """Twelve at one place are one of their power."""
+    lens_scene(stage, 1.5)
+    one = next(lamp for lamp in stage.scene.objects if lamp.type == "LIGHT")
+    single = indirect_light_of_beams(stage)
+    one.data.energy /= 12
+    for _ in range(11):
+        stage.light("POINT", one.location, energy=one.data.energy, shadow_soft_size=0.0)
+    assert indirect_light_of_beams(stage).mean() == pytest.approx(single.mean(), rel=1e-3)
