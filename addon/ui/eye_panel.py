@@ -62,7 +62,7 @@ class CANDELA_OT_eye_pictures(bpy.types.Operator):
 
     bl_idname = "candela.eye_pictures"
     bl_label = "Update Pictures"
-    bl_options = {"REGISTER"}
+    bl_options = {"REGISTER", "UNDO"}
 
     whole: bpy.props.BoolProperty(
         name="With Core", default=True,
