@@ -21,6 +21,21 @@ def part(steps: Iterator, first: float, last: float) -> Iterator[tuple[float, st
         steps.close()
 
 
+def layer_named(scene, name: str):
+    """A view layer that was chosen before a step; ValueError where it is gone. Held itself, it would point to nothing
+    once the artist removes it, and the context's is of another scene once the window shows one."""
+    layer = scene.view_layers.get(name)
+    if layer is None:
+        raise ValueError(f"Scene '{scene.name}' has no view layer '{name}' any more.")
+    return layer
+
+
+def depsgraph_of(context, scene, layer):
+    """The evaluated scene, whatever the window shows meanwhile."""
+    with context.temp_override(scene=scene, view_layer=layer):
+        return context.evaluated_depsgraph_get()
+
+
 class Job:
     """Base of operators whose work is the generator `work(context)`.
 

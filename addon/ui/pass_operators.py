@@ -18,7 +18,7 @@ from ..frame.plan import PlanError, make_plan
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
 from . import ENGINE, shown_images, shown_otherwise
-from .jobs import Job, draw_progress, part
+from .jobs import Job, draw_progress, layer_named, part
 from .pass_nodes import pictures_of
 from .pass_run import Rendered, reference_images, render_steps
 from .pass_tree import TREE, Result, checked, fill, forget_results, graph_of, result, set_result
@@ -109,12 +109,13 @@ class CANDELA_OT_passes_run(_OnTree, Job, bpy.types.Operator):
             )
         size, share = run_size(scene, tree), 0.5 if self.compare else 1.0
         settings = replace(settings_of(scene, viewport=False), samples=tree.samples, passes=found.order, profile=True)
-        depsgraph = context.evaluated_depsgraph_get()
+        depsgraph, layer = context.evaluated_depsgraph_get(), context.view_layer.name
         rendered = yield from part(render_steps(scene, depsgraph, size, settings), 0.0, share)
         reference = None
         if self.compare:
-            shown_otherwise.warn(self, context.view_layer)
-            steps = reference_steps(scene, tree.reference_samples, settings.bounces == 0, size, context.view_layer)
+            chosen = layer_named(scene, layer)
+            shown_otherwise.warn(self, chosen)
+            steps = reference_steps(scene, tree.reference_samples, settings.bounces == 0, size, chosen)
             reference = yield from part(steps, share, 1.0)
         truth = reference_images(reference) if reference is not None else {}
         self._show(context, tree, rendered, truth, reference)
