@@ -11,6 +11,7 @@ from mathutils import Vector
 from ..techniques.reflection_editing import ReflectionEditing
 from . import ENGINE
 from .scoped_panels import active_entry
+from .texts import refusal
 
 CONSTRAINTS, REGIONS = "reflection_editing_constraints", "reflection_editing_regions"
 PANEL = f"CANDELA_OBJECT_PT_{ReflectionEditing.name}"
@@ -77,6 +78,8 @@ def clicked(layer, met):
         raise ValueError(f"'{edited.name}' is no mesh.")
     if all(one != edited for one in layer.objects):
         raise ValueError(f"'{edited.name}' is only shown as an instance here: make the instance real to edit it.")
+    if refused := refusal(edited):
+        raise ValueError(refused)
     return edited
 
 
@@ -103,6 +106,9 @@ class CANDELA_OT_place_reflection(_OfAnObject, bpy.types.Operator):
 
     def execute(self, context):
         edited = context.object
+        if refused := refusal(edited):
+            self.report({"ERROR"}, refused)
+            return {"CANCELLED"}
         inverse = edited.matrix_world.inverted_safe()
         there = nearest(edited, inverse @ Vector(self.location))
         if there is None:

@@ -12,6 +12,7 @@ import numpy as np
 from ..frame.technique import MATERIAL, identifier
 from ..materials import translucency
 from ..techniques.image_space_subsurface import ImageSpaceSubsurface
+from .texts import refusal
 
 LABELS = {translucency.BLUR: "blur", translucency.TINT: "tint", translucency.TRANSLUCENCY: "translucency"}
 SOFT_BRUSH = "brushes/essentials_brushes-mesh_texture.blend/Brush/Paint Soft"
@@ -82,6 +83,9 @@ class CANDELA_OT_new_translucency_maps(bpy.types.Operator):
 
     def execute(self, context):
         material = getattr(context, "material", None) or context.object.active_material
+        if refused := refusal(material):
+            self.report({"ERROR"}, refused)
+            return {"CANCELLED"}
         mesh = context.object.data if context.object is not None and context.object.type == "MESH" else None
         if mesh is not None and not mesh.uv_layers:
             self.report({"ERROR"}, f"'{mesh.name}' has no UV map: unwrap it first, then make maps.")
