@@ -75,8 +75,10 @@ class Job:
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
-            self._work.close()
-            self._end(context)
+            try:
+                self._work.close()
+            finally:
+                self._end(context)
             self.report({"INFO"}, f"{self.bl_label} was cancelled.")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -110,13 +112,15 @@ class Job:
 
     def cancel(self, context):
         """Blender ends the operator: the window is closed or another file is opened."""
-        self._work.close()
-        Job.running = None
+        try:
+            self._work.close()
+        finally:
+            Job.running = None
 
     def before_undo(self) -> None:
         """Give up what the work refers to, while it is there; the operator ends with its next event."""
-        self._work.close()
         self._undone = True
+        self._work.close()
 
     def _end(self, context) -> None:
         Job.running = None

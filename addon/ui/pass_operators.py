@@ -156,9 +156,14 @@ def _errors(rendered: Rendered, reference) -> dict[str, str]:
     return lines
 
 
-def _ended(called: set[str]) -> set[str]:
-    """What an operator says that has called another. The other one may be running; it has ended itself: Blender never
-    frees an operator that claims to be modal and is not."""
+def _run(operator: bpy.types.Operator, mode: str, **options) -> set[str]:
+    """What an operator says that has called Run, whose sentence becomes its own. Run may go on; the caller has ended:
+    Blender never frees an operator that claims to be modal and is not."""
+    try:
+        called = bpy.ops.candela.passes_run(mode, tree=operator.tree, **options)
+    except RuntimeError as error:
+        operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        return {"CANCELLED"}
     return {"CANCELLED"} if "CANCELLED" in called else {"FINISHED"}
 
 
@@ -174,7 +179,7 @@ class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
         return Job.running is None and space is not None and space.type == "NODE_EDITOR" and context.active_node
 
     def execute(self, context):
-        return _ended(bpy.ops.candela.passes_run("INVOKE_DEFAULT", tree=self.tree, node=context.active_node.name))
+        return _run(self, "INVOKE_DEFAULT", node=context.active_node.name)
 
 
 class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
@@ -188,8 +193,7 @@ class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
         return Job.running is None
 
     def execute(self, context):
-        mode = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        return _ended(bpy.ops.candela.passes_run(mode, tree=self.tree, compare=True))
+        return _run(self, "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT", compare=True)
 
 
 class CANDELA_OT_passes_bake(_OnTree, bpy.types.Operator):

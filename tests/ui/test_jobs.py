@@ -91,3 +91,30 @@ def test_a_layer_is_found_by_name_in_its_scene_only(chosen):
     assert jobs.layer_named(chosen, "Chosen").id_data == chosen
     with pytest.raises(ValueError, match="Scene 'Other' has no view layer 'Chosen'"):
         jobs.layer_named(bpy.data.scenes["Other"], "Chosen")
+
+
+@pytest.mark.parametrize("operator", ["passes_run", "passes_compare"])
+def test_what_is_missing_is_one_sentence(registered, empty_scene, operator):
+    with pytest.raises(RuntimeError, match=r"^Error: No pass tree is open: choose New from Auto first\.\s*$"):
+        getattr(bpy.ops.candela, operator)()
+
+
+def test_a_job_that_cannot_clean_up_has_ended_all_the_same(monkeypatch):
+    def work():
+        try:
+            yield 0.0, "begun"
+        finally:
+            raise OSError("in use")
+
+    ended = []
+    job = SimpleNamespace(_work=work(), _end=ended.append, report=None)
+    next(job._work)
+    with pytest.raises(OSError, match="in use"):
+        jobs.Job.modal(job, "context", SimpleNamespace(type="ESC", value="PRESS"))
+    assert ended == ["context"]
+    job._work = work()
+    next(job._work)
+    monkeypatch.setattr(jobs.Job, "running", job)
+    with pytest.raises(OSError, match="in use"):
+        jobs.Job.cancel(job, "context")
+    assert jobs.Job.running is None
