@@ -37,12 +37,13 @@ def reference_steps(
         yield 0.0, DOING
         return reference(scene, samples, direct_only, size, view_layer)
     key, folder = reference_key(scene, samples, direct_only, size, view_layer), cache_folder()
+    layer = view_layer.name  # after a step the layer itself may be gone
     yield 0.0, DOING
     if not (folder / f"{key}.npz").exists():
         with tempfile.TemporaryDirectory(prefix="candela_") as temporary:
             path = Path(temporary) / "scene.blend"
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
-            job = {"scene": scene.name, "layer": view_layer.name, "samples": samples, "direct_only": direct_only,
+            job = {"scene": scene.name, "layer": layer, "samples": samples, "direct_only": direct_only,
                    "size": size, "key": key, "folder": str(folder.resolve())}  # fmt: skip
             yield from _watched(path, Path(temporary) / "output.txt", job)
     made = cache.load(folder, key)

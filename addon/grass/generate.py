@@ -209,19 +209,38 @@ class Studio:
 
 @contextmanager
 def studio(order: Order) -> Iterator[Studio]:
-    """The scene for the time of the block; what was made for it is removed afterwards."""
-    before = {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
-    scene = bpy.data.scenes.new("Grass tile")
+    """The scene for the time of the block; what was made for it is removed afterwards, and nothing else."""
+    before, made = set(_blocks()), set()
     try:
-        build(order, scene)
+        scene = bpy.data.scenes.new("Grass tile")
+        try:
+            build(order, scene)
+        finally:
+            made = set(_blocks()) - before  # what comes later is the artist's: a run in a window gives way to events
         with tempfile.TemporaryDirectory(prefix="candela_") as folder:
             yield Studio(order, scene, Path(folder) / "tile.exr")
     finally:
-        made = [one for kind in _KINDS for one in set(getattr(bpy.data, kind)) - before[kind]]
-        bpy.data.batch_remove([one for one in made if one.bl_rna.identifier != "Image"])
+        _left.update(made)
+        remove_left()
 
 
 _KINDS = ("scenes", "objects", "meshes", "cameras", "lights", "materials", "collections")
+_left: set[int] = set()  # session_uid of data-blocks of tiles that were rendered or given up
+
+
+def _blocks() -> dict[int, bpy.types.ID]:
+    """Those of the file that a tile may consist of, by session_uid: undo and the artist may free what is held."""
+    return {one.session_uid: one for kind in _KINDS for one in getattr(bpy.data, kind)}
+
+
+def remove_left() -> None:
+    """Remove what is there of former tiles: at their end, and after an undo to a step that was made meanwhile."""
+    found = [one for uid, one in _blocks().items() if uid in _left]
+    for scene in [one for one in found if isinstance(one, bpy.types.Scene)]:
+        found.remove(scene)
+        with contextlib.suppress(RuntimeError):  # it stays where the artist has removed all other scenes
+            bpy.data.scenes.remove(scene)  # windows that show it go to another one, unlike with batch_remove
+    bpy.data.batch_remove(found)
 
 
 def build(order: Order, scene: bpy.types.Scene) -> None:

@@ -17,7 +17,7 @@ from ..compare.beside import reference_steps
 from ..compare.comparison import Picture, compare_passes
 from ..compare.report import shown_pixels
 from . import shown_images, shown_otherwise
-from .jobs import Job, draw_progress, part
+from .jobs import Job, draw_progress, layer_named, part
 from .pass_run import render_steps
 from .properties import settings_of, titled
 from .texts import wrapped
@@ -108,10 +108,11 @@ class CANDELA_OT_compare(Job, bpy.types.Operator):
         share = scene.render.resolution_percentage * options.percentage / 10000
         size = tuple(max(int(side * share), 1) for side in (scene.render.resolution_x, scene.render.resolution_y))
         settings = replace(settings_of(scene, viewport=False), samples=options.samples)
-        layer = context.view_layer
-        shown_otherwise.warn(self, layer)
+        layer = context.view_layer.name
+        shown_otherwise.warn(self, context.view_layer)
         rendered = yield from part(render_steps(scene, context.evaluated_depsgraph_get(), size, settings), 0.0, 0.5)
-        steps = reference_steps(scene, options.reference_samples, settings.bounces == 0, size, layer)
+        chosen = layer_named(scene, layer)
+        steps = reference_steps(scene, options.reference_samples, settings.bounces == 0, size, chosen)
         reference = yield from part(steps, 0.5, 1.0)
         global _rows
         _rows = compare_passes(rendered.passes(), reference, with_flip=False)

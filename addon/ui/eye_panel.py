@@ -22,6 +22,7 @@ from ..techniques.eye import EyeModel, eye_of
 from ..techniques.temporal_glare import TemporalGlare, degrees_per_pixel
 from . import ENGINE
 from .properties import block_of, settings_of
+from .texts import refusal
 
 PUPIL, GLARE = "Candela Pupil", "Candela Glare"
 _PARENT = f"CANDELA_CAMERA_PT_{EyeModel.name}"
@@ -46,6 +47,9 @@ class CANDELA_OT_eye_preset(bpy.types.Operator):
 
     def execute(self, context):
         camera = _camera(context)
+        if refused := refusal(camera):
+            self.report({"ERROR"}, refused)
+            return {"CANCELLED"}
         named = PRESETS[self.preset].values
         for param in EyeModel.params:
             if param.name in named or param.name in _OF_OBSERVERS:
@@ -62,7 +66,7 @@ class CANDELA_OT_eye_pictures(bpy.types.Operator):
 
     bl_idname = "candela.eye_pictures"
     bl_label = "Update Pictures"
-    bl_options = {"REGISTER"}
+    bl_options = {"REGISTER", "UNDO"}
 
     whole: bpy.props.BoolProperty(
         name="With Core", default=True,

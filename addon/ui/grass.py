@@ -8,7 +8,7 @@ import bpy
 
 from ..grass import directions
 from ..grass.blades import Recipe
-from ..grass.generate import Order, generate
+from ..grass.generate import Order, generate, remove_left
 from ..grass.patch import SUFFIX
 from . import ENGINE
 from .jobs import Job
@@ -86,11 +86,21 @@ def _in_menu(self, context):
         self.layout.operator(CandelaGrassPatch.bl_idname, icon="FORCE_TURBULENCE")
 
 
+@bpy.app.handlers.persistent
+def _after_undo(*_) -> None:
+    """Steps that were made while a tile was rendered hold it."""
+    remove_left()
+
+
 def register() -> None:
     bpy.utils.register_class(CandelaGrassPatch)
+    bpy.app.handlers.undo_post.append(_after_undo)
+    bpy.app.handlers.redo_post.append(_after_undo)
     bpy.types.TOPBAR_MT_render.append(_in_menu)
 
 
 def unregister() -> None:
     bpy.types.TOPBAR_MT_render.remove(_in_menu)
+    bpy.app.handlers.redo_post.remove(_after_undo)
+    bpy.app.handlers.undo_post.remove(_after_undo)
     bpy.utils.unregister_class(CandelaGrassPatch)

@@ -21,6 +21,21 @@ def part(steps: Iterator, first: float, last: float) -> Iterator[tuple[float, st
         steps.close()
 
 
+def layer_named(scene, name: str):
+    """A view layer that was chosen before a step; ValueError where it is gone. Held itself, it would point to nothing
+    once the artist removes it, and the context's is of another scene once the window shows one."""
+    layer = scene.view_layers.get(name)
+    if layer is None:
+        raise ValueError(f"Scene '{scene.name}' has no view layer '{name}' any more.")
+    return layer
+
+
+def depsgraph_of(context, scene, layer):
+    """The evaluated scene, whatever the window shows meanwhile."""
+    with context.temp_override(scene=scene, view_layer=layer):
+        return context.evaluated_depsgraph_get()
+
+
 class Job:
     """Base of operators whose work is the generator `work(context)`.
 
@@ -60,8 +75,10 @@ class Job:
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
-            self._work.close()
-            self._end(context)
+            try:
+                self._work.close()
+            finally:
+                self._end(context)
             self.report({"INFO"}, f"{self.bl_label} was cancelled.")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -95,13 +112,15 @@ class Job:
 
     def cancel(self, context):
         """Blender ends the operator: the window is closed or another file is opened."""
-        self._work.close()
-        Job.running = None
+        try:
+            self._work.close()
+        finally:
+            Job.running = None
 
     def before_undo(self) -> None:
         """Give up what the work refers to, while it is there; the operator ends with its next event."""
-        self._work.close()
         self._undone = True
+        self._work.close()
 
     def _end(self, context) -> None:
         Job.running = None

@@ -18,7 +18,7 @@ from ..frame.plan import PlanError, make_plan
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..techniques import REGISTRY, make_registry
 from . import ENGINE, shown_images, shown_otherwise
-from .jobs import Job, draw_progress, part
+from .jobs import Job, draw_progress, layer_named, part
 from .pass_nodes import pictures_of
 from .pass_run import Rendered, reference_images, render_steps
 from .pass_tree import TREE, Result, checked, fill, forget_results, graph_of, result, set_result
@@ -109,12 +109,13 @@ class CANDELA_OT_passes_run(_OnTree, Job, bpy.types.Operator):
             )
         size, share = run_size(scene, tree), 0.5 if self.compare else 1.0
         settings = replace(settings_of(scene, viewport=False), samples=tree.samples, passes=found.order, profile=True)
-        depsgraph = context.evaluated_depsgraph_get()
+        depsgraph, layer = context.evaluated_depsgraph_get(), context.view_layer.name
         rendered = yield from part(render_steps(scene, depsgraph, size, settings), 0.0, share)
         reference = None
         if self.compare:
-            shown_otherwise.warn(self, context.view_layer)
-            steps = reference_steps(scene, tree.reference_samples, settings.bounces == 0, size, context.view_layer)
+            chosen = layer_named(scene, layer)
+            shown_otherwise.warn(self, chosen)
+            steps = reference_steps(scene, tree.reference_samples, settings.bounces == 0, size, chosen)
             reference = yield from part(steps, share, 1.0)
         truth = reference_images(reference) if reference is not None else {}
         self._show(context, tree, rendered, truth, reference)
@@ -155,9 +156,14 @@ def _errors(rendered: Rendered, reference) -> dict[str, str]:
     return lines
 
 
-def _ended(called: set[str]) -> set[str]:
-    """What an operator says that has called another. The other one may be running; it has ended itself: Blender never
-    frees an operator that claims to be modal and is not."""
+def _run(operator: bpy.types.Operator, mode: str, **options) -> set[str]:
+    """What an operator says that has called Run, whose sentence becomes its own. Run may go on; the caller has ended:
+    Blender never frees an operator that claims to be modal and is not."""
+    try:
+        called = bpy.ops.candela.passes_run(mode, tree=operator.tree, **options)
+    except RuntimeError as error:
+        operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        return {"CANCELLED"}
     return {"CANCELLED"} if "CANCELLED" in called else {"FINISHED"}
 
 
@@ -173,7 +179,7 @@ class CANDELA_OT_passes_run_to_node(_OnTree, bpy.types.Operator):
         return Job.running is None and space is not None and space.type == "NODE_EDITOR" and context.active_node
 
     def execute(self, context):
-        return _ended(bpy.ops.candela.passes_run("INVOKE_DEFAULT", tree=self.tree, node=context.active_node.name))
+        return _run(self, "INVOKE_DEFAULT", node=context.active_node.name)
 
 
 class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
@@ -187,8 +193,7 @@ class CANDELA_OT_passes_compare(_OnTree, bpy.types.Operator):
         return Job.running is None
 
     def execute(self, context):
-        mode = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        return _ended(bpy.ops.candela.passes_run(mode, tree=self.tree, compare=True))
+        return _run(self, "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT", compare=True)
 
 
 class CANDELA_OT_passes_bake(_OnTree, bpy.types.Operator):

@@ -11,6 +11,7 @@ from mathutils import Vector
 from ..techniques.reflection_editing import ReflectionEditing
 from . import ENGINE
 from .scoped_panels import active_entry
+from .texts import refusal
 
 CONSTRAINTS, REGIONS = "reflection_editing_constraints", "reflection_editing_regions"
 PANEL = f"CANDELA_OBJECT_PT_{ReflectionEditing.name}"
@@ -44,15 +45,47 @@ def place(context, edited, point: Vector, normal: Vector, viewer: Vector):
     return entry
 
 
-def angle_of(entry, edited) -> float:
-    """Radians by which a constraint turns what its point mirrors; 0 where it has no surface."""
+def nearest(edited, place: Vector) -> tuple[Vector, Vector] | None:
+    """Point of an object's surface that is nearest to a place, and the normal there, all in its own space. None where
+    Blender keeps no surface to ask: without faces, in Edit Mode, and while the object is disabled in viewports."""
+    try:
+        found, point, normal, _ = edited.closest_point_on_mesh(place)
+    except RuntimeError:
+        return None
+    return (point, normal) if found else None
+
+
+def angle_of(entry, edited) -> float | None:
+    """Radians by which a constraint turns what its point mirrors; None where that is not known."""
     point, viewer, target = (Vector(getattr(entry, name)) for name in ("point", "viewer", "target"))
-    found, _, normal, _ = edited.closest_point_on_mesh(point)
-    if not found or entry.of != "REFLECTION" or not (target - point).length or not (viewer - point).length:
+    there = nearest(edited, point)
+    if there is None:
+        return None
+    if entry.of != "REFLECTION" or not (target - point).length or not (viewer - point).length:
         return 0.0
+    normal = there[1]
     view = (viewer - point).normalized()
     mirrored = 2.0 * view.dot(normal) * normal - view
     return mirrored.angle(target - point, 0.0)
+
+
+def clicked(layer, met):
+    """The object to edit of what a ray has met. ValueError with a sentence where it is none."""
+    if met is None:
+        raise ValueError("There is no surface where you clicked.")
+    edited = met.original or met
+    if edited.type != "MESH":
+        raise ValueError(f"'{edited.name}' is no mesh.")
+    if all(one != edited for one in layer.objects):
+        raise ValueError(f"'{edited.name}' is only shown as an instance here: make the instance real to edit it.")
+    if refused := refusal(edited):
+        raise ValueError(refused)
+    return edited
+
+
+_NO_SURFACE = (
+    "'{}' has no surface to place a constraint on: it needs faces, has to be enabled in viewports, and in Object Mode."
+)
 
 
 class _OfAnObject:
@@ -73,11 +106,15 @@ class CANDELA_OT_place_reflection(_OfAnObject, bpy.types.Operator):
 
     def execute(self, context):
         edited = context.object
-        inverse = edited.matrix_world.inverted_safe()
-        found, point, normal, _ = edited.closest_point_on_mesh(inverse @ Vector(self.location))
-        if not found:
-            self.report({"ERROR"}, f"'{edited.name}' has no surface to place a constraint on.")
+        if refused := refusal(edited):
+            self.report({"ERROR"}, refused)
             return {"CANCELLED"}
+        inverse = edited.matrix_world.inverted_safe()
+        there = nearest(edited, inverse @ Vector(self.location))
+        if there is None:
+            self.report({"ERROR"}, _NO_SURFACE.format(edited.name))
+            return {"CANCELLED"}
+        point, normal = there
         normal = (inverse.to_3x3().transposed() @ normal).normalized()
         place(context, edited, edited.matrix_world @ point, normal, Vector(self.viewer))
         return {"FINISHED"}
@@ -114,10 +151,10 @@ class CANDELA_OT_pick_reflection(_OfAnObject, bpy.types.Operator):
         direction = view3d_utils.region_2d_to_vector_3d(region, view, place_on_region)
         graph = context.evaluated_depsgraph_get()
         hit, point, normal, _, met, _ = context.scene.ray_cast(graph, start, direction)
-        edited = (met.original or met) if hit else None
-        if edited is None or edited.type != "MESH":
-            missing = f"'{edited.name}' is no mesh." if hit else "There is no surface where you clicked."
-            self.report({"WARNING"}, missing)
+        try:
+            edited = clicked(context.view_layer, met if hit else None)
+        except ValueError as error:
+            self.report({"WARNING"}, str(error))
             return {"CANCELLED"}
         for other in context.view_layer.objects.selected:
             other.select_set(False)
@@ -185,8 +222,8 @@ def _draw(self, context):
     row.operator("candela.pick_reflection", icon="EYEDROPPER")
     row.operator("candela.return_to_view", icon="LOOP_BACK")
     entry = active_entry(edited.candela, CONSTRAINTS)
-    if entry is not None and edited.type == "MESH" and edited.mode == "OBJECT":
-        turned = angle_of(entry, edited)
+    turned = angle_of(entry, edited) if entry is not None and edited.type == "MESH" else None
+    if turned is not None:
         icon = "ERROR" if turned > LARGE else "NONE"
         text = f"Turns reflections by {math.degrees(turned):.0f}°"
         self.layout.label(text=f"{text}: beyond 120° they fold over" if turned > LARGE else text, icon=icon)

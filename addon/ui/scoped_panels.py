@@ -16,6 +16,7 @@ from ..frame.technique import CAMERA, LIGHT, MATERIAL, OBJECT, POINT, SCENE, WOR
 from ..techniques import REGISTRY
 from . import ENGINE
 from .properties import titled
+from .texts import refusal
 
 # Tab of the Properties editor, and the context's name for the data-block that it shows.
 _TABS = {
@@ -130,6 +131,9 @@ class CANDELA_OT_edit_list(bpy.types.Operator):
         group = getattr(block, "candela", None)
         if group is None or not hasattr(group, f"{self.name}_active"):
             self.report({"ERROR"}, f"There is no list '{self.name}' of {self.scope.lower() or 'nothing'}.")
+            return {"CANCELLED"}
+        if refused := refusal(block):
+            self.report({"ERROR"}, refused)
             return {"CANCELLED"}
         entries, index = getattr(group, self.name), getattr(group, f"{self.name}_active")
         if self.action == "ADD":

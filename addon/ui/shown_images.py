@@ -5,16 +5,16 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-OWN = "made_by_candela"  # a packed image no longer says that it was generated
+OWN = "made_by_candela"  # under which name; a packed image no longer says that it was generated
 
 
 def write(name: str, picture: np.ndarray):
     """The image of this name with the content of `picture`, (H, W, 1 to 4) scene-linear; made if it is not there."""
     height, width = picture.shape[:2]
-    image = bpy.data.images.get(name)
-    if image is None or not image.is_float or not (image.source == "GENERATED" or image.get(OWN)):
+    image = _written_before(name)
+    if image is None:
         image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
-        image[OWN] = True
+        image[OWN] = name
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
     pixels = np.ones((height, width, 4), np.float32)
@@ -28,13 +28,22 @@ def write(name: str, picture: np.ndarray):
     return image
 
 
+def _written_before(name: str):
+    """The image to write anew: the one of this name or, where the artist has another so named, that with a number."""
+    named = bpy.data.images.get(name)
+    if named is not None and named.is_float and (named.source == "GENERATED" or named.get(OWN)):
+        return named
+    numbered = (image for image in bpy.data.images if image.name.startswith(f"{name}.") and image.is_float)
+    return next((image for image in numbered if image.get(OWN) == name), None)
+
+
 def show(context, name: str, picture: np.ndarray):
     """Write the image and show it in every Image Editor of the window that shows nothing else of the artist's.
 
     A new image is a step of its own for undo, since it may come long after the operator that wanted it has been called.
     A data-block that no step knows of would be freed by the next undo under those that point to it.
     """
-    made = name not in bpy.data.images
+    made = _written_before(name) is None
     image = write(name, picture)
     if made:
         bpy.ops.ed.undo_push(message=f"Show {name}")

@@ -1,4 +1,4 @@
-"""Sentences in panels, over as many lines as their width asks for."""
+"""Sentences in panels, over as many lines as their width asks for, and one that operators share."""
 
 from __future__ import annotations
 
@@ -15,3 +15,10 @@ def wrapped(layout, context, text: str, dim=False, indent=False, icon="NONE", ro
         row.active = not dim
         row.scale_y = 0.8
         row.label(text=line, icon=icon if number == 0 and icon != "NONE" else blank)
+
+
+def refusal(block) -> str:
+    """A sentence where a data-block is linked from another file: Blender would forget what is set. Else nothing."""
+    if block.is_editable:
+        return ""
+    return f"'{block.name}' is linked from another file, and what is set here would not be saved: make it local first."

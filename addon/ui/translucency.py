@@ -12,6 +12,7 @@ import numpy as np
 from ..frame.technique import MATERIAL, identifier
 from ..materials import translucency
 from ..techniques.image_space_subsurface import ImageSpaceSubsurface
+from .texts import refusal
 
 LABELS = {translucency.BLUR: "blur", translucency.TINT: "tint", translucency.TRANSLUCENCY: "translucency"}
 SOFT_BRUSH = "brushes/essentials_brushes-mesh_texture.blend/Brush/Paint Soft"
@@ -49,6 +50,18 @@ def overlapping(mesh) -> bool:
     return float((covered > 1.6).mean()) > 0.05
 
 
+def _overlaps(edited) -> bool:
+    """The same of an object's mesh, also in Edit Mode, in which Blender shows scripts no coordinates of it."""
+    if not edited.data.is_editmode:
+        return overlapping(edited.data)
+    edited.update_from_editmode()
+    copy = edited.data.copy()
+    try:
+        return overlapping(copy)
+    finally:
+        bpy.data.meshes.remove(copy)
+
+
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
@@ -70,11 +83,14 @@ class CANDELA_OT_new_translucency_maps(bpy.types.Operator):
 
     def execute(self, context):
         material = getattr(context, "material", None) or context.object.active_material
+        if refused := refusal(material):
+            self.report({"ERROR"}, refused)
+            return {"CANCELLED"}
         mesh = context.object.data if context.object is not None and context.object.type == "MESH" else None
         if mesh is not None and not mesh.uv_layers:
             self.report({"ERROR"}, f"'{mesh.name}' has no UV map: unwrap it first, then make maps.")
             return {"CANCELLED"}
-        if mesh is not None and mesh.uv_layers and overlapping(mesh):
+        if mesh is not None and _overlaps(context.object):
             self.report({"WARNING"}, "Parts of the UV map lie over one another: they will be painted together.")
         made = []
         for name in translucency.MAPS:
@@ -109,6 +125,12 @@ class CANDELA_OT_paint_translucency_map(bpy.types.Operator):
         image = getattr(material.candela, property_of(self.name), None) if material and self.name in LABELS else None
         if image is None:
             self.report({"ERROR"}, f"There is no {LABELS.get(self.name, self.name)} map: make new maps first.")
+            return {"CANCELLED"}
+        if not bpy.ops.object.mode_set.poll():
+            told = (
+                f"'{context.object.name}' cannot be painted: enable it in viewports, or make it local if it is linked."
+            )
+            self.report({"ERROR"}, told)
             return {"CANCELLED"}
         settings = context.scene.tool_settings.image_paint
         settings.mode, settings.canvas = "IMAGE", image

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import bpy
 
@@ -19,7 +20,7 @@ from ..frame.ledger import RAN
 from ..frame.technique import identifier
 from ..techniques import REGISTRY
 from . import ENGINE, shown_otherwise
-from .jobs import Job, draw_progress, part
+from .jobs import Job, depsgraph_of, draw_progress, layer_named, part
 from .pass_run import Rendered, render_steps
 from .properties import settings_of
 
@@ -119,20 +120,22 @@ class CANDELA_OT_tune(Job, bpy.types.Operator):
         share = scene.render.resolution_percentage * options.percentage / 10000
         size = tuple(max(int(side * share), 1) for side in (scene.render.resolution_x, scene.render.resolution_y))
         settings = settings_of(scene, viewport=False)
+        layer = context.view_layer.name
         shown_otherwise.warn(self, context.view_layer)
         steps = reference_steps(scene, options.reference_samples, settings.bounces == 0, size, context.view_layer)
         truth = yield from part(steps, 0.0, REFERENCE_SHARE)
         trials: list[tune.Trial] = []
-        searching = self._search(context, size, settings, truth, trials, options.milliseconds / 1000)
+        render = partial(_timed, context, scene, layer, size)
+        searching = self._search(render, scene, settings, truth, trials, options.milliseconds / 1000)
         yield from part(_within(searching, options.budget, trials), REFERENCE_SHARE, 1.0)
         global _found
         seconds = options.milliseconds / 1000
         _found = Found(scene.session_uid, trials, tune.proposal(trials, seconds), seconds)
         yield 1.0, "done"
 
-    def _search(self, context, size, settings, truth, trials, seconds) -> Iterator[str]:
+    def _search(self, render, scene, settings, truth, trials, seconds) -> Iterator[str]:
         """Renders candidate after candidate in small steps; yields a sentence after each."""
-        scene, mean = context.scene, truth.images["combined"]
+        mean = truth.images["combined"]
         noise = metrics.compare_radiance("", mean, mean, truth.half["combined"]).floor
         asked = tune.candidates(trials, choices(scene), REGISTRY, settings.values, seconds)
         warm: set[tuple] = set()
@@ -143,8 +146,8 @@ class CANDELA_OT_tune(Job, bpy.types.Operator):
                 if candidate.slots not in warm:
                     warm.add(candidate.slots)
                     first = replace(candidate, samples=1)
-                    yield from _timed(context, size, changed(settings, first, SEED + 1), told)
-                rendered, took = yield from _timed(context, size, changed(settings, candidate, SEED), told)
+                    yield from render(changed(settings, first, SEED + 1), told)
+                rendered, took = yield from render(changed(settings, candidate, SEED), told)
                 error = metrics.compare_radiance("", rendered.passes().images["combined"], mean).relmse
                 ran = tuple(row.name for row in rendered.ledger.rows if row.state == RAN)
                 candidate = asked.send(tune.Picture(took, max(error - noise, 1e-12), ran))
@@ -159,10 +162,11 @@ def changed(settings, candidate: tune.Candidate, seed: int):
     return replace(settings, samples=candidate.samples, seed=seed, slots=slots, values=values)
 
 
-def _timed(context, size, settings, told: str) -> Iterator[str]:
+def _timed(context, scene, layer: str, size, settings, told: str) -> Iterator[str]:
     """A render in steps, each followed by `told`; returns `Rendered` and the seconds that the steps took together."""
     took = 0.0
-    steps = render_steps(context.scene, context.evaluated_depsgraph_get(), size, settings, profile=False)
+    depsgraph = depsgraph_of(context, scene, layer_named(scene, layer))
+    steps = render_steps(scene, depsgraph, size, settings, profile=False)
     try:
         while True:
             started = time.perf_counter()

@@ -124,6 +124,63 @@ def test_nothing_is_left_in_the_open_file(tiny):
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
 
 
+def test_what_the_artist_makes_meanwhile_stays(tmp_path):
+    """A run in a window gives way to events after each view."""
+    steps = generate.generate(TINY, tmp_path / "tiny.grass")
+    next(steps), next(steps)
+    before = generate._blocks()
+    mesh, lamp = bpy.data.meshes.new("Own mesh"), bpy.data.lights.new("Own lamp", "POINT")
+    mesh.materials.append(bpy.data.materials.new("Own material"))
+    for data in (mesh, lamp):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(f"Object of {data.name}", data))
+    own = {one.name for uid, one in generate._blocks().items() if uid not in before}
+    steps.close()
+    left = {one.name for one in generate._blocks().values()}
+    assert len(own) == 5 and own <= left and "Grass tile" not in left
+
+
+def test_what_the_artist_removes_meanwhile_is_no_error(tmp_path):
+    steps = generate.generate(TINY, tmp_path / "tiny.grass")
+    before = {kind: len(getattr(bpy.data, kind)) for kind in generate._KINDS}
+    next(steps), next(steps)
+    bpy.data.objects.remove(bpy.data.scenes["Grass tile"].camera)
+    bpy.data.scenes.remove(bpy.data.scenes["Grass tile"])
+    with pytest.raises(ReferenceError):
+        next(steps)
+    assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
+
+
+def test_a_tile_as_the_only_scene_stays(empty_scene):
+    with generate.studio(TINY):
+        bpy.data.scenes.remove(empty_scene)
+    assert [scene.name for scene in bpy.data.scenes] == ["Grass tile"] and not bpy.data.scenes[0].objects
+    bpy.data.scenes.new("Own")
+    generate.remove_left()
+    assert [scene.name for scene in bpy.data.scenes] == ["Own"]
+
+
+def test_undo_to_a_step_made_meanwhile_brings_no_tile_back(registered, empty_scene, tmp_path):
+    def push(name):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, None))
+        bpy.ops.ed.undo_push(message=name)
+
+    def objects():
+        return [one.name for one in bpy.data.objects]
+
+    push("First")
+    with generate.studio(TINY):
+        push("Meanwhile")
+    push("Afterwards")
+    bpy.ops.ed.undo()
+    assert objects() == ["First", "Meanwhile"] and "Grass tile" not in bpy.data.scenes
+    bpy.ops.ed.undo()
+    assert objects() == ["First"]
+    for _ in range(2):
+        bpy.ops.ed.redo()
+        assert "Grass tile" not in bpy.data.scenes and "Meanwhile" in objects()
+    assert sorted(objects()) == ["Afterwards", "First", "Meanwhile"]
+
+
 def test_a_stopped_run_goes_on_and_gives_the_same_file(tiny, tmp_path):
     path = tmp_path / "tiny.grass"
     steps = generate.generate(TINY, path)

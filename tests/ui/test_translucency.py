@@ -7,7 +7,7 @@ import pytest
 from addon.materials import translucency
 from addon.materials.graph import Graph, Input, Node
 from addon.snapshot.scene import Image
-from addon.ui.translucency import overlapping, property_of
+from addon.ui.translucency import _overlaps, overlapping, property_of
 
 
 def _plane(name="Plane"):
@@ -60,6 +60,31 @@ def test_faces_over_one_another_are_found(registered):
     for k, corner in enumerate(bpy.context.object.data.uv_layers.active.uv):
         corner.vector = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)][k % 4]
     assert overlapping(bpy.context.object.data)
+
+
+def test_maps_are_made_in_edit_mode_too(registered):
+    """Blender keeps a mesh's coordinates elsewhere then; of the copy that is looked at nothing is left."""
+    plane, before = _plane("Edited"), len(bpy.data.meshes)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not _overlaps(plane)
+    assert bpy.ops.candela.new_translucency_maps(size=16) == {"FINISHED"}
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.duplicate()
+    assert _overlaps(plane) and len(bpy.data.meshes) == before and plane.mode == "EDIT"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert all(getattr(plane.active_material.candela, property_of(name)) for name in translucency.MAPS)
+
+
+def test_a_disabled_object_is_not_painted_and_the_remedy_is_said(registered):
+    plane = _plane("Disabled")
+    bpy.ops.candela.new_translucency_maps(size=16)
+    settings = bpy.context.scene.tool_settings.image_paint
+    settings.canvas = None
+    plane.hide_viewport = True
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match=r"^Error: 'Plane.*' cannot be painted: enable it in viewports"):
+        bpy.ops.candela.paint_translucency_map(name=translucency.MAPS[0])
+    assert settings.canvas is None and plane.mode == "OBJECT"
 
 
 def test_maps_join_the_graph_beside_the_surface():

@@ -9,12 +9,14 @@ import contextlib
 import random
 
 import bpy
+import numpy as np
 import pytest
 
 from addon import engine
-from addon.ui import ENGINE, pass_tree
+from addon.ui import ENGINE, pass_tree, shown_images
 
 STEPS = 60
+NAME = "Candela Shown"
 
 
 @pytest.fixture
@@ -64,6 +66,59 @@ def test_second_run_is_no_step(undoable):
     bpy.ops.candela.passes_run()
     bpy.ops.ed.undo()
     assert "Candela Passes" not in bpy.data.images
+
+
+def bake():
+    make_tree()
+    bpy.ops.candela.passes_run()
+    node = next(node for node in bpy.context.scene.candela.pass_tree.nodes if node.bl_idname == "CandelaPassOutput")
+    return bpy.ops.candela.passes_bake("EXEC_DEFAULT", True, node=node.name)
+
+
+def maps():
+    triangle = bpy.data.objects["Triangle"]
+    triangle.data.uv_layers.new()
+    triangle.data.materials.append(bpy.data.materials.new("Skin"))
+    bpy.context.view_layer.objects.active = triangle
+    push("Skin")
+    return bpy.ops.candela.new_translucency_maps("EXEC_DEFAULT", True, size=16)
+
+
+def eye():
+    bpy.context.scene.camera.data.candela.eye_side = "128"
+    push("Side")
+    return bpy.ops.candela.eye_pictures("EXEC_DEFAULT", True)
+
+
+def from_auto():
+    return bpy.ops.candela.passes_from_auto("EXEC_DEFAULT", True, use=True)
+
+
+@pytest.mark.parametrize("call", [eye, maps, from_auto, bake])
+def test_what_an_operator_makes_is_a_step(undoable, call):
+    """`True` has Blender push the step as for a button, which it does if the operator declares UNDO."""
+
+    def blocks():
+        return {one.name for kind in (bpy.data.images, bpy.data.node_groups) for one in kind}
+
+    assert call() == {"FINISHED"}
+    made = blocks()
+    bpy.ops.ed.undo()
+    before = blocks()
+    assert before < made
+    bpy.ops.ed.redo()
+    assert blocks() == made
+
+
+def test_an_image_beside_one_of_the_artists_own_is_a_step_and_one_only(undoable):
+    """An image of bytes takes no light: it stays as it is, whatever its name."""
+    own = bpy.data.images.new(NAME, 4, 4)
+    push("Own")
+    picture = np.full((8, 8, 3), 2.0, np.float32)
+    shown = [shown_images.show(bpy.context, NAME, picture).name for _ in range(2)]
+    assert shown == [f"{NAME}.001"] * 2 and tuple(own.size) == (4, 4)
+    bpy.ops.ed.undo()
+    assert [image.name for image in bpy.data.images if image.name.startswith(NAME)] == [NAME]
 
 
 def test_random_walk_of_trees_runs_edits_and_undo(undoable):
