@@ -26,7 +26,8 @@ Sources: Kulla & Fajardo 2012; Veach & Guibas 1995 (balance heuristic). In mirro
 
 Bias: below FEW samples shafts are as wide as four pixels at least; below MANY, light of several bounces is. Penumbrae
 of round lamps where walks end are those of points in a ball. Phase functions mixed at one place are one of their mean
-anisotropy. Mirrors and glass show single scattering alone, none in drafts and rough lobes, and no beams.
+anisotropy. Mirrors and glass show single scattering alone, none in drafts and rough lobes, and no beams. Of a ray that
+crosses more than twelve boundaries only the nearest twelve are known, and how often the others lead out.
 """
 
 from __future__ import annotations
