@@ -108,6 +108,7 @@ def test_a_medium_shines_as_the_integral_of_what_it_emits(stage):
     assert seen == pytest.approx(np.array([3, 2, 1]) / 0.5 * (1 - np.exp(-1.0)), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_what_shines_behind_media_that_vary_is_seen(stage):
     """Those before it leave room among a ray's bins."""
     stage.camera_above()

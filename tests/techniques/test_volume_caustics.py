@@ -196,6 +196,7 @@ def test_a_sun_sends_no_beams_into_fog_without_an_end(stage):
     assert not indirect_light_of_beams(stage).any()
 
 
+@pytest.mark.slow
 def test_fog_far_upstream_dims_the_beams_of_a_sun(stage):
     """A slab of optical depth 1, farther away than the scene is large."""
     stage.camera((0, -5, 0), (np.pi / 2, 0, 0))
