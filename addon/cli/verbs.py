@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import engine
+from .. import engine, final
 from ..compare import compare_scene, metrics, png, reference, table, write_report
 from ..film import point_costs
 from ..film.points import POINTS
@@ -402,6 +402,7 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
     `begun` was done before and this is `share` of it. Raises Refused when the render ended before its last sample.
     """
     lines = os.fdopen(os.dup(STDOUT), "w") if getattr(job.options, "progress", False) else None
+    latest, reached, started = None, 0.0, time.monotonic()
     with contextlib.ExitStack() as stack:
         if lines is not None:
             stack.enter_context(lines)
@@ -410,32 +411,32 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
             context.ensure()
         except RuntimeError as error:
             raise Refused(str(error)) from None
-        renderer = engine.session(job.scene, "final").renderer
-        advance, seen, wanted = renderer.advance, 0, 1
-        started = time.monotonic()
 
-        def advance_and_tell(frame) -> None:
-            nonlocal seen, wanted, started
-            if frame.samples_done == 0:
-                started = time.monotonic()
-            advance(frame)
-            seen, wanted = frame.samples_done, frame.settings.samples_to_draw
-            left = (time.monotonic() - started) / max(seen, 1) * (wanted - seen)
-            progress(terminal, f"Sample {seen} of {wanted}, {_duration(left)} left" if seen < wanted else then)
+        def tell(news: final.Progress) -> None:
+            nonlocal latest, reached, started
+            latest = news
+            if news.share is None:
+                return
+            if news.share == 0.0:  # of the next view layer, too
+                reached, started = 0.0, time.monotonic()
+            if news.share <= reached:
+                return
+            reached = news.share
+            left = (time.monotonic() - started) / reached * (1.0 - reached)
+            progress(terminal, f"{news.text}, {_duration(left)} left" if reached < 1.0 else then)
             if lines is not None:
                 print(
-                    f"Fra:{job.scene.frame_current} | {job.scene.name} | Rendering {seen} / {wanted} samples\n"
-                    f"openjd_progress: {100 * (begun + share * seen / wanted):.1f}",
+                    f"Fra:{job.scene.frame_current} | {job.scene.name} | {news.text}\n"
+                    f"openjd_progress: {100 * (begun + share * reached):.1f}",
                     file=lines, flush=True,
                 )  # fmt: skip
 
-        renderer.advance = advance_and_tell
+        engine.told = tell
         try:
             yield
         finally:
-            del renderer.advance
+            engine.told = None
             progress(terminal, "")
-    if renderer.frame is not None and renderer.frame.settings.time_limit:
-        wanted = renderer.frame.settings.samples_to_draw  # as many as there was time for
-    if seen < wanted and not engine.given:
-        raise Refused(f"The render of {job.options.file} ended after {seen} of {wanted} samples.")
+    if latest is not engine.FINISHED:
+        how = f" at: {latest.text}" if latest is not None else ""
+        raise Refused(f"The render of {job.options.file} was broken off{how}.")
