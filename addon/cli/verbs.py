@@ -185,10 +185,9 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
     sliced = scene.candela.sample_offset > 0 or scene.candela.sample_count > 0
     about = slices.about_slice(job) if sliced else {}
     with placed_in(path.parent, path.name) as folder:
-        held_back = [*job.held_back, *untrusted.hold_file_outputs(scene, path.parent, folder)]
         engine.taken = {} if sliced else None
         try:
-            with _watched(job, begun=begun, share=share):
+            with untrusted.file_outputs_held(scene, path.parent, folder) as muted, _watched(job, "", begun, share):
                 try:
                     bpy.ops.render.render(scene=scene.name, **target)
                 except RuntimeError as error:
@@ -204,7 +203,7 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
                 result.save_render(str(folder / path.name), scene=scene)
         if not (folder / path.name).is_file():
             raise OSError(None, "Blender wrote no file")
-        held_back += untrusted.leave_what_stands(folder, path.parent, path.name)
+        held_back = [*job.held_back, *muted, *untrusted.leave_what_stands(folder, path.parent, path.name)]
     print(job.title)
     _print_ledger()
     _print_held_back(held_back)
