@@ -115,6 +115,7 @@ def test_bad_usage_is_refused_before_the_file_is_opened(arguments, words, tmp_pa
         (("--samples", "0"), ["samples", "at least 1"]),
         (("--set", "direct_light.nonsense=1"), ["direct_light.nonsense", "Known settings"]),
         (("--set", "samples"), ["name=value"]),
+        (("--set", "relief.steps=300"), ["relief.steps", "material"]),
         (("--scene", "Nowhere"), ["Nowhere", "Cornell Box"]),
         (("--view-layer", "Nothing"), ["Nothing", "ViewLayer"]),
         (("--output", "picture.gif"), [".png", "picture.gif"]),

@@ -8,7 +8,7 @@ import os
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -28,7 +28,7 @@ from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
 from ..techniques import REGISTRY, make_registry
-from ..ui.properties import identifier, settings_of
+from ..ui.properties import put_values, settings_of
 from . import slices, untrusted
 from .files import output, placed_in, refuse_blend
 from .refused import USAGE, Refused, reason
@@ -114,20 +114,20 @@ def _named(kind: str, name: str | None, among):
 
 
 def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
-    """Put the given settings into the scene's properties. Raises ValueError with a sentence."""
+    """Put the given settings into the properties of the scene, its world and its cameras. Raises ValueError with a
+    sentence."""
     given = list(options.assignments)
     if options.samples is not None:
         given.append(f"samples={options.samples}")
         for layer in scene.view_layers:
             layer.samples = 0  # its own number of samples would count
-    settings = settings_of(scene, viewport=False).override(REGISTRY, given)
+    settings = replace(settings_of(scene, viewport=False), values={}).override(REGISTRY, given)
     group = scene.candela
     for param in SCENE_PARAMS:
         setattr(group, param.name, getattr(settings, param.name))
     for slot, technique in settings.slots.items():
         setattr(group, f"slot_{slot}", technique)
-    for (technique, param), value in settings.values.items():
-        setattr(group, identifier(technique, param), value)
+    put_values(scene, settings.values)
 
 
 # ------------------------------------------------------------------------------------------------------------- render

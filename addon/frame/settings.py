@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from .technique import Param, Technique
+from .technique import OF_A_PICTURE, Param, Technique
 
 SAMPLES = Param("samples", "Samples", 64, "Number of samples averaged per pixel; error falls as it grows", 1, 65536)
 SEED = Param(
@@ -106,11 +106,13 @@ class Settings:
         return tuple(self.get(technique, param.name) for param in technique.params)
 
     def override(self, techniques: Iterable[Technique], assignments: Iterable[str]) -> Settings:
-        """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown."""
+        """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown, or
+        of what a picture has many of."""
         settings = self
         techniques = list(techniques)
         own = {param.name: param for param in SCENE_PARAMS}
-        table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
+        declared = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
+        table = {name: (t, p) for name, (t, p) in declared.items() if p.scope in OF_A_PICTURE}
         slots: dict[str, list[str]] = {}
         for technique in techniques:
             for slot in technique.fills:
@@ -130,6 +132,11 @@ class Settings:
                 technique, param = table[name]
                 settings = replace(
                     settings, values={**settings.values, (technique.name, param.name): param.check(value)}
+                )
+            elif name in declared:
+                kind = declared[name][1].scope.lower()
+                raise ValueError(
+                    f"'{name}' is a setting of each {kind}, not of the picture: set it on the {kind} in the file."
                 )
             else:
                 known = ", ".join([*own, *slots, *table])
