@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import engine, final
+from .. import engine
 from ..compare import compare_scene, metrics, png, reference, table, write_report
 from ..film import point_costs
 from ..film.points import POINTS
@@ -411,7 +411,7 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
         except RuntimeError as error:
             raise Refused(str(error)) from None
 
-        def tell(news: final.Progress) -> None:
+        def tell(news) -> None:
             nonlocal latest, reached, started
             latest = news
             if news.share is None:
