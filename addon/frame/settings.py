@@ -45,6 +45,7 @@ MOTION_STEPS = Param(
     "Moments at which a final render with motion blur looks at the scene, at most one for each sample", 1, 256,
 )  # fmt: skip
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD, MOTION_STEPS)
+PARTIAL = (SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD)  # by which a picture has other samples than all
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 
@@ -100,6 +101,10 @@ class Settings:
     def as_draft(self) -> Settings:
         """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""
         return replace(self, draft=True, bounces=min(self.bounces, DRAFT_BOUNCES))
+
+    def with_all_samples(self) -> Settings:
+        """The same for a picture that is measured: no slice, and none that ends early."""
+        return replace(self, **{param.name: param.default for param in PARTIAL})
 
     def of(self, technique: Technique) -> tuple:
         """All of a technique's values, for its key."""
