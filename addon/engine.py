@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -53,6 +53,8 @@ _sessions: dict[tuple, Session] = {}
 # dictionary, each layer's samples are put there; of a layer in `given` no sample is drawn, but those sums are shown.
 taken: dict[str, slices.Slice] | None = None
 given: dict[str, dict[str, np.ndarray]] = {}
+told: Callable[[final.Progress], None] | None = None  # what the command line hears of final renders, as they go on
+FINISHED = final.Progress("Finished", 1.0)  # the last that is told of a view layer; one that was broken off lacks it
 
 
 def session(scene: bpy.types.Scene, use: str) -> Session:
@@ -223,6 +225,7 @@ class CandelaEngine(bpy.types.RenderEngine):
             for name, text in cryptomatte_metadata(order.snapshot, layer.name).items():
                 self.get_result().stamp_data_add_field(name, text)
             self.end_result(result)
+            self._tell(FINISHED, None, layer.name, eye)
         except (ValueError, RuntimeError) as error:
             self._fail(str(error))
             return
@@ -270,6 +273,8 @@ class CandelaEngine(bpy.types.RenderEngine):
     def _tell(self, progress: final.Progress, result, layer: str, eye: str):
         """Show how far the render is; returns the result that shows its picture, if there is one yet."""
         self.update_stats("Candela", progress.text)
+        if told is not None:
+            told(progress)
         if progress.share is not None:
             self.update_progress(progress.share)
         if progress.picture is not None:

@@ -12,12 +12,12 @@ CORNELL = ROOT / "sample_blends" / "cornell_box.blend"
 TINY = ("--size", "32x24", "--samples", "2")
 
 
-def candela(*arguments, folder: Path) -> subprocess.CompletedProcess:
+def candela(*arguments, folder: Path, start=("-m", "addon")) -> subprocess.CompletedProcess:
     """Run `python -m addon …` in `folder`."""
     # Blender as a module sets OCIO for this process, and says so where it finds it set.
     clean = {name: value for name, value in os.environ.items() if name != "OCIO"}
     return subprocess.run(
-        [sys.executable, "-m", "addon", *map(str, arguments)],
+        [sys.executable, *start, *map(str, arguments)],
         check=False,
         cwd=folder,
         env={**clean, "PYTHONPATH": str(ROOT), "CANDELA_CACHE": str(folder / "cache")},
@@ -115,6 +115,7 @@ def test_bad_usage_is_refused_before_the_file_is_opened(arguments, words, tmp_pa
         (("--samples", "0"), ["samples", "at least 1"]),
         (("--set", "direct_light.nonsense=1"), ["direct_light.nonsense", "Known settings"]),
         (("--set", "samples"), ["name=value"]),
+        (("--set", "relief.steps=300"), ["relief.steps", "material"]),
         (("--scene", "Nowhere"), ["Nowhere", "Cornell Box"]),
         (("--view-layer", "Nothing"), ["Nothing", "ViewLayer"]),
         (("--output", "picture.gif"), [".png", "picture.gif"]),
@@ -199,6 +200,105 @@ def test_render_writes_the_files_passes_as_multilayer_exr(tmp_path):
 
     layers = read_exr(output)
     assert layers["ViewLayer.Combined"].shape == (24, 32, 4)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    """A small scene whose block moves while the shutter is open."""
+    path = tmp_path_factory.mktemp("moving") / "moving.blend"
+    made = subprocess.run(
+        [sys.executable, "-c", MAKE_MOVING, str(CORNELL), str(path)], check=False, capture_output=True, text=True,
+        timeout=120,
+    )  # fmt: skip
+    assert path.exists(), made.stderr
+    return path
+
+
+MAKE_MOVING = """
+import os, sys
+import bpy
+
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+scene = bpy.context.scene
+block = bpy.data.objects["Tall Block"]
+for frame, x in ((0, -0.5), (2, 0.5)):
+    block.location.x = x
+    block.keyframe_insert("location", frame=frame)
+scene.frame_set(1)
+scene.render.use_motion_blur = True
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+os._exit(0)
+"""
+
+
+def progress_of(done: subprocess.CompletedProcess) -> list[float]:
+    marks = [line.split() for line in done.stdout.splitlines() if line.startswith("openjd_progress:")]
+    return [float(share) for _, share in marks]
+
+
+@pytest.mark.slow
+def test_motion_blur_is_rendered_to_its_last_sample_and_progress_counts_on_over_its_steps(moving, tmp_path):
+    options = ("--size", "32x24", "--samples", "4", "--progress")
+    done = candela("render", moving, *options, "--output", "picture.png", folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert (tmp_path / "picture.png").exists()
+    assert progress_of(done) == [25.0, 50.0, 75.0, 100.0]
+
+
+@pytest.mark.slow
+def test_slices_of_motion_blur_are_written_and_merged(moving, tmp_path):
+    for k in (1, 2):
+        done = candela(
+            "render", moving, "--size", "32x24", "--samples", "4", "--slice", f"{k}/2", "--output", f"{k}.exr",
+            "--progress", folder=tmp_path,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert progress_of(done) == [50.0, 100.0]
+    merged = candela("merge", "1.exr", "2.exr", "--output", "whole.png", folder=tmp_path)
+    assert merged.returncode == 0 and (tmp_path / "whole.png").exists(), merged.stderr
+
+
+@pytest.mark.slow
+def test_compare_takes_a_scene_with_motion_blur(moving, tmp_path):
+    options = ("--reference-samples", "2", "--output", "page")
+    done = candela("compare", moving, *TINY, *options, folder=tmp_path)
+    assert done.returncode == 0 and (tmp_path / "page" / "index.html").exists(), done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("file", "end"),
+    [("still", "noise_threshold=1"), ("moving", "noise_threshold=1"), ("moving", "time_limit=0.01")],
+    ids=["noise", "noise with motion blur", "time with motion blur"],
+)
+def test_a_picture_that_may_end_early_is_written_with_the_samples_that_it_has(file, end, moving, tmp_path):
+    options = ("--size", "32x24", "--samples", "64", "--set", end, "--progress", "--output", "picture.png")
+    done = candela("render", moving if file == "moving" else CORNELL, *options, folder=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert (tmp_path / "picture.png").exists()
+    assert progress_of(done)[-1] == 100.0
+    if (file, end) != ("moving", "noise_threshold=1"):  # a threshold does not count where something moves
+        assert "Rendering 64 / 64" not in done.stdout
+
+
+BROKEN_OFF = """
+import os, sys
+import addon
+from addon import cli, engine
+
+addon.register()
+engine.CandelaEngine._render = lambda *_: None  # as after Ctrl+C: nothing is drawn, and Blender calls it no error
+code = cli.main(sys.argv[1:])
+sys.stdout.flush()
+os._exit(code)
+"""
+
+
+@pytest.mark.slow
+def test_a_render_that_is_broken_off_is_refused_and_leaves_nothing(tmp_path):
+    done = candela("render", CORNELL, *TINY, "--output", "picture.png", folder=tmp_path, start=("-c", BROKEN_OFF))
+    assert_refused(done, 1, "broken off")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow

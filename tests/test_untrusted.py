@@ -174,6 +174,38 @@ def test_file_output_nodes_write_below_the_output_and_replace_nothing(folder, tm
     assert "taken" in done.stdout.partition("was there before")[0]
 
 
+ONLY_PROPER = """
+import os, sys
+import bpy
+
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
+scene = bpy.context.scene
+tree = scene.compositing_node_group if bpy.app.version >= (5, 0) else scene.node_tree
+for node in list(tree.nodes):
+    if node.name != "Proper" and node.bl_idname in ("CompositorNodeOutputFile", "CompositorNodeGroup"):
+        tree.nodes.remove(node)
+node = tree.nodes["Proper"]
+if hasattr(node, "directory"):
+    node.file_name = "beauty_####"
+else:
+    node.file_slots[0].path = "beauty_####"
+bpy.ops.wm.save_mainfile()
+os._exit(0)
+"""
+
+
+@pytest.mark.slow
+def test_file_output_nodes_write_below_the_output_in_each_of_several_frames(folder, tmp_path):
+    subprocess.run([sys.executable, "-c", ONLY_PROPER, str(folder / "scene.blend")], check=True, capture_output=True)
+    options = ("--compositing", "--frames", "1-3", "--output", folder / "out" / "a_####.png")
+    for _ in range(2):  # the second run deletes what the first has left behind
+        done = run("render", folder / "scene.blend", *TINY, *options, folder=tmp_path)
+        assert done.returncode == 0 and done.stderr == ""
+        found = sorted(path.name for path in (folder / "out" / "parts").glob("*"))
+        assert found == [f"beauty_000{frame}.png" for frame in (1, 2, 3)]
+        assert not [path for path in (folder / "out").iterdir() if path.name.startswith(".")]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("start", [("-m", "addon"), ("-c", WITH_PREFERENCE)], ids=["module", "preference on"])
 def test_no_code_of_the_file_runs_unless_it_is_trusted(start, folder, tmp_path):

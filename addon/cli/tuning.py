@@ -13,7 +13,7 @@ from ..frame import ledger as ledgers
 from ..gfx import context
 from ..techniques import REGISTRY
 from ..ui.properties import settings_of
-from ..ui.tuning import SEED, choices, properties
+from ..ui.tuning import AGAIN, SEED, choices, properties
 from . import untrusted
 from .files import output
 from .refused import USAGE, Refused, reason
@@ -62,7 +62,8 @@ def tune_scene(job: Job) -> None:
 
 def _renders(job: Job, layer, truth, deadline: float, seconds: float, terminal):
     """What renders a candidate for `tune.search`: warm, with its error; raises Spent after the deadline."""
-    warm: set[tuple] = set()
+    tried: set[tuple] = set()
+    warm: set[tuple] = set()  # techniques that ran together, whose programs are compiled
     scene = job.scene
     half = truth.half["combined"]
     noise = metrics.compare_radiance("", truth.images["combined"], truth.images["combined"], half).floor
@@ -70,18 +71,23 @@ def _renders(job: Job, layer, truth, deadline: float, seconds: float, terminal):
     def passes(candidate: tune.Candidate, seed: int):
         settings = [(scene.candela, name, value) for name, value in properties(candidate)]
         with reference.overridden(settings):
-            return reference.render_passes(scene, "CANDELA", candidate.samples, seed, view_layer=layer)
+            made = reference.render_passes(scene, "CANDELA", candidate.samples, seed, view_layer=layer)
+        ran = ledgers.latest().ran
+        was_warm = ran in warm
+        warm.add(ran)
+        return made, ran, was_warm
 
     def render(candidate: tune.Candidate) -> tune.Picture:
         if time.monotonic() > deadline:
             raise tune.Spent
         progress(terminal, f"{deadline - time.monotonic():.0f} s left: {candidate.text()}")
-        if candidate.slots not in warm:
+        if candidate.slots not in tried:
             passes(replace(candidate, samples=1), SEED + 1)
-            warm.add(candidate.slots)
-        made = passes(candidate, SEED)
+            tried.add(candidate.slots)
+        made, ran, was_warm = passes(candidate, SEED)
+        if not was_warm:  # Auto, and Denoise, go by the number of samples
+            made, ran, _ = passes(candidate, AGAIN)
         error = metrics.compare_radiance("", made.images["combined"], truth.images["combined"]).relmse
-        ran = tuple(row.name for row in ledgers.latest().rows if row.state == ledgers.RAN)
         return tune.Picture(made.seconds, max(error - noise, 1e-12), ran)
 
     return render

@@ -19,6 +19,7 @@ What an artist would miss is said in a sentence; what changes no picture is not.
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -102,29 +103,43 @@ def _of_sequence(path: Path, first: Path) -> bool:
 # ---------------------------------------------------------------------------------------------------- File Output nodes
 
 
-def hold_file_outputs(scene, folder: Path, temporary: Path) -> Sentences:
-    """Let the scene's File Output nodes write into `temporary`, as they would into `folder`; mute all others."""
-    said = []
-    tree = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.node_tree
-    if not scene.render.use_compositing or tree is None:
-        return said
+@contextlib.contextmanager
+def file_outputs_held(scene, folder: Path, temporary: Path) -> Iterator[Sentences]:
+    """The scene's File Output nodes write into `temporary` inside, as they would into `folder`; all others are mute.
+
+    Afterwards they are as they were: the next frame has another temporary folder.
+    """
+    said, before = [], []
     folder = folder.resolve()
-    for node in _file_outputs(tree, set()):
-        where, names = _target(node)
-        place = Path(bpy.path.abspath(where)).resolve() if where else folder
-        wanders = any(".." in Path(name).parts or Path(name).is_absolute() for name in names)
-        if wanders or "{" in where or not place.is_relative_to(folder):
-            node.mute = True
-            said.append(
-                f"File Output node '{node.name}' points to {where or names[0]}, not below {folder}; it is mute."
-            )
-        else:
-            _aim(node, str(temporary / place.relative_to(folder)))
-    return said
+    try:
+        for node in _file_outputs(_compositor(scene), set()):
+            where, names = _target(node)
+            before.append((node, where, node.mute))
+            place = Path(bpy.path.abspath(where)).resolve() if where else folder
+            wanders = any(".." in Path(name).parts or Path(name).is_absolute() for name in names)
+            if wanders or "{" in where or not place.is_relative_to(folder):
+                node.mute = True
+                said.append(
+                    f"File Output node '{node.name}' points to {where or names[0]}, not below {folder}; it is mute."
+                )
+            else:
+                aimed = str(temporary / place.relative_to(folder))
+                setattr(node, _place_of(node), f"{aimed}/" if _place_of(node) == "directory" else aimed)
+        yield said
+    finally:
+        for node, where, mute in before:
+            setattr(node, _place_of(node), where)
+            node.mute = mute
+
+
+def _compositor(scene):
+    """The node tree that a render runs; None without one."""
+    tree = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.node_tree
+    return tree if scene.render.use_compositing else None
 
 
 def _file_outputs(tree, seen: set) -> Iterator:
-    if tree.name_full in seen:
+    if tree is None or tree.name_full in seen:
         return
     seen.add(tree.name_full)
     for node in tree.nodes:
@@ -135,17 +150,15 @@ def _file_outputs(tree, seen: set) -> Iterator:
 
 
 def _target(node) -> tuple[str, list[str]]:
-    """Folder (before 5.0, of a multilayer file the file itself) and the names that are added to it."""
-    if hasattr(node, "directory"):
+    """The folder and the names that are added to it."""
+    if _place_of(node) == "directory":
         return node.directory, [node.file_name, *(item.name for item in node.file_output_items)]
     return node.base_path, [slot.path for slot in node.file_slots]
 
 
-def _aim(node, place: str) -> None:
-    if hasattr(node, "directory"):
-        node.directory = place + "/"
-    else:
-        node.base_path = place
+def _place_of(node) -> str:
+    """The property that holds the folder; before Blender 5.0, of a multilayer file the file itself."""
+    return "directory" if hasattr(node, "directory") else "base_path"
 
 
 def leave_what_stands(temporary: Path, folder: Path, picture: str) -> Sentences:

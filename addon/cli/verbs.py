@@ -8,7 +8,7 @@ import os
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -28,7 +28,7 @@ from ..materials.compiler import compile_material
 from ..snapshot import SnapshotCache, UnsupportedScene, take
 from ..snapshot.scene import Note, Snapshot
 from ..techniques import REGISTRY, make_registry
-from ..ui.properties import identifier, settings_of
+from ..ui.properties import put_values, settings_of
 from . import slices, untrusted
 from .files import output, placed_in, refuse_blend
 from .refused import USAGE, Refused, reason
@@ -114,20 +114,20 @@ def _named(kind: str, name: str | None, among):
 
 
 def _apply_settings(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
-    """Put the given settings into the scene's properties. Raises ValueError with a sentence."""
+    """Put the given settings into the properties of the scene, its world and its cameras. Raises ValueError with a
+    sentence."""
     given = list(options.assignments)
     if options.samples is not None:
         given.append(f"samples={options.samples}")
         for layer in scene.view_layers:
             layer.samples = 0  # its own number of samples would count
-    settings = settings_of(scene, viewport=False).override(REGISTRY, given)
+    settings = replace(settings_of(scene, viewport=False), values={}).override(REGISTRY, given)
     group = scene.candela
     for param in SCENE_PARAMS:
         setattr(group, param.name, getattr(settings, param.name))
     for slot, technique in settings.slots.items():
         setattr(group, f"slot_{slot}", technique)
-    for (technique, param), value in settings.values.items():
-        setattr(group, identifier(technique, param), value)
+    put_values(scene, settings.values)
 
 
 # ------------------------------------------------------------------------------------------------------------- render
@@ -185,10 +185,9 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
     sliced = scene.candela.sample_offset > 0 or scene.candela.sample_count > 0
     about = slices.about_slice(job) if sliced else {}
     with placed_in(path.parent, path.name) as folder:
-        held_back = [*job.held_back, *untrusted.hold_file_outputs(scene, path.parent, folder)]
         engine.taken = {} if sliced else None
         try:
-            with _watched(job, begun=begun, share=share):
+            with untrusted.file_outputs_held(scene, path.parent, folder) as muted, _watched(job, "", begun, share):
                 try:
                     bpy.ops.render.render(scene=scene.name, **target)
                 except RuntimeError as error:
@@ -204,7 +203,7 @@ def _render_picture(job: Job, path: Path, begun: float, share: float) -> None:
                 result.save_render(str(folder / path.name), scene=scene)
         if not (folder / path.name).is_file():
             raise OSError(None, "Blender wrote no file")
-        held_back += untrusted.leave_what_stands(folder, path.parent, path.name)
+        held_back = [*job.held_back, *muted, *untrusted.leave_what_stands(folder, path.parent, path.name)]
     print(job.title)
     _print_ledger()
     _print_held_back(held_back)
@@ -402,6 +401,7 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
     `begun` was done before and this is `share` of it. Raises Refused when the render ended before its last sample.
     """
     lines = os.fdopen(os.dup(STDOUT), "w") if getattr(job.options, "progress", False) else None
+    latest, reached, started = None, 0.0, time.monotonic()
     with contextlib.ExitStack() as stack:
         if lines is not None:
             stack.enter_context(lines)
@@ -410,32 +410,32 @@ def _watched(job: Job, then: str = "", begun: float = 0.0, share: float = 1.0) -
             context.ensure()
         except RuntimeError as error:
             raise Refused(str(error)) from None
-        renderer = engine.session(job.scene, "final").renderer
-        advance, seen, wanted = renderer.advance, 0, 1
-        started = time.monotonic()
 
-        def advance_and_tell(frame) -> None:
-            nonlocal seen, wanted, started
-            if frame.samples_done == 0:
-                started = time.monotonic()
-            advance(frame)
-            seen, wanted = frame.samples_done, frame.settings.samples_to_draw
-            left = (time.monotonic() - started) / max(seen, 1) * (wanted - seen)
-            progress(terminal, f"Sample {seen} of {wanted}, {_duration(left)} left" if seen < wanted else then)
+        def tell(news) -> None:
+            nonlocal latest, reached, started
+            latest = news
+            if news.share is None:
+                return
+            if news.share == 0.0:  # of the next view layer, too
+                reached, started = 0.0, time.monotonic()
+            if news.share <= reached:
+                return
+            reached = news.share
+            left = (time.monotonic() - started) / reached * (1.0 - reached)
+            progress(terminal, f"{news.text}, {_duration(left)} left" if reached < 1.0 else then)
             if lines is not None:
                 print(
-                    f"Fra:{job.scene.frame_current} | {job.scene.name} | Rendering {seen} / {wanted} samples\n"
-                    f"openjd_progress: {100 * (begun + share * seen / wanted):.1f}",
+                    f"Fra:{job.scene.frame_current} | {job.scene.name} | {news.text}\n"
+                    f"openjd_progress: {100 * (begun + share * reached):.1f}",
                     file=lines, flush=True,
                 )  # fmt: skip
 
-        renderer.advance = advance_and_tell
+        engine.told = tell
         try:
             yield
         finally:
-            del renderer.advance
+            engine.told = None
             progress(terminal, "")
-    if renderer.frame is not None and renderer.frame.settings.time_limit:
-        wanted = renderer.frame.settings.samples_to_draw  # as many as there was time for
-    if seen < wanted and not engine.given:
-        raise Refused(f"The render of {job.options.file} ended after {seen} of {wanted} samples.")
+    if latest is not engine.FINISHED:
+        how = f" at: {latest.text}" if latest is not None else ""
+        raise Refused(f"The render of {job.options.file} was broken off{how}.")

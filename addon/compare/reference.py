@@ -29,6 +29,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..frame.settings import PARTIAL
 from ..gfx import context
 from ..gfx.user_folder import user_folder
 from ..snapshot.exr import read_exr
@@ -289,6 +290,7 @@ def render_settings(
     else:
         own = getattr(scene, engine.lower(), None)
         settings += [(own, "samples", samples), (own, "seed", seed)]
+        settings += [(own, param.name, param.default) for param in PARTIAL]  # all samples that are asked for
         if bounces is not None:
             settings.append((own, "bounces", bounces))
     return [setting for setting in settings if setting[0] is not None and hasattr(setting[0], setting[1])]

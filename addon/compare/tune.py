@@ -3,11 +3,12 @@
 What Auto knows comes from other scenes and another machine. Here candidates are rendered and measured on the scene
 itself, until a budget is spent:
 
-1. The scene's own techniques, and then each other choice of techniques by slot, are swept over 1, 2, 4, … samples up
-   to the asked time; a choice that is clearly behind what is already known is not swept further.
+1. The scene's own choices, Auto among them, and then each other choice of techniques by slot, are swept over 1, 2, 4,
+   … samples up to the asked time; a choice that is clearly behind what is already known is not swept further. A slot
+   that is off stays off.
 2. The best choice is rendered at the number of samples that just fits.
-3. Its techniques' numeric parameters are doubled and halved, one by one, the samples refitted to the time; what lowers
-   the error stays, and is the start for the next.
+3. Its techniques' numeric parameters of the scene are doubled and halved, one by one, the samples refitted to the time;
+   what lowers the error stays, and is the start for the next.
 
 Error is relMSE against a reference of the same scene, less the reference's own noise. Time is that of a whole render
 with compiled programs. A trial's figures are those of one seed: differences of a few per cent are chance, so a
@@ -20,7 +21,7 @@ import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from ..frame.technique import Technique
+from ..frame.technique import SCENE, Technique
 
 BEHIND = 2.0  # a choice whose error is so many times the best known one at its time is not swept further
 WINS = 0.95  # a changed parameter must bring the error below this share of what it was
@@ -101,8 +102,8 @@ def candidates(
 ) -> Generator[Candidate, Picture, None]:
     """Yields what to render next, and is sent what came out; `trials`, empty at first, grows by one each time.
 
-    `slots` names the techniques to choose from by slot, the scene's own choice first; `values` are the scene's own
-    parameters; `seconds` is the time that a picture may take.
+    `slots` names what to choose from by slot, techniques and Auto, the scene's own choice first; `values` are the
+    scene's own parameters; `seconds` is the time that a picture may take.
     """
     for choice in _choices(slots):
         yield from _sweep(trials, Candidate(1, choice), seconds, most_samples)
@@ -135,12 +136,19 @@ def _sweep(trials: list[Trial], start: Candidate, seconds: float, most: int) -> 
     samples = 1
     while samples <= most:
         trial = yield from _tried(trials, replace(start, samples=samples))
-        if any(one.candidate.slots != start.slots and one.picture.ran == trial.picture.ran for one in trials):
+        if any(_is_alike(one, trial) for one in trials):
             return  # the choice makes no difference in this scene
         others = [one.error for one in trials if one.candidate.slots != start.slots and one.seconds <= trial.seconds]
         if trial.seconds * 1.5 > seconds or (others and trial.error > BEHIND * min(others)):
             return
         samples *= 2
+
+
+def _is_alike(one: Trial, other: Trial) -> bool:
+    """Whether two choices came to the same techniques. With other numbers of samples that says nothing: Auto chooses
+    by them."""
+    choices, samples = (one.candidate.slots, other.candidate.slots), (one.candidate.samples, other.candidate.samples)
+    return choices[0] != choices[1] and samples[0] == samples[1] and one.picture.ran == other.picture.ran
 
 
 def _fitted(trials: list[Trial], trial: Trial, seconds: float, most: int) -> Asking:
@@ -152,12 +160,12 @@ def _fitted(trials: list[Trial], trial: Trial, seconds: float, most: int) -> Ask
 def _step_parameters(
     trials: list[Trial], best: Trial, techniques, own: dict, seconds: float, most: int
 ) -> Generator[Candidate, Picture, None]:
-    """Double and halve each numeric parameter of the techniques that ran; what wins is kept."""
+    """Double and halve each numeric parameter of the scene of the techniques that ran; what wins is kept."""
     for technique in techniques:
         if technique.name not in best.picture.ran:
             continue
-        for param in technique.params:
-            if isinstance(param.default, bool | str):
+        for param in technique.params_of(SCENE):  # what is applied is applied to the scene
+            if isinstance(param.default, bool | str | tuple):
                 continue
             for factor in (2.0, 0.5):
                 values = dict(best.candidate.values)

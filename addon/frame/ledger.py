@@ -40,6 +40,11 @@ class Ledger:
                 return row
         raise KeyError(f"The ledger has no row '{name}'.")
 
+    @property
+    def ran(self) -> tuple[str, ...]:
+        """Names of the techniques that ran."""
+        return tuple(row.name for row in self.rows if row.state == RAN)
+
     def text(self) -> str:
         """As a table for the terminal."""
         width = max((len(row.label) for row in self.rows), default=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from .technique import Param, Technique
+from .technique import OF_A_PICTURE, Param, Technique
 
 SAMPLES = Param("samples", "Samples", 64, "Number of samples averaged per pixel; error falls as it grows", 1, 65536)
 SEED = Param(
@@ -45,6 +45,7 @@ MOTION_STEPS = Param(
     "Moments at which a final render with motion blur looks at the scene, at most one for each sample", 1, 256,
 )  # fmt: skip
 SCENE_PARAMS = (SAMPLES, SEED, BOUNCES, SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD, MOTION_STEPS)
+PARTIAL = (SAMPLE_OFFSET, SAMPLE_COUNT, TIME_LIMIT, NOISE_THRESHOLD)  # by which a picture has other samples than all
 AUTO = "AUTO"
 OFF = "OFF"  # a slot that nothing fills
 
@@ -101,16 +102,22 @@ class Settings:
         """The same for a picture of a moment. Light of more bounces than four is faint, and costs as much as before."""
         return replace(self, draft=True, bounces=min(self.bounces, DRAFT_BOUNCES))
 
+    def with_all_samples(self) -> Settings:
+        """The same for a picture that is measured: no slice, and none that ends early."""
+        return replace(self, **{param.name: param.default for param in PARTIAL})
+
     def of(self, technique: Technique) -> tuple:
         """All of a technique's values, for its key."""
         return tuple(self.get(technique, param.name) for param in technique.params)
 
     def override(self, techniques: Iterable[Technique], assignments: Iterable[str]) -> Settings:
-        """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown."""
+        """Settings changed by texts like `direct.rays=2`, `samples=16`, `slot.shadow=NAME`. ValueError if unknown, or
+        of what a picture has many of."""
         settings = self
         techniques = list(techniques)
         own = {param.name: param for param in SCENE_PARAMS}
-        table = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
+        declared = {f"{t.name}.{p.name}": (t, p) for t in techniques for p in t.params}
+        table = {name: (t, p) for name, (t, p) in declared.items() if p.scope in OF_A_PICTURE}
         slots: dict[str, list[str]] = {}
         for technique in techniques:
             for slot in technique.fills:
@@ -130,6 +137,11 @@ class Settings:
                 technique, param = table[name]
                 settings = replace(
                     settings, values={**settings.values, (technique.name, param.name): param.check(value)}
+                )
+            elif name in declared:
+                kind = declared[name][1].scope.lower()
+                raise ValueError(
+                    f"'{name}' is a setting of each {kind}, not of the picture: set it on the {kind} in the file."
                 )
             else:
                 known = ", ".join([*own, *slots, *table])

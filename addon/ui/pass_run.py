@@ -60,7 +60,7 @@ _kept: dict[int, _Kept] = {}  # by session_uid of the scene, the one that was as
 def render_steps(
     scene, depsgraph, size: tuple[int, int], settings: Settings, profile: bool = True
 ) -> Iterator[tuple[float, str]]:
-    """Render the scene with these settings; yields the share done and a sentence, returns `Rendered`.
+    """Render all samples of the scene with these settings; yields the share done and a sentence, returns `Rendered`.
 
     With `profile` each technique's time is true, and the whole takes longer, for the GPU is waited for after each.
 
@@ -68,6 +68,7 @@ def render_steps(
     RuntimeError when the GPU cannot.
     """
     gpu_context.ensure()
+    settings = replace(settings.with_all_samples(), profile=profile)
     kept = _kept[scene.session_uid] = _kept.pop(scene.session_uid, None) or _Kept()
     try:
         snapshot = take(depsgraph, kept.cache, *size)
@@ -78,7 +79,7 @@ def render_steps(
         for other in list(_kept)[:-MOST_KEPT]:
             _kept.pop(other).renderer.release()
     compiled = library.compile_count
-    frame = yield from _begun(kept.renderer, snapshot, replace(settings, profile=profile))
+    frame = yield from _begun(kept.renderer, snapshot, settings)
     if profile and compiled != library.compile_count:
         # Drivers make the rest of a program at its first draw. Drawn again, each technique's time is its own.
         for _ in samples_in_parts(kept.renderer, frame):
@@ -86,7 +87,7 @@ def render_steps(
             if frame.samples_done:
                 break
         kept.renderer.forget()
-        frame = yield from _begun(kept.renderer, snapshot, replace(settings, profile=profile))
+        frame = yield from _begun(kept.renderer, snapshot, settings)
     for _ in samples_in_parts(kept.renderer, frame):
         drawing = min(frame.samples_done + 1, settings.samples)
         yield frame.samples_done / settings.samples, f"sample {drawing} of {settings.samples}"

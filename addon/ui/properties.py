@@ -224,6 +224,20 @@ def block_of(scope: str, scene, depsgraph=None):
     return block.evaluated_get(depsgraph) if depsgraph is not None and block is not None else block
 
 
+def put_values(scene, values: dict[tuple[str, str], object]) -> None:
+    """Set parameters of which a picture has one value each, by (technique, parameter): in the scene and its world, and
+    in all cameras that markers make active. ValueError with a sentence where there is no such data-block."""
+    marked = [marker.camera for marker in scene.timeline_markers if marker.camera and marker.camera.type == "CAMERA"]
+    for scope, key, name, _ in _of_a_picture(REGISTRY):
+        if key not in values:
+            continue
+        blocks = [block_of(scope, scene), *(camera.data for camera in marked if scope == CAMERA)]
+        if blocks == [None]:
+            raise ValueError(f"'{'.'.join(key)}' is a setting of the {scope.lower()}, and the scene has none.")
+        for block in filter(None, blocks):
+            setattr(block.candela, name, values[key])
+
+
 def _values(scene, depsgraph) -> dict[tuple[str, str], object]:
     """What is set of the parameters of which a picture has one value each."""
     values = {}

@@ -16,7 +16,7 @@ import bpy
 
 from ..compare import metrics, tune
 from ..compare.beside import reference_steps
-from ..frame.ledger import RAN
+from ..frame.settings import OFF
 from ..frame.technique import identifier
 from ..techniques import REGISTRY
 from . import ENGINE, shown_otherwise
@@ -25,19 +25,23 @@ from .pass_run import Rendered, render_steps
 from .properties import settings_of
 
 SEED = 11  # of timed renders; programs are compiled by a render of another one
+AGAIN = 13  # where that was found to have compiled programs after all; the same picture would not be drawn twice
 REFERENCE_SHARE = 0.3  # of the progress
 MOST_ROWS = 12  # of the curve, in the panel
 
 
 def choices(scene) -> dict[str, list[str]]:
-    """Techniques to try by slot, the one that is set first; slots without a choice stay away."""
+    """What to try by slot, the scene's own choice first: of a slot on Auto that is Auto itself. Slots without a choice
+    stay away, and so do those that are off."""
     found: dict[str, list[str]] = {}
     for technique in REGISTRY:
         for slot in technique.fills:
             found.setdefault(slot, []).append(technique.name)
     chosen = {slot: getattr(scene.candela, f"slot_{slot}") for slot in found}
     return {
-        slot: sorted(names, key=lambda name: name != chosen[slot]) for slot, names in found.items() if len(names) > 1
+        slot: [chosen[slot], *(name for name in names if name != chosen[slot])]
+        for slot, names in found.items()
+        if len(names) > 1 and chosen[slot] != OFF
     }
 
 
@@ -138,19 +142,23 @@ class CANDELA_OT_tune(Job, bpy.types.Operator):
         mean = truth.images["combined"]
         noise = metrics.compare_radiance("", mean, mean, truth.half["combined"]).floor
         asked = tune.candidates(trials, choices(scene), REGISTRY, settings.values, seconds)
-        warm: set[tuple] = set()
+        tried: set[tuple] = set()
+        warm: set[tuple] = set()  # techniques that ran together, whose programs are compiled
         try:
             candidate = next(asked)
             while True:
                 told = f"{len(trials)} settings measured; {candidate.samples} samples"
-                if candidate.slots not in warm:
-                    warm.add(candidate.slots)
+                if candidate.slots not in tried:
+                    tried.add(candidate.slots)
                     first = replace(candidate, samples=1)
-                    yield from render(changed(settings, first, SEED + 1), told)
+                    rendered, _ = yield from render(changed(settings, first, SEED + 1), told)
+                    warm.add(rendered.ledger.ran)
                 rendered, took = yield from render(changed(settings, candidate, SEED), told)
+                if rendered.ledger.ran not in warm:  # Auto, and Denoise, go by the number of samples
+                    warm.add(rendered.ledger.ran)
+                    rendered, took = yield from render(changed(settings, candidate, AGAIN), told)
                 error = metrics.compare_radiance("", rendered.passes().images["combined"], mean).relmse
-                ran = tuple(row.name for row in rendered.ledger.rows if row.state == RAN)
-                candidate = asked.send(tune.Picture(took, max(error - noise, 1e-12), ran))
+                candidate = asked.send(tune.Picture(took, max(error - noise, 1e-12), rendered.ledger.ran))
         except StopIteration:
             pass
 

@@ -73,6 +73,36 @@ def test_a_choice_that_makes_no_difference_costs_one_render():
     assert len(others) == 1
 
 
+def test_a_choice_is_swept_unless_it_comes_to_the_same_with_the_same_samples():
+    def by_samples(candidate):
+        """Auto takes maps for one sample and moments for more."""
+        choice = dict(candidate.slots)["shadow"]
+        taken = choice if choice != "AUTO" else "maps" if candidate.samples == 1 else "moments"
+        return Picture(0.01 * candidate.samples, 1.0 / candidate.samples, (taken,))
+
+    trials = tune.search({"shadow": ["AUTO", "maps", "moments"]}, (), {}, by_samples, 0.1)
+    tried = {name: [] for name in ("AUTO", "maps", "moments")}
+    for trial in trials:
+        tried[dict(trial.candidate.slots)["shadow"]].append(trial.candidate.samples)
+    assert tried["maps"] == [1]  # as Auto
+    assert tried["moments"] == [1, 2]  # as Auto from two samples on
+
+
+@pytest.mark.parametrize("scope", ["CAMERA", "WORLD", "LIGHT", "MATERIAL", "OBJECT"])
+def test_only_numbers_of_the_scene_are_tuned(scope):
+    class Elsewhere(Technique):
+        name = "maps"
+        params = (
+            Param("age", "Age", 8.0, "", 1.0, 16.0, scope=scope),
+            Param("tint", "Tint", (1.0, 1.0, 1.0), ""),
+            Param("texels", "Texels", 8, "", 1, 16),
+        )
+
+    values = {("maps", "texels"): 8, ("maps", "tint"): (1.0, 1.0, 1.0)}
+    trials = tune.search({"shadow": ["maps"]}, (Elsewhere,), values, machine, 1.0)
+    assert {name for trial in trials for name, _ in trial.candidate.values} == {("maps", "texels")}
+
+
 def test_when_the_budget_is_spent_what_was_measured_is_the_result():
     left = iter(range(5))
 

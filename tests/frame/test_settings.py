@@ -75,6 +75,27 @@ def test_a_mistake_is_answered_with_a_sentence_that_names_it(text, sentence):
         Settings().override([RAYS], [text])
 
 
+@pytest.mark.parametrize("scope", ["LIGHT", "MATERIAL", "OBJECT"])
+def test_what_each_lamp_material_or_object_has_is_no_setting_of_a_picture(scope):
+    class Own(Rays):
+        params = (Param("steps", "Steps", 8, "", 1, 64, scope=scope), Param("count", "Count", 8, "", 1, 64))
+
+    kind = scope.lower()
+    with pytest.raises(ValueError, match=f"'rays.steps' is a setting of each {kind}.*set it on the {kind} in the file"):
+        Settings().override([Own()], ["rays.steps=9"])
+    with pytest.raises(ValueError, match="Known settings") as listed:
+        Settings().override([Own()], ["rays.unknown=9"])
+    assert "rays.count" in str(listed.value) and "rays.steps" not in str(listed.value)
+
+
+@pytest.mark.parametrize("scope", ["CAMERA", "WORLD"])
+def test_what_the_camera_or_the_world_has_is_a_setting_of_a_picture(scope):
+    class Own(Rays):
+        params = (Param("steps", "Steps", 8, "", 1, 64, scope=scope),)
+
+    assert Settings().override([Own()], ["rays.steps=9"]).get(Own(), "steps") == 9
+
+
 def test_overriding_changes_a_copy():
     before = Settings()
     after = before.override([RAYS], ["rays.count=8", "samples=2"])

@@ -12,7 +12,13 @@ from addon import engine
 from addon.compare import reference
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.frame.settings import PARTIAL
 from addon.kernels.ranks import ids_of
+
+
+def own_share(scene):
+    """For `render_passes`: slices and early ends as the scene has them, which a measured picture has not."""
+    return [(scene.candela, param.name, getattr(scene.candela, param.name)) for param in PARTIAL]
 
 
 class Stage:
@@ -157,7 +163,8 @@ class Stage:
         """Passes by Candela's names, (H, W, C) float32, bottom row first."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
-            images = render_passes(self.scene, engine, samples, seed, size=size, bounces=bounces).images
+            extra = own_share(self.scene)
+            images = render_passes(self.scene, engine, samples, seed, size=size, bounces=bounces, extra=extra).images
         if engine == "CANDELA" and finite:
             assert ledger.latest().bad_pixels == 0
             for name, pixels in images.items():
@@ -227,8 +234,9 @@ def written(stage, monkeypatch):
     monkeypatch.setattr(reference, "named_images", all_of)
     layer = stage.scene.view_layers[0]
 
-    def rendered(engine, samples, size=(48, 40), **options):
-        return reference.render_passes(stage.scene, engine, samples, 1, size=size, **options).images
+    def rendered(engine, samples, size=(48, 40), extra=(), **options):
+        extra = [*own_share(stage.scene), *extra]
+        return reference.render_passes(stage.scene, engine, samples, 1, size=size, extra=extra, **options).images
 
     stage.written = rendered
     stage.layer, stage.coverage = layer, coverage

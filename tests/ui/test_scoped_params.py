@@ -1,8 +1,11 @@
 """Parameters of lamps, materials, objects, cameras and worlds, and lists of them: from declaration to snapshot."""
 
+from argparse import Namespace
+
 import bpy
 import pytest
 
+from addon.cli import verbs
 from addon.frame.technique import CAMERA, DIRECTION, OBJECT, POINT, Param, Technique, identifier, own_value
 from addon.snapshot.own_settings import own_settings
 from addon.ui import properties, scoped_panels
@@ -94,6 +97,30 @@ def test_points_and_directions_of_the_active_entry_have_handles(declared):
     assert scoped_panels._handles(cube) == []
     cube.candela.bent_edits.add()
     assert [place.name for place in scoped_panels._handles(cube)] == ["place", "towards"]
+
+
+def test_a_setting_of_the_command_line_reaches_every_camera_of_the_picture(lit_floor):
+    other = bpy.data.objects.new("Other", bpy.data.cameras.new("Other"))
+    lit_floor.timeline_markers.new("cut", frame=9).camera = other
+    options = Namespace(assignments=["eye.age=80", "film.points=16"], samples=None)
+    verbs._apply_settings(lit_floor, options)
+    assert lit_floor.camera.data.candela.eye_age == other.data.candela.eye_age == 80.0
+    values = properties.settings_of(lit_floor, viewport=False).values
+    assert values["eye", "age"] == 80.0 and values["film", "points"] == 16
+
+
+def test_a_setting_of_a_camera_that_is_none_is_refused_with_a_sentence(lit_floor):
+    lit_floor.camera = None
+    with pytest.raises(ValueError, match=r"'eye\.age' is a setting of the camera, and the scene has none"):
+        verbs._apply_settings(lit_floor, Namespace(assignments=["eye.age=80"], samples=None))
+
+
+def test_what_the_command_line_does_not_name_stays(lit_floor):
+    lit_floor.candela.use_denoise = False
+    strength = lit_floor.candela.denoise_strength
+    verbs._apply_settings(lit_floor, Namespace(assignments=["seed=3"], samples="5"))
+    assert (lit_floor.candela.seed, lit_floor.candela.samples) == (3, 5)
+    assert lit_floor.candela.denoise_strength == strength > 0.0
 
 
 def test_a_cameras_parameter_is_a_setting_of_the_picture(declared):

@@ -3,8 +3,10 @@
 import bpy
 import pytest
 
-from addon.compare import tune
+from addon.compare import reference, tune
+from addon.frame import ledger
 from addon.ui import tuning
+from addon.ui.pass_run import render_steps
 
 
 @pytest.fixture
@@ -53,3 +55,77 @@ def test_a_candidate_becomes_settings_and_properties_alike(floor):
     asked = tuning.changed(applied, candidate, applied.seed)
     assert asked == applied
     assert (applied.samples, applied.slots["shadow"], applied.values[name]) == (7, "vssm", 12)
+
+
+def test_auto_is_a_choice_of_its_own_and_what_is_off_stays_off(floor):
+    floor.candela.slot_shadow, floor.candela.slot_indirect = "vssm", "OFF"
+    found = tuning.choices(floor)
+    assert "indirect" not in found
+    assert found["shadow"][0] == "vssm" and found["shadow"].count("vssm") == 1
+    assert "AUTO" not in found["shadow"] and len(found["shadow"]) > 1
+    floor.candela.slot_shadow = "AUTO"
+    named = [technique.name for technique in tuning.REGISTRY if "shadow" in technique.fills]
+    assert tuning.choices(floor)["shadow"] == ["AUTO", *named]
+    own = {slot: names[0] for slot, names in tuning.choices(floor).items()}
+    assert tuning.changes(floor, tune.Candidate(floor.candela.samples, tuple(own.items()))) == []
+
+
+@pytest.mark.slow
+def test_a_scene_with_relief_glare_and_ends_of_its_own_is_tuned_by_numbers_of_the_scene(floor, monkeypatch):
+    """Relief's numbers are the material's, those of glare the camera's; neither is tried."""
+    plane = next(thing for thing in floor.objects if thing.type == "MESH")
+    plane.data.materials.append(displaced())
+    dazzling(floor)
+    floor.candela.time_limit, floor.candela.noise_threshold = 0.001, 1.0
+    floor.candela.sample_offset, floor.candela.sample_count = 1, 1
+    monkeypatch.setattr(tuning, "choices", lambda _: {})  # so that the phase of the parameters is reached soon
+    options = bpy.context.window_manager.candela_tuning
+    options.milliseconds, options.budget = 300, 12
+    assert bpy.ops.candela.tune() == {"FINISHED"}
+    found = tuning.latest(floor)
+    assert {"relief", "glare"} <= set(found.best.picture.ran)
+    assert any(trial.candidate.values for trial in found.trials)
+    for name, _ in tuning.properties(found.best.candidate):
+        assert name in floor.candela.bl_rna.properties
+    assert bpy.ops.candela.tune_apply() == {"FINISHED"}
+
+
+def dazzling(scene):
+    """A small bright square, and a camera that it dazzles."""
+    bpy.ops.mesh.primitive_plane_add(size=0.2, location=(1, 1, 3))
+    material = bpy.data.materials.new("Glow")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Emission Color"].default_value = (1, 1, 1, 1)
+    shader.inputs["Emission Strength"].default_value = 1e4
+    bpy.context.object.data.materials.append(material)
+    scene.camera.data.candela.glare_mode = "CONVOLUTION"
+
+
+def displaced():
+    material = bpy.data.materials.new("Waves")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True  # later versions have it on and warn about the property
+    material.candela.relief_mode, material.displacement_method = "RELIEF", "DISPLACEMENT"
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    noise, lift = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeDisplacement")
+    links.new(noise.outputs[0], lift.inputs["Height"])
+    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    links.new(lift.outputs[0], output.inputs["Displacement"])
+    return material
+
+
+def test_a_measured_picture_has_all_samples_that_are_asked_for(floor):
+    floor.candela.time_limit, floor.candela.noise_threshold = 0.001, 1.0
+    floor.candela.sample_offset, floor.candela.sample_count = 1, 1
+    settings = tuning.changed(tuning.settings_of(floor, viewport=False), tune.Candidate(3), 1)
+    steps = render_steps(floor, bpy.context.evaluated_depsgraph_get(), (32, 24), settings)
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(steps)
+    assert ended.value.value.ledger.samples == 3
+    passes = reference.render_passes(floor, "CANDELA", 3)
+    assert passes.samples == ledger.latest().samples == 3
+    assert (floor.candela.sample_offset, floor.candela.sample_count) == (1, 1)
+    assert floor.candela.time_limit > 0.0 and floor.candela.noise_threshold == 1.0
