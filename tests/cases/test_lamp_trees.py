@@ -120,6 +120,20 @@ def test_falloff(lamp, beside, kind, output, smooth):
     same(*beside(16, (32, 32), 0, 64))
 
 
+def test_a_lamp_without_falloff_takes_no_shadow_from_another(stage, lamp):
+    """Its strength is measured a kilometre away, and stands beside no inverse square."""
+    tree, emission = lamp("POINT", (1.5, 0.0, 4.0), shadow_soft_size=0.0, energy=10.0)
+    chain(tree, emission, "Strength", ("ShaderNodeLightFalloff", "Constant", "", {"Strength": 1.0, "Smooth": 0.0}))
+    constant = stage.scene.objects[-1]
+    stage.light("POINT", (0, 0, 3), energy=1000, shadow_soft_size=0.0)
+    stage.blocker((-0.5, -0.5), (0.5, 0.5), 2.0).visible_camera = False
+    stage.scene.candela.accumulated_maps_by = "MAPS"
+    both = stage.render(1)["combined"][14:18, 14:18, 0].mean()
+    constant.hide_render = True
+    assert stage.render(1)["combined"][14:18, 14:18, 0].max() < 1e-3
+    assert both < 1.0
+
+
 @pytest.mark.slow
 def test_falloff_of_a_gobo_in_reflected_light(stage, lamp, beside):
     tree, emission = lamp("POINT", shadow_soft_size=0.1)

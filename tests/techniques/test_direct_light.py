@@ -81,6 +81,19 @@ def test_a_spot_light_is_a_point_light_within_its_cone(floor, cone):
 
 
 @SLOW
+@pytest.mark.parametrize("samples", [1, 16])
+def test_within_the_ball_of_a_spot_its_cone_does_not_count(stage, samples):
+    """As in Cycles: the ball shines on what stands in it from all around, beside its cone, too.
+
+    Cycles has half of that where the middle of the ball lies behind the surface, of points all of it."""
+    stage.floor()
+    stage.camera_above(span=0.1)
+    stage.light("SPOT", (0, 0, 0.3), (np.pi, 0, 0), spot_size=0.8, shadow_soft_size=0.5, use_soft_falloff=False)
+    own, cycles = stage.render(samples, (8, 8)), stage.render(64, (8, 8), engine="CYCLES")
+    assert cycles["diffuse_direct"].mean() > 1.0
+    assert own["diffuse_direct"].mean() == pytest.approx(cycles["diffuse_direct"].mean(), rel=0.02)
+
+
 def test_the_cone_of_a_soft_spot_light_applies_to_each_ray(floor):
     floor.light("SPOT", (0, 0, 2), shadow_soft_size=0.4, spot_size=np.radians(60), spot_blend=0.6)
     source = model.spot(model.soft_point((0, 0, 2), 0.4, 100), np.eye(3), np.radians(60), 0.6)

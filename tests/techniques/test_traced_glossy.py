@@ -97,6 +97,20 @@ def test_tracing_changes_the_noise_of_a_lobe_and_not_its_mean(stage, roughness):
     assert means[1] == pytest.approx(means[0], rel=0.02)
 
 
+def test_of_more_equal_lamps_than_rays_look_for_the_same_are_left_to_points_in_any_order(stage):
+    """A lamp that rays look for and points do not know of would be seen twice, or not at all the other way round."""
+    places_of_lamps = np.random.default_rng(3).random((70, 2)) * 4 - 2
+    pictures = []
+    for order in (1, -1):
+        stage.clear()
+        stage.floor(material=stage.material("ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.2))
+        stage.camera_above(SPAN)
+        for x, y in places_of_lamps[::order]:
+            stage.light("POINT", (x, y, 1.5), energy=10, shadow_soft_size=0.3, use_shadow=False)
+        pictures.append(glossy(stage))
+    np.testing.assert_allclose(pictures[0], pictures[1], rtol=1e-3)
+
+
 def test_what_has_no_material_traces_rays_where_it_is_glossy(stage):
     """As it is since Blender 5.0."""
     stage.rectangle((-20, -20), (20, 20))
