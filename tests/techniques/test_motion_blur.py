@@ -245,6 +245,37 @@ def weight_of(name, mattes):
     return np.where(pairs[..., 0::2] == ids_of([name])[0], pairs[..., 1::2], 0.0).sum(axis=-1)
 
 
+@pytest.mark.parametrize("samples", [1, 4])
+def test_vector_is_zero_and_other_values_keep_their_places(blurred, written, samples):
+    """As in Cycles, which leaves it out. START: a single moment is not the frame's own."""
+    blurred.scene.render.motion_blur_position = "START"
+    named_things(blurred)
+    made = blurred.layer.aovs.add()
+    made.name, made.type = "two", "VALUE"
+    output = blurred.scene.objects["Plane"].data.materials[0].node_tree.nodes.new("ShaderNodeOutputAOV")
+    output.aov_name, output.inputs["Value"].default_value = "two", 2.0
+    without = written.written("CANDELA", samples, (32, 24))
+    assert not any("Vector" in str(note) for note in blurred.ledger.notes)
+    blurred.layer.use_pass_vector = True
+    found = written.written("CANDELA", samples, (32, 24))
+    assert any("Vector pass is zero" in str(note) for note in blurred.ledger.notes)
+    assert found["Vector"].shape == (24, 32, 4) and not found["Vector"].any()
+    assert found["two"].max() == pytest.approx(2.0, abs=1e-4) and found["two"].min() < 1.5
+    for name in without.keys() - {"header"}:
+        if without[name] is not None:
+            np.testing.assert_array_equal(found[name], without[name], err_msg=name)
+
+
+def test_a_scene_at_rest_has_no_vector_either(blurred, written):
+    lit_floor(blurred)
+    blurred.camera_above(4.0)
+    blurred.layer.use_pass_vector = True
+    keyed(blurred.scene.camera, "location", [(0, 0, 10), (0.5, 0, 10)], (1.5, 2))  # while the shutter is closed
+    assert not written.written("CANDELA", 2, (32, 24))["Vector"].any()
+    blurred.scene.render.use_motion_blur = False
+    assert np.abs(written.written("CANDELA", 2, (32, 24))["Vector"]).max() > 1.0
+
+
 def test_parts_for_a_window_draw_the_same_picture(blurred, monkeypatch):
     moving_box(blurred)
     whole = blurred.render(8, (32, 24))
