@@ -84,6 +84,7 @@ class Frame:
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     more_writes: list[Write] = field(default_factory=list)  # see `add_write`
+    read_last: set[str] = field(default_factory=set)  # images of the last sample that `end` reads; said in `begin`
     carried: dict[str, images.Image] = field(default_factory=dict)  # ranked pairs of other frames; see `empty`
     readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
