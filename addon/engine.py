@@ -220,7 +220,8 @@ class CandelaEngine(bpy.types.RenderEngine):
                 result = self._begun(pixels["Combined"], layer.name, eye)
             for name, array in pixels.items():
                 _fill(result, name, eye, array)
-            for name, text in cryptomatte_metadata(order.snapshot, layer.name).items():
+            seen = (order.snapshot, *(order.moments.snapshots if order.moments is not None else ()))
+            for name, text in cryptomatte_metadata(seen, layer.name).items():
                 self.get_result().stamp_data_add_field(name, text)
             self.end_result(result)
         except (ValueError, RuntimeError) as error:

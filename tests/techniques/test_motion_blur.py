@@ -1,5 +1,6 @@
 """Motion blur: what moves while the shutter is open is seen at several moments, beside Cycles and closed forms."""
 
+import json
 from itertools import pairwise
 
 import bpy
@@ -221,6 +222,18 @@ def test_values_of_surfaces_and_mattes_are_those_of_all_moments(blurred, written
     assert plane.max() == pytest.approx(1.0, abs=1e-4) and ((plane > 0.1) & (plane < 0.9)).mean() > 0.05
     depth = found["Denoising Depth"][..., 0][plane > 0.999]
     np.testing.assert_allclose(depth, 10.0, atol=0.11)  # where rays begin, by Blender's version up to 0.1 nearer
+
+
+def test_what_is_seen_for_a_part_of_the_time_has_a_name(blurred, written):
+    named_things(blurred)
+    cube = blurred.scene.objects["Cube"]
+    for frame, hidden in ((0, False), (1, True)):
+        cube.hide_render = hidden
+        cube.keyframe_insert("hide_render", frame=frame)
+    found = written.written("CANDELA", 4, (32, 24))
+    assert 0.1 < written.coverage(found, "Object", "Cube").max() < 0.9
+    (names,) = (text for field, text in found["header"].items() if field.endswith("/manifest"))
+    assert set(json.loads(names)) == {"Plane", "Cube"}
 
 
 def test_mattes_and_values_of_slices_are_those_of_the_whole(blurred, written):
