@@ -129,21 +129,21 @@ class CandelaEngine(bpy.types.RenderEngine):
         self._snapshot = self._moments = None
         self.update_stats("Candela", "Reading the scene")
         try:
-            around = self._frames_around(depsgraph) if depsgraph.view_layer.use_pass_vector else None
-            size = self.resolution_x, self.resolution_y
-            self._snapshot = take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
-            if shutter.is_blurred(scene, depsgraph.view_layer) and not self.is_preview:
-                # What the Vector pass asks for would tell the frame from the moments.
-                central = self._snapshot if around is None else self._take(depsgraph, shared)
-                self._moments = self._take_moments(depsgraph, shared, central)
+            layer = depsgraph.view_layer
+            blurred = shutter.is_blurred(scene, layer) and not self.is_preview
+            around = self._frames_around(depsgraph) if layer.use_pass_vector and not blurred else None
+            self._snapshot = self._take(depsgraph, shared, around)
+            if blurred:
+                self._moments = self._take_moments(depsgraph, shared, self._snapshot)
         except UnsupportedScene as error:
             self._fail(str(error))
         except Exception as error:  # Blender would print it and go on with a black picture
             self._fail_unforeseen(error)
         self._sync_seconds = time.perf_counter() - started
 
-    def _take(self, depsgraph, shared: Session) -> Snapshot:
-        return take(depsgraph, shared.cache, self.resolution_x, self.resolution_y, camera=self.camera_override)
+    def _take(self, depsgraph, shared: Session, around: tuple[Moment, ...] | None = None) -> Snapshot:
+        size = self.resolution_x, self.resolution_y
+        return take(depsgraph, shared.cache, *size, camera=self.camera_override, around=around)
 
     def _take_moments(self, depsgraph, shared: Session, central: Snapshot) -> shutter.Moments | None:
         """The scene while the shutter is open, where anything moves. It is evaluated now, while Blender keeps it."""
@@ -222,7 +222,8 @@ class CandelaEngine(bpy.types.RenderEngine):
                 result = self._begun(pixels["Combined"], layer.name, eye)
             for name, array in pixels.items():
                 _fill(result, name, eye, array)
-            for name, text in cryptomatte_metadata(order.snapshot, layer.name).items():
+            seen = (order.snapshot, *(order.moments.snapshots if order.moments is not None else ()))
+            for name, text in cryptomatte_metadata(seen, layer.name).items():
                 self.get_result().stamp_data_add_field(name, text)
             self.end_result(result)
             self._tell(FINISHED, None, layer.name, eye)
@@ -244,10 +245,12 @@ class CandelaEngine(bpy.types.RenderEngine):
     ) -> final.Order:
         """What this render asks for."""
         shared = session(scene, "preview" if self.is_preview else "final")
-        missing, notes = missing_passes(layer), ()
-        if missing and not self.is_preview:
-            text = f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing."
-            notes = (Note(f"View layer '{layer.name}'", text),)
+        missing, texts = missing_passes(layer), []
+        if missing:
+            texts.append(f"Candela does not write {', '.join(missing)}: compositor nodes that read it get nothing.")
+        if layer.use_pass_vector and shutter.is_blurred(scene, layer):
+            texts.append("the Vector pass is zero with motion blur, as in Cycles: what moves is blurred already.")
+        notes = () if self.is_preview else tuple(Note(f"View layer '{layer.name}'", text) for text in texts)
         keep = None
         if taken is not None:
             keep = partial(taken.__setitem__, layer.name)

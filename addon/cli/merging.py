@@ -1,8 +1,8 @@
 """The verb `merge`: one picture, or one for each frame, of the slices that several machines have rendered.
 
 It opens the same scene with the same options, and ends the picture as the render of all samples does: denoising,
-passes, metadata and file format are those of `render`. Slices of another scene, another number of samples, another
-size or another Blender are refused, and so is a picture of which samples are missing or there twice.
+passes, metadata and file format are those of `render`. Slices of another scene, other settings, another number of
+samples, another size or another Blender are refused, and so is a picture of which samples are missing or there twice.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def _merge(options: argparse.Namespace, paths: list[Path], output: Path, file: P
             }
         )
     )  # fmt: skip
-    if scene_hash(job.scene) != about["scene_hash"]:
+    if (scene_hash(job.scene), slices.settings_hash(job.scene)) != (about["scene_hash"], about.get("settings_hash")):
         raise Refused(f"{job.options.file} is not the file of which these are slices: it has been changed since.")
     read = [slices.read_sums(part) for part in parts]
     try:

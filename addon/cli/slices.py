@@ -2,14 +2,15 @@
 
 A slice is a multilayer EXR: per view layer the sums that `frame/slices.py` takes, under "LAYER.sum NAME", beside
 "LAYER.Combined", the picture of its own samples, which any viewer shows. What a merge must know stands in the header as
-JSON, in the attribute `candela`: which samples, of which scene (a hash of all that it is made of), and the options of
-the command line.
+JSON, in the attribute `candela`: which samples, of which scene (a hash of all that it is made of, and one of Candela's
+own settings, which that leaves out), and the options of the command line.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -19,11 +20,19 @@ from ..compare.exr_write import read_about, write_exr
 from ..compare.reference import scene_hash
 from ..frame import slices
 from ..snapshot.exr import ExrError, read_exr
+from ..snapshot.own_settings import all_settings
+from ..ui.properties import GROUPS, settings_of
 from .refused import USAGE, Refused
 
 ABOUT = "candela"
 SUM = "sum "
-ALIKE = ("scene_hash", "frame", "total", "options", "blender", "layers")  # what slices of one picture have in common
+# What slices of one picture have in common.
+ALIKE = ("scene_hash", "settings_hash", "frame", "total", "options", "blender", "layers")
+UNLIKE = {  # how a person knows them
+    "scene_hash": "scene (its contents differ)",
+    "settings_hash": "settings of Candela",
+    "total": "number of samples",
+}
 
 
 @dataclass(frozen=True)
@@ -49,11 +58,25 @@ def bounds(text: str, total: int) -> tuple[int, int]:
     return first, end - first
 
 
+def settings_hash(scene: bpy.types.Scene) -> str:
+    """Hexadecimal hash of Candela's settings that a final picture of the scene depends on: its own and those of all
+    data-blocks. Which samples are drawn is left out, and what does not count for slices."""
+    settings = settings_of(scene, viewport=False)
+    settings = replace(settings, sample_offset=0, sample_count=0, time_limit=0.0, noise_threshold=0.0)
+    digest = hashlib.blake2b(f"{settings} {scene.candela.split_light_groups}".encode(), digest_size=20)
+    for scope in GROUPS:
+        used = [block for block in getattr(bpy.data, f"{scope.lower()}s") if block.users]
+        for block in sorted(used, key=lambda block: block.name_full):
+            digest.update(f"{scope} {block.name_full!r} {all_settings(block)}".encode())
+    return digest.hexdigest()
+
+
 def about_slice(job) -> dict:
     """What a slice's header says; the same for all slices of a picture but for `first` and `count`."""
     options = job.options
     return {
         "scene_hash": scene_hash(job.scene),
+        "settings_hash": settings_hash(job.scene),
         "file": str(options.file.resolve()),
         "frame": job.scene.frame_current,
         "total": job.scene.candela.samples,
@@ -126,7 +149,7 @@ def of_one_picture(parts: list[Part]) -> None:
     for part in parts[1:]:
         for name in ALIKE:
             if part.about.get(name) != first.about.get(name):
-                what = {"scene_hash": "scene (its contents differ)", "total": "number of samples"}.get(name, name)
+                what = UNLIKE.get(name, name)
                 raise Refused(f"{first.path.name} and {part.path.name} are slices of different pictures: {what}.")
 
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..gfx import images
+from ..gfx import images, passes
 from ..gfx.readback import Readback, Reading
 from ..gfx.struct import Block
 from ..gfx.timing import Profiler
@@ -84,6 +84,8 @@ class Frame:
     choices: dict[str, dict[str, str]] = field(default_factory=dict)  # by technique: of what, and why; see `chose`
     lasting: dict[type, object] = field(default_factory=dict)  # see `kept`; the renderer's
     more_writes: list[Write] = field(default_factory=list)  # see `add_write`
+    read_last: set[str] = field(default_factory=set)  # images of the last sample that `end` reads; said in `begin`
+    carried: dict[str, images.Image] = field(default_factory=dict)  # ranked pairs of other frames; see `empty`
     readback: Readback = field(default_factory=Readback)
     _services: dict[type[Service], Service] = field(default_factory=dict)
     _shared: dict[type, object] = field(default_factory=dict)
@@ -299,8 +301,17 @@ class Frame:
         if write.name not in self.images:
             self.images[write.name] = images.pool.take(*self.size, write.format)
             self.more_writes.append(write)
-        self.target(write.name).clear()
+        self.empty(write)
         return self.images[write.name]
+
+    def empty(self, write: Write) -> None:
+        """Make an image of a write ready for the first sample: without light, and with no pairs of ids and weights but
+        those of the time steps before, since pairs of two images cannot be added pixel by pixel."""
+        before = self.carried.get(write.name)
+        if before is None:
+            self.target(write.name).clear()
+        else:
+            passes.copy(before, self.target(write.name))
 
     @property
     def writes(self) -> list[Write]:

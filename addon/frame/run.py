@@ -403,7 +403,7 @@ class Renderer:
     def _clear_sums(self, frame: Frame) -> None:
         for write in frame.writes:
             if (write.accumulates or write.ranked) and write.name in frame.images:
-                frame.target(write.name).clear()
+                frame.empty(write)
 
 
 def _stage(frame: Frame, stage: str) -> Iterator[None]:

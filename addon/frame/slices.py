@@ -5,7 +5,7 @@ but for the order in which floats were added. What is taken from a finished slic
 
     sums      light by path, colours, coverage, normals: added up
     first     depth, positions and indices, which every slice has from the picture's first sample: of any slice
-    last      surface.position of the last sample, from which Denoise tells surfaces: of the last slice
+    last      what Denoise reads of the last sample (Frame.read_last), to tell surfaces apart: of the last slice
     ranked    pairs of ids and weights: weights added by id (kernels/ranks.py)
     halves    what Denoise compares: sums of the first half of the samples, of the slice in which that half ends
 
@@ -26,7 +26,7 @@ from ..snapshot.scene import RANKED
 from .picture import Frame
 
 HALF = "_half"
-LAST = ("surface.position",)
+LAST = ("surface.position", "surface.lobe")
 FIRST = ("film.depth", "film.position", "film.index")
 
 
@@ -46,7 +46,7 @@ class Slice:
 
 def taken(frame: Frame, part: str = "", before: Slice | None = None) -> Slice:
     """What a merge needs of a frame whose samples are drawn: of the `part` of a picture, beside those before it."""
-    wanted = {frame.shown.get(name, name) for name in frame.sums} | set(FIRST) | set(LAST)
+    wanted = {frame.shown.get(name, name) for name in frame.sums} | set(FIRST) | frame.read_last
     wanted |= {name for name in frame.images if name.endswith(HALF) or name.startswith(RANKED)}
     read = {joined(part, name): images.read(frame.images[name]) for name in sorted(wanted) if name in frame.images}
     if part and before is not None:

@@ -5,10 +5,10 @@
 
 so that both halves, which Denoise compares, see all of the motion. A step draws its samples as a slice of the picture
 (slices.py): what is learned from the first sample is learned anew of its own scene, and its sums are added to those of
-the steps before. The step in the middle comes last. In its frame the picture is finished, so that depth, and the
-surfaces that Denoise goes by, are those of the middle of the shutter. A slice without a sample of that step draws its
-surfaces all the same. The others come in an order that spreads over the shutter: a time limit cuts motion coarsely
-rather than at its end.
+the steps before; coverage by name (kernels/ranks.py) goes on from theirs. The step in the middle comes last. In its
+frame the picture is finished, so that depth, and the surfaces that Denoise goes by, are those of the middle of the
+shutter. A slice without a sample of that step draws its surfaces all the same. The others come in an order that spreads
+over the shutter: a time limit cuts motion coarsely rather than at its end.
 
 | cost | |
 |---|---|
@@ -85,6 +85,7 @@ class Sums:
     def __init__(self):
         self.whole: dict[str, images.Image] = {}
         self.half: dict[str, images.Image] = {}
+        self.ranked: dict[str, images.Image] = {}  # pairs of ids and weights, which the next step's samples add to
         self.samples = 0
         self.in_half = 0
         self.seconds = 0.0
@@ -93,6 +94,9 @@ class Sums:
         """Take over what the samples of a step have summed up."""
         for name, image in sums_of(frame).items():
             _add(image, self.whole, name)
+        for write in frame.writes:
+            if write.ranked:
+                _copy(frame.images[write.name], self.ranked, write.name)
         self.samples += frame.samples_done
         self.seconds += frame.drawn_s
 
@@ -120,16 +124,15 @@ class Sums:
         frame.drawn_s += self.seconds
 
     def release(self) -> None:
-        for image in (*self.whole.values(), *self.half.values()):
-            images.pool.give(image)
-        self.whole.clear()
-        self.half.clear()
+        for held in (self.whole, self.half, self.ranked):
+            for image in held.values():
+                images.pool.give(image)
+            held.clear()
 
 
 def sums_of(frame: Frame) -> dict[str, images.Image]:
     """Images in which the samples of a frame add up."""
-    written = {write.name for technique in frame.plan.techniques for write in technique.writes if write.accumulates}
-    names = {frame.shown.get(name, name) for name in written}
+    names = {frame.shown.get(name, name) for name in frame.sums}
     return {name: frame.images[name] for name in sorted(names) if name in frame.images}
 
 
@@ -139,10 +142,16 @@ def _halved(half: str) -> str:
 
 
 def _add(image: images.Image, to: dict[str, images.Image], name: str) -> None:
-    fresh = name not in to
-    if fresh:
+    if name in to:
+        put(image, images.Target((to[name],)), 0, 0, "ADDITIVE_PREMULT")
+    else:
+        _copy(image, to, name)
+
+
+def _copy(image: images.Image, to: dict[str, images.Image], name: str) -> None:
+    if name not in to:
         to[name] = images.pool.take(*image.size, image.format)
-    put(image, images.Target((to[name],)), 0, 0, "NONE" if fresh else "ADDITIVE_PREMULT")
+    put(image, images.Target((to[name],)), 0, 0)
 
 
 def drawn(
@@ -172,6 +181,7 @@ def drawn(
                     renderer.forget()
                     renderer.begin(step.snapshot, settings, step.numbers)
             frame = renderer.frame
+            frame.carried = sums.ranked
             first = sum(number < half for number in step.numbers)
             halved = first == 0
             for _ in parts(renderer, frame):

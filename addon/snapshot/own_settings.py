@@ -6,7 +6,9 @@ whatever has been set, by the property's identifier; what was never touched has 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import bpy
@@ -21,6 +23,18 @@ def own_settings(block) -> Own:
     return () if group is None else _values(group, False, getattr(block, "library", None))
 
 
+def all_settings(block) -> Own:
+    """All settings of a data-block, whether set or not; of a file what it holds, wherever it lies."""
+    return _values(block.candela, True, block.library, _content)
+
+
+def _content(path: str) -> str:
+    try:
+        return hashlib.blake2b(Path(path).read_bytes(), digest_size=20).hexdigest()
+    except OSError:  # the ledger says what is missing
+        return ""
+
+
 def own_images(block) -> Iterator[tuple[str, bpy.types.Image]]:
     """What has been set on an evaluated data-block that is an image, by identifier."""
     group = getattr(block, "candela", None)
@@ -30,11 +44,11 @@ def own_images(block) -> Iterator[tuple[str, bpy.types.Image]]:
             yield name, image
 
 
-def _values(group, every: bool, library=None) -> Own:
+def _values(group, every: bool, library=None, of_file: Callable[[str], str] = str) -> Own:
     found = []
     for name, kind, is_array, is_path in _properties(type(group)):
         if kind == "COLLECTION":
-            entries = tuple(_values(entry, True, library) for entry in getattr(group, name))
+            entries = tuple(_values(entry, True, library, of_file) for entry in getattr(group, name))
             if entries:
                 found.append((name, entries))
         elif every or group.is_property_set(name):
@@ -42,7 +56,7 @@ def _values(group, every: bool, library=None) -> Own:
             if kind == "POINTER":
                 value = value.name if value is not None else ""
             elif is_path:
-                value = bpy.path.abspath(value, library=library) if value else ""
+                value = of_file(bpy.path.abspath(value, library=library)) if value else ""
             elif is_array:
                 value = tuple(value)
             found.append((name, value))

@@ -146,6 +146,7 @@ class Denoise(Technique):
         for write in self.writes:
             if write.name.startswith("denoise."):  # a pass tree may show what no light path needs
                 frame.target(write.name).clear()
+        frame.read_last |= {"surface.position", "surface.lobe"} if _beside_grass(frame) else {"surface.position"}
 
     def sample(self, frame: Frame) -> None:
         done = frame.sample + 1
@@ -198,7 +199,7 @@ class Denoise(Technique):
         }  # fmt: skip
         blocks, how = {"film_view": frame.view_block}, FILTERS[path]
         half_count, half = self._half(frame, path, count)
-        grass = path == "diffuse_direct" and frame.service(GrassTable) is not None
+        grass = path == "diffuse_direct" and _beside_grass(frame)
         lobes = {"surface_lobe": frame.images["surface.lobe"]} if grass else {}
         with images.borrowed(*frame.size, "RGBA32F") as light, images.borrowed(*frame.size, "RGBA32F") as other:
             for rows in frame.bands(self):
@@ -225,3 +226,7 @@ class Denoise(Technique):
             textures = {"light_in": light.colors[0], **sums}
             passes.fullscreen(END, frame.target(f"denoise.{path}"), textures=textures, constants={"count": count})
         frame.count(self, "passes", len(how.strides) + 2)
+
+
+def _beside_grass(frame: Frame) -> bool:
+    return frame.service(GrassTable) is not None

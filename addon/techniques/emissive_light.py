@@ -66,7 +66,7 @@ class EmissiveLight(Technique):
         self._maps, self._rays = PlainMaps(self._resolution), Rays()
         self._sources = lights.Sources()
         self._triangles: EmissiveTriangles | None = None
-        self._traced = False  # rays take the place of maps
+        self._traced: bool | None = None  # whether rays take the place of maps; None: not decided yet
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         graphs = [snapshot.materials[slot].graph for slot in snapshot.used_materials]
@@ -77,6 +77,7 @@ class EmissiveLight(Technique):
         return None
 
     def begin(self, frame: Frame) -> None:
+        self._traced = None
         if frame.receivers is None or not len(frame.receivers.distance):
             return
         self._triangles = EmissiveTriangles(frame, ("diffuse", "glossy"))
@@ -105,7 +106,7 @@ class EmissiveLight(Technique):
             if patches:
                 points.append(self._patch(frame, provider, numbers, number, count, flags))
                 continue
-            if number == 0:
+            if self._traced is None:  # by the picture's first point that asks no other
                 self._traced = by_rays(
                     frame, lambda place=point: _views(frame, place, 0, resolution), resolution, self, "emissive meshes"
                 )

@@ -12,7 +12,7 @@ before both are added to it, but not to UV and Vector, which are that surface's 
 Vector is how far what is seen was a frame ago from where it is seen, and how far it is from there to where it will be,
 in pixels: by the camera's motion, the object's, and that of the mesh's vertices, which each corner has as an attribute
 (snapshot/motion.py, shaders/surface/motion.glsl). Behind all it is what the camera's turn and zoom
-make of what is infinitely far away.
+make of what is infinitely far away. With motion blur it is 0, as in Cycles.
 Denoising Depth is the distance from where the camera's rays begin; albedo and normal of that data are sums of the film.
 
 | cost | per point of the film |
@@ -42,6 +42,8 @@ from ..gfx import images
 from ..scene.materials import AOV_GROUP
 from ..surfaces.draw import draw_aovs
 
+MOVING, NOTHING = ("VECTOR", "HIT"), "NOTHING"  # kinds that ask how things move; what stays 0
+
 
 class ShaderAovs(Technique):
     name = "shader_aovs"
@@ -54,13 +56,14 @@ class ShaderAovs(Technique):
         return None if snapshot.film.aovs else "the view layer asks for no AOV, no UV, Vector or denoising data"
 
     def begin(self, frame: Frame) -> None:
-        aovs = frame.snapshot.film.aovs
-        self._images: dict[str, list] = {}  # by image of the frame, what its channels hold
+        aovs, motion = frame.snapshot.film.aovs, frame.snapshot.motion
+        held: dict[str, list] = {}  # by image of the frame, what its channels hold
         for aov, (image, _) in zip(aovs, film_aovs.places(aovs)):
-            self._images.setdefault(image, []).append((aov.name, aov.kind))
+            nothing = motion is None and aov.kind in MOVING
+            held.setdefault(image, []).append((aov.name, NOTHING if nothing else aov.kind))
+        self._images = {image: kinds for image, kinds in held.items() if any(kind != NOTHING for _, kind in kinds)}
         for image, held in self._images.items():
             frame.add_write(Write(image, "RGBA32F", f"AOVs: {', '.join(name or 'UV' for name, _ in held)}", True))
-        motion = frame.snapshot.motion
         self._motion = images.upload_list(_motion_rows(frame)) if motion is not None else None
         frame.provide(SurfaceValues(self._draw))
 

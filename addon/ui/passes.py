@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -175,15 +176,17 @@ def cryptomatte_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
     return found
 
 
-def cryptomatte_metadata(snapshot: Snapshot, layer: str) -> dict[str, str]:
-    """Fields of a file's header by which readers find the mattes of a view layer and the names in them."""
-    shown, fields = snapshot.instances, {}
+def cryptomatte_metadata(snapshots: Sequence[Snapshot], layer: str) -> dict[str, str]:
+    """Fields of a file's header by which readers find the mattes of a view layer and the names in them, at whatever
+    moment they are seen."""
+    shown, fields = [one for snapshot in snapshots for one in snapshot.instances], {}
+    materials = [one.name for snapshot in snapshots for one in snapshot.materials[1:]]
     names = {
         "object": [one.object_name for one in shown],
-        "material": [CRYPTO_DEFAULT, *(one.name for one in snapshot.materials[1:])],
+        "material": [CRYPTO_DEFAULT, *materials],
         "asset": [one.asset or one.object_name for one in shown],
     }
-    for kind in snapshot.film.cryptomattes:
+    for kind in snapshots[0].film.cryptomattes:
         name = f"{layer}.{_matte(kind)}"
         key = f"cryptomatte/{ranks.murmur_hash(name):08x}"[:-1]
         fields |= {

@@ -114,6 +114,46 @@ def test_slices_make_the_picture_of_all_samples(moving, tmp_path):
     assert done.returncode == 1 and "s2.exr" in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
+CHANGE = """
+import os, sys
+import addon, bpy
+addon.register()
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+bpy.context.scene.candela.bounces = int(sys.argv[2])
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+os._exit(0)
+"""
+
+
+@pytest.mark.slow
+def test_slices_of_other_settings_are_refused(moving, tmp_path):
+    """The file is saved with fewer bounces between two slices."""
+    file = tmp_path / "moving.blend"
+    shutil.copy(moving, file)
+
+    def saved(bounces):
+        command = [sys.executable, "-c", CHANGE, str(file), str(bounces)]
+        done = subprocess.run(command, check=False, env=environment(), capture_output=True, text=True)
+        assert "Error" not in done.stderr, done.stderr
+
+    def rendered(part):
+        options = ("--size", "24x18", "--samples", "2", "--slice", f"{part}/2", "--output", f"s{part}.exr")
+        assert candela("render", file, *options, folder=tmp_path).returncode == 0
+
+    def refusal():
+        done = candela("merge", "s1.exr", "s2.exr", "--output", "merged.exr", folder=tmp_path)
+        return done.stderr if done.returncode else ""
+
+    saved(4)
+    for part in (1, 2):
+        rendered(part)
+    assert not refusal()
+    saved(0)
+    assert "has been changed since" in refusal()
+    rendered(2)
+    assert "different pictures: settings of Candela" in refusal()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),

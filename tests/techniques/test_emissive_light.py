@@ -1,5 +1,6 @@
 """Meshes that emit light: the same irradiance as an area light of their radiance, from both sides, with shadows."""
 
+import bpy
 import numpy as np
 import pytest
 
@@ -123,3 +124,37 @@ def test_ray_visibility_says_what_an_emitter_lights(floor, path, other):
     one = floor.render(16, SIZE)
     assert both[f"{path}_direct"].max() > 0 and not one[f"{path}_direct"].any()
     np.testing.assert_allclose(one[f"{other}_direct"].mean(), both[f"{other}_direct"].mean(), rtol=0.02)
+
+
+def two_panels(stage):
+    stage.blocker((-0.5, -0.5), (0.5, 0.5), 1.0)
+    return [panel(stage, half=0.3, location=(x, 0, 0)) for x in (-1, 1)]
+
+
+def maps_of(stage, by, samples=8):
+    stage.scene.candela.accumulated_maps_by = by
+    stage.render(samples, SIZE)
+    return stage.ledger.row("emissive_light").counters.get("maps", 0)
+
+
+def test_a_slice_of_later_samples_traces_where_the_picture_does(floor):
+    two_panels(floor)
+    assert maps_of(floor, "MAPS", 16) > 0
+    floor.scene.candela.sample_offset = 8
+    assert maps_of(floor, "RAYS", 16) == 0
+    assert maps_of(floor, "MAPS", 16) > 0
+
+
+def test_each_picture_decides_anew_between_maps_and_rays(floor):
+    """Whichever of two panels the first point falls on, and with links, of which nothing is asked."""
+    panels = two_panels(floor)
+    links = bpy.data.collections.new("Links")
+    links.objects.link(floor.blocker((-1.9, -1.9), (-1.8, -1.8), 0.5))
+    links.collection_objects[0].light_linking.link_state = "EXCLUDE"
+    try:
+        for linked, other in (panels, panels[::-1]):
+            linked.light_linking.blocker_collection, other.light_linking.blocker_collection = links, None
+            assert maps_of(floor, "RAYS") == 0
+            assert maps_of(floor, "MAPS") > 0
+    finally:
+        bpy.data.collections.remove(links)

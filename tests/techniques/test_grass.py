@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
+from addon import engine
+from addon.frame import slices
 from addon.frame.ledger import RAN, SKIPPED
 from addon.grass import patch as patches
 from addon.grass.blades import Recipe
@@ -208,6 +210,35 @@ def test_density_is_the_share_that_is_covered(stage, tmp_path):
     towards(stage, 0, 0, 4.0)
     depth = stage.render(1, (64, 64))["depth"]
     assert 0.35 < (depth < 4.95).mean() < 0.65
+
+
+def test_slices_are_denoised_as_the_whole(stage, tmp_path):
+    """The filter goes by where the last sample saw grass, not the first, which draws the merged picture's surfaces."""
+    ground(stage, flat_patch(tmp_path / "flat.grass", 1.0), density=0.5)
+    stage.light("AREA", (0, 0, 3), size=3.0)
+    stage.blocker((-0.5, -0.5), (0.5, 0.5), 1.0)
+    towards(stage, 0, 0, 4.0)
+    settings = stage.scene.candela
+
+    def render(first, count):
+        settings.sample_offset, settings.sample_count = first, count
+        return stage.render(4, (24, 24))
+
+    parts = []
+    try:
+        for first in (0, 2):
+            engine.taken = {}
+            render(first, 2)
+            parts += engine.taken.values()
+        engine.taken = None
+        whole = render(0, 0)
+        engine.given = dict.fromkeys([bpy.context.view_layer.name], slices.merged(parts))
+        found = render(0, 0)
+    finally:
+        engine.taken, engine.given = None, {}
+    assert stage.ledger.row("denoise").state == RAN
+    for name in whole:
+        np.testing.assert_allclose(found[name], whole[name], rtol=1e-3, atol=1e-4, err_msg=name)
 
 
 @pytest.mark.slow
@@ -538,13 +569,13 @@ def real_field(stage, tiles):
 def test_from_sampled_directions_it_is_the_field_of_blades(stage, view, light):
     """Mean of the tile within 3 %, contrast within 5 %."""
     pictures = []
-    for engine in ("CANDELA", "CYCLES"):
+    for name in ("CANDELA", "CYCLES"):
         stage.clear()
         stage.scene.render.filter_size = 1.5
-        ground(stage) if engine == "CANDELA" else real_field(stage, 10)
+        ground(stage) if name == "CANDELA" else real_field(stage, 10)
         sun(stage, *light)
         towards(stage, *view, 0.8)
-        both = [stage.render(64, (48, 48), seed, engine, bounces=None)["combined"][..., :3] @ LUMA for seed in (1, 2)]
+        both = [stage.render(64, (48, 48), seed, name, bounces=None)["combined"][..., :3] @ LUMA for seed in (1, 2)]
         pictures.append(np.stack(both))
     # Noise is contrast, too: what two pictures have in common has none.
     (mine, std), (true, true_std) = ((both.mean(), np.sqrt(np.cov(*both.reshape(2, -1))[0, 1])) for both in pictures)
