@@ -26,7 +26,7 @@ from ..frame.technique import Technique
 from ..gfx import images, passes
 from ..materials.compiled import CompiledMaterial
 from ..scene import acceleration
-from ..scene.area_points import AreaPoints, Surfaces, spread
+from ..scene.area_points import AreaPoints, Surfaces, shown_of, spread
 from ..scene.pieces import octahedral
 from ..scene.point_tree import PointTree, fitted
 from ..scene.seen import UNSEEN, seen_triangles
@@ -109,6 +109,8 @@ class PointRuns:
                 self._runs[number] = self._placed(frame, run.points)
             frame.count(technique, "trees refitted", len(before))
         else:
+            # What keys do not tell apart, as a name or a pass index, makes another object of an instance, too.
+            self._surfaces = replace(self._surfaces, shown=shown_of(frame))
             frame.count(technique, "trees kept", len(self._runs))
         for run in self._runs.values():
             self._unshade(run)

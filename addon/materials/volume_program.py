@@ -59,6 +59,29 @@ def compile_volume(name: str, graph: Graph, images: dict | None = None) -> Compi
 
 
 DEEPEST = 64  # shaders above each other
+# Outputs that follow the camera; without a name: all of the node's.
+OF_CAMERA = {
+    ("ShaderNodeTexCoord", "Camera"), ("ShaderNodeTexCoord", "Window"), ("ShaderNodeTexCoord", "Reflection"),
+    ("ShaderNodeNewGeometry", "Incoming"), ("ShaderNodeLightPath", "Ray Length"), ("ShaderNodeCameraData", ""),
+    ("ShaderNodeLightFalloff", ""), ("ShaderNodeFresnel", ""), ("ShaderNodeLayerWeight", ""),
+}  # fmt: skip
+
+
+def reads_camera(graph: Graph) -> bool:
+    """Whether what is linked to the volume output depends on where the camera stands or how it is turned."""
+    waiting, seen = [graph.volume], set()
+    while waiting:
+        link = waiting.pop()
+        if link is None or link in seen or link[0] not in graph.nodes:
+            continue
+        seen.add(link)
+        node = graph.nodes[link[0]]
+        if not OF_CAMERA.isdisjoint(((node.type, link[1]), (node.type, ""))):
+            return True
+        if "CAMERA" in (node.properties.get("convert_from"), node.properties.get("convert_to")):
+            return True
+        waiting += [socket.link for socket in node.inputs.values()]
+    return False
 
 
 def _walk(code: Expressions, link: tuple[str, str], weight: str, depth: int) -> None:

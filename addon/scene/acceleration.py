@@ -33,7 +33,7 @@ from ..kernels.scatter import scatter
 from ..snapshot.scene import Instance, Snapshot
 from . import box_tree
 from .box_tree import LEAF
-from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, kept, parted
+from .instance_tree import MOST_BOXES, OWN_TREE, RECORD_NODES, Copies, UpperTree, is_point, kept, parted
 from .node_boxes import EMPTY, NODE_TEXELS, NodeBoxes, pack_boxes
 from .traced_triangles import ALL_RAYS, is_empty, is_met, mean_code, mean_emission, rays_met, world_triangles
 
@@ -347,7 +347,11 @@ class HierarchyCache:
             own = () if trees.upper is None else set(trees.upper.numbers.tolist())
             copies = {k: shown[k] for k in moved if k in own}
             place = {id(one): k for k, one in enumerate(trees.hierarchy.expanded)}
-            expanded = [k for k in moved if id(old[k]) in place]  # others have no triangle that a ray meets
+            expanded = [k for k in moved if id(old[k]) in place]
+            # Others have no triangle that a ray meets, or were left out of the trees since they were points.
+            left = (k for k in moved if k not in own and id(old[k]) not in place)
+            if any(is_point(old[k]) and not is_point(shown[k]) for k in left if meshes[shown[k].mesh].triangle_count):
+                continue
             counts = np.array([meshes[one.mesh].triangle_count for one in trees.hierarchy.expanded], np.int64)
             numbers = [place[id(old[k])] for k in expanded]
             if 2 * counts[numbers].sum() > max(len(trees.world.place), 1):

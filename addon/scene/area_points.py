@@ -51,8 +51,7 @@ class Surfaces:
     @classmethod
     def of(cls, frame) -> Surfaces:
         """Of the frame's snapshot."""
-        instances, meshes, _ = frame.geometry.placed
-        shown = tuple(one for one in instances if one.visibility.diffuse and meshes[one.mesh].triangle_count)
+        shown, meshes = shown_of(frame), frame.geometry.placed[1]
         maps = frame.opacity_maps, frame.emission_maps
         corners, look = world_triangles(
             shown, meshes, frame.measured_materials, frame.geometry.origin, "diffuse", *maps
@@ -74,6 +73,12 @@ class Surfaces:
         across = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         areas = np.linalg.norm(across, axis=1) / 2
         return np.where(np.isfinite(areas), areas, 0.0)
+
+
+def shown_of(frame) -> tuple[Instance, ...]:
+    """Instances of the frame's snapshot that have points."""
+    instances, meshes, _ = frame.geometry.placed
+    return tuple(one for one in instances if one.visibility.diffuse and meshes[one.mesh].triangle_count)
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,11 @@ def inverses(instances: Sequence[Instance]) -> np.ndarray:
     return (size > 1e-15) & (size < 1e15) & (np.linalg.norm(cofactors, axis=(1, 2)) < WORST_TURN * volume)
 
 
+def is_point(instance: Instance) -> bool:
+    """Whether an instance is scaled to a point, or by what is no number."""
+    return not np.abs(instance.matrix[:3, :3]).max() > 1e-15
+
+
 def parted(
     shown: Sequence[Instance], meshes: dict[str, Mesh], kind_of: Callable[[Instance], object], most: int
 ) -> tuple[list[Instance], dict[object, list[int]]]:
@@ -133,7 +138,7 @@ def parted(
     for k, fits in zip(numbers, inverses([shown[k] for k in numbers])):
         if fits:
             kinds.setdefault(kind_of(shown[k]), []).append(k)
-        elif not np.abs(shown[k].matrix[:3, :3]).max() > 1e-15:
+        elif is_point(shown[k]):
             points.add(k)
     kinds = {
         kind: some for kind, some in kinds.items()

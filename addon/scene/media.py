@@ -28,7 +28,7 @@ from ..gfx.struct import Block, Struct
 from ..materials.compiled import CompiledMaterial
 from ..materials.graph import Graph
 from ..materials.volume import PHASES, Medium
-from ..materials.volume_program import CompiledVolume, compile_volume
+from ..materials.volume_program import CompiledVolume, compile_volume, reads_camera
 from ..snapshot.scene import Instance, Note, Snapshot, Volume
 from .acceleration import Tree
 from .materials import MATERIAL_SCENE, values_block, values_struct
@@ -164,12 +164,17 @@ def _affine(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
 
 def _bounds(snapshot: Snapshot, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Around all objects and the camera, relative to the origin."""
-    places = [] if snapshot.camera is None else [snapshot.camera.matrix[:3, 3][None]]
-    for one in snapshot.instances:
-        mesh = snapshot.meshes[one.mesh]
-        low, high = np.asarray(mesh.bounds_min, float), np.asarray(mesh.bounds_max, float)
-        places.append((low + CORNERS * (high - low)) @ one.matrix[:3, :3].T + one.matrix[:3, 3])
-    places = np.concatenate(places or [np.zeros((1, 3))]) - origin
+    matrices = np.array([one.matrix[:3] for one in snapshot.instances], float).reshape(-1, 3, 4)
+    meshes = [snapshot.meshes[one.mesh] for one in snapshot.instances]
+    low, high = (
+        np.array([getattr(mesh, name) for mesh in meshes], float).reshape(-1, 3)
+        for name in ("bounds_min", "bounds_max")
+    )
+    centre = np.einsum("nij,nj->ni", matrices[:, :, :3], (low + high) / 2) + matrices[:, :, 3]
+    reach = np.einsum("nij,nj->ni", np.abs(matrices[:, :, :3]), (high - low) / 2)
+    eye = np.zeros((0, 3)) if snapshot.camera is None else snapshot.camera.matrix[None, :3, 3]
+    places = np.concatenate([centre - reach, centre + reach, eye])
+    places = (places if len(places) else np.zeros((1, 3))) - origin
     low, high = places.min(axis=0), places.max(axis=0)
     spare = max(0.05 * float((high - low).max()), 1e-3)
     return low - spare, high + spare
@@ -289,10 +294,19 @@ class Media:
         ]
         used = {k for one in bound for k in one.materials} | {one.material for one in snapshot.volumes}
         uneven_world = world.medium is not None and not world.medium.even
+        trees = [snapshot.materials[k].graph for k in used if compiled[k].medium and not compiled[k].medium.even]
+        trees += [world.volume] if uneven_world else []
+        follows = snapshot.camera is not None and any(reads_camera(tree) for tree in trees)
         key = (
             world.medium and world.medium.key, world.volume if uneven_world else None,
+            # Where its grid lies: a camera that moves among the objects changes nothing.
+            np.concatenate(_bounds(snapshot, origin)).tobytes() if uneven_world else None,
+            snapshot.camera.matrix.tobytes() if follows else None,
             tuple(id(one) for one in (snapshot.instances if uneven_world else bound)),
-            tuple((one.volume.key, one.volume.version, one.matrix.tobytes(), one.material) for one in snapshot.volumes),
+            tuple(
+                (one.volume.key, one.volume.version, one.matrix.tobytes(), one.material, one.density)
+                for one in snapshot.volumes
+            ),
             tuple((k, _key_of(compiled[k]), snapshot.materials[k].graph) for k in sorted(used)),
             tuple((key, image.version) for key, image in snapshot.images.items()),
             tuple((key, mesh.version) for key, mesh in snapshot.meshes.items()), origin.tobytes(), resolution,

@@ -45,18 +45,21 @@ class Surface:
         corners = mesh.positions[mesh.corner_vertices[mesh.triangle_corners]].astype(np.float64) @ stretch.T
         opacity = coverage(look[:, 0], maps) if len(look) == len(corners) else np.zeros(len(corners))
         closed = frame.geometry.is_closed(mesh)
-        if np.linalg.det(linear) < 0.0:  # a mirrored mesh winds the other way, and so do its normals when turned
-            corners = corners[:, ::-1]
-        key = (instance.mesh, mesh.version, instance.materials, stretch.tobytes(), np.linalg.det(linear) < 0.0)
+        key = (instance.mesh, mesh.version, instance.materials, stretch.tobytes())
         key = (*key, opacity.astype(np.float32).tobytes() if opacity.min(initial=1.0) < 1.0 else b"")
         return cls(key, corners, opacity, closed, turn, instance.matrix[:3, 3] - frame.geometry.origin)
 
+    @property
+    def mirrored(self) -> bool:
+        """Whether fronts by the winding of its triangles are backs in the world; normals turn along all the same."""
+        return bool(np.linalg.det(self.turn) < 0.0)
+
     def parted(self, seen: np.ndarray | None) -> Iterator[Surface]:
-        """Triangles by what their sides see, (T, 2) for front and back."""
+        """Triangles by what their sides see, (T, 2) for front and back by their winding in the world."""
         if seen is None or len(seen) != len(self.corners):
             yield self
             return
-        front, back = seen.T
+        front, back = seen.T[::-1] if self.mirrored else seen.T
         if self.closed:
             kinds = (front, False, True, False, 1.0), (~front, False, True, False, UNSEEN)
         else:
@@ -74,7 +77,9 @@ class Surface:
                 )  # fmt: skip
 
     def world(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.corners @ self.turn.T + self.moved, self.opacity
+        """Its triangles with the fronts that they have in its own space, and their opacities."""
+        corners = self.corners[:, ::-1] if self.mirrored else self.corners
+        return corners @ self.turn.T + self.moved, self.opacity
 
     def far(self, reach: float, eye: np.ndarray) -> bool:
         """Whether parts of it are farther than `reach`."""

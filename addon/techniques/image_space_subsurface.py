@@ -153,6 +153,7 @@ class ImageSpaceSubsurface(Technique):
         self._white: dict[tuple[int, int], tuple[images.Image, images.Image]] = {}
         self._whole: list[images.Target] = []  # sums of profiles over points, before this sample and after it
         self._shapes: images.Image | None = None  # of cells: normal and mean length of lines through the object
+        self._met: tuple[int, int] | None = None  # what the rays of these have met
 
     def skip(self, snapshot: Snapshot, settings: Settings) -> str | None:
         shown = snapshot.used_materials
@@ -180,8 +181,12 @@ class ImageSpaceSubsurface(Technique):
         self._materials = {k for k, material in enumerate(frame.materials.compiled) if material.scatter > 0.0}
         if not self._materials:
             return
-        if self.points.update(frame, frame.settings.get(self, "points")) or self._shapes is None:
+        moved = self.points.update(frame, frame.settings.get(self, "points"))
+        # What stands inside an object makes it thinner, too.
+        met = frame.geometry.changes, frame.hierarchy("shadow").leaves.number
+        if moved or met != self._met:
             self._measure(frame)
+            self._met = met
         if self._lobes is None:
             self._lobes = images.upload(diffusion.table())
         self._give_whole()
@@ -319,4 +324,4 @@ class ImageSpaceSubsurface(Technique):
         self._give_whole()
         self._give_white()
         self._give_shapes()
-        self._lobes = None
+        self._lobes = self._met = None

@@ -241,6 +241,9 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
         return len(layers) - 1
 
     scale = abs(np.linalg.det(matrix[:3, :3])) ** (1 / 3)
+    # What is painted is the same for all regions; it comes first, since nothing can stand for it.
+    if any(one["kind"] == "PAINTED" for one in wanted_regions):
+        layers.append(_painted(mesh))
     found = [_constraint(frame, instance, mesh, matrix, surface, one) for one in wanted_constraints]
     widest = max((scale * one["radius"] for one in wanted_regions if one["kind"] == "GEODESIC"), default=0.0)
     if widest > 0.0:  # places of a region are within two radii of its constraints, and edges that paths begin with
@@ -252,9 +255,8 @@ def _made(frame: Frame, instance: Instance, mesh: Mesh, row: int, surface: geode
         if kind == reflection_edits.GEODESIC:
             layer = along(centre, scale * one["radius"])
             kind = kind if layer >= 0 else reflection_edits.EUCLIDEAN
-        elif kind == reflection_edits.PAINTED and len(layers) < MOST_LAYERS:
-            layer = len(layers)
-            layers.append(_painted(mesh))
+        elif kind == reflection_edits.PAINTED:
+            layer = 0
         region = Region(kind, centre, scale * one["radius"], scale * one["border"], layer)
         regions.append(region)
         members.append(sum(1 << n for n, c in enumerate(found) if _inside(region, c, layers, surface)))

@@ -1,10 +1,19 @@
 """The hierarchy that rays search, on the CPU's side: triangles that move keep their places, and boxes follow them."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from addon.frame.settings import Settings
 from addon.gfx import images
-from addon.scene import acceleration
+from addon.materials.compiler import compile_material
+from addon.scene import acceleration, instance_tree
+from addon.scene.acceleration import HierarchyCache
+from addon.scene.emission_maps import EmissionMaps
+from addon.scene.opacity_maps import OpacityMaps
+from tests.frame.test_plan import room
 
 
 @pytest.fixture
@@ -59,3 +68,32 @@ def test_triangle_that_is_not_finite_is_left_out_and_not_moved(triangles):
     assert place[3] == -1 and len(set(np.delete(place, 3))) == 299
     assert not trees.move(np.array([3]), (np.zeros((1, 3, 3), np.float32), look[:1]), {})
     assert not trees.move(np.array([4]), (corners[3:4], look[:1]), {})
+
+
+def seen_by(snapshot):
+    """What a hierarchy asks of a draft's frame."""
+    return SimpleNamespace(
+        snapshot=snapshot, geometry=SimpleNamespace(origin=np.zeros(3)), settings=Settings(draft=True, whole=False),
+        measured_materials=[compile_material(one.name, one.graph) for one in snapshot.materials],
+        opacity_maps=OpacityMaps(), emission_maps=EmissionMaps(), blocker_sets=(),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("before", [0.0, np.nan])
+def test_copy_that_grows_from_a_point_is_met(gpu_context, monkeypatch, before):
+    monkeypatch.setattr(instance_tree, "OWN_TREE", 1)
+    snapshot, matrices = room(), np.repeat(np.eye(4)[None], 8, axis=0)
+    matrices[:, 0, 3] = np.arange(8)
+    matrices[7, :3, :3] *= before
+
+    def with_copies():
+        copies = tuple(replace(snapshot.instances[0], matrix=matrix.copy()) for matrix in matrices)
+        return seen_by(replace(snapshot, instances=copies))
+
+    cache = HierarchyCache()
+    first = cache.get(with_copies(), "glossy")
+    matrices[6, 1, 3] = 1.0
+    assert cache.get(with_copies(), "glossy").nodes is first.nodes  # boxes have followed
+    matrices[7, :3, :3] = np.eye(3)
+    grown, fresh = (one.get(with_copies(), "glossy") for one in (cache, HierarchyCache()))
+    assert np.array_equal(images.read(grown.nodes), images.read(fresh.nodes))

@@ -4,6 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
+from addon import engine
+from addon.gfx import images
 from addon.kernels import diffusion
 from addon.techniques import instant_radiosity
 from tests.techniques.conftest import places
@@ -220,6 +222,28 @@ def test_indirect_light_enters_too(stage):
     ours = stage.render(32, bounces=1)["diffuse_indirect"][..., :3].mean()
     cycles = stage.render(256, bounces=1, engine="CYCLES")["diffuse_indirect"][..., :3].mean()
     assert instant_radiosity.SUBSETS and ours == pytest.approx(cycles, rel=0.1)
+
+
+@pytest.mark.slow
+def test_an_object_is_thinner_where_another_stands_inside(stage):
+    sphere(stage, scattering(stage, "RANDOM_WALK", scale=0.3))
+    inside = box(stage, stage.diffuse(0.0), location=(5, 0, 0))
+    stage.floor(z=-2.0)
+    stage.light("SUN", energy=np.pi)
+    stage.camera_above(4.0)
+
+    def thickness():
+        stage.render(size=(16, 16))
+        techniques = stage.renderer.techniques
+        shapes = next(one for one in techniques if one.name == "image_space_subsurface")._shapes
+        return images.read(shapes)[..., 2]
+
+    whole = thickness()
+    inside.location = 0, 0, 0
+    seen = thickness()
+    engine.free_sessions()
+    np.testing.assert_array_equal(seen, thickness())
+    assert seen.mean() < 0.9 * whole.mean()
 
 
 def test_one_sample_is_smooth(stage):

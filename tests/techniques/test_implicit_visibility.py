@@ -12,6 +12,7 @@ from addon.compare.reference import render_passes
 from addon.frame import ledger
 from addon.gfx import images
 from addon.scene.surfel_cells import Cells, sampled
+from addon.scene.surfel_surfaces import Surface
 from addon.scene.surfel_tree import tree
 from addon.scene.surfels import Surfels
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
@@ -298,6 +299,46 @@ def test_the_back_of_a_sheet_that_sees_nothing_is_dark(stage, render):
     assert cells.sheet.all()
     stage.camera((0, 6, 1), (-np.pi / 2, 0, np.pi), angle=0.4)  # from behind the wall
     assert not render(2, size=(8, 8)).any()
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_surfels_of_closed_meshes_face_outwards(stage, render, turn):
+    slab(stage, (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)).scale.x = turn
+    stage.light("POINT", (2, 1, 3))
+    stage.camera_above()
+    render(1, size=(8, 8), surfels=200)
+    cells, _, _ = solved(stage)
+    assert len(cells) > 100 and cells.closed.all()
+    assert (((cells.place + stage.renderer.geometry.origin) * cells.normal).sum(axis=1) > 0.49).all()
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_a_sheet_faces_what_one_of_its_sides_sees(turn, side):
+    """Sampled in its own space or where it stands in the world."""
+    corners = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]], float)
+    whole = Surface((), corners, np.ones(2), False, np.diag([turn, 1.0, 1.0]), np.zeros(3))
+    front = turn  # z of normals by winding in the world
+    (part,) = whole.parted(np.arange(2)[None].repeat(2, axis=0) == side)
+    for cells in (Surfels()._own(part, 20, np.inf, np.zeros(3), {}), sampled(*part.world(), 20, part.closed)):
+        assert cells.closed.all()
+        np.testing.assert_allclose(cells.normal, np.array([(0, 0, -front if side else front)]).repeat(len(cells), 0))
+
+
+@pytest.mark.slow
+def test_a_mirrored_sphere_reflects_as_much_light(stage, render):
+    found = []
+    for turn in (1.0, -1.0):
+        stage.clear()
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, radius=0.5, location=(0, 0, 0.7))
+        bpy.context.object.scale.x = turn
+        bpy.context.object.data.materials.append(stage.diffuse(0.8))
+        stage.floor(half=2.0)
+        stage.light("SUN", turn=(0, 1.2, 0), energy=10.0, angle=0.0)
+        stage.camera_above()
+        found.append(render(1, size=(16, 16)).mean())
+    assert found[0] > 0.01
+    assert found[1] == pytest.approx(found[0], rel=0.1)
 
 
 # What is kept ---------------------------------------------------------------------------------------------------------

@@ -1,5 +1,8 @@
 """Micro-rendering against closed forms, Cycles, and the laws that light obeys."""
 
+from dataclasses import replace
+
+import bpy
 import numpy as np
 import pytest
 
@@ -7,6 +10,10 @@ from addon import engine
 from addon.compare.passes import light_paths
 from addon.compare.reference import render_passes
 from addon.frame import ledger
+from addon.frame.run import Renderer
+from addon.snapshot import SnapshotCache, take
+from addon.techniques import make_registry
+from addon.ui.properties import settings_of
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
 NAME = "micro_rendering"
@@ -157,6 +164,30 @@ def test_trees_stay_while_cameras_and_lamps_move_and_are_made_anew_for_what_is_m
     thing.location.z -= 0.1
     render(2)
     assert counters()["trees made"] == 2
+
+
+def test_trees_stay_where_an_object_has_another_pass_index(stage):
+    """They hold objects, of which a change that moves nothing makes others."""
+    lamp_in_a_corner(stage)
+    stage.scene.candela.slot_indirect, stage.scene.candela.micro_rendering_points = NAME, 1024
+    size, count = (16, 16), 8
+    settings = replace(settings_of(stage.scene, viewport=False), samples=count, bounces=1)
+    first = take(bpy.context.evaluated_depsgraph_get(), SnapshotCache(), *size)
+    second = replace(first, instances=(replace(first.instances[0], pass_index=3), *first.instances[1:]))
+
+    def drawn(renderer, snapshot, samples):
+        frame = renderer.begin(snapshot, settings)
+        for _ in range(samples):
+            renderer.advance(frame)
+        return renderer.finish(frame, ["radiance.diffuse_indirect"])["radiance.diffuse_indirect"]
+
+    used, fresh = Renderer(make_registry), Renderer(make_registry)
+    try:
+        assert drawn(used, first, 2).max() > 0
+        np.testing.assert_array_equal(drawn(used, second, count), drawn(fresh, second, count))
+    finally:
+        used.release()
+        fresh.release()
 
 
 def test_one_triangle_and_nothing_are_drawn(stage, render):

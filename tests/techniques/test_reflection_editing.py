@@ -8,7 +8,7 @@ import pytest
 from addon import engine
 from addon.gfx import images, passes
 from addon.surfaces import geodesic, reflection_edits
-from addon.surfaces.reflection_edits import EUCLIDEAN, SOLVE, Constraint, Region, edit_table, mirrored
+from addon.surfaces.reflection_edits import EUCLIDEAN, MOST_LAYERS, SOLVE, Constraint, Region, edit_table, mirrored
 from bench.reflection_costs import torus
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -516,6 +516,27 @@ def test_an_island_without_a_constraint_stays_as_it_is(stage):
     both.candela.reflection_editing_regions[0].centre = (-1, 0, 0)
     changed = np.any(stage.render(1, (32, 32), bounces=2)["combined"] != plain, axis=-1)
     assert changed[:, :15].all() and not changed[:, 17:].any()
+
+
+@pytest.mark.slow
+def test_where_black_is_painted_nothing_is_edited_however_many_constraints_there_are(stage):
+    """Distances from 16 constraints along the surface are as many layers as there are, without that of the paint."""
+    mirror = mirror_scene(stage)
+    paint = mirror.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+    paint.data.foreach_set("color", [0.0, 0.0, 0.0, 1.0] * len(paint.data))
+    plain = stage.render(1, (32, 32), bounces=2)["combined"]
+    for x in np.linspace(-1.5, 1.5, MOST_LAYERS):
+        constrain(mirror, (x, 0, 0), (-3, 6, 3), (0, -6, 3))
+    regions = mirror.candela.reflection_editing_regions
+    while len(regions) > 2:
+        regions.remove(2)
+    regions[0].kind, regions[0].centre, regions[0].radius = "GEODESIC", (2, 2, 0), 1e-6
+    regions[1].kind = "PAINTED"
+    mirror.update_tag()
+    assert np.array_equal(stage.render(1, (32, 32), bounces=2)["combined"], plain)
+    regions[1].kind = "EUCLIDEAN"
+    mirror.update_tag()
+    assert not np.array_equal(stage.render(1, (32, 32), bounces=2)["combined"], plain)
 
 
 @pytest.mark.slow
