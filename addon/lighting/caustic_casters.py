@@ -34,6 +34,7 @@ SLOT = "caustics"
 SMOOTH = 0.25  # roughness
 METALLIC = 0.5
 WIDEST = 0.6  # tangent of half the angle of a light, seen from the casters
+MARGIN = 0.02  # of a caster's box, for what its float32 bounds miss
 FLAT = 0.999  # cosine between normals of a pane's faces
 _CLEAR = ("ShaderNodeBsdfTransparent", "ShaderNodeEeveeSpecular", "ShaderNodeHoldout", "ShaderNodeBsdfRayPortal")
 _MIRRORS = ("ShaderNodeBsdfGlossy", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic")
@@ -67,6 +68,7 @@ class Casters:
     low: np.ndarray  # (K, 3) world space
     high: np.ndarray
     lights: frozenset[str]  # keys of the lights that are answered for
+    bent: frozenset[str]  # of those whose refracted light is wanted, too
 
     @property
     def materials(self) -> frozenset[int]:
@@ -103,16 +105,18 @@ def casters_of(snapshot: Snapshot) -> Casters | str:
         return "no object that throws caustics is visible to light from surfaces"
     if not mirrors and all(_is_pane(snapshot.meshes[mesh]) for mesh in {one.mesh for one in shown}):
         return "all glass is flat panes, which light passes straight"
-    boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
-    low, high = groups(boxes[:, 0], boxes[:, 1])
     given = [light for light in snapshot.lights if light.cast_shadow and np.any(light.strength)]
     given = [light for light in given if light.visibility.diffuse and (light.caustics or not by_flags or mirrors)]
     if not given:
         return "no lamp that casts shadows lights them: light of the world and of meshes passes straight"
+    boxes = np.array([_box(one, snapshot.meshes[one.mesh]) for one in shown])
+    low, high = groups(*grown(boxes[:, 0], boxes[:, 1]))
     answered = [light for light in given if _width(light, low, high) <= WIDEST]
     if not answered:
         return "all lamps are so wide, seen from what would throw caustics, that these look like straight light"
-    return Casters(frozenset(glass), mirrors, low, high, frozenset(light.key for light in answered))
+    keys = frozenset(light.key for light in answered)
+    bent = frozenset(light.key for light in answered if light.caustics) if by_flags else keys
+    return Casters(frozenset(glass), mirrors, low, high, keys, bent)
 
 
 class Answered:
@@ -166,6 +170,12 @@ def _box(instance: Instance, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     world = instance.matrix[:3, :3] @ centre + instance.matrix[:3, 3]
     reach = np.abs(instance.matrix[:3, :3]) @ half
     return world - reach, world + reach
+
+
+def grown(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes with a margin. They are grown before they are grouped, so that no photon is in two groups."""
+    pad = MARGIN * (high - low) + 1e-5 * np.linalg.norm(high.max(axis=0) - low.min(axis=0))
+    return low - pad, high + pad
 
 
 def _width(light: Light, low: np.ndarray, high: np.ndarray) -> float:

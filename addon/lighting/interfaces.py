@@ -13,7 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..frame.picture import Frame
+from ..gfx import images
 from ..materials.compiled import CompiledMaterial
+from ..surfaces.hits import defines_of_absorption
 
 
 def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, float] | None = None) -> np.ndarray:
@@ -32,6 +34,14 @@ def interface_table(compiled: Sequence[CompiledMaterial], mirrors: dict[int, flo
             if not material.glass:
                 row[1, 0] = mirrors[number]
     return table
+
+
+def upload_interfaces(compiled: Sequence[CompiledMaterial], mirrors: dict[int, float] | None = None) -> images.Image:
+    """The table as an image, which says to programs whether any solid absorbs."""
+    table = interface_table(compiled, mirrors)
+    image = images.upload(table)
+    image.defines = defines_of_absorption(table[(table[:, 1, 1] > 0.0), 2, :3])
+    return image
 
 
 def clear_roughness(frame: Frame) -> float:

@@ -31,6 +31,7 @@ from ..frame.picture import Frame
 from ..frame.technique import Technique
 from ..gfx import images
 from ..gfx.struct import Block
+from ..kernels.morton import morton_codes
 from ..scene.culling import CORNERS
 from ..scene.geometry import DIFFUSE_FLAG
 from ..scene.materials import SURFACE_IMAGES
@@ -40,8 +41,7 @@ from ..surfaces.draw import OPAQUE, STOCHASTIC, draw_view
 
 WIDEST = 1.4  # tangent of half the angle of one view
 FARTHEST = 4.0  # the same of what light may reach that casters bend
-MOST_GROUPS = 4
-MARGIN = 0.02  # of the box, for what its float32 bounds miss
+MOST_GROUPS, MOST_APART = 4, 32
 REFRACTED, REFLECTED = 1, 2  # wanted_lobe of the program of one lobe
 
 
@@ -62,32 +62,25 @@ class LightView:
 def groups(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boxes (K, 3), K <= MOST_GROUPS, that hold the boxes (N, 3) and do not overlap: of those that do, and of the two
     whose common box is least, one is made."""
-    boxes = [(a.copy(), b.copy()) for a, b in zip(low, high)]
+    low, high = np.reshape(low, (-1, 3)), np.reshape(high, (-1, 3))
+    if len(low) > MOST_APART:  # neighbours along a curve first: pairs of all would take a scene's time
+        runs = np.array_split(np.argsort(morton_codes((low + high) / 2), kind="stable"), MOST_APART)
+        low, high = (
+            np.array([each(side[run], axis=0) for run in runs]) for each, side in ((np.min, low), (np.max, high))
+        )
     while True:
-        pairs = [
-            (_extent(*_joined(boxes[i], boxes[j])) - max(_extent(*boxes[i]), _extent(*boxes[j])), i, j)
-            for i in range(len(boxes))
-            for j in range(i)
-        ]
-        overlapping = [one for one in pairs if _overlap(boxes[one[1]], boxes[one[2]])]
-        if not overlapping and len(boxes) <= MOST_GROUPS:
-            break
-        _, i, j = min(overlapping or pairs)
-        boxes[j] = _joined(boxes[i], boxes[j])
-        del boxes[i]
-    return np.array([a for a, _ in boxes]).reshape(-1, 3), np.array([b for _, b in boxes]).reshape(-1, 3)
-
-
-def _joined(a, b):
-    return np.minimum(a[0], b[0]), np.maximum(a[1], b[1])
-
-
-def _extent(low, high) -> float:
-    return float(np.linalg.norm(high - low))
-
-
-def _overlap(a, b) -> bool:
-    return bool(((a[0] <= b[1]) & (b[0] <= a[1])).all())
+        i, j = np.tril_indices(len(low), -1)
+        overlapping = ((low[i] <= high[j]) & (low[j] <= high[i])).all(axis=1)
+        if not overlapping.any() and len(low) <= MOST_GROUPS:
+            return low, high
+        if overlapping.any():
+            i, j = i[overlapping], j[overlapping]
+        extent = np.linalg.norm(high - low, axis=1)
+        joined = np.minimum(low[i], low[j]), np.maximum(high[i], high[j])
+        grown = np.linalg.norm(joined[1] - joined[0], axis=1) - np.maximum(extent[i], extent[j])
+        least = np.lexsort((j, i, grown))[0]
+        low, high = (np.delete(side, (i[least], j[least]), axis=0) for side in (low, high))
+        low, high = (np.concatenate([side, one[least][None]]) for side, one in zip((low, high), joined))
 
 
 def views_of(
@@ -95,8 +88,6 @@ def views_of(
 ) -> list[LightView]:
     """Views of `side` x `side` texels from the light's point `sample` over the box `low` to `high`; none where its
     light cannot reach it. `shift`: two uniform numbers; `size`: the scene's, in metres."""
-    pad = MARGIN * (high - low) + 1e-5 * size
-    low, high = low - pad, high + pad
     corners = low + CORNERS * (high - low)
     if emitter.kind == lights.SUN:
         u, v = _frame(sample)

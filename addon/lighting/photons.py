@@ -46,7 +46,7 @@ from ..sources import lights
 from ..surfaces.draw import SURFACE_TEXTURES
 from ..surfaces.reflectance import Reflectance
 from . import caustic_casters
-from .interfaces import interface_table
+from .interfaces import upload_interfaces
 from .light_views import REFLECTED, REFRACTED, LightBuffers, LightView, views_of
 from .media import MediaService
 
@@ -133,20 +133,18 @@ class Photons:
     def begin(self, frame: Frame, casters: caustic_casters.Casters) -> None:
         """Before the first sample of a frame."""
         frame.kept(Reflectance).update(frame)
-        self._interfaces = images.upload(interface_table(frame.materials.compiled, casters.mirrors))
+        self._interfaces = upload_interfaces(frame.materials.compiled, casters.mirrors)
         inner = [frame.materials.compiled[k].medium for k in casters.refracting]
         absorbed = [np.clip(medium.absorption, 0.0, 1e30) if medium else np.zeros(3) for medium in inner]
         self._absorbed = np.mean(absorbed, axis=0) if absorbed else np.zeros(3)
 
     def views(self, frame: Frame, casters: caustic_casters.Casters, side: int) -> Iterator[LitView]:
         """Views of the lights whose turn it is in this sample, `side` photons along each side."""
-        lobes = ()
-        if casters.refracting:
-            lobes += (REFRACTED,)
-        if frame.snapshot.film.caustics_reflective:
-            lobes += (REFLECTED,)
+        reflected = (REFLECTED,) if frame.snapshot.film.caustics_reflective else ()
         alone = frame.settings.whole and frame.settings.samples == 1
         for emitter, index, count, weight in self._turns(frame, casters):
+            bends = casters.refracting and emitter.light.key in casters.bent
+            lobes = ((REFRACTED,) if bends else ()) + reflected
             sample = emitter.middle() if alone else emitter.sample(*frame.random_volume_at(index, "light"))
             shift = frame.random_at(index, "caustics/grid")
             for low, high in caustic_casters.boxes_of(frame, casters):

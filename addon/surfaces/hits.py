@@ -77,7 +77,13 @@ TRACE = passes.fullscreen_program(
     "hits/trace.frag.glsl",
     textures=(*acceleration.HIERARCHY_TEXTURES, *RAYS, ("RG32F", "trace_owners"), ("RGBA32F", "hit_materials")),
     blocks=((VIEW, "film_view"),),
-    constants=(("INT", "ray_number"), ("INT", "glass_bends"), ("INT", "first_leaf"), ("FLOAT", "spread")),
+    constants=(
+        ("INT", "ray_number"),
+        ("INT", "glass_bends"),
+        ("INT", "first_leaf"),
+        ("FLOAT", "spread"),
+        ("FLOAT", "offset_size"),
+    ),
     outputs=(*(("VEC4", f"out_{name}") for name in RECORDS), ("FLOAT", "out_material")),
     writes_depth=True,
 )
@@ -296,7 +302,7 @@ class Hits:
             constants={
                 "ray_number": number, "glass_bends": int(refracts(frame)),
                 "first_leaf": hierarchy.first_leaf - _leaves_of_rows(hierarchy),
-                "spread": pixel_spread(frame),
+                "spread": pixel_spread(frame), "offset_size": frame.offset_size,
             },
         )  # fmt: skip
         frame.count(technique, "passes")
@@ -512,7 +518,9 @@ class Hits:
             for k, medium in enumerate(media[:MOST_MATERIALS]):
                 table[k, :3] = 0.0 if medium is None else np.clip(medium.absorption, 0.0, 1e30)
                 table[k, 3] = materials.leaders[k] + (materials.first_rows[k] << LEADER_BITS)
-            self._absorption = (key, images.upload(table.reshape(-1, ROW, 4)))
+            image = images.upload(table.reshape(-1, ROW, 4))
+            image.defines = defines_of_absorption(table[:, :3])
+            self._absorption = (key, image)
         return self._absorption[1]
 
     @staticmethod
@@ -523,6 +531,11 @@ class Hits:
     def release(self) -> None:
         """Drop GPU resources."""
         self.__init__()
+
+
+def defines_of_absorption(per_metre: np.ndarray) -> tuple[tuple[str, str], ...]:
+    """What programs that follow rays define where solids absorb: they look back from what stands in one, by a ray."""
+    return (("ABSORBING", "1"),) if (per_metre > 0.0).any() else ()
 
 
 def pixel_spread(frame: Frame) -> float:

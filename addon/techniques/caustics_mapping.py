@@ -20,7 +20,7 @@ ellipses between neighbouring photons in place of discs (lighting/photons.py).
 
 Bias, in diffuse indirect: one reflection or two refractions; what is mirrored inside of glass is missing (of a ball
 13 % of its light). Of several surfaces along the light the first and the last count, so hollow or folded glass is
-taken for full. Receivers that the light does not see past the casters get nothing: of reflections most, and whatever
+taken for full, and what stands in glass is lit as if it stood behind it. Receivers that the light does not see past the casters get nothing: of reflections most, and whatever
 leaves the map's rectangle. The mean over samples converges to that. With `by` rays, paths are those of screen-space
 photons, and only the map's own limits stay.
 

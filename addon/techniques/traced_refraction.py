@@ -40,7 +40,7 @@ from ..frame.settings import Settings
 from ..frame.technique import Param, Technique, Write
 from ..gfx import images, passes
 from ..gfx.library import Program
-from ..lighting.interfaces import clear_roughness, interface_table
+from ..lighting.interfaces import clear_roughness, upload_interfaces
 from ..lighting.media import MediaService, attenuated
 from ..lighting.path_sources import PathSources, ShadedLobes
 from ..materials.compiler import may_refract
@@ -127,7 +127,7 @@ class TracedRefraction(Technique):
     def prepare(self, frame: Frame) -> None:
         """Tell the shader how the materials behind the first interface bend light, and what their insides absorb: three
         texels for each."""
-        self._interfaces = images.upload(interface_table(frame.materials.compiled))
+        self._interfaces = upload_interfaces(frame.materials.compiled)
 
     def begin(self, frame: Frame) -> None:
         frame.kept(Reflectance).update(frame)

@@ -11,6 +11,9 @@
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
 #include "caustics/emission.glsl"
+#ifdef ABSORBING
+#include "trace/solid.glsl"
+#endif
 
 #define REFLECTANCE_BANDS 4  // see indirect/reflectance.frag.glsl
 #define PATHS 8192.0
@@ -111,6 +114,10 @@ void main()
     vec2 numbers = numbers_of(photon_light.lobe.zw, step);
     bool is_glass = shape.y > 0.0 && numbers.x <= shape.y;
     bool mirrors = !is_glass && body.w > 0.5;
+#ifdef ABSORBING
+    int solid = (leaves && shape.y > 0.0) ? material : solid_around(origin, onward, ray_offset(origin), salt + uint(step));
+    flux *= (solid >= 0) ? exp(-interface_table_fetch(ivec2(2, solid)).rgb * t) : vec3(1.0);
+#endif
     if (!is_glass && !mirrors) {
       // The end. Light spreads by the light's extent as by its distance; parallel light by its angle.
       float light_spread = photon_light.spread.x * (parallel ? 1.0 : 1.0 / max(away, 1e-30)) * travelled;
@@ -119,9 +126,6 @@ void main()
       out_normal = vec4((dot(normal, onward) > 0.0) ? -normal : normal, sqrt(light_spread * light_spread + lobes));
       out_flux = vec4(flux, width * (parallel ? 1.0 : (away + travelled) / away));
       return;
-    }
-    if (leaves && is_glass) {
-      flux *= exp(-body.rgb * t);
     }
     geometric_normal = leaves ? -normal : normal;
     smooth_normal = leaves ? -smooth_normal : smooth_normal;

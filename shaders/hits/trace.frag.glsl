@@ -4,13 +4,16 @@
 //   triangle   row of the instance, number of the triangle among those of its material, barycentric coordinates of the
 //              second and third corner
 //   normals    octahedral normal of the triangle by its winding (xy) and shading normal outwards (zw)
-//   passed     what the inside of a solid that is left here has let pass; w: luminance of the mean radiance that the
+//   passed     what the inside of a solid that the ray was in has let pass; w: luminance of the mean radiance that the
 //              triangle emits, times distance squared over cosine: a density per steradian times the power of all
 //   material   its number
 //
 // Depth: as it was, 0, where there is no ray, as is all else there; 0.5 where one meets nothing, above where one does, by program.
 #include "trace/hierarchy.glsl"
 #include "hits/shared.glsl"
+#ifdef ABSORBING
+#include "trace/solid.glsl"
+#endif
 
 vec4 owner_texel(int index)
 {
@@ -61,9 +64,19 @@ void main()
   vec3 emission = triangle_emission(hit, direction, ignored);
   out_passed.w = luminance(abs(emission)) * t * t / max(abs(dot(normal, direction)), 1e-6);
   vec3 outwards = (dot(normal, shading) < 0.0) ? -normal : normal;
+#ifdef ABSORBING
+  int solid = material_index;
+  vec3 absorbed = vec3(0.0);
   if (dot(outwards, direction) > 0.0) {
-    out_passed.rgb = exp(-hit_materials_fetch(ivec2(material_index & 255, material_index >> 8)).rgb * t);
+    absorbed = hit_materials_fetch(ivec2(material_index & 255, material_index >> 8)).rgb;
   }
+  if (max_component(absorbed) <= 0.0) {
+    float offset = max(offset_size, 2e-5 * distance(start.xyz, film_view.eye.xyz));
+    solid = solid_around(start.xyz, direction, offset, roll.x);
+    absorbed = (solid >= 0) ? hit_materials_fetch(ivec2(solid & 255, solid >> 8)).rgb : vec3(0.0);
+  }
+  out_passed.rgb = exp(-absorbed * t);
+#endif
   out_material = float(material_index);
   gl_FragDepth = shared_depth(material_index);
 }

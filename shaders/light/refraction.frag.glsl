@@ -9,6 +9,9 @@
 #include "lib/refraction.glsl"
 #include "light/sources.glsl"
 #include "trace/rays.glsl"
+#ifdef ABSORBING
+#include "trace/solid.glsl"
+#endif
 #ifdef MEDIA
 #include "media/media.glsl"
 #endif
@@ -203,9 +206,10 @@ void main()
     normal = (dot(normal, smooth_normal) < 0.0) ? -normal : normal;  // out of the solid
     bool leaves = dot(normal, direction) > 0.0;
     geometric_normal = leaves ? -normal : normal;
-    if (leaves) {
-      throughput *= exp(-interface_table_fetch(ivec2(2, material)).rgb * t);
-    }
+#ifdef ABSORBING
+    int solid = (leaves && shape.y > 0.0) ? material : solid_around(origin, direction, ray_offset(origin), roll.y);
+    throughput *= (solid >= 0) ? exp(-interface_table_fetch(ivec2(2, solid)).rgb * t) : vec3(1.0);
+#endif
     if (to_unit(roll.x) >= shape.y) {
       Walk rest;
       rest.direction = direction;

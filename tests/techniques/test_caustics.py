@@ -1,11 +1,15 @@
 """Caustics on surfaces: closed forms, energy, and what may not happen."""
 
+import time
+
 import bpy
 import numpy as np
 import pytest
 
 from addon.frame.ledger import RAN, SKIPPED
 from addon.lighting import photons
+from addon.lighting.caustic_casters import grown
+from addon.lighting.light_views import groups
 from tests.techniques.conftest import places
 from tests.techniques.foggy_stage import fill
 
@@ -245,6 +249,60 @@ def test_glass_with_an_absorbing_inside_dims_by_beer_and_lambert(stage, techniqu
         means.append(light.mean(axis=(0, 1)))
         bpy.data.objects.remove(made)
     np.testing.assert_allclose(means[1] / means[0], np.exp(-2.0 * 0.3 * np.array([0.5, 1.0, 0.0])), rtol=0.01)
+
+
+@pytest.mark.slow
+def test_light_on_a_floor_that_stands_in_water_is_dimmed(stage):
+    """On the way of .4 m to it, though no photon leaves the water."""
+    stage.floor()
+    material = glass(stage)
+    ball(stage, material, radius=0.1, place=(3, 0, 1))
+    fill(material.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.5, 0.0, 1.0, 1.0), Density=2.0)
+    slab(stage, material, -0.1, 0.4)
+    stage.light("SUN", angle=0.0)
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_indirect, stage.scene.candela.slot_caustics = "OFF", PHOTONS
+    seen = stage.render(samples=4, size=(32, 32), bounces=2)["combined"][..., :3].mean(axis=(0, 1))
+    np.testing.assert_allclose(seen / seen[2], np.exp(-0.4 * np.array([1.0, 2.0, 0.0])), rtol=0.01)
+
+
+@pytest.mark.parametrize("gap", [0.003, 0.05])
+def test_a_small_caster_beside_a_large_one_is_answered_for_once(gap):
+    """However near: boxes are grown before they are sorted into groups, and groups do not overlap."""
+    low = np.array([[0, 0, 0], [1 + gap, 0.5, 0.3]], float)
+    found_low, found_high = groups(*grown(low, np.array([[1, 1, 1], [1.015 + gap, 0.515, 0.315]])))
+    assert len(found_low) == 1 or (found_low[0] > found_high[1]).any() or (found_low[1] > found_high[0]).any()
+    assert len(found_low) == (1 if gap < 0.02 else 2)
+
+
+def test_a_thousand_casters_are_grouped_soon():
+    low = np.random.default_rng(0).random((1000, 3)) * 100
+    started = time.process_time()
+    found_low, found_high = groups(low, low + 0.1)
+    assert time.process_time() - started < 1.0
+    assert len(found_low) <= 4
+    for one in low:
+        assert ((found_low <= one).all(axis=1) & (found_high >= one + 0.1).all(axis=1)).sum() == 1
+
+
+def test_a_mirror_brings_no_light_of_glass_to_lamps_that_are_not_asked(stage):
+    """Refractive caustics off: glass and lamps that are set to have them all the same, alone."""
+    stage.floor()
+    ball(stage, glass(stage), radius=0.3, place=(0, 0, 0.5)).cycles.is_caustics_caster = True
+    ball(stage, stage.material("ShaderNodeBsdfGlossy", Roughness=0.0), radius=0.3, place=(2, 0, 0.5))
+    stage.light("POINT", (0, 0, 3), energy=100, shadow_soft_size=0.0)
+    stage.camera_above(4.0)
+    stage.scene.candela.slot_indirect = "OFF"
+    lamp = next(one for one in stage.scene.objects if one.type == "LIGHT")
+    light = {}
+    stage.scene.cycles.caustics_refractive = False
+    try:
+        for asked in (True, False):
+            lamp.data.cycles.is_caustics_light = asked
+            light[asked] = stage.render(2, size=(32, 32), bounces=2)["diffuse_indirect"][12:20, 12:20, 0].mean()
+    finally:
+        stage.scene.cycles.caustics_refractive = True
+    assert light[True] > 0.05 and light[False] < 0.1 * light[True]
 
 
 @pytest.mark.slow

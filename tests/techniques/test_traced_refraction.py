@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from .conftest import places
+from .foggy_stage import box, fill
 
 SIZE = (24, 24)
 SLOW = pytest.mark.slow
@@ -207,6 +208,20 @@ def test_what_a_solid_of_glass_absorbs_is_missing_as_in_cycles(stage, roughness)
     if not roughness:
         straight = np.exp(-density * (1 - color) * depth)
         assert ours[0] / ours[2] == pytest.approx(straight[0] / straight[2], rel=0.05)
+
+
+@pytest.mark.parametrize("slot", ["AUTO", "OFF"])
+def test_what_stands_in_a_solid_is_seen_through_what_that_absorbs(stage, slot):
+    """A shining plate .6 m below the face of a block, by rays that meet surfaces and by walks among means."""
+    material = glass(stage, ior=1.3)
+    fill(material.node_tree, "ShaderNodeVolumeAbsorption", Color=(0.5, 0.0, 1.0, 1.0), Density=2.0)
+    box(stage, material, (-1, -1, -1), (1, 1, 1))
+    stage.rectangle((-0.8, -0.8), (0.8, 0.8), 0.4, material=stage.material("ShaderNodeEmission", Strength=3.0))
+    stage.camera_above(1.0)
+    stage.scene.candela.slot_reflection = slot
+    seen = stage.render(4, (16, 16), bounces=4)["combined"][4:12, 4:12, :3].mean(axis=(0, 1))
+    assert seen[2] == pytest.approx(3.0 * (1 - fresnel(1.0, 1.3)), rel=0.02)
+    np.testing.assert_allclose(seen / seen[2], np.exp(-0.6 * np.array([1.0, 2.0, 0.0])), rtol=0.01)
 
 
 def test_scenes_without_glass_pay_nothing(stage):
