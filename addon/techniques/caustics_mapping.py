@@ -18,11 +18,11 @@ ellipses between neighbouring photons in place of discs (lighting/photons.py).
 | passes | 4, and 1 instanced draw of the grid into the map |
 | bytes | 36 x 16 per photon, 7 x 16 per texel of the map |
 
-Bias, in diffuse indirect: one reflection or two refractions; what is mirrored inside of glass is missing (of a ball
-13 % of its light). Of several surfaces along the light the first and the last count, so hollow or folded glass is
-taken for full, and what stands in glass is lit as if it stood behind it. Receivers that the light does not see past the casters get nothing: of reflections most, and whatever
-leaves the map's rectangle. The mean over samples converges to that. With `by` rays, paths are those of screen-space
-photons, and only the map's own limits stay.
+Bias, in diffuse indirect: one reflection or two refractions; what is mirrored inside of glass is missing (of a ball 13
+% of its light). Of several surfaces along the light the first and the last count, so hollow or folded glass is taken
+for full, and what stands in glass is lit as if it stood behind it. Receivers that the light does not see past the
+casters get nothing: of reflections most, and whatever leaves the map's rectangle. The mean over samples converges to
+that. With `by` rays, paths are those of screen-space photons, and only the map's own limits stay.
 
 Fails: beside a lamp that stands within the casters' box, maps have the faces of a cube, and light that passes from one
 face to another is lost.
