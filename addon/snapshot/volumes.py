@@ -1,6 +1,6 @@
 """OpenVDB objects: their grids as dense arrays, read through Blender's own `openvdb` module.
 
-A volume that modifiers made has no file: Blender writes it to a temporary one, which is read and removed. Grids of one
+Blender writes a volume that modifiers made or changed to a temporary file, which is read and removed. Grids of one
 object that share the first one's voxels are laid over a common box; others are read at its voxels' centres. Grids
 longer than MOST_VOXELS on a side are averaged by whole factors first.
 """
@@ -27,6 +27,7 @@ def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], sh
     if not len(bpy.data.volumes):
         return ()
     found, used = [], set()
+    numbers: dict[int, list[int]] = {}  # addresses of the volumes that each object made, by its session_uid
     for instance in depsgraph.object_instances:
         thing = instance.object
         if thing.type != "VOLUME" or not instance.show_self or (shown is not None and not shown(thing)):
@@ -36,7 +37,15 @@ def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], sh
             continue
         owner = instance.instance_object if instance.is_instance else thing
         name = owner.original.name
-        volume = _volume(thing.data, name, cache, notes)
+        if _is_own(owner, thing.data):
+            key = ""
+        else:
+            made = numbers.setdefault(owner.original.session_uid, [])
+            pointer = thing.data.as_pointer()
+            if pointer not in made:
+                made.append(pointer)
+            key = f"volume {owner.original.session_uid} #{made.index(pointer)}"
+        volume = _volume(thing.data, name, key, cache, notes)
         if volume is None:
             continue
         used.add(volume.key)
@@ -61,7 +70,19 @@ def _density(data, matrix: np.ndarray) -> float:
     return 1.0 / scale if scale > 0 else 1.0
 
 
-def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume | None:
+def _is_own(owner, data) -> bool:
+    """Whether a volume is the object's data-block as the file has it, and nothing that modifiers made."""
+    original = owner.original
+    return (
+        not len(original.modifiers)
+        and data.original is not None
+        and original.data is not None
+        and data.original.session_uid == original.data.session_uid
+    )
+
+
+def _volume(data, name: str, made_key: str, cache: SnapshotCache, notes: list[Note]) -> Volume | None:
+    """`made_key`: key of a volume that modifiers made, empty for the object's own, which its file tells all of."""
     subject = f"Object '{name}'"
     try:
         data.grids.load()
@@ -69,12 +90,13 @@ def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume 
         notes.append(Note(subject, f"its volume cannot be read: {error}."))
         return None
     path = bpy.path.abspath(data.grids.frame_filepath or "", library=data.library)
-    file = bool(path) and Path(path).is_file()
-    key = f"volume {path}" if file else f"volume {name} {(data.original or data).session_uid}"
+    file = not made_key and bool(path) and Path(path).is_file()
+    key = f"volume {path}" if file else made_key or f"volume {(data.original or data).session_uid}"
     stat = Path(path).stat() if file else None
+    # What modifiers make is a new data-block, with a number of its own, whenever they are evaluated.
     state = (path, stat.st_mtime_ns, stat.st_size) if file else (data.session_uid,)
     known = cache.volumes.get(key)
-    if known is not None and known[0] == state:
+    if known is not None and known[0] == state and any(state):
         return known[1]
     grids = None
     try:
@@ -92,8 +114,19 @@ def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume 
         return None
     arrays, low, to_object = grids
     volume = Volume(key, next_version(), arrays, low, to_object)
+    if known is not None and _alike(known[1], volume):
+        volume = known[1]
     cache.volumes[key] = state, volume
     return volume
+
+
+def _alike(one: Volume, other: Volume) -> bool:
+    return (
+        one.grids.keys() == other.grids.keys()
+        and all(np.array_equal(values, other.grids[name]) for name, values in one.grids.items())
+        and np.array_equal(one.low, other.low)
+        and np.array_equal(one.to_object, other.to_object)
+    )
 
 
 def openvdb():
