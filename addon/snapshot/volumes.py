@@ -9,53 +9,45 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from .cache import SnapshotCache, next_version
-from .instances import visibility_of
+from .instances import Place
 from .scene import Note, Volume, VolumeInstance
 
 MOST_VOXELS = 192  # on a side
 MOST_GRIDS = 6  # of one object
 
 
-def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], shown=None) -> tuple[VolumeInstance, ...]:
-    """All instances of volume objects. Reads files only when they, or the objects, have changed."""
-    if not len(bpy.data.volumes):
-        return ()
+def read_volumes(
+    places: Sequence[Place], matrices: np.ndarray, shading, override, cache: SnapshotCache, notes: list[Note]
+) -> tuple[VolumeInstance, ...]:
+    """The volumes at these places (N, 4, 4). Reads files only when they, or the objects, have changed.
+
+    `override`: material of all, or None.
+    """
     found, used = [], set()
     numbers: dict[int, list[int]] = {}  # addresses of the volumes that each object made, by its session_uid
-    for instance in depsgraph.object_instances:
-        thing = instance.object
-        if thing.type != "VOLUME" or not instance.show_self or (shown is not None and not shown(thing)):
-            continue
-        matrix = np.array(instance.matrix_world, np.float64)
-        if not np.isfinite(matrix).all():
-            continue
-        owner = instance.instance_object if instance.is_instance else thing
-        name = owner.original.name
-        if _is_own(owner, thing.data):
-            key = ""
-        else:
-            made = numbers.setdefault(owner.original.session_uid, [])
-            pointer = thing.data.as_pointer()
-            if pointer not in made:
-                made.append(pointer)
-            key = f"volume {owner.original.session_uid} #{made.index(pointer)}"
-        volume = _volume(thing.data, name, key, cache, notes)
+    for place, matrix in zip(places, matrices, strict=True):
+        source, facts = place.source, place.source.facts
+        made_key = ""
+        if not facts.data_uid or len(source.owner.original.modifiers):
+            made = numbers.setdefault(facts.uid, [])
+            if source.pointer not in made:
+                made.append(source.pointer)
+            made_key = f"volume {facts.uid} #{made.index(source.pointer)}"
+        volume = _volume(source.data, facts.name, made_key, cache, notes)
         if volume is None:
             continue
         used.add(volume.key)
-        slots = thing.material_slots
-        material = shading.index_of(slots[0].material if len(slots) else None)
-        ids = "-".join(str(number) for number in instance.persistent_id)
-        key = f"{name} {len(found)} {ids}"
-        density = _density(thing.data, matrix)
+        material = shading.index_of_volume(override or next(iter(source.materials), None))
+        density = _density(source.data, matrix)
         found.append(
-            VolumeInstance(name, volume, matrix, material, visibility_of(owner), key, density, owner.lightgroup)
+            VolumeInstance(facts.name, volume, matrix, material, facts.visibility, place.key, density, facts.group)
         )
     for key in {key for key in cache.volumes if key.startswith("volume ")} - used:
         del cache.volumes[key]
@@ -68,17 +60,6 @@ def _density(data, matrix: np.ndarray) -> float:
         return 1.0
     scale = float(np.linalg.norm(matrix[:3, :3] @ np.full(3, 3**-0.5)))
     return 1.0 / scale if scale > 0 else 1.0
-
-
-def _is_own(owner, data) -> bool:
-    """Whether a volume is the object's data-block as the file has it, and nothing that modifiers made."""
-    original = owner.original
-    return (
-        not len(original.modifiers)
-        and data.original is not None
-        and original.data is not None
-        and data.original.session_uid == original.data.session_uid
-    )
 
 
 def _volume(data, name: str, made_key: str, cache: SnapshotCache, notes: list[Note]) -> Volume | None:

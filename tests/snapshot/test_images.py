@@ -1,6 +1,7 @@
 """Images arrive as Blender stores them, with what it takes to decode them."""
 
 import os
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -198,7 +199,7 @@ def overwrite(path, value):
     other.filepath_raw, other.file_format = path, "PNG"
     other.save()
     bpy.data.images.remove(other)
-    made = os.stat(path).st_mtime_ns + 10**9
+    made = Path(path).stat().st_mtime_ns + 10**9
     os.utime(path, ns=(made, made))
 
 

@@ -4,8 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.snapshot import SnapshotCache
+from addon.snapshot import SnapshotCache, instances, smoke
 from addon.snapshot.volumes import openvdb
+from tests.snapshot.test_instances import collection_of, in_layer
 
 
 @pytest.fixture
@@ -69,8 +70,7 @@ def test_each_object_has_its_own_of_a_shared_volume_that_modifiers_change(stage,
 
 
 def test_a_volume_that_a_mesh_turns_into_is_followed(stage):
-    """Without any volume data-block in the file but one that nothing shows."""
-    bpy.data.volumes.new("unused")
+    """The file has no volume data-block then."""
     placed, cache = stage.link("O", stage.mesh()), SnapshotCache()
     node = shift(placed, 5)
     tree = node.id_data
@@ -83,3 +83,59 @@ def test_a_volume_that_a_mesh_turns_into_is_followed(stage):
     second = only_volume(stage.take(cache))
     assert second.to_object[0, 3] - first.to_object[0, 3] == pytest.approx(2)
     assert second.key == first.key
+
+
+def test_a_view_layer_without_volumes_has_none(stage, cloud):
+    assert stage.take().volumes
+    bpy.context.view_layer.use_volumes = False
+    assert stage.take().volumes == ()
+
+
+def test_the_view_layers_material_is_that_of_volumes_too(stage, cloud):
+    cloud.data.materials.append(stage.material("Own"))
+    bpy.context.view_layer.material_override = stage.material("Over")
+    snapshot = stage.take()
+    assert snapshot.materials[snapshot.volumes[0].material].name == "Over"
+
+
+@pytest.mark.parametrize("slot", [False, True], ids=["no slot", "empty slot"])
+def test_a_volume_without_a_material_is_a_principled_volume(stage, cloud, slot):
+    if slot:
+        cloud.data.materials.append(None)
+    stage.link("another", cloud.data)
+    snapshot = stage.take()
+    (index,) = {one.material for one in snapshot.volumes}
+    graph = snapshot.materials[index].graph
+    assert graph.nodes[graph.volume[0]].type == "ShaderNodeVolumePrincipled"
+    assert graph.surface is None
+
+
+def test_volumes_are_seen_by_the_rays_of_the_object_and_of_its_instancer(stage, cloud):
+    cloud.visible_shadow = False
+    empty = collection_of(stage, cloud)
+    empty.visible_glossy = False
+    layer = in_layer(stage, "Empty", empty)
+    plain, instance = sorted(stage.take().volumes, key=lambda one: "/" in one.key)
+    assert (plain.visibility.shadow, plain.visibility.glossy) == (False, True)
+    assert (instance.visibility.shadow, instance.visibility.glossy) == (False, False)
+    layer.indirect_only = True
+    plain, instance = sorted(stage.take().volumes, key=lambda one: "/" in one.key)
+    assert (plain.visibility.camera, instance.visibility.camera) == (True, False)
+
+
+@pytest.mark.parametrize("surfaces", [False, True])
+def test_a_domain_of_smoke_counts_as_a_volume_of_the_view_layer(stage, monkeypatch, surfaces):
+    for module in (instances, smoke):
+        monkeypatch.setattr(module, "domain_of", lambda owner: owner if owner.name == "Domain" else None)
+    monkeypatch.setattr(smoke, "domain_grids", lambda settings: {"density": np.ones((2, 2, 2), np.float32)})
+    stage.link("Domain", stage.mesh())
+    stage.link("O", stage.mesh())
+    layer = bpy.context.view_layer
+    layer.use_solid, layer.material_override = surfaces, stage.material("Over")
+    snapshot = stage.take()
+    assert [snapshot.materials[one.material].name for one in snapshot.volumes] == ["Over"]
+    assert len(snapshot.instances) == surfaces
+    layer.use_volumes = False
+    snapshot = stage.take()
+    assert snapshot.volumes == ()
+    assert len(snapshot.instances) == surfaces
