@@ -75,6 +75,9 @@ class PointMaps(Technique, VisibilityProvider):
         typical = np.zeros(len(centre))  # irradiance at the tiles' centres if nothing is blocked
         largest = []
         for emitter in emitters:
+            if emitter.maps is not None:  # its light falls off otherwise, and is stronger than in the mean somewhere
+                largest.append(np.full(len(centre), np.inf))
+                continue
             strength = float(np.abs(emitter.radiance).max())
             if emitter.kind == lights.SUN:
                 typical += strength * emitter.area

@@ -103,8 +103,7 @@ class TracedGlossy(Technique):
     def begin(self, frame: Frame) -> None:
         """Tell the techniques that draw points of lights, which run before this one, what share the rays take over."""
         frame.provide(TracedLobes(frame.settings.get(self, "roughness")))
-        found = {emitter.light.key: emitter for emitter in frame.emitters}
-        shown = lights.traceable([found[light.key] for light in frame.snapshot.lights if light.key in found])
+        shown = lights.traceable(frame.emitters)
         points = frame.service(PointsDrawn)  # whole lights have one point, whatever their rate
         drawn = points.per_sample if points else {}
         rates = [drawn.get(e.light.key, rate_of(frame, e.light.key).per_sample) for e in shown]

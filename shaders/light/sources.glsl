@@ -329,6 +329,9 @@ vec3 light_hit(Light light, vec3 origin, vec3 direction, out float hit_distance,
     hit_distance = t;
     density = t * t / max(light.area * cos_light, 1e-30);
   }
-  float attenuation = ((light.flags & LIGHT_SPOT) != 0) ? spot_attenuation(light, -direction) : 1.0;
+  // Within a spot's ball its cone does not count, as in Cycles.
+  bool cone = (light.flags & LIGHT_SPOT) != 0
+              && !(LIGHT_IS(light, LIGHT_SPHERE) && distance_squared < light.radius * light.radius);
+  float attenuation = cone ? spot_attenuation(light, -direction) : 1.0;
   return light.radiance * (attenuation * light_tree(light, -direction, origin + hit_distance * direction, hit_distance));
 }

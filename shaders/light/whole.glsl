@@ -124,7 +124,7 @@ vec3 whole_irradiance(Light light, vec3 position, vec3 normal, vec3 direction)
   float attenuation = ((light.flags & LIGHT_SPOT) != 0) ? spot_attenuation(light, -direction) : 1.0;
   if (LIGHT_IS(light, LIGHT_SPHERE)) {
     if (radius_squared >= distance_squared) {
-      return light.radiance * (PI * attenuation);
+      return light.radiance * PI;  // its cone does not count there
     }
     return light.radiance * (attenuation * whole_cone(sqrt(radius_squared / distance_squared), dot(normal, direction)));
   }
