@@ -50,7 +50,7 @@ class ImageTable:
         original = image.original or image
         dropped = not original.has_data  # as by Reload: asking for anything then loads the file
         part = _part(original, user, self._frame)
-        key = f"image {original.session_uid}" + (f" {part}" if part else "")
+        key = whole_key(original.session_uid) + (f" {part}" if part else "")
         if key in self.images:
             return key
         entry = self._cache.images.get(key)
@@ -118,6 +118,11 @@ class ImageTable:
         self.read += 1
         made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles, bits)
         return ImageEntry(made, state, notes)
+
+
+def whole_key(uid: int) -> str:
+    """Image.key of a data-block of which no ImageUser picks a frame or pass."""
+    return f"image {uid}"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ..materials.reader import read_graph
 from ..materials.sky import Sky
 from ..materials.translucency import names_of, with_maps
 from .cache import GraphEntry, SnapshotCache
-from .images import ImageTable
+from .images import ImageTable, whole_key
 from .meshes import Wanted
 from .object_attributes import INSTANCER, OBJECT, VIEW_LAYER, of_view_layer
 from .own_settings import own_images, own_settings
@@ -181,7 +181,9 @@ class ShadingTable:
                 self._images.key_of_sky(uid)
                 continue
             image = self._images_by_uid.get(uid)
-            if image is None or self._images.key_of(image) != key:
+            if image is None or key != whole_key(uid) or image.source == "SEQUENCE":
+                return False  # its node says what of it is shown
+            if self._images.key_of(image) != key:
                 return False
         return True
 

@@ -146,6 +146,24 @@ def test_a_frame_that_a_sequence_lacks_is_named(stage, tmp_path):
     assert "frame 7" in note.text
 
 
+@pytest.mark.parametrize("before", ["SEQUENCE", "FILE"])
+def test_a_frame_of_a_sequence_is_no_other_one_at_the_next_sync(stage, tmp_path, before):
+    path, _ = saved(tmp_path, "frame0007.png")
+    image, cache = bpy.data.images.load(path), SnapshotCache()
+    image.source = before
+    user = shown(stage, image).image_user
+    user.frame_duration, user.frame_offset = 1, 6
+    stage.take(cache)
+    for read in (before != "SEQUENCE", 0):
+        with stage.telling(cache):
+            stage.scene.camera.location.x += 1.0
+            image.source = "SEQUENCE"
+        snapshot = stage.take(cache)
+        assert snapshot.notes == ()
+        assert list(snapshot.images) == [f"image {image.session_uid} frame 7"]
+        assert snapshot.sync_stats["images_read"] == read
+
+
 def test_an_unchanged_image_is_not_read_again(stage, tmp_path):
     path, _ = saved(tmp_path)
     shown(stage, bpy.data.images.load(path))
