@@ -81,7 +81,8 @@ class ObjectFacts:
     shadow_catcher: bool
     smoke: bool  # a gas domain of a fluid simulation, whose mesh is not drawn
     linked: bool  # it, or its instancer, has collections of light linking
-    asset: str
+    asset: str  # name of the last ancestor
+    ancestors: tuple[int, ...]  # uids of the original parent, its parent, and so on
     group: str
     notes: tuple[Note, ...]
 
@@ -139,8 +140,9 @@ def walk(
                 data_uid = own_data.session_uid if is_own else 0
                 name = original.session_uid, parent_uid, data_uid
                 facts = before.get(name)
-                if facts is None or not told or not changed.isdisjoint(name):
+                if facts is None or not told or not (changed.isdisjoint(name) and changed.isdisjoint(facts.ancestors)):
                     top = owner if parent is None else parent
+                    ancestors = _ancestors(owner)
                     cuts = _is_holdout(top, view_layer if holdout else None)
                     # A holdout is one for the camera too, wherever it stands.
                     unseen = indirect_only and not cuts and top.indirect_only_get(view_layer=view_layer)
@@ -161,7 +163,8 @@ def walk(
                         smoke=domain_of(owner) is not None,
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
-                        asset=_topmost(owner),
+                        asset=ancestors[-1].name if ancestors else "",
+                        ancestors=tuple(one.original.session_uid for one in ancestors),
                         group=owner.lightgroup,
                         notes=_object_notes(owner, kind, original.name, final),
                     )
@@ -229,12 +232,13 @@ def _collections_say(top) -> tuple[bool, bool]:
     return indirect_only, holdout
 
 
-def _topmost(owner) -> str:
-    """Name of the topmost parent of an object, empty without one."""
-    parent = owner.parent
-    while parent is not None and parent.parent is not None:
-        parent = parent.parent
-    return "" if parent is None else parent.name
+def _ancestors(owner) -> list:
+    """An object's parent, its parent, and so on."""
+    found = []
+    while owner.parent is not None:
+        owner = owner.parent
+        found.append(owner)
+    return found
 
 
 def _is_holdout(top, view_layer) -> bool:

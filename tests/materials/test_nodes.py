@@ -357,3 +357,15 @@ def test_tables_that_fit_no_block_are_read_whole(evaluate):
     seen = evaluate(material)["emission"][0]
     assert seen[1:] == pytest.approx(seen[0] * np.array([0.5, 0.25]), rel=1e-4)
     assert 0.5 < seen[0] < 1.0
+
+
+def test_compare_takes_only_equal_numbers_for_equal(evaluate):
+    """Cycles: 1 where they are the same or no further apart than the epsilon, which is 1.19e-7 or more."""
+    cases = {(5e-6, 0, 0): 0, (1.3e-7, 0, 0): 0, (1e-7, 0, 0): 1, (1e30, 1e30, 0): 1, (0.5, 0.4, 0.2): 1, (1, 0, -1): 0}
+    for (a, b, epsilon), expected in cases.items():
+        compare = node(
+            "Compare", "ShaderNodeMath", {"Value": "FLOAT"}, "", {"operation": "COMPARE"},
+            Value=a, Value_001=b, Value_002=epsilon,
+        )  # fmt: skip
+        shown = graph(compare, emission(Color=("Compare", "Value")), surface=("Emission", "Emission"))
+        assert evaluate(compile_material("Test", shown))["emission"][0, 0] == expected

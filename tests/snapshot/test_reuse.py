@@ -212,6 +212,8 @@ EDITS = {
     "parent": lambda stage, a, b: setattr(a, "parent", b),
     "move the parent": lambda stage, a, b: setattr(stage.scene.objects["Parent"], "location", (0, 0, 4)),
     "name": lambda stage, a, b: setattr(a, "name", "Other"),
+    "name of the topmost parent": lambda stage, a, b: setattr(stage.scene.objects["Parent"], "name", "Other"),
+    "no topmost parent": lambda stage, a, b: setattr(stage.scene.objects["Child"], "parent", None),
     "color": lambda stage, a, b: setattr(a, "color", (1, 0, 0, 1)),
     "pass index": lambda stage, a, b: setattr(a, "pass_index", 7),
     "shadow": lambda stage, a, b: setattr(a, "visible_shadow", False),
@@ -237,6 +239,7 @@ def test_what_is_taken_over_is_what_would_be_read(stage, edit, informed):
     cache = SnapshotCache()
     one, other, parent, child = (stage.link(name, stage.mesh()) for name in ("O", "P", "Parent", "Child"))
     child.parent = parent
+    stage.link("Grandchild", stage.mesh()).parent = child
     inner = bpy.data.collections.new("Inner")
     stage.scene.collection.children.link(inner)
     inner.objects.link(stage.scene.objects["P"])
