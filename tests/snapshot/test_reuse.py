@@ -226,6 +226,7 @@ EDITS = {
     "indirect only": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "indirect_only", True),
     "holdout of the layer": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "holdout", True),
     "exclude": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "exclude", True),
+    "removal of the parent": lambda stage, a, b: bpy.data.objects.remove(stage.scene.objects["Parent"]),
     "removal": lambda stage, a, b: bpy.data.objects.remove(b),
     "override": lambda stage, a, b: setattr(
         bpy.context.view_layer, "material_override", bpy.data.materials.new("Over")
