@@ -113,9 +113,6 @@ class _Compilation:
             absorbs_alone = medium.even and not (medium.scattering.any() or medium.emission.any() or medium.glow)
             if not absorbs_alone:
                 self.code.note(node, text)
-        if self.code.values.overflow:
-            sentence = "The material has more sliders than fit a uniform block; the last ones recompile it."
-            self.code.fallbacks.setdefault((self.code.name, sentence))
 
     def _displacement(self) -> None:
         """The surface keeps its place, but every shader sees the normal that the displaced surface would have."""

@@ -104,7 +104,13 @@ class Expressions:
 
     def text(self, head: str = SURFACE_HEAD) -> str:
         """The whole source: includes, the images' functions, and the function of that head."""
-        includes = "".join(f'#include "{path}"\n' for path in self.includes)
+        if self.values.overflow:
+            sentence = (
+                "Not all sliders and tables of its nodes fit a uniform block; changing the last ones recompiles it."
+            )
+            self.fallbacks.setdefault((self.name, sentence))
+        includes = self.values.text()
+        includes += "".join(f'#include "{path}"\n' for path in self.includes)
         wanted = [(k, source) for k, sources in enumerate(self.image_keys.values()) for source in sources]
         keys = list(self.image_keys)
         includes += _working_luminance()
@@ -298,8 +304,8 @@ class Expressions:
             return "true" if (node.key, argument.output) in self._read_outputs else "false"
         if isinstance(argument, words.Rows):
             if (node.key, argument) not in self._constants:
-                first, count = self.values.add_rows(argument.rows(node.properties.get(argument.property)))
-                self._constants[node.key, argument] = f"{first}, {count}"
+                rows = argument.rows(node.properties.get(argument.property))
+                self._constants[node.key, argument] = f"{self.values.add_rows(rows)}, {len(rows)}"
             return self._constants[node.key, argument]
         return self._constant(node, argument, float(self._image_flags(node.image)), "FLOAT")
 

@@ -42,6 +42,7 @@ class ValueBlock:
     def __init__(self) -> None:
         self._rows: list[list[float]] = []
         self._free: list[tuple[int, int]] = []  # components that no value uses yet, in order
+        self._text_rows: list[list[float]] = []  # of tables that did not fit
         self.overflow = False  # some constants did not fit and stand in the program's text
 
     def add(self, value, kind: str) -> str:
@@ -62,13 +63,32 @@ class ValueBlock:
         self._rows[row][component] = value
         return f"material_value({row}).{'xyzw'[component]}"
 
-    def add_rows(self, rows) -> tuple[int, int]:
-        """Whole rows of four that stand one after the other: (first row, how many fitted)."""
-        start = len(self._rows)
-        fitting = [[float(x) for x in row] for row in rows][: BLOCK_LIMIT - start]
-        self.overflow |= len(fitting) < len(rows)
-        self._rows += fitting
-        return start, len(fitting)
+    def add_rows(self, rows) -> int:
+        """Whole rows of four that stand one after the other: `first` of material_row (material/values.glsl)."""
+        rows = [[float(x) for x in row] for row in rows]
+        if len(self._rows) + len(rows) > BLOCK_LIMIT:
+            self.overflow = True
+            self._text_rows += rows
+            return len(rows) - len(self._text_rows) - 1
+        self._rows += rows
+        return len(self._rows) - len(rows)
+
+    def text(self) -> str:
+        """GLSL of the rows that stand in the program's text, which goes before all includes."""
+        if not self._text_rows:
+            return ""
+        return (
+            f"#define MATERIAL_TEXT_ROWS {len(self._text_rows)}\n"
+            f"vec4 material_text_row(int row)\n{{\n{self._found(0, len(self._text_rows))}}}\n"
+        )
+
+    def _found(self, low: int, high: int) -> str:
+        """Halves the rows: Metal has no constructors of arrays, and drivers may go through a switch case by case."""
+        if high - low == 1:
+            numbers = ", ".join(repr(float(np.float32(x))) for x in self._text_rows[low])
+            return f"return vec4({numbers});\n"
+        middle = (low + high) // 2
+        return f"if (row < {middle}) {{\n{self._found(low, middle)}}}\n{self._found(middle, high)}"
 
     def array(self) -> np.ndarray:
         """(P, 4) float32 with P >= 1, because a uniform block cannot be empty."""

@@ -12,7 +12,8 @@ Node graphs have none either. They are taken over only when the caller has told 
 (`invalidate`) and none of them can concern a graph; without that news they are read again.
 
 For images there is not even news: Blender tells no one when an image is painted, reloaded or gets another alpha mode.
-What can be asked cheaply (file time, packed data, settings) is compared at each sync, and the pixels of an unsaved one.
+What can be asked cheaply (file time, packed data, settings, whether it is loaded) is compared at each sync, and the
+pixels of one that is unsaved, or whose file is newer than the pixels that Blender may still show.
 """
 
 from __future__ import annotations

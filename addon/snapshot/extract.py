@@ -93,7 +93,7 @@ def take(
     images = ImageTable(cache, scene.frame_current)
     layer = depsgraph.view_layer_eval
     shading = ShadingTable(cache, images, aovs_of(layer), (scene, layer))
-    places, light_places, walk_notes = walk(depsgraph, cache, shown)
+    places, light_places, volume_places, walk_notes = walk(depsgraph, cache, shown)
     notes += walk_notes
     links = _links(places, light_places)
     notes += links.notes
@@ -105,8 +105,9 @@ def take(
     meshes, instances, mesh_notes, stats = _meshes(places, placed, shading, cache, depsgraph, links)
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, links)
-    volumes = read_volumes(depsgraph, shading, cache, notes, shown)
-    volumes += read_smoke(domains, domain_places, shading, cache, notes)
+    override = layer.material_override
+    volumes = read_volumes(*_at_a_place(volume_places, notes), shading, override, cache, notes)
+    volumes += read_smoke(domains, domain_places, shading, override, cache, notes)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)
     notes += [*shading.notes, *images.notes]

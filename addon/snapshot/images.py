@@ -48,14 +48,16 @@ class ImageTable:
         `user` (ImageUser) says which frame of a sequence is meant, and which pass of a multilayer file.
         """
         original = image.original or image
+        dropped = not original.has_data  # as by Reload: asking for anything then loads the file
         part = _part(original, user, self._frame)
-        key = f"image {original.session_uid}" + (f" {part}" if part else "")
+        key = whole_key(original.session_uid) + (f" {part}" if part else "")
         if key in self.images:
             return key
         entry = self._cache.images.get(key)
         # A painted image that is not saved changes without a trace: the pixels are compared.
-        if entry is None or original.is_dirty or entry.state != _state(original, part):
-            entry = self._read(key, original, part, entry)
+        loaded = dropped and part is None
+        if entry is None or loaded or original.is_dirty or entry.state != _state(original, part):
+            entry = self._read(key, original, part, entry, loaded)
         else:
             self.reused += 1
         self._cache.images[key] = entry
@@ -81,7 +83,8 @@ class ImageTable:
             self.images[key] = Image(key, 0, pixels, "LINEAR", "NONE", "IES")
         return key
 
-    def _read(self, key: str, original, part: Part, old: ImageEntry | None) -> ImageEntry:
+    def _read(self, key: str, original, part: Part, old: ImageEntry | None, loaded: bool) -> ImageEntry:
+        """`loaded`: Blender has just read the file."""
         pixels, tiles, missing, notes = _pixels(original, part)
         # The state is taken after reading: asking for pixels makes Blender load the file.
         state = _state(original, part)
@@ -109,10 +112,17 @@ class ImageTable:
         )
         if same:
             self.reused += 1
+            if part is None and not loaded and state[1:] == old.state[1:]:
+                state = old.state  # of a new file Blender may still hold the old pixels: each sync looks again
             return ImageEntry(old.image, state, notes)
         self.read += 1
         made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles, bits)
         return ImageEntry(made, state, notes)
+
+
+def whole_key(uid: int) -> str:
+    """Image.key of a data-block of which no ImageUser picks a frame or pass."""
+    return f"image {uid}"
 
 
 @dataclass(frozen=True)
@@ -244,7 +254,7 @@ def _turned(pixels: np.ndarray, encoding: str) -> np.ndarray:
 
 
 def _state(original, part: Part) -> tuple:
-    """Facts that change when the pixels of a saved or generated image do."""
+    """Facts that change when the pixels of a saved or generated image do; first those of its files."""
     path = _path(original)
     paths = [path] if path and original.packed_file is None else []
     if isinstance(part, OfSequence):
@@ -253,9 +263,9 @@ def _state(original, part: Part) -> tuple:
         paths = [tile_path(path, tile.number) for tile in original.tiles]
     packed = original.packed_file
     return (
+        (path, *(_file_state(one) for one in paths)),
         original.source,
-        path,
-        tuple(_file_state(one) for one in paths),
+        original.is_dirty,
         zlib.crc32(packed.data) if packed is not None else None,
         tuple(original.size),
         tuple(tile.number for tile in original.tiles) if original.source == "TILED" else (),

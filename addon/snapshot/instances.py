@@ -3,7 +3,8 @@
 Blender hands out every instance of a collection, geometry node, particle system or vertex/face instancer here, and
 also the meshes of curves, texts, surfaces and metaballs, as instances of their own object. The iterator's objects
 are temporary, so nothing of them is kept but the data-block of the mesh, which lives as long as the evaluation: or of
-hair curves or a point cloud, which strands.py makes a mesh, or the particle system that grows hair (hair.py). What an
+hair curves or a point cloud, which strands.py makes a mesh, a volume (volumes.py), or the particle system that grows
+hair (hair.py). What an
 object says of itself is taken over from the last walk where the updates since then cannot concern it (see cache.py).
 """
 
@@ -28,7 +29,7 @@ _UNUSED_ID = 2147483647  # what Blender fills persistent_id with
 
 @dataclass(slots=True)
 class Place:
-    """A mesh or light as found in one place; `source` is shared by all places of the same object in the same parent."""
+    """A mesh, light or volume as found in one place; `source` is shared by all places of one object in one parent."""
 
     source: Source
     key: str
@@ -49,13 +50,12 @@ class Source:
     """What is shown, as Blender has it during this walk."""
 
     facts: ObjectFacts
-    data: object  # evaluated mesh or light data-block, or a HairSystem
+    data: object  # evaluated mesh, light or volume data-block, or a HairSystem
     pointer: int  # its address
     owner: object  # evaluated object that owns the data: the instanced one, not the iterator's temporary
     materials: tuple  # evaluated bpy materials (or None), one per slot
     parent: object = None  # evaluated instancer
     own: str = ""  # end of its places' keys
-    is_light: bool = False
 
 
 LEFT_OUT = object()  # in place of the source of what is not drawn
@@ -81,17 +81,21 @@ class ObjectFacts:
     shadow_catcher: bool
     smoke: bool  # a gas domain of a fluid simulation, whose mesh is not drawn
     linked: bool  # it, or its instancer, has collections of light linking
-    asset: str
+    asset: str  # name of the last ancestor
+    ancestors: tuple[int, ...]  # uids of the original parent, its parent, and so on
     group: str
     notes: tuple[Note, ...]
 
 
 def walk(
     depsgraph, cache: SnapshotCache, shown: Callable | None = None
-) -> tuple[list[Place], list[Place], tuple[Note, ...]]:
-    """All mesh and light instances in Blender's order. `shown(object)` may hide some (a viewport's local view)."""
+) -> tuple[list[Place], list[Place], list[Place], tuple[Note, ...]]:
+    """All instances of meshes, of lights and of volumes, in Blender's order. `shown(object)` may hide some (a
+    viewport's local view)."""
     meshes: list[Place] = []
     lights: list[Place] = []
+    volumes: list[Place] = []
+    of_kind = {"LIGHT": lights, "VOLUME": volumes}
     notes: dict[Note, None] = {}
     known: dict[tuple, Source] = {}
     before, kept = cache.facts, {}
@@ -99,8 +103,9 @@ def walk(
     changed = cache.changed
     view_layer = depsgraph.view_layer_eval
     hairy, final = len(bpy.data.particles) > 0, depsgraph.mode == "RENDER"
-    strands = view_layer.use_strand
-    included = {"MESH": view_layer.use_solid, "CURVES": strands}  # point clouds are always, as in Cycles
+    strands, solid, use_volumes = view_layer.use_strand, view_layer.use_solid, view_layer.use_volumes
+    # Point clouds always are, as in Cycles. Domains of smoke are meshes but count as volumes.
+    included = {"MESH": solid or use_volumes, "CURVES": strands, "VOLUME": use_volumes}
     # Asked of each object only where some collection says so: these two are slower than all else.
     indirect_only, holdout = _collections_say(view_layer.layer_collection)
     listed = _listed(depsgraph.object_instances)
@@ -120,7 +125,7 @@ def walk(
             if source is None:
                 kind = found.type
                 hair = isinstance(data, HairSystem)
-                drawn = kind in _DRAWN or kind == "LIGHT"
+                drawn = kind in _DRAWN or kind in of_kind
                 if not drawn or not (strands if hair else included.get(kind, True)):
                     known[identity] = LEFT_OUT
                     continue
@@ -135,15 +140,20 @@ def walk(
                 data_uid = own_data.session_uid if is_own else 0
                 name = original.session_uid, parent_uid, data_uid
                 facts = before.get(name)
-                if facts is None or not told or not changed.isdisjoint(name):
+                if facts is None or not told or not (changed.isdisjoint(name) and changed.isdisjoint(facts.ancestors)):
+                    top = owner if parent is None else parent
+                    ancestors = _ancestors(owner)
+                    cuts = _is_holdout(top, view_layer if holdout else None)
+                    # A holdout is one for the camera too, wherever it stands.
+                    unseen = indirect_only and not cuts and top.indirect_only_get(view_layer=view_layer)
                     made = ObjectFacts(
                         shown=shown is None or bool(shown(found)),
                         name=original.name,
                         uid=name[0],
                         parent_uid=parent_uid,
                         data_uid=data_uid,
-                        visibility=_visibility(owner, parent, view_layer if indirect_only else None),
-                        holdout=_is_holdout(owner, parent, view_layer if holdout else None),
+                        visibility=_visibility(owner, parent, unseen),
+                        holdout=cuts,
                         pass_index=owner.pass_index,
                         random=_random_of_name(original.name),
                         color=tuple(owner.color),
@@ -153,18 +163,22 @@ def walk(
                         smoke=domain_of(owner) is not None,
                         shadow_catcher=owner.is_shadow_catcher or (parent is not None and parent.is_shadow_catcher),
                         linked=_is_linked(owner) or (parent is not None and _is_linked(parent)),
-                        asset=_topmost(owner),
+                        asset=ancestors[-1].name if ancestors else "",
+                        ancestors=tuple(one.original.session_uid for one in ancestors),
                         group=owner.lightgroup,
                         notes=_object_notes(owner, kind, original.name, final),
                     )
                     if made != facts:
                         facts = made
                 kept[name] = facts
+                if kind == "MESH" and not hair and not (use_volumes if facts.smoke else solid):
+                    known[identity] = LEFT_OUT
+                    continue
                 materials = tuple([slot.material for slot in found.material_slots])
                 if hair and materials:
                     materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
                 own = f"/hair {data.number}" if hair else ""
-                source = known[identity] = Source(facts, data, pointer, owner, materials, parent, own, kind == "LIGHT")
+                source = known[identity] = Source(facts, data, pointer, owner, materials, parent, own)
                 for note in facts.notes:
                     notes[note] = None
             if source is LEFT_OUT or not source.facts.shown:
@@ -180,9 +194,9 @@ def walk(
                 place = Place(source, key, random, placed, orco, uv, numbers)
             else:
                 place = Place(source, f"{facts.uid}{source.own}", facts.random, placed)
-            (lights if source.is_light else meshes).append(place)
+            of_kind.get(kind, meshes).append(place)
     cache.facts = kept
-    return meshes, lights, tuple(notes)
+    return meshes, lights, volumes, tuple(notes)
 
 
 def _listed(found) -> list:
@@ -218,40 +232,34 @@ def _collections_say(top) -> tuple[bool, bool]:
     return indirect_only, holdout
 
 
-def _topmost(owner) -> str:
-    """Name of the topmost parent of an object, empty without one."""
-    parent = owner.parent
-    while parent is not None and parent.parent is not None:
-        parent = parent.parent
-    return "" if parent is None else parent.name
+def _ancestors(owner) -> list:
+    """An object's parent, its parent, and so on."""
+    found = []
+    while owner.parent is not None:
+        owner = owner.parent
+        found.append(owner)
+    return found
 
 
-def _is_holdout(owner, parent, view_layer) -> bool:
-    """Whether an object or its instancer cuts a hole. `view_layer`: None where no collection of it is a holdout."""
-    if view_layer is None:
-        return owner.is_holdout or (parent is not None and parent.is_holdout)
-    return any(one.holdout_get(view_layer=view_layer) for one in (owner, parent) if one is not None)
+def _is_holdout(top, view_layer) -> bool:
+    """Whether `top` cuts a hole: an object, or what instances it, which alone decides of its instances.
 
-
-def visibility_of(owner) -> Visibility:
-    """Ray visibility of an object by itself."""
-    return _visibility_of(_flags(owner, None))
-
-
-def _visibility(owner, parent, view_layer) -> Visibility:
-    """Ray visibility of an object, and of what instances it: Cycles lets a ray see it only where both do.
-
-    `view_layer`: None where no collection of it is for indirect light alone.
+    `view_layer`: None where no collection of it is a holdout.
     """
-    flags = _flags(owner, view_layer)
+    return top.is_holdout if view_layer is None else top.holdout_get(view_layer=view_layer)
+
+
+def _visibility(owner, parent, indirect_only: bool) -> Visibility:
+    """Ray visibility of an object, and of what instances it: Cycles lets a ray see it only where both do."""
+    flags = _flags(owner)
     if parent is not None:
-        flags = tuple(map(and_, flags, _flags(parent, view_layer)))
-    return _visibility_of(flags)
+        flags = tuple(map(and_, flags, _flags(parent)))
+    return _visibility_of((flags[0] and not indirect_only, *flags[1:]))
 
 
-def _flags(one, view_layer) -> tuple[bool, ...]:
+def _flags(one) -> tuple[bool, ...]:
     return (
-        one.visible_camera and not (view_layer is not None and one.indirect_only_get(view_layer=view_layer)),
+        one.visible_camera,
         one.visible_diffuse,
         one.visible_glossy,
         one.visible_transmission,

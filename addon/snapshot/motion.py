@@ -31,7 +31,7 @@ def read_moment(depsgraph, width: int, height: int, camera=None) -> Moment:
     """The evaluated scene at the frame at which it stands."""
     scene = depsgraph.scene_eval
     view = cameras.camera_of_scene(scene, depsgraph, width, height, camera or scene.camera)
-    places, _, _ = walk(depsgraph, SnapshotCache())
+    places, *_ = walk(depsgraph, SnapshotCache())
     by_mesh: dict[int, np.ndarray] = {}
     positions = {}
     for place in places:

@@ -14,7 +14,7 @@ from ..materials.reader import read_graph
 from ..materials.sky import Sky
 from ..materials.translucency import names_of, with_maps
 from .cache import GraphEntry, SnapshotCache
-from .images import ImageTable
+from .images import ImageTable, whole_key
 from .meshes import Wanted
 from .object_attributes import INSTANCER, OBJECT, VIEW_LAYER, of_view_layer
 from .own_settings import own_images, own_settings
@@ -53,6 +53,13 @@ def empty_slot_graph() -> Graph:
     return Graph({"Principled": node}, surface=("Principled", "BSDF"))
 
 
+def empty_volume_graph() -> Graph:
+    """What Cycles draws where a volume object has no material."""
+    inputs = {"Color": Input("COLOR", (0.5, 0.5, 0.5, 1.0)), "Density": Input("FLOAT", 1.0)}
+    node = Node("Principled", "Principled", "ShaderNodeVolumePrincipled", inputs, {"Volume": "SHADER"})
+    return Graph({"Principled": node}, volume=("Principled", "Volume"))
+
+
 class ShadingTable:
     """Collects materials in order of first use; index 0 is the neutral default."""
 
@@ -66,6 +73,7 @@ class ShadingTable:
         uv = tuple((aov.name, aov.kind, Input("VECTOR")) for aov in aovs if aov.of_surface)
         self.materials[0] = replace(self.materials[0], graph=replace(self.materials[0].graph, aovs=uv))
         self._index: dict[int, int] = {}
+        self._empty_volume = 0
         self._images_by_uid: dict[int, object] | None = None
 
     def index_of(self, material) -> int:
@@ -76,6 +84,16 @@ class ShadingTable:
         if pointer not in self._index:
             self._index[pointer] = self._add(material)
         return self._index[pointer]
+
+    def index_of_volume(self, material) -> int:
+        """As `index_of`, for a volume object: None is the default of volumes."""
+        if material is not None:
+            return self.index_of(material)
+        if self._empty_volume == 0:
+            self._empty_volume = len(self.materials)
+            self.materials.append(Material("default volume", "Default", empty_volume_graph()))
+            self.wanted.append(Wanted())
+        return self._empty_volume
 
     def _add(self, material) -> int:
         key = f"material {(material.original or material).session_uid}"
@@ -163,7 +181,9 @@ class ShadingTable:
                 self._images.key_of_sky(uid)
                 continue
             image = self._images_by_uid.get(uid)
-            if image is None or self._images.key_of(image) != key:
+            if image is None or key != whole_key(uid) or image.source == "SEQUENCE":
+                return False  # its node says what of it is shown
+            if self._images.key_of(image) != key:
                 return False
         return True
 

@@ -20,9 +20,9 @@ GRIDS = ("density", "flame", "temperature", "heat")  # attributes of Cycles, one
 
 
 def read_smoke(
-    places: Sequence[Place], matrices: np.ndarray, shading, cache: SnapshotCache, notes: list[Note]
+    places: Sequence[Place], matrices: np.ndarray, shading, override, cache: SnapshotCache, notes: list[Note]
 ) -> tuple[VolumeInstance, ...]:
-    """What stands in the domains at these places (N, 4, 4)."""
+    """What stands in the domains at these places (N, 4, 4). `override`: material of all, or None."""
     found, used = [], set()
     for place, matrix in zip(places, matrices, strict=True):
         facts = place.source.facts
@@ -32,7 +32,7 @@ def read_smoke(
             notes.append(Note(f"Object '{facts.name}'", text))
             continue
         used.add(volume.key)
-        material = shading.index_of(next(iter(place.source.materials), None))
+        material = shading.index_of(override or next(iter(place.source.materials), None))
         found.append(
             VolumeInstance(
                 facts.name, volume, matrix.astype(np.float64), material, facts.visibility, place.key, 1.0, facts.group

@@ -1,6 +1,6 @@
 """OpenVDB objects: their grids as dense arrays, read through Blender's own `openvdb` module.
 
-A volume that modifiers made has no file: Blender writes it to a temporary one, which is read and removed. Grids of one
+Blender writes a volume that modifiers made or changed to a temporary file, which is read and removed. Grids of one
 object that share the first one's voxels are laid over a common box; others are read at its voxels' centres. Grids
 longer than MOST_VOXELS on a side are averaged by whole factors first.
 """
@@ -9,44 +9,45 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from .cache import SnapshotCache, next_version
-from .instances import visibility_of
+from .instances import Place
 from .scene import Note, Volume, VolumeInstance
 
 MOST_VOXELS = 192  # on a side
 MOST_GRIDS = 6  # of one object
 
 
-def read_volumes(depsgraph, shading, cache: SnapshotCache, notes: list[Note], shown=None) -> tuple[VolumeInstance, ...]:
-    """All instances of volume objects. Reads files only when they, or the objects, have changed."""
-    if not len(bpy.data.volumes):
-        return ()
+def read_volumes(
+    places: Sequence[Place], matrices: np.ndarray, shading, override, cache: SnapshotCache, notes: list[Note]
+) -> tuple[VolumeInstance, ...]:
+    """The volumes at these places (N, 4, 4). Reads files only when they, or the objects, have changed.
+
+    `override`: material of all, or None.
+    """
     found, used = [], set()
-    for instance in depsgraph.object_instances:
-        thing = instance.object
-        if thing.type != "VOLUME" or not instance.show_self or (shown is not None and not shown(thing)):
-            continue
-        matrix = np.array(instance.matrix_world, np.float64)
-        if not np.isfinite(matrix).all():
-            continue
-        owner = instance.instance_object if instance.is_instance else thing
-        name = owner.original.name
-        volume = _volume(thing.data, name, cache, notes)
+    numbers: dict[int, list[int]] = {}  # addresses of the volumes that each object made, by its session_uid
+    for place, matrix in zip(places, matrices, strict=True):
+        source, facts = place.source, place.source.facts
+        made_key = ""
+        if not facts.data_uid or len(source.owner.original.modifiers):
+            made = numbers.setdefault(facts.uid, [])
+            if source.pointer not in made:
+                made.append(source.pointer)
+            made_key = f"volume {facts.uid} #{made.index(source.pointer)}"
+        volume = _volume(source.data, facts.name, made_key, cache, notes)
         if volume is None:
             continue
         used.add(volume.key)
-        slots = thing.material_slots
-        material = shading.index_of(slots[0].material if len(slots) else None)
-        ids = "-".join(str(number) for number in instance.persistent_id)
-        key = f"{name} {len(found)} {ids}"
-        density = _density(thing.data, matrix)
+        material = shading.index_of_volume(override or next(iter(source.materials), None))
+        density = _density(source.data, matrix)
         found.append(
-            VolumeInstance(name, volume, matrix, material, visibility_of(owner), key, density, owner.lightgroup)
+            VolumeInstance(facts.name, volume, matrix, material, facts.visibility, place.key, density, facts.group)
         )
     for key in {key for key in cache.volumes if key.startswith("volume ")} - used:
         del cache.volumes[key]
@@ -61,7 +62,8 @@ def _density(data, matrix: np.ndarray) -> float:
     return 1.0 / scale if scale > 0 else 1.0
 
 
-def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume | None:
+def _volume(data, name: str, made_key: str, cache: SnapshotCache, notes: list[Note]) -> Volume | None:
+    """`made_key`: key of a volume that modifiers made, empty for the object's own, which its file tells all of."""
     subject = f"Object '{name}'"
     try:
         data.grids.load()
@@ -69,12 +71,13 @@ def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume 
         notes.append(Note(subject, f"its volume cannot be read: {error}."))
         return None
     path = bpy.path.abspath(data.grids.frame_filepath or "", library=data.library)
-    file = bool(path) and Path(path).is_file()
-    key = f"volume {path}" if file else f"volume {name} {(data.original or data).session_uid}"
+    file = not made_key and bool(path) and Path(path).is_file()
+    key = f"volume {path}" if file else made_key or f"volume {(data.original or data).session_uid}"
     stat = Path(path).stat() if file else None
+    # What modifiers make is a new data-block, with a number of its own, whenever they are evaluated.
     state = (path, stat.st_mtime_ns, stat.st_size) if file else (data.session_uid,)
     known = cache.volumes.get(key)
-    if known is not None and known[0] == state:
+    if known is not None and known[0] == state and any(state):
         return known[1]
     grids = None
     try:
@@ -92,8 +95,19 @@ def _volume(data, name: str, cache: SnapshotCache, notes: list[Note]) -> Volume 
         return None
     arrays, low, to_object = grids
     volume = Volume(key, next_version(), arrays, low, to_object)
+    if known is not None and _alike(known[1], volume):
+        volume = known[1]
     cache.volumes[key] = state, volume
     return volume
+
+
+def _alike(one: Volume, other: Volume) -> bool:
+    return (
+        one.grids.keys() == other.grids.keys()
+        and all(np.array_equal(values, other.grids[name]) for name, values in one.grids.items())
+        and np.array_equal(one.low, other.low)
+        and np.array_equal(one.to_object, other.to_object)
+    )
 
 
 def openvdb():

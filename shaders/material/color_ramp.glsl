@@ -1,15 +1,15 @@
-// Colour ramps. The stops stand in material_values: for each a row with its colour and a row with its position (x),
+// Colour ramps. The stops stand in a table: for each a row with its colour and a row with its position (x),
 // in rising order. `first` is the row where they begin, `rows` their number.
 #include "material/values.glsl"
 
 vec4 color_ramp_stop(int first, int stop)
 {
-  return material_value(first + 2 * stop);
+  return material_row(first, 2 * stop);
 }
 
 float color_ramp_position(int first, int stop)
 {
-  return material_value(first + 2 * stop + 1).x;
+  return material_row(first, 2 * stop + 1).x;
 }
 
 // Index of the last stop at or before `position` (0 if there is none) and how far it is on the way to the next.

@@ -1,4 +1,4 @@
-// Curves, colour ramps and spectra as tables of evenly spaced rows of material_values, linear in between.
+// Curves, colour ramps and spectra as tables of evenly spaced rows, linear in between.
 #include "material/values.glsl"
 
 // `position` counts rows; beyond the ends the table goes on straight or stays as it is.
@@ -7,8 +7,8 @@ vec4 table_row(float position, int first, int rows, bool onwards)
   float last = float(rows - 1);
   float bounded = clamp(position, 0.0, last);
   int row = min(int(bounded), rows - 2);
-  vec4 low = material_value(first + row);
-  vec4 high = material_value(first + row + 1);
+  vec4 low = material_row(first, row);
+  vec4 high = material_row(first, row + 1);
   return mix(low, high, (onwards ? clamp(position, -3e38, 3e38) : bounded) - float(row));
 }
 

@@ -28,10 +28,10 @@ void input_instance_attribute(SurfacePoint point, float column, out vec3 color, 
   alpha = stored.w;
 }
 
-// Of the view layer, the scene or the world: the row of material_values where it stands.
+// Of the view layer, the scene or the world: the row where it stands.
 void input_layer_attribute(int first, int rows, out vec3 color, out vec3 vector, out float average, out float alpha)
 {
-  vec4 stored = material_value(first);
+  vec4 stored = material_row(first, 0);
   color = stored.xyz;
   vector = stored.xyz;
   average = vector_average(stored.xyz);
@@ -98,7 +98,7 @@ void input_texture_coordinate_instancer(SurfacePoint point, out vec3 generated, 
   texture_coordinates(point, normal, camera, window, reflection);
 }
 
-// Places as another object sees them: `first` is the row of material_values where its inverse matrix stands.
+// Places as another object sees them: `first` is the row where its inverse matrix stands.
 void input_texture_coordinate_object(SurfacePoint point, vec4 generated_attribute, vec4 uv_attribute, int first,
                                      int rows, out vec3 generated, out vec3 normal, out vec3 uv, out vec3 object,
                                      out vec3 camera, out vec3 window, out vec3 reflection)
@@ -106,8 +106,8 @@ void input_texture_coordinate_object(SurfacePoint point, vec4 generated_attribut
   input_texture_coordinate(point, generated_attribute, uv_attribute, generated, normal, uv, object, camera, window,
                            reflection);
   vec4 place = vec4(point.position + material_scene.origin.xyz, 1.0);
-  object = vec3(dot(material_value(first), place), dot(material_value(first + 1), place),
-                dot(material_value(first + 2), place));
+  object = vec3(dot(material_row(first, 0), place), dot(material_row(first, 1), place),
+                dot(material_row(first, 2), place));
 }
 
 // A direction of object space as a tangent: turned to world space and laid into the surface.

@@ -149,7 +149,7 @@ void math_sign(float a, float b, float c, out float result)
 
 void math_compare(float a, float b, float c, out float result)
 {
-  result = (abs(a - b) <= max(c, 1e-5)) ? 1.0 : 0.0;
+  result = (a == b || abs(a - b) <= max(c, 1.1920929e-7)) ? 1.0 : 0.0;
 }
 
 void math_smooth_min(float a, float b, float c, out float result)

@@ -330,3 +330,42 @@ def test_random_trees_compile_and_stay_finite(evaluate, tree):
     bad = {name: values for name, values in closures.items() if not np.isfinite(values).all()}
     assert not bad
     assert 0.0 <= material.opacity <= 1.0
+
+
+def test_tables_that_fit_no_block_are_read_whole(evaluate):
+    """Nine curves, each a table of 129 rows, and a ramp: the block has room for seven of them."""
+    steps = np.linspace(0.0, 1.0, 129)
+    tables = [0.9 * steps**gamma + 0.1 for gamma in np.linspace(0.4, 1.6, 9)]
+    nodes, link, expected = [], (0.3, 0.7, 0.95, 1.0), np.array([0.3, 0.7, 0.95])
+    for k, table in enumerate(tables):
+        settings = {
+            "mapping_table": tuple((y, y, y, 0.0) for y in table.tolist()), "mapping_start": 0.0,
+            "mapping_extent": 1.0, "mapping_onwards": False,
+        }  # fmt: skip
+        nodes.append(node(f"C{k}", "ShaderNodeRGBCurve", {"Color": "COLOR"}, "", settings, Fac=1.0, Color=link))
+        link, expected = (f"C{k}", "Color"), np.interp(expected, steps, table)
+    material = compile_material("Test", graph(*nodes, emission(Color=link), surface=("Emission", "Emission")))
+    assert len(material.values) <= 1024
+    assert any("tables" in text for _, text in material.fallbacks)
+    assert evaluate(material)["emission"][0] == pytest.approx(expected, rel=1e-4)
+    ramp = node(
+        "Ramp", "ShaderNodeValToRGB", {"Color": "COLOR", "Alpha": "FLOAT"}, "",
+        {"color_ramp": ((0.0, 0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 0.5, 0.25, 1.0))}, Fac=link,
+    )  # fmt: skip
+    surface = emission(Color=("Ramp", "Color"))
+    material = compile_material("Test", graph(*nodes, ramp, surface, surface=("Emission", "Emission")))
+    seen = evaluate(material)["emission"][0]
+    assert seen[1:] == pytest.approx(seen[0] * np.array([0.5, 0.25]), rel=1e-4)
+    assert 0.5 < seen[0] < 1.0
+
+
+def test_compare_takes_only_equal_numbers_for_equal(evaluate):
+    """Cycles: 1 where they are the same or no further apart than the epsilon, which is 1.19e-7 or more."""
+    cases = {(5e-6, 0, 0): 0, (1.3e-7, 0, 0): 0, (1e-7, 0, 0): 1, (1e30, 1e30, 0): 1, (0.5, 0.4, 0.2): 1, (1, 0, -1): 0}
+    for (a, b, epsilon), expected in cases.items():
+        compare = node(
+            "Compare", "ShaderNodeMath", {"Value": "FLOAT"}, "", {"operation": "COMPARE"},
+            Value=a, Value_001=b, Value_002=epsilon,
+        )  # fmt: skip
+        shown = graph(compare, emission(Color=("Compare", "Value")), surface=("Emission", "Emission"))
+        assert evaluate(compile_material("Test", shown))["emission"][0, 0] == expected

@@ -1,5 +1,8 @@
 """Images arrive as Blender stores them, with what it takes to decode them."""
 
+import os
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -143,6 +146,24 @@ def test_a_frame_that_a_sequence_lacks_is_named(stage, tmp_path):
     assert "frame 7" in note.text
 
 
+@pytest.mark.parametrize("before", ["SEQUENCE", "FILE"])
+def test_a_frame_of_a_sequence_is_no_other_one_at_the_next_sync(stage, tmp_path, before):
+    path, _ = saved(tmp_path, "frame0007.png")
+    image, cache = bpy.data.images.load(path), SnapshotCache()
+    image.source = before
+    user = shown(stage, image).image_user
+    user.frame_duration, user.frame_offset = 1, 6
+    stage.take(cache)
+    for read in (before != "SEQUENCE", 0):
+        with stage.telling(cache):
+            stage.scene.camera.location.x += 1.0
+            image.source = "SEQUENCE"
+        snapshot = stage.take(cache)
+        assert snapshot.notes == ()
+        assert list(snapshot.images) == [f"image {image.session_uid} frame 7"]
+        assert snapshot.sync_stats["images_read"] == read
+
+
 def test_an_unchanged_image_is_not_read_again(stage, tmp_path):
     path, _ = saved(tmp_path)
     shown(stage, bpy.data.images.load(path))
@@ -187,3 +208,58 @@ def test_painting_without_change_keeps_the_version(stage):
     before = only_image(stage.take(cache))
     image.update()
     assert only_image(stage.take(cache)) is before
+
+
+def overwrite(path, value):
+    """Another program writes pixels of one grey to the file, at another time."""
+    other = bpy.data.images.new("other", 2, 3)
+    other.pixels.foreach_set(np.array([value, value, value, 1.0] * 6, np.float32))
+    other.filepath_raw, other.file_format = path, "PNG"
+    other.save()
+    bpy.data.images.remove(other)
+    made = Path(path).stat().st_mtime_ns + 10**9
+    os.utime(path, ns=(made, made))
+
+
+def test_reload_takes_back_what_was_painted(stage, tmp_path):
+    path, values = saved(tmp_path)
+    image, cache = bpy.data.images.load(path), SnapshotCache()
+    shown(stage, image)
+    stage.take(cache)
+    image.pixels.foreach_set(np.full(24, 0.5, np.float32))
+    assert not np.allclose(only_image(stage.take(cache)).pixels, values, atol=1e-6)
+    image.reload()
+    assert np.allclose(only_image(stage.take(cache)).pixels, values, atol=1e-6)
+
+
+# Where no sync was before the writing and an editor loads the file, nothing tells that the pixels were older than it.
+@pytest.mark.parametrize(("synced", "elsewhere"), [(False, False), (True, False), (True, True)])
+def test_reload_shows_what_another_program_wrote(stage, tmp_path, synced, elsewhere):
+    """`synced`: also before it was written. `elsewhere`: an editor of Blender's asks for the pixels first."""
+    path, values = saved(tmp_path)
+    image, cache = bpy.data.images.load(path), SnapshotCache()
+    shown(stage, image)
+    assert len(image.pixels)  # Blender holds the file
+    if synced:
+        stage.take(cache)
+    overwrite(path, 0.2)
+    for _ in range(2):
+        assert np.allclose(only_image(stage.take(cache)).pixels, values, atol=1e-6)
+    image.reload()
+    if elsewhere:
+        assert len(image.pixels)
+    assert np.allclose(only_image(stage.take(cache)).pixels, (0.2, 0.2, 0.2, 1.0), atol=1e-6)
+
+
+def test_a_painted_image_that_is_saved_is_not_read_again(stage, tmp_path):
+    path, _ = saved(tmp_path)
+    image, cache = bpy.data.images.load(path), SnapshotCache()
+    shown(stage, image)
+    stage.take(cache)
+    image.pixels.foreach_set(np.full(24, 0.5, np.float32))
+    before = stage.take(cache)
+    image.save()
+    assert only_image(stage.take(cache)) is only_image(before)
+    state = next(iter(cache.images.values())).state
+    assert only_image(stage.take(cache)) is only_image(before)
+    assert next(iter(cache.images.values())).state is state

@@ -204,6 +204,40 @@ def test_holdout_and_pass_index(stage):
     assert (one.holdout, one.pass_index) == (True, 7)
 
 
+def in_layer(stage, name, *objects):
+    """The layer collection of a new collection in the scene that holds these objects alone."""
+    made = bpy.data.collections.new(name)
+    stage.scene.collection.children.link(made)
+    for one in objects:
+        stage.scene.collection.objects.unlink(one)
+        made.objects.link(one)
+    return bpy.context.view_layer.layer_collection.children[name]
+
+
+@pytest.mark.parametrize("decides", [False, True], ids=["instanced", "instancer"])
+@pytest.mark.parametrize("how", ["object's holdout", "holdout", "indirect only", "both"])
+def test_an_instance_is_cut_out_or_unseen_where_its_instancer_is(stage, how, decides):
+    inner = stage.link("Inner", stage.mesh())
+    empty = collection_of(stage, inner)
+    layers = in_layer(stage, "Inner", inner), in_layer(stage, "Empty", empty)
+    if how == "object's holdout":
+        (inner, empty)[decides].is_holdout = True
+    else:
+        layers[decides].holdout = how != "indirect only"
+        layers[decides].indirect_only = how != "holdout"
+    (one,) = [one for one in stage.take().instances if "/" in one.key]
+    assert one.holdout == (decides and how != "indirect only")
+    assert one.visibility.camera == (not decides or how != "indirect only")
+
+
+def test_a_holdout_in_a_collection_for_indirect_light_cuts_all_the_same(stage):
+    placed = stage.link("O", stage.mesh())
+    in_layer(stage, "Layer", placed).indirect_only = True
+    placed.is_holdout = True
+    (one,) = stage.take().instances
+    assert (one.holdout, one.visibility.camera) == (True, True)
+
+
 def test_the_predicate_hides_objects(stage):
     for name in "AB":
         stage.link(name, stage.mesh())

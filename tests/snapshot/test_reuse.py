@@ -212,6 +212,8 @@ EDITS = {
     "parent": lambda stage, a, b: setattr(a, "parent", b),
     "move the parent": lambda stage, a, b: setattr(stage.scene.objects["Parent"], "location", (0, 0, 4)),
     "name": lambda stage, a, b: setattr(a, "name", "Other"),
+    "name of the topmost parent": lambda stage, a, b: setattr(stage.scene.objects["Parent"], "name", "Other"),
+    "no topmost parent": lambda stage, a, b: setattr(stage.scene.objects["Child"], "parent", None),
     "color": lambda stage, a, b: setattr(a, "color", (1, 0, 0, 1)),
     "pass index": lambda stage, a, b: setattr(a, "pass_index", 7),
     "shadow": lambda stage, a, b: setattr(a, "visible_shadow", False),
@@ -224,6 +226,7 @@ EDITS = {
     "indirect only": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "indirect_only", True),
     "holdout of the layer": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "holdout", True),
     "exclude": lambda stage, a, b: setattr(layer_of(stage, "Inner"), "exclude", True),
+    "removal of the parent": lambda stage, a, b: bpy.data.objects.remove(stage.scene.objects["Parent"]),
     "removal": lambda stage, a, b: bpy.data.objects.remove(b),
     "override": lambda stage, a, b: setattr(
         bpy.context.view_layer, "material_override", bpy.data.materials.new("Over")
@@ -237,6 +240,7 @@ def test_what_is_taken_over_is_what_would_be_read(stage, edit, informed):
     cache = SnapshotCache()
     one, other, parent, child = (stage.link(name, stage.mesh()) for name in ("O", "P", "Parent", "Child"))
     child.parent = parent
+    stage.link("Grandchild", stage.mesh()).parent = child
     inner = bpy.data.collections.new("Inner")
     stage.scene.collection.children.link(inner)
     inner.objects.link(stage.scene.objects["P"])

@@ -416,6 +416,8 @@ def test_voxels_absorb_what_stands_in_them(stage, tmp_path):
     # Interpolated linearly, the grid fades out over the voxel beyond its rim, which is pixel 3; the next is free of it.
     assert 2 * np.exp(-0.8) < seen[8, 3, 0] < 2.0
     assert seen[8, 2, 0] == pytest.approx(2.0, rel=0.01)
+    cloud.materials.clear()  # leaves a Principled Volume of density 1
+    assert stage.render(4, size=(16, 16))["combined"][8, 8, 0] == pytest.approx(2 * np.exp(-0.8), rel=0.01)
 
 
 def test_a_change_of_fog_alone_begins_the_picture_anew(stage):

@@ -87,9 +87,10 @@ class ImageFlags:
 
 @dataclass(frozen=True)
 class Rows:
-    """A table out of a property, such as the stops of a colour ramp, as rows of `material_values`.
+    """A table out of a property, such as the stops of a colour ramp, as rows that `material_row` reads.
 
-    Gives two int literals, the first row and the number of rows; their number is topology, their content is not.
+    Gives two int literals, the first row and the number of rows; their number is topology, their content is not, unless
+    they have to stand in the program's text.
     """
 
     property: str

@@ -1,0 +1,141 @@
+"""Volume objects arrive as grids of voxels, with what their objects and modifiers make of them."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.snapshot import SnapshotCache, instances, smoke
+from addon.snapshot.volumes import openvdb
+from tests.snapshot.test_instances import collection_of, in_layer
+
+
+@pytest.fixture
+def cloud(stage, tmp_path):
+    """An object of 4 voxels of half a metre on a side."""
+    vdb = openvdb()
+    grid = vdb.FloatGrid()
+    grid.name = "density"
+    grid.copyFromArray(np.ones((4, 4, 4), np.float32))
+    grid.transform = vdb.createLinearTransform(voxelSize=0.5)
+    vdb.write(str(tmp_path / "cloud.vdb"), [grid])
+    data = bpy.data.volumes.new("cloud")
+    data.filepath = str(tmp_path / "cloud.vdb")
+    return stage.link("cloud", data)
+
+
+def only_volume(snapshot):
+    (one,) = snapshot.volumes
+    return one.volume
+
+
+def shift(placed, x):
+    """Gives the object a modifier that moves its geometry; its node is returned."""
+    group = bpy.data.node_groups.new("Shift", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    entry, move, leave = (
+        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeTransform", "NodeGroupOutput")
+    )
+    group.links.new(entry.outputs[0], move.inputs["Geometry"])
+    group.links.new(move.outputs[0], leave.inputs[0])
+    move.inputs["Translation"].default_value = (x, 0, 0)
+    placed.modifiers.new("Shift", "NODES").node_group = group
+    return move
+
+
+def test_modifiers_of_a_volume_with_a_file_are_followed(stage, cloud):
+    cache = SnapshotCache()
+    plain = only_volume(stage.take(cache))
+    node = shift(cloud, 5)
+    first = only_volume(stage.take(cache))
+    node.inputs["Translation"].default_value = (7, 0, 0)
+    second = only_volume(stage.take(cache))
+    assert [one.to_object[0, 3] - plain.to_object[0, 3] for one in (first, second)] == pytest.approx([5, 7])
+    assert np.array_equal(second.grids["density"], plain.grids["density"])
+    assert len({plain.version, first.version, second.version}) == 3
+
+
+def test_a_volume_that_modifiers_made_anew_alike_is_the_same(stage, cloud):
+    cache = SnapshotCache()
+    shift(cloud, 5)
+    before = only_volume(stage.take(cache))
+    cloud.data.update_tag()
+    assert only_volume(stage.take(cache)) is before
+
+
+def test_each_object_has_its_own_of_a_shared_volume_that_modifiers_change(stage, cloud):
+    shift(stage.link("shifted", cloud.data), 5)
+    plain, shifted = stage.take().volumes
+    assert shifted.volume.to_object[0, 3] - plain.volume.to_object[0, 3] == pytest.approx(5)
+
+
+def test_a_volume_that_a_mesh_turns_into_is_followed(stage):
+    """The file has no volume data-block then."""
+    placed, cache = stage.link("O", stage.mesh()), SnapshotCache()
+    node = shift(placed, 5)
+    tree = node.id_data
+    made = tree.nodes.new("GeometryNodeVolumeCube")
+    for axis in "XYZ":
+        made.inputs[f"Resolution {axis}"].default_value = 4
+    tree.links.new(made.outputs["Volume"], node.inputs["Geometry"])
+    first = only_volume(stage.take(cache))
+    node.inputs["Translation"].default_value = (7, 0, 0)
+    second = only_volume(stage.take(cache))
+    assert second.to_object[0, 3] - first.to_object[0, 3] == pytest.approx(2)
+    assert second.key == first.key
+
+
+def test_a_view_layer_without_volumes_has_none(stage, cloud):
+    assert stage.take().volumes
+    bpy.context.view_layer.use_volumes = False
+    assert stage.take().volumes == ()
+
+
+def test_the_view_layers_material_is_that_of_volumes_too(stage, cloud):
+    cloud.data.materials.append(stage.material("Own"))
+    bpy.context.view_layer.material_override = stage.material("Over")
+    snapshot = stage.take()
+    assert snapshot.materials[snapshot.volumes[0].material].name == "Over"
+
+
+@pytest.mark.parametrize("slot", [False, True], ids=["no slot", "empty slot"])
+def test_a_volume_without_a_material_is_a_principled_volume(stage, cloud, slot):
+    if slot:
+        cloud.data.materials.append(None)
+    stage.link("another", cloud.data)
+    snapshot = stage.take()
+    (index,) = {one.material for one in snapshot.volumes}
+    graph = snapshot.materials[index].graph
+    assert graph.nodes[graph.volume[0]].type == "ShaderNodeVolumePrincipled"
+    assert graph.surface is None
+
+
+def test_volumes_are_seen_by_the_rays_of_the_object_and_of_its_instancer(stage, cloud):
+    cloud.visible_shadow = False
+    empty = collection_of(stage, cloud)
+    empty.visible_glossy = False
+    layer = in_layer(stage, "Empty", empty)
+    plain, instance = sorted(stage.take().volumes, key=lambda one: "/" in one.key)
+    assert (plain.visibility.shadow, plain.visibility.glossy) == (False, True)
+    assert (instance.visibility.shadow, instance.visibility.glossy) == (False, False)
+    layer.indirect_only = True
+    plain, instance = sorted(stage.take().volumes, key=lambda one: "/" in one.key)
+    assert (plain.visibility.camera, instance.visibility.camera) == (True, False)
+
+
+@pytest.mark.parametrize("surfaces", [False, True])
+def test_a_domain_of_smoke_counts_as_a_volume_of_the_view_layer(stage, monkeypatch, surfaces):
+    for module in (instances, smoke):
+        monkeypatch.setattr(module, "domain_of", lambda owner: owner if owner.name == "Domain" else None)
+    monkeypatch.setattr(smoke, "domain_grids", lambda settings: {"density": np.ones((2, 2, 2), np.float32)})
+    stage.link("Domain", stage.mesh())
+    stage.link("O", stage.mesh())
+    layer = bpy.context.view_layer
+    layer.use_solid, layer.material_override = surfaces, stage.material("Over")
+    snapshot = stage.take()
+    assert [snapshot.materials[one.material].name for one in snapshot.volumes] == ["Over"]
+    assert len(snapshot.instances) == surfaces
+    layer.use_volumes = False
+    snapshot = stage.take()
+    assert snapshot.volumes == ()
+    assert len(snapshot.instances) == surfaces
