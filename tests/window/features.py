@@ -36,6 +36,10 @@ def steps():
         name, started = step.__name__, time.monotonic()
         if ONLY and name not in ONLY:
             continue
+        # A script that changes a scene while a material's icon is drawn by any engine in Python stops Blender: it waits
+        # for the icon and holds Python's lock, which that needs to end.
+        while bpy.app.is_job_running("RENDER_PREVIEW"):
+            yield 0.1
         try:
             yield from step(left, right)
             result["done"].append(name)
