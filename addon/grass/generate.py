@@ -235,12 +235,15 @@ def _blocks() -> dict[int, bpy.types.ID]:
 
 def remove_left() -> None:
     """Remove what is there of former tiles: at their end, and after an undo to a step that was made meanwhile."""
+    if not _left:
+        return
     found = [one for uid, one in _blocks().items() if uid in _left]
     for scene in [one for one in found if isinstance(one, bpy.types.Scene)]:
         found.remove(scene)
         with contextlib.suppress(RuntimeError):  # it stays where the artist has removed all other scenes
             bpy.data.scenes.remove(scene)  # windows that show it go to another one, unlike with batch_remove
-    bpy.data.batch_remove(found)
+    if found:  # to remove nothing makes Blender sort all collections anew
+        bpy.data.batch_remove(found)
 
 
 def build(order: Order, scene: bpy.types.Scene) -> None:

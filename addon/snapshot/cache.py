@@ -74,6 +74,7 @@ class ImageEntry:
     image: Image
     state: tuple
     notes: tuple[Note, ...]
+    again: float = 0.0  # by the monotonic clock: no sooner is a file that was written since looked at again
 
 
 @dataclass

@@ -106,7 +106,9 @@ def take(
     notes += mesh_notes
     lights = _lights(*_at_a_place(light_places, notes), shading, links)
     override = layer.material_override
-    volumes = read_volumes(*_at_a_place(volume_places, notes), shading, override, cache, notes)
+    volumes = read_volumes(
+        *_at_a_place(volume_places, notes), shading, override, cache, notes, depsgraph.mode == "RENDER"
+    )
     volumes += read_smoke(domains, domain_places, shading, override, cache, notes)
     world, sun = _world(scene, depsgraph.view_layer_eval, shading, images, notes)
     lights = lights if sun is None else (*lights, sun)

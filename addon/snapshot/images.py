@@ -8,6 +8,7 @@ that no shader decodes are converted here.
 
 from __future__ import annotations
 
+import time
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,7 @@ _LINEAR_SPACES = ("Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data"
 PROFILES_FADE = bpy.app.version < (5, 0)  # see materials/ies.py
 # Cycles before Blender 5.1: bytes have straight alpha and floats premultiplied alpha, whatever their alpha mode says.
 BYTES_ARE_STRAIGHT = FLOATS_ARE_PREMULTIPLIED = bpy.app.version < (5, 1)
+LOOK_S = 5e-8  # between two looks at a file that is newer than its pixels, per number: some ten times what one takes
 MAGENTA = (1.0, 0.0, 1.0, 1.0)  # what Cycles shows for an image that is not there
 
 
@@ -56,7 +58,7 @@ class ImageTable:
         entry = self._cache.images.get(key)
         # A painted image that is not saved changes without a trace: the pixels are compared.
         loaded = dropped and part is None
-        if entry is None or loaded or original.is_dirty or entry.state != _state(original, part):
+        if entry is None or loaded or original.is_dirty or _is_stale(entry, _state(original, part)):
             entry = self._read(key, original, part, entry, loaded)
         else:
             self.reused += 1
@@ -112,12 +114,19 @@ class ImageTable:
         )
         if same:
             self.reused += 1
-            if part is None and not loaded and state[1:] == old.state[1:]:
-                state = old.state  # of a new file Blender may still hold the old pixels: each sync looks again
+            if part is None and not loaded and state[1:] == old.state[1:] and state != old.state:
+                # Of a new file Blender may still hold the old pixels: it is looked at again, large ones now and then.
+                return ImageEntry(old.image, old.state, notes, time.monotonic() + pixels.size * LOOK_S)
             return ImageEntry(old.image, state, notes)
         self.read += 1
         made = Image(key, next_version(), pixels, encoding, alpha, original.name, missing, tiles, bits)
         return ImageEntry(made, state, notes)
+
+
+def _is_stale(entry: ImageEntry, state: tuple) -> bool:
+    if entry.state == state:
+        return False
+    return entry.state[1:] != state[1:] or time.monotonic() >= entry.again
 
 
 def whole_key(uid: int) -> str:

@@ -56,6 +56,7 @@ class Source:
     materials: tuple  # evaluated bpy materials (or None), one per slot
     parent: object = None  # evaluated instancer
     own: str = ""  # end of its places' keys
+    kind: str = "MESH"  # type of the object that is shown
 
 
 LEFT_OUT = object()  # in place of the source of what is not drawn
@@ -178,7 +179,7 @@ def walk(
                 if hair and materials:
                     materials = (materials[min(max(data.slot, 0), len(materials) - 1)],)
                 own = f"/hair {data.number}" if hair else ""
-                source = known[identity] = Source(facts, data, pointer, owner, materials, parent, own)
+                source = known[identity] = Source(facts, data, pointer, owner, materials, parent, own, kind)
                 for note in facts.notes:
                     notes[note] = None
             if source is LEFT_OUT or not source.facts.shown:
@@ -194,7 +195,7 @@ def walk(
                 place = Place(source, key, random, placed, orco, uv, numbers)
             else:
                 place = Place(source, f"{facts.uid}{source.own}", facts.random, placed)
-            of_kind.get(kind, meshes).append(place)
+            of_kind.get(source.kind, meshes).append(place)
     cache.facts = kept
     return meshes, lights, volumes, tuple(notes)
 

@@ -24,18 +24,24 @@ MOST_GRIDS = 6  # of one object
 
 
 def read_volumes(
-    places: Sequence[Place], matrices: np.ndarray, shading, override, cache: SnapshotCache, notes: list[Note]
+    places: Sequence[Place],
+    matrices: np.ndarray,
+    shading,
+    override,
+    cache: SnapshotCache,
+    notes: list[Note],
+    final: bool,
 ) -> tuple[VolumeInstance, ...]:
     """The volumes at these places (N, 4, 4). Reads files only when they, or the objects, have changed.
 
-    `override`: material of all, or None.
+    `override`: material of all, or None; `final`: modifiers are those of renders.
     """
     found, used = [], set()
     numbers: dict[int, list[int]] = {}  # addresses of the volumes that each object made, by its session_uid
     for place, matrix in zip(places, matrices, strict=True):
         source, facts = place.source, place.source.facts
         made_key = ""
-        if not facts.data_uid or len(source.owner.original.modifiers):
+        if not facts.data_uid or any(_is_on(one, final) for one in source.owner.original.modifiers):
             made = numbers.setdefault(facts.uid, [])
             if source.pointer not in made:
                 made.append(source.pointer)
@@ -52,6 +58,10 @@ def read_volumes(
     for key in {key for key in cache.volumes if key.startswith("volume ")} - used:
         del cache.volumes[key]
     return tuple(found)
+
+
+def _is_on(modifier, final: bool) -> bool:
+    return modifier.show_render if final else modifier.show_viewport
 
 
 def _density(data, matrix: np.ndarray) -> float:
@@ -73,11 +83,13 @@ def _volume(data, name: str, made_key: str, cache: SnapshotCache, notes: list[No
     path = bpy.path.abspath(data.grids.frame_filepath or "", library=data.library)
     file = not made_key and bool(path) and Path(path).is_file()
     key = f"volume {path}" if file else made_key or f"volume {(data.original or data).session_uid}"
-    stat = Path(path).stat() if file else None
-    # What modifiers make is a new data-block, with a number of its own, whenever they are evaluated.
-    state = (path, stat.st_mtime_ns, stat.st_size) if file else (data.session_uid,)
+    stat = Path(path).stat() if path and Path(path).is_file() else None
+    # What modifiers make is a new data-block, with a number of its own, whenever they are evaluated; what they let pass
+    # is that of the file.
+    made = 0 if file else data.session_uid
+    state = (made, path, stat and stat.st_mtime_ns, stat and stat.st_size)
     known = cache.volumes.get(key)
-    if known is not None and known[0] == state and any(state):
+    if known is not None and known[0] == state and (file or made):
         return known[1]
     grids = None
     try:

@@ -179,6 +179,8 @@ def cryptomatte_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
 def cryptomatte_metadata(snapshots: Sequence[Snapshot], layer: str) -> dict[str, str]:
     """Fields of a file's header by which readers find the mattes of a view layer and the names in them, at whatever
     moment they are seen."""
+    if not snapshots[0].film.cryptomattes:
+        return {}
     shown, fields = [one for snapshot in snapshots for one in snapshot.instances], {}
     materials = [one.name for snapshot in snapshots for one in snapshot.materials[1:]]
     names = {

@@ -48,6 +48,24 @@ def test_objects_that_share_a_mesh_share_one_mesh(stage):
     assert [one.matrix[0, 3] for one in snapshot.instances] == [0, 1, 2]
 
 
+@pytest.mark.parametrize("names_of_both", [("a cube", "b lamp"), ("b cube", "a lamp")])
+def test_lamps_and_meshes_of_a_collection_on_points_stay_what_they_are(stage, names_of_both):
+    """Copies come point by point, in either order of kinds."""
+    cube = stage.link(names_of_both[0], stage.mesh())
+    lamp = stage.link(names_of_both[1], bpy.data.lights.new("lamp", "POINT"))
+    placed = collection_of(stage, cube, lamp)
+    made = placed.instance_collection
+    for one in (cube, lamp, placed):
+        stage.scene.collection.objects.unlink(one)
+    group = cube_on_points("On points", "GeometryNodeCollectionInfo")
+    info = next(node for node in group.nodes if node.bl_idname == "GeometryNodeCollectionInfo")
+    info.inputs["Collection"].default_value = made
+    stage.link("points", stage.mesh()).modifiers.new("Scatter", "NODES").node_group = group
+    snapshot = stage.take()
+    points = len(stage.scene.objects["points"].data.vertices)
+    assert names(snapshot).count(names_of_both[0]) == points == len(snapshot.lights)
+
+
 def test_a_modifier_parts_an_object_from_the_shared_mesh(stage):
     data = stage.mesh()
     stage.link("plain", data)

@@ -55,6 +55,25 @@ def test_modifiers_of_a_volume_with_a_file_are_followed(stage, cloud):
     assert len({plain.version, first.version, second.version}) == 3
 
 
+def test_a_file_that_a_modifier_lets_pass_is_read_anew(stage, cloud, tmp_path):
+    """Whether the modifier is off, or does nothing."""
+    for shown in (False, True):
+        cache = SnapshotCache()
+        modifier = cloud.modifiers.new("Displace", "VOLUME_DISPLACE")
+        modifier.show_render = modifier.show_viewport = shown
+        modifier.strength = 0.0
+        first = only_volume(stage.take(cache))
+        vdb = openvdb()
+        grid = vdb.FloatGrid()
+        grid.name = "density"
+        grid.copyFromArray(np.full((4, 4, 4), 2.0 + shown, np.float32))
+        vdb.write(str(tmp_path / f"{shown}.vdb"), [grid])
+        cloud.data.filepath = str(tmp_path / f"{shown}.vdb")
+        second = only_volume(stage.take(cache))
+        assert second.grids["density"].max() == 2.0 + shown and second.version != first.version
+        cloud.modifiers.remove(modifier)
+
+
 def test_a_volume_that_modifiers_made_anew_alike_is_the_same(stage, cloud):
     cache = SnapshotCache()
     shift(cloud, 5)
