@@ -123,9 +123,16 @@ class EdgeShadows(PointMaps):
         if emitter.kind in (lights.POINT, lights.SPHERE) and emitter.radius > NEAR * nearest:
             return "round lights that are near: rays or maps", None
         extent = Extent.of(emitter, nearest)
-        if self.silhouettes(frame, extent).count > frame.settings.get(self, "most_edges"):
+        count = self.silhouettes(frame, extent).count
+        if count > frame.settings.get(self, "most_edges") or not edge_tiles.fits(frame.size, count):
             return "lights with too many edges: rays or maps", None
+        if not edge_tiles.fits(frame.size, self._card_count(frame)):
+            return "lights with too many cards: rays or maps", None
         return "", extent
+
+    def _card_count(self, frame: Frame) -> int:
+        cards = self.cards.cards(frame)
+        return cards.count if cards is not None else 0
 
     by_group = False
 
@@ -179,7 +186,8 @@ class EdgeShadows(PointMaps):
         for number, views in enumerate(own):
             extent = self._served[views[0].emitter.light.key]
             lit = self.tiles.light(
-                frame, self, self._casters, extent, self.accurate(frame), self.by_group, number
+                frame, self, self._casters, extent, self.accurate(frame), self.by_group, number,
+                -(-self._card_count(frame) // 32),
             )  # fmt: skip
             lit.update(picture_row=number * frame.size[1])
             yield from self.gather(frame, lit, views, found)

@@ -176,14 +176,14 @@ class EdgeTiles:
 
     def light(
         self, frame: Frame, technique: Technique, casters: CasterEdges, extent: Extent, accurate: bool = True,
-        by_group: bool = False, number: int = 0,
+        by_group: bool = False, number: int = 0, card_words: int = 0,
     ) -> Lit:  # fmt: skip
         """Receivers, count and words of one light for this sample's surfaces. `number`: of the light in the sample,
-        whose images must not be another's."""
+        whose images must not be another's; `card_words`: of each tile's other list."""
         _, made, records, wedges, quads, casters, _ = self.found(frame, casters, extent, accurate, by_group)
         width, height = frame.size
         words = -(-made.count // 32)
-        tile = tile_side(frame.size, words)
+        tile = tile_side(frame.size, max(words, card_words))
         columns, rows = -(-width // tile), -(-height // tile)
         eye = eye_of(frame)
         hidden = self._hidden(frame, casters, extent, eye)
@@ -297,9 +297,18 @@ def tile_side(size: tuple[int, int], words: int) -> int:
     """Pixels along a tile's side: the finest whose words fit."""
     first = 0 if size[0] * size[1] <= SMALL_PICTURE else 1
     for tile in TILES[first:]:
-        if words * (-(-size[0] // tile)) * (-(-size[1] // tile)) <= MOST_WORDS:
+        if _fits(size, words, tile):
             return tile
     return TILES[-1]
+
+
+def fits(size: tuple[int, int], entries: int) -> bool:
+    """Whether a list of so many entries, a bit each in every tile, fits a picture of a size."""
+    return _fits(size, -(-entries // 32), TILES[-1])
+
+
+def _fits(size: tuple[int, int], words: int, tile: int) -> bool:
+    return words * (-(-size[0] // tile)) * (-(-size[1] // tile)) <= MOST_WORDS
 
 
 def eye_of(frame: Frame) -> np.ndarray:

@@ -33,6 +33,7 @@ translucent lobes get none, clear glass is not there, rough diffuse counts as La
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 from ..frame.picture import Frame
 from ..frame.settings import Settings
@@ -59,11 +60,12 @@ from .multires_radiosity import GRID, RUNS, MultiresRadiosity, _level_size, fitt
 
 MOST_TEXELS = 1 << 22  # of micro-buffers that are drawn at once
 WIDEST = 8192  # texels of their image
+BLOCK = tuple(("INT", name) for name in ("first_row", "row_count", "first_column", "columns"))  # of a picture
 
 
 def _regions(listed: bool) -> Program:
     if listed:
-        textures, constants = lists.READ, ()
+        textures, constants = lists.READ, (("INT", "list_width"),)
     else:
         textures = (("FLOAT_2D", "region_flags"), ("FLOAT_2D", "coarser_flags"))
         constants = (("INT", "region_level"), ("INT", "levels"))
@@ -74,7 +76,7 @@ def _regions(listed: bool) -> Program:
         images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
         blocks=((VIEW, "film_view"),),
         constants=(
-            *BUFFER_CONSTANTS, *GRID, ("INT", "first_row"), ("INT", "row_count"), ("INT", "columns"), *constants,
+            *BUFFER_CONSTANTS, *GRID, *BLOCK, *constants,
         ),
         defines=(*RUNS, *BUFFER_DEFINES, *(() if listed else (("BY_LEVEL", ""),))),
         group=(lists.RUN, 1, 1),
@@ -88,7 +90,7 @@ GLOSSY = Program(
     textures=(*SURFACE_TEXTURES, ("RGBA32F", "energy_table"), *BUFFER_TEXTURES, ("RGBA32F", "node_radiance")),
     images=(("gathered", "RGBA32F", "FLOAT_2D", "WRITE"), BUFFER_IMAGE),
     blocks=((VIEW, "film_view"),),
-    constants=(*BUFFER_CONSTANTS, ("INT", "first_row"), ("INT", "row_count")),
+    constants=(*BUFFER_CONSTANTS, *BLOCK),
     defines=BUFFER_DEFINES,
 )
 REFLECTED = passes.fullscreen_program(
@@ -203,7 +205,7 @@ class MicroRendering(MultiresRadiosity):
         textures = bindings["textures"] | listed
         columns = min(lists.columns((WIDEST // bindings["constants"]["micro_side"], 0), 1), 512)
         rows = -(-frame.size[0] * frame.size[1] // columns)
-        yield from self._dispatch(REGIONS, bindings, textures, grid, atlas, (columns, rows), {})
+        yield from self._dispatch(REGIONS, bindings, textures, grid, atlas, (columns, rows), {"list_width": columns})
 
     def _gather_levels(self, frame: Frame, bindings, bound, grid: dict, atlas, flags: list) -> Iterator[None]:
         levels, anything = len(flags), bindings["textures"]["tree_nodes"]  # for what a level does not look at
@@ -240,22 +242,23 @@ class MicroRendering(MultiresRadiosity):
     def _dispatch(
         self, program: Program, bindings, textures, grid, atlas, size: tuple[int, int], constants
     ) -> Iterator[None]:  # fmt: skip
-        """Some rows after the others, so that micro-buffers take little memory and no dispatch takes long."""
+        """Block after block, so that micro-buffers take little memory, fit an image, and no dispatch takes long."""
         side, leaves = (bindings["constants"][name] for name in ("micro_side", "leaf_count"))
-        columns, height = size
+        width, height = size
+        columns = min(WIDEST // side, width)
         rows = max(min(MOST_TEXELS // (columns * side * side), WIDEST // side, height), 1)
         micro = images.pool.take(columns * side, rows * side, "R32UI")
         try:
-            for first in range(0, height, rows):
-                count = min(rows, height - first)
+            for first_row, first_column in product(range(0, height, rows), range(0, width, columns)):
+                block = {
+                    "first_row": first_row, "row_count": min(rows, height - first_row),
+                    "first_column": first_column, "columns": min(columns, width - first_column),
+                }  # fmt: skip
                 for part in micro_buffers.parts(leaves, side):
                     passes.compute(
-                        program, (columns, count), textures=textures, images={"gathered": atlas, "micro": micro},
-                        blocks=bindings["blocks"],
-                        constants={
-                            **bindings["constants"], **grid, **constants, "first_row": first, "row_count": count,
-                            "part": part, **({} if program is GLOSSY else {"columns": columns}),
-                        },
+                        program, (block["columns"], block["row_count"]), textures=textures,
+                        images={"gathered": atlas, "micro": micro}, blocks=bindings["blocks"],
+                        constants={**bindings["constants"], **grid, **constants, **block, "part": part},
                     )  # fmt: skip
                     yield
         finally:

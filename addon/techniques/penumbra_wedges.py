@@ -15,7 +15,7 @@ of 2, 3, 5 and 9 random polygons: .0026 .0041 .0093 .0165 (a little too dark).
 | per pixel and edge in its tile | 4 fetches, 60 operations to reject, 300 else |
 | bytes | 90 per pixel; 128 per silhouette edge |
 
-For previews of few casters: a light whose edges belong to more than 64 groups has depth complexity sampling instead, as
+For previews of few casters: a light whose edges belong to more than 48 groups has depth complexity sampling instead, as
 have all lights that wedges do not suit. The light is taken as a whole (in closed form) and of one colour. Discs and
 spheres count as squares of their area, turned with the receiver. Alpha casters are tested at 64 points
 (lighting/textured_volumes.py) and their hidden share is added: too dark where both overlap.
@@ -49,8 +49,8 @@ from ..scene.view import VIEW
 from ..sources import lights
 from .depth_complexity import DepthComplexity, gathering
 
-GROUPS = 64  # four images of four channels of four digits
-BIAS = 24
+GROUPS = 48  # four images of four channels of three digits of base 256, which float32 holds exactly
+BIAS = 96  # layers that a digit may fall short by, so that 159 may lie before a light
 SQUARE_OF_DISC = np.sqrt(np.pi) / 2  # half a square's side, by the radius of a disc as large
 FEW_BORDERS = 0.15  # share of the edges of a body that may be borders
 CARD_POINTS = 64
@@ -196,7 +196,7 @@ class PenumbraWedges(EdgeShadows):
         start = np.full(GROUPS, float(BIAS))
         between = place_of[lit.casters.triangle_group[lit.hidden]]
         start += np.bincount(between[between >= 0], minlength=GROUPS)
-        channels = start.reshape(4, 4, 4) @ (64.0 ** np.arange(4))
+        channels = start.reshape(4, 4, 3) @ (256.0 ** np.arange(3))
         for image, color in zip(kept, channels):
             images.Target((image,)).clear(tuple(color))
         target = images.Target(tuple(kept))

@@ -1,10 +1,10 @@
-// quads.frag.glsl by group: each group has a digit of base 64 in one of sixteen channels.
+// quads.frag.glsl by group: each group has a digit of base 256 in one of sixteen channels.
 #include "edges/light.glsl"
 
 vec4 in_channel(int slot, int image_number, float value)
 {
-  float digit = value * exp2(float(6 * (slot & 3)));
-  bvec4 own = equal(ivec4(slot >> 2), ivec4(4 * image_number) + ivec4(0, 1, 2, 3));
+  float digit = value * exp2(float(8 * (slot % 3)));
+  bvec4 own = equal(ivec4(slot / 3), ivec4(4 * image_number) + ivec4(0, 1, 2, 3));
   vec4 channel = mix(vec4(0.0), vec4(1.0), own);
   return channel * digit;
 }

@@ -15,21 +15,21 @@
 
 #define LEAST_AREA 1e-4  // of a quarter: rounding of areas is less
 #define NO_BORDER 1e-4
-#define COUNT_BIAS 24.0
+#define COUNT_BIAS 96.0
 
 uint word_of(int index)
 {
   return tile_words_fetch(ivec2(index & 2047, index >> 11)).x;
 }
 
-// Layers of a group before the light's centre, from the digits of base 64 in sixteen channels.
+// Layers of a group before the light's centre, from the digits of base 256 in sixteen channels.
 float group_layers(ivec2 pixel, int slot, float layers_of_one)
 {
-  int image_number = slot >> 4;
+  int image_number = slot / 12;
   vec4 counts = (image_number == 0) ? counts_a_fetch(pixel) : (image_number == 1) ? counts_b_fetch(pixel)
                 : (image_number == 2) ? counts_c_fetch(pixel) : counts_d_fetch(pixel);
-  int packed_digits = int(counts[(slot >> 2) & 3] + 0.5);
-  int digit = (packed_digits >> (6 * (slot & 3))) & 63;
+  int packed_digits = int(counts[(slot / 3) & 3] + 0.5);
+  int digit = (packed_digits >> (8 * (slot % 3))) & 255;
   return (float(digit) - COUNT_BIAS) / layers_of_one;
 }
 

@@ -128,6 +128,11 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   hit.along_x = vec3(1.0, 0.0, 0.0);
   hit.along_y = vec3(0.0, 1.0, 0.0);
   hit.albedo = vec3(0.0);
+  // Taken before any pixel of four leaves, for they are differences to its neighbours.
+  vec3 place_along_x = dFdx(world_position);
+  vec3 place_along_y = dFdy(world_position);
+  vec3 normal_along_x = dFdx(world_normal);
+  vec3 normal_along_y = dFdy(world_normal);
   Grass g = grass_of(grass_entry);
   vec3 up = point.normal;
   vec3 toward = point.incoming;
@@ -198,8 +203,8 @@ bool own_hit(inout SurfacePoint point, Instance instance, out OwnHit hit)
   // On a crest the ground falls away from the ray, which climbs out of the grass again if it has met fewer blades by then than
   // the picture's ray had when it met this one. How many stand in the way grows as the square of how far below the tips.
   vec3 ahead = safe_normalize(toward - up * dot(toward, up));
-  vec2 steps = window_steps(ahead, point.geometric_normal);
-  vec3 bend = steps.x * dFdx(world_normal) + steps.y * dFdy(world_normal);
+  vec2 steps = steps_along(ahead, point.geometric_normal, place_along_x, place_along_y);
+  vec3 bend = steps.x * normal_along_x + steps.y * normal_along_y;
   float curvature = dot(bend, ahead) / max(length(world_normal), 1e-20);
   float level = max(1.0 - rise * rise, 1e-6);
   float falling = curvature * level * height;

@@ -1,4 +1,4 @@
-// What pixels reflect of other surfaces by microfacets: a micro-buffer each, of rays of the lobe, some rows of the picture.
+// What pixels reflect of other surfaces by microfacets: a micro-buffer each, of rays of the lobe, block by block.
 #define GLOSSY
 #include "lib/gbuffer.glsl"
 #include "lib/brdf.glsl"
@@ -8,8 +8,8 @@
 void main()
 {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  ivec2 pixel = place + ivec2(0, first_row);
-  if (place.x >= surface_position_size().x || place.y >= row_count || surface_position_fetch(pixel).w == 0.0) {
+  ivec2 pixel = place + ivec2(first_column, first_row);
+  if (place.x >= columns || place.y >= row_count || surface_position_fetch(pixel).w == 0.0) {
     return;
   }
   Surface s = SURFACE_READ(pixel);

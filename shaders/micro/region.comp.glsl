@@ -36,7 +36,7 @@ void main()
   }
   ivec2 corner = place * micro_side;
 #ifdef BY_LEVEL
-  place.y += first_row;
+  place += ivec2(first_column, first_row);
   ivec2 first = (place << region_level) - grid_offset;
   bool outside = any(lessThan(first + (1 << region_level), ivec2(1))) || any(greaterThanEqual(first, surface_position_size()));
   bool split = region_level > 0 && region_flags_fetch(place).x > 0.5;
@@ -44,7 +44,7 @@ void main()
     gather(place, region_level, corner);
   }
 #else
-  int index = (first_row + place.y) * columns + place.x;
+  int index = (first_row + place.y) * list_width + first_column + place.x;
   if (index < int(entry_count_fetch(ivec2(0)).x)) {
     uint entry = entries_fetch(entry_place(index)).x;
     uint axis = (1u << REGION_BITS) - 1u;

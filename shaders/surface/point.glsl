@@ -8,13 +8,16 @@ float pixel_width(vec3 position)
 }
 
 // How far along the window's axes the surface point moves with `step` in its plane: the window's derivatives of an
-// attribute times this is the attribute's change.
-vec2 window_steps(vec3 step, vec3 plane_normal)
+// attribute times this is the attribute's change. `x`, `y`: those of the place.
+vec2 steps_along(vec3 step, vec3 plane_normal, vec3 x, vec3 y)
 {
-  vec3 x = dFdx(world_position);
-  vec3 y = dFdy(world_position);
   float area = dot(cross(x, y), plane_normal);
   return (area != 0.0) ? vec2(dot(cross(step, y), plane_normal), dot(cross(x, step), plane_normal)) / area : vec2(0.0);
+}
+
+vec2 window_steps(vec3 step, vec3 plane_normal)
+{
+  return steps_along(step, plane_normal, dFdx(world_position), dFdy(world_position));
 }
 
 // How high above its triangle (x) and how far below it (y) a smooth-shaded surface is meant to run, on the viewer's side.

@@ -12,7 +12,7 @@ from addon.compare.reference import render_passes
 from addon.frame import ledger
 from addon.frame.run import Renderer
 from addon.snapshot import SnapshotCache, take
-from addon.techniques import make_registry
+from addon.techniques import make_registry, micro_rendering
 from addon.ui.properties import settings_of
 from tests.techniques.test_instant_radiosity import corner, sphere, wall_irradiance
 
@@ -188,6 +188,30 @@ def test_trees_stay_where_an_object_has_another_pass_index(stage):
     finally:
         used.release()
         fresh.release()
+
+
+@pytest.mark.parametrize("levels", [0, 2])
+def test_a_picture_is_gathered_in_blocks_that_fit_an_image(stage, render, monkeypatch, levels):
+    """Pixels' micro-buffers side by side are soon wider than images may be."""
+    corner(stage)
+    stage.rectangle((-0.4, -0.4), (0.4, 0.4), 0.3, material=stage.principled(Metallic=1.0, Roughness=0.4))
+    asked = {"side": 8, "lobe_side": 5, "levels": levels, "points": 256}
+    whole = render(1, 1, **asked)
+    reflected = render_passes(stage.scene, "CANDELA", 1, 0, size=(24, 24), bounces=1).images["glossy_indirect"]
+    sides = []
+    compute = micro_rendering.passes.compute
+
+    def noted(program, size, **bindings):
+        sides.extend(bindings["images"]["micro"].size if "micro" in bindings.get("images", {}) else ())
+        compute(program, size, **bindings)
+
+    monkeypatch.setattr(micro_rendering, "WIDEST", 60)
+    monkeypatch.setattr(micro_rendering.passes, "compute", noted)
+    engine.free_sessions()
+    np.testing.assert_array_equal(render(1, 1, **asked), whole)
+    again = render_passes(stage.scene, "CANDELA", 1, 0, size=(24, 24), bounces=1).images["glossy_indirect"]
+    np.testing.assert_array_equal(again, reflected)
+    assert reflected.any() and 0 < max(sides) <= 60
 
 
 def test_one_triangle_and_nothing_are_drawn(stage, render):

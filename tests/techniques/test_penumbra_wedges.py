@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addon.gfx import images
-from addon.lighting import silhouettes
+from addon.lighting import edge_shadows, silhouettes
 from addon.sources import lights
 
 from .conftest import places
@@ -223,6 +223,45 @@ def test_alpha_casters_are_added(by_wedges):
     # From x the plane hides the lamp up to -0.4 - x, the opaque half of the card what lies beyond -x.
     expected = np.clip(np.minimum(0.5, -x) - np.maximum(-0.5, -0.4 - x), 0, 1)
     assert np.abs(share(stage, size) - expected).mean() < 0.02
+
+
+def test_a_body_of_many_layers_hides_the_light(by_wedges):
+    """A comb with 30 teeth: 60 triangles before the lamp."""
+    stage = by_wedges
+    stage.floor()
+    outline = [(-1.0, 1.0)]
+    for z in 1.0 + 0.02 * np.arange(30):
+        outline += [(1.0, z), (1.0, z + 0.01), (-0.9, z + 0.01), (-0.9, z + 0.02)]
+    outline[-1] = (-1.0, outline[-2][1])
+    outline.pop(-2)
+    count = len(outline)
+    corners = [(x, y, z) for y in (-1.0, 1.0) for x, z in outline]
+    sides = [(k, (k + 1) % count, count + (k + 1) % count, count + k) for k in range(count)]
+    ends = [tuple(range(count))[::-1], tuple(range(count, 2 * count))]
+    stage.mesh(corners, [*sides, *ends]).visible_camera = False
+    for x in (2.0, 2.3, 2.6):  # nearer to the lamp, so that the comb's place among groups is the fourth
+        stage.blocker((x, -0.5), (x + 0.2, 0.5), 3.0)
+    stage.light("AREA", (0, 0, 4), size=0.2, shape="SQUARE")
+    stage.camera_above(span=8.0)
+    stage.render(size=(32, 32))
+    assert row(stage).counters["groups"] == 5  # and the floor
+    found = share(stage, (32, 32))
+    assert found[15:17, 14:18].max() < 0.02
+    assert found[2:4, 2:4].min() > 0.98
+
+
+def test_lights_before_too_many_cards_have_maps(by_wedges, monkeypatch):
+    stage = by_wedges
+    stage.floor()
+    card = stage.card(
+        with_alpha(stage, np.arange(64)[None] * np.ones((64, 1)) < 32, "Closest"), 0, 1, location=(0, 0, 2)
+    )
+    card.visible_camera = False
+    square(stage)
+    stage.camera_above(span=2.0)
+    monkeypatch.setattr(edge_shadows.EdgeShadows, "_card_count", lambda *_: 10**9)
+    stage.render(size=(16, 16))
+    assert row(stage).counters["lights with too many cards: rays or maps"] == 1
 
 
 def test_lights_with_too_many_groups_have_depth_complexity(by_wedges):
