@@ -1,5 +1,6 @@
 """Jobs for render farms, run by the runtimes that farms use: OpenJD's sessions dispatched by Dask, and Node.js."""
 
+import argparse
 import json
 import os
 import shutil
@@ -288,6 +289,23 @@ def test_a_farm_that_loses_a_worker_makes_what_one_process_makes(moving, tmp_pat
     print(f"farm {shared:.1f} s, one process {alone:.1f} s; largest difference {max(differences):.1e}")
     assert max(differences) < 1e-5
     assert not list((bundle / "pictures").glob(".writing_*"))
+
+
+@pytest.mark.parametrize(
+    "text", ["1-99999999999", "-99999999999-1", "1-99999999999:7", "99999999999-1", "1,1048575", "1-" + 5000 * "9"]
+)
+def test_frames_beyond_those_of_blender_are_refused_before_they_are_listed(text):
+    from addon import cli
+
+    with pytest.raises(argparse.ArgumentTypeError):
+        cli._frames(text)
+
+
+def test_ranges_that_overlap_are_frames_once_and_in_order():
+    from addon import cli
+
+    assert cli._frames("3, 1-7:2,-2--1") == [3, 1, 5, 7, -2, -1]
+    assert len(cli._frames(",".join(20 * ["1-100000"]))) == 100000
 
 
 def test_the_operator_writes_the_job_of_the_saved_file(registered, tmp_path):
