@@ -88,10 +88,11 @@ def check_catchers(scene: bpy.types.Scene, layer: bpy.types.ViewLayer | None) ->
 
 def _holds_catchers(shown: list[bpy.types.Collection]) -> bool:
     """Whether an object of these collections, or of those that their objects instance, is rendered as a catcher."""
+    # With each: whether the object of the view layer that instances it is a catcher; None: it stands there itself.
     waiting: list[tuple[bpy.types.Collection, bool | None]] = [(one, None) for one in shown]
     seen = set(waiting)
     while waiting:
-        collection, caught = waiting.pop()  # whether what instances it in the view layer is a catcher; None: nothing
+        collection, caught = waiting.pop()
         for owner in collection.objects:
             if owner.hide_render:
                 continue
